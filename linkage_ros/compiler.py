@@ -1,0 +1,360 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Expressions turned into code.
+
+One list of operations serves every use: plain Python on floats for a single pose, numpy for
+arrays, and numba where it is asked for. Only what the outputs depend on is in the list, each
+value once; what depends on dimensions alone is worked out when they are set, and so is every
+condition on dimensions: the code for a pose has no branch for it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+import math
+from typing import Callable, Mapping, Sequence
+
+import numpy as np
+
+from .expression import Real
+
+# A block of this many poses stays in the second-level cache; measured in benchmark/.
+BLOCK = 4096
+# Below this many poses the float code in a loop beats numpy's cost per call.
+FEW = 32
+# Python's parser bounds how deep parentheses may nest.
+DEEPEST = 16
+
+
+def _grazed(x, tolerance):
+    """Return the root of a radicand that is not above zero."""
+    return 0.0 if x >= -tolerance else math.nan
+
+
+def _root(x, tolerance):
+    if np.min(x, initial=0.0) < 0.0 or np.any(np.isnan(x)):
+        x = np.where(x >= -tolerance, np.maximum(x, 0.0), np.nan)
+    return np.sqrt(x)
+
+
+@np.vectorize
+def _fsum(*terms):
+    try:
+        return math.fsum(terms)
+    except OverflowError:
+        return math.nan
+
+
+_OPERATORS = {
+    'add': '({} + {})', 'subtract': '({} - {})', 'multiply': '({} * {})', 'divide': '({} / {})',
+    'negative': '(-{})', 'less': '({} < {})', 'less_equal': '({} <= {})',
+    'sin': 'sin({})', 'cos': 'cos({})', 'sqrt': 'sqrt({})', 'atan2': 'atan2({}, {})',
+    'absolute': 'abs({})',
+}
+
+
+@dataclass(frozen=True)
+class _Dialect:
+    """How operations are spelt, which of them repeat their first operand, and their names."""
+
+    templates: Mapping[str, str]
+    repeating: frozenset
+    names: Mapping[str, Callable]
+    frees: bool
+
+
+_FLOAT = _Dialect(
+    {**_OPERATORS, 'where': '({1} if {0} else {2})',
+     'root': '(sqrt({0}) if {0} > 0.0 else grazed({0}, {1}))'},
+    frozenset({'root'}),
+    {'sin': math.sin, 'cos': math.cos, 'sqrt': math.sqrt, 'atan2': math.atan2,
+     'grazed': _grazed, 'nan': math.nan}, frees=False)
+
+_ARRAY = _Dialect(
+    {**_OPERATORS, 'where': 'where({}, {}, {})', 'root': 'root({}, {})'},
+    frozenset(),
+    {'sin': np.sin, 'cos': np.cos, 'sqrt': np.sqrt, 'atan2': np.arctan2, 'where': np.where,
+     'root': _root, 'nan': np.nan}, frees=True)
+
+_EVALUATED = {
+    'add': np.add, 'subtract': np.subtract, 'multiply': np.multiply, 'divide': np.divide,
+    'negative': np.negative, 'absolute': np.absolute, 'less': np.less,
+    'less_equal': np.less_equal, 'sin': np.sin, 'cos': np.cos, 'sqrt': np.sqrt,
+    'atan2': np.arctan2, 'where': np.where, 'root': _root, 'fsum': _fsum,
+}
+
+
+def evaluate(node: Real, dimensions: Mapping, known: dict):
+    """Return the value of an expression of dimensions alone; known is shared between calls."""
+    if node.op == 'constant':
+        return np.float64(node.value)
+    if node.op == 'dimension':
+        return np.asarray(dimensions[node.args[0]], float)[()]
+    if node not in known:
+        values = [evaluate(a, dimensions, known) for a in node.args]
+        known[node] = _EVALUATED[node.op](*values)[()]
+    return known[node]
+
+
+class _Listing:
+    """The operations behind some outputs, in an order they can be done in, each once."""
+
+    def __init__(self, outputs: Sequence[Real], decided: Mapping[Real, bool]):
+        self.entries = []
+        self._decided = decided
+        self._numbers = {}
+        self._known = {}
+        self.outputs = [self._number(node) for node in outputs]
+        self.constants = self._boundary()
+        self._uses = self._count_uses()
+
+    def _number(self, node: Real) -> int:
+        if node not in self._known:
+            self._known[node] = self._enter(node)
+        return self._known[node]
+
+    def _enter(self, node: Real) -> int:
+        if node.op == 'where' and node.args[0] in self._decided:
+            return self._number(node.args[1 if self._decided[node.args[0]] else 2])
+        args = tuple(self._number(a) if isinstance(a, Real) else a for a in node.args)
+        key = (node.op, tuple(sorted(args)) if node.op in ('add', 'multiply') else args)
+        if key not in self._numbers:
+            self._numbers[key] = len(self.entries)
+            self.entries.append((node, args))
+        return self._numbers[key]
+
+    def _operands(self, number: int) -> tuple:
+        node, args = self.entries[number]
+        return args if node.varies and node.op != 'angle' else ()
+
+    def _live(self) -> list:
+        live, waiting = set(), list(self.outputs)
+        while waiting:
+            number = waiting.pop()
+            if number not in live:
+                live.add(number)
+                waiting.extend(self._operands(number))
+        return sorted(live)
+
+    def _boundary(self) -> list:
+        """Return the values of dimensions alone that the varying operations start from."""
+        return [n for n in self._live()
+                if not self.entries[n][0].varies and self.entries[n][0].op != 'constant']
+
+    def _count_uses(self) -> dict:
+        uses = dict.fromkeys(self._live(), 0)
+        for number in list(uses):
+            for operand in self._operands(number):
+                uses[operand] += 1
+        for number in self.outputs:
+            uses[number] += 1
+        return uses
+
+    def statements(self, dialect: _Dialect) -> tuple:
+        """Return the assignments as (name, code, names used) and the code of each output."""
+        text, depth, reads, lines = {}, {}, {}, []
+        repeated = {args[0] for node, args in map(self.entries.__getitem__, self._uses)
+                    if node.op in dialect.repeating}
+        for number, uses in self._uses.items():
+            node, args = self.entries[number]
+            if number in self.constants:
+                text[number], depth[number], reads[number] = f'k{number}', 0, set()
+            elif node.op == 'constant':
+                text[number], depth[number], reads[number] = repr(node.value), 0, set()
+            elif node.op == 'angle':
+                text[number], depth[number], reads[number] = f'x{args[0]}', 0, set()
+            else:
+                text[number] = dialect.templates[node.op].format(*(text[a] for a in args))
+                depth[number] = 1 + max(depth[a] for a in args)
+                reads[number] = set().union(*(reads[a] for a in args))
+                if uses > 1 or number in repeated or depth[number] > DEEPEST:
+                    name = f'v{number}'
+                    lines.append((name, text[number], reads[number]))
+                    text[number], depth[number], reads[number] = name, 0, {name}
+        kept = set().union(*(reads[n] for n in self.outputs))
+        return lines, [text[n] for n in self.outputs], kept
+
+
+def _with_releases(lines, kept):
+    """Drop each array after its last use, so that the next one takes over its warm memory."""
+    last = {}
+    for index, (_, _, reads) in enumerate(lines):
+        last.update(dict.fromkeys(reads, index))
+    for index, (name, code, reads) in enumerate(lines):
+        yield f'{name} = {code}'
+        done = sorted(n for n in reads if last[n] == index and n not in kept)
+        if done:
+            yield 'del ' + ', '.join(done)
+
+
+def _python(listing: _Listing, dialect: _Dialect, angles: int) -> Callable:
+    """Return a function of the constants that returns the function of the angles."""
+    lines, outputs, kept = listing.statements(dialect)
+    body = (list(_with_releases(lines, kept)) if dialect.frees
+            else [f'{name} = {code}' for name, code, _ in lines])
+    source = '\n'.join([
+        f'def bind({", ".join(f"k{n}" for n in listing.constants)}):',
+        f'    def pose({", ".join(f"x{i}" for i in range(angles))}):',
+        *(f'        {line}' for line in body),
+        f'        return ({"".join(code + ", " for code in outputs)})',
+        '    return pose'])
+    scope = dict(dialect.names)
+    exec(compile(source, '<linkage>', 'exec'), scope)
+    return scope['bind']
+
+
+def _accelerated(listing: _Listing, angles: int) -> Callable:
+    """Return a numba kernel (angles, constants, out); the dimensions may change without it."""
+    import numba
+
+    lines, outputs, _ = listing.statements(_FLOAT)
+    given = [f'x{i}' for i in range(angles)]
+    constants = [f'k{n}' for n in listing.constants]
+    source = '\n'.join([
+        f'def kernel(angles, {"".join(k + ", " for k in constants)}out):',
+        '    for i in range(out.shape[1]):',
+        *(f'        {x} = angles[{j}, i]' for j, x in enumerate(given)),
+        *(f'        {name} = {code}' for name, code, _ in lines),
+        *(f'        out[{j}, i] = {code}' for j, code in enumerate(outputs))])
+    scope = {**_FLOAT.names, 'grazed': numba.njit(_grazed)}
+    exec(compile(source, '<linkage>', 'exec'), scope)
+    return numba.njit(scope['kernel'], error_model='numpy')
+
+
+class _Variant:
+    """The code for one outcome of the conditions on dimensions."""
+
+    def __init__(self, outputs, decided, angles):
+        self._listing = _Listing(outputs, decided)
+        self._angles = angles
+        self.outputs = len(outputs)
+        self.constants = [self._listing.entries[n][0] for n in self._listing.constants]
+        self.float = _python(self._listing, _FLOAT, angles)
+
+    @cached_property
+    def array(self):
+        return _python(self._listing, _ARRAY, self._angles)
+
+    @cached_property
+    def accelerated(self):
+        return _accelerated(self._listing, self._angles)
+
+
+class Program:
+    """
+    Some outputs of a linkage, ready to be bound to dimensions.
+
+    Parameters
+    ----------
+    outputs : sequence of Real
+        What is computed.
+    angles : int
+        How many angles are given.
+
+    """
+
+    def __init__(self, outputs: Sequence[Real], angles: int = 1):
+        self._outputs = tuple(outputs)
+        self._angles = angles
+        self._conditions = _conditions(self._outputs)
+        self._variants = {}
+
+    def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False) -> Pose:
+        """Return the outputs as functions of the angles, for dimensions that are floats or arrays."""
+        swept = any(np.ndim(v) for v in dimensions.values())
+        with np.errstate(all='ignore'):
+            decisions = () if swept else tuple(
+                bool(evaluate(c, dimensions, known)) for c in self._conditions)
+            variant = self._variant(decisions)
+            constants = [evaluate(c, dimensions, known) for c in variant.constants]
+        shape = np.broadcast_shapes(*map(np.shape, constants)) if swept else ()
+        return Pose(variant, constants, shape, accelerate)
+
+    def _variant(self, decisions: tuple) -> _Variant:
+        if decisions not in self._variants:
+            decided = dict(zip(self._conditions, decisions))
+            self._variants[decisions] = _Variant(self._outputs, decided, self._angles)
+        return self._variants[decisions]
+
+
+def _conditions(outputs) -> list:
+    """Return the conditions on dimensions alone that varying operations choose by."""
+    found, seen, waiting = [], set(), list(outputs)
+    while waiting:
+        node = waiting.pop()
+        if node in seen or not node.varies:
+            continue
+        seen.add(node)
+        if node.op == 'where' and not node.args[0].varies and node.args[0] not in found:
+            found.append(node.args[0])
+        waiting.extend(a for a in node.args if isinstance(a, Real))
+    return found
+
+
+class Pose:
+    """The outputs of a program as a function of the angles, for dimensions that are set."""
+
+    def __init__(self, variant: _Variant, constants, shape: tuple, accelerate: bool):
+        self._variant = variant
+        self._constants = constants
+        self._accelerate = accelerate
+        self.shape = shape
+        if not shape:
+            self._float = variant.float(*map(float, constants))
+
+    def at(self, *angles: float) -> tuple:
+        """Return the outputs at one pose, from floats."""
+        try:
+            return self._float(*angles)
+        except (ArithmeticError, ValueError):
+            # What Python raises for, numpy answers with inf or nan.
+            return tuple(self._blocks(np.array(angles)[:, None])[:, 0])
+
+    def over(self, *angles: np.ndarray) -> np.ndarray:
+        """Return the outputs over arrays that are broadcast together, shape (outputs, *shape)."""
+        shape = np.broadcast_shapes(self.shape, *map(np.shape, angles))
+        if self.shape:
+            return self._swept(shape, angles)
+        given = np.array([np.broadcast_to(a, shape).ravel() for a in angles], float)
+        if self._accelerate:
+            out = self._by_kernel(given)
+        elif given.shape[1] < FEW:
+            poses = [self.at(*column) for column in given.T.tolist()]
+            out = np.array(poses, float).T
+        else:
+            out = self._blocks(given)
+        return out.reshape(self._variant.outputs, *shape)
+
+    def _by_kernel(self, given):
+        out = np.empty((self._variant.outputs, given.shape[1]))
+        self._variant.accelerated(given, *map(float, self._constants), out)
+        return out
+
+    def _blocks(self, given):
+        pose = self._variant.array(*self._constants)
+        out = np.empty((self._variant.outputs, given.shape[1]))
+        with np.errstate(all='ignore'):
+            for start in range(0, given.shape[1], BLOCK):
+                block = slice(start, start + BLOCK)
+                for row, values in zip(out, pose(*given[:, block])):
+                    row[block] = values
+        return out
+
+    def _swept(self, shape, angles):
+        with np.errstate(all='ignore'):
+            rows = self._variant.array(*self._constants)(*angles)
+        return np.array([np.broadcast_to(row, shape) for row in rows], float)

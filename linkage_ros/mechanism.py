@@ -1,0 +1,326 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A linkage with its dimensions: poses, velocities, joint angles and reach."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Callable, Mapping, Optional, Sequence, Tuple
+
+import numpy as np
+
+from .compiler import Pose, Program, evaluate
+from .expression import Real, cross, derivative, dimension, real
+from .reach import arcs
+from .sketch import Sketch
+
+# Squares of lengths, and sums of a few of them, must stay inside the range of float64.
+SHORTEST, LONGEST = 1e-150, 1e151
+
+
+@dataclass(frozen=True)
+class Design:
+    """
+    What a type of mechanism is: its dimensions and how it is drawn.
+
+    Parameters
+    ----------
+    name : str
+        The name that users type.
+    dimensions : mapping
+        Defaults [m].
+    draw : callable
+        Gets a Sketch, the dimensions and the branches, each as attributes of a namespace.
+    tracer : str
+        The joint whose curve is the locus.
+    signed : frozenset
+        Dimensions that may be zero or negative.
+    branches : mapping
+        Assembly signs, +1 or -1, by name.
+
+    """
+
+    name: str
+    dimensions: Mapping[str, float]
+    draw: Callable
+    tracer: str
+    signed: frozenset = frozenset()
+    branches: Mapping[str, int] = field(default_factory=dict)
+
+
+class Structure:
+    """A design drawn with its branches: what all mechanisms of that kind share."""
+
+    def __init__(self, design: Design, branches: Mapping[str, int]):
+        self.sketch = Sketch()
+        symbols = {n: dimension(n, n not in design.signed) for n in design.dimensions}
+        design.draw(self.sketch, SimpleNamespace(**symbols), SimpleNamespace(**branches))
+        self._programs = {}
+
+    def program(self, kind: str, names: Tuple[str, ...]) -> Program:
+        """Return the code for outputs of one kind; what they do not depend on is left out."""
+        if (kind, names) not in self._programs:
+            outputs = getattr(self, f'_{kind}')(names)
+            self._programs[kind, names] = Program(outputs, len(self.sketch.cranks))
+        return self._programs[kind, names]
+
+    def _points(self, names):
+        places = [self.sketch.points[n].place for n in names]
+        return [part for place in places for part in (place.x, place.y)]
+
+    def _velocities(self, names):
+        known = {}
+        return [derivative(part, {0: 1.0}, known) for part in self._points(names)]
+
+    def _angles(self, names):
+        return [self.sketch.joint_values[n] for n in names]
+
+    def _rates(self, names):
+        known = {}
+        links = {link.name: link for link in self.sketch.links}
+        return [self._rate(links[n], known) for n in names]
+
+    def _rate(self, link, known):
+        if link.kind == 'prismatic' or link.name in self.sketch.cranks:
+            return derivative(self.sketch.joint_values[link.name], {0: 1.0}, known)
+        return self._spin(link.name, known) - self._spin(link.parent, known)
+
+    def _spin(self, name, known) -> Real:
+        """Return the angular velocity of a link."""
+        if name not in self.sketch.directions:
+            return real(0.0)
+        bar = self.sketch.directions[name]
+        moving = type(bar)(*(derivative(part, {0: 1.0}, known) for part in (bar.x, bar.y)))
+        return cross(bar, moving) / bar.squared()
+
+    def _margins(self, _):
+        """Return each limit's margin, so much above its tolerance that a reached one is >= 0."""
+        return [limit.margin + limit.tolerance for limit in self.sketch.limits]
+
+
+class Mechanism:
+    """
+    A linkage whose dimensions are set.
+
+    A pose depends on the crank angle alone: any angle, in any order, gives the same numbers.
+    Make one with `linkage_ros.mechanisms.create`.
+    """
+
+    def __init__(self, design: Design, structure: Structure, dimensions: Mapping,
+                 branches: Mapping[str, int], accelerate: bool = False):
+        self.type = design.name
+        self.dimensions = dict(dimensions)
+        self.branches = dict(branches)
+        self.tracer = design.tracer
+        sketch = structure.sketch
+        self.points = tuple(sketch.points)
+        self.links = tuple(sketch.links)
+        self.joints = tuple(sketch.joint_values)
+        self.bars = tuple((bar.first, bar.second) for bar in sketch.bars)
+        self._design = design
+        self._structure = structure
+        self._accelerate = accelerate
+        self._evaluated = {}
+        self._poses = {}
+
+    def __repr__(self):
+        lengths = ', '.join(f'{k}={v}' for k, v in self.dimensions.items())
+        return f'<{self.type} {lengths}>'
+
+    @property
+    def bar_lengths(self) -> dict:
+        """The length [m] of each bar."""
+        with np.errstate(all='ignore'):
+            return {(bar.first, bar.second): evaluate(bar.length, self.dimensions,
+                                                      self._evaluated)
+                    for bar in self._structure.sketch.bars}
+
+    @property
+    def longest(self) -> float:
+        """The longest bar [m]."""
+        return max(self.bar_lengths.values())
+
+    def with_dimensions(self, **changed) -> Mechanism:
+        """Return the same mechanism with other dimensions [m]; raises ValueError like create."""
+        return type(self)(self._design, self._structure,
+                          checked_dimensions(self._design, {**self.dimensions, **changed}),
+                          self.branches, self._accelerate)
+
+    def accelerated(self) -> Mechanism:
+        """
+        Return the same mechanism with arrays solved by compiled code.
+
+        The first call for a set of points compiles for a second or two.
+
+        Raises
+        ------
+        ImportError
+            If numba is not installed (`pip install linkage_ros[fast]`).
+
+        """
+        try:
+            import numba  # noqa: F401
+        except ImportError as error:
+            raise ImportError('accelerated() needs numba: pip install linkage_ros[fast]') \
+                from error
+        return type(self)(self._design, self._structure, self.dimensions, self.branches, True)
+
+    def solve(self, theta, points: Optional[Sequence[str]] = None) -> dict:
+        """
+        Place the joints.
+
+        Parameters
+        ----------
+        theta : float or array-like
+            Crank angle [rad].
+        points : sequence of str, optional
+            The joints wanted; only what they depend on is computed. Default: all.
+
+        Returns
+        -------
+        dict
+            For each joint an array of shape (*theta.shape, 2) [m], NaN where it cannot be
+            assembled.
+
+        Raises
+        ------
+        ValueError
+            If a joint does not exist.
+
+        """
+        return self._vectors('points', theta, points)
+
+    def velocity(self, theta, points: Optional[Sequence[str]] = None) -> dict:
+        """
+        Differentiate the joints' places with respect to the crank angle [m/rad].
+
+        Takes, returns and raises what `solve` does; infinite or NaN at a dead point.
+        """
+        return self._vectors('velocities', theta, points)
+
+    def joint_angles(self, theta, joints: Optional[Sequence[str]] = None) -> dict:
+        """
+        Return the angle of each moving link to its parent.
+
+        Parameters
+        ----------
+        theta : float or array-like
+            Crank angle [rad].
+        joints : sequence of str, optional
+            The links wanted, by name. Default: all.
+
+        Returns
+        -------
+        dict
+            For each link an array of theta's shape: rad in (-pi, pi] counted from its `zero`,
+            the crank's as given, a slide [m]. NaN where it cannot be assembled.
+
+        Raises
+        ------
+        ValueError
+            If a link does not exist.
+
+        """
+        return self._scalars('angles', theta, joints)
+
+    def joint_rates(self, theta, joints: Optional[Sequence[str]] = None) -> dict:
+        """Differentiate the joint angles with respect to the crank angle; see `joint_angles`."""
+        return self._scalars('rates', theta, joints)
+
+    def reach(self) -> list:
+        """
+        Return the crank angles that can be assembled.
+
+        Returns
+        -------
+        list of (float, float)
+            Arcs (lo, hi) [rad] with lo in [-pi, pi) and hi > lo; a full turn is
+            [(-pi, pi)], a linkage that cannot be assembled at all [].
+
+        """
+        margins = self._pose('margins', ())
+        return arcs(margins, self._structure.sketch.limits, self.dimensions, self._evaluated)
+
+    def _pose(self, kind: str, names: Tuple[str, ...]) -> Pose:
+        pose = self._poses.get((kind, names))
+        if pose is None:
+            program = self._structure.program(kind, names)
+            pose = program.bind(self.dimensions, self._evaluated, self._accelerate)
+            self._poses[kind, names] = pose
+        return pose
+
+    def _vectors(self, kind, theta, points):
+        names = self.points if points is None else _known(points, self.points, 'point', self)
+        pose = self._pose(kind, names)
+        if isinstance(theta, float) and not pose.shape:
+            return dict(zip(names, np.array(pose.at(theta)).reshape(-1, 2)))
+        values = pose.over(np.asarray(theta, float))
+        pairs = np.moveaxis(values.reshape(-1, 2, *values.shape[1:]), 1, -1)
+        return dict(zip(names, pairs))
+
+    def _scalars(self, kind, theta, joints):
+        names = self.joints if joints is None else _known(joints, self.joints, 'joint', self)
+        pose = self._pose(kind, names)
+        return dict(zip(names, pose.over(np.asarray(theta, float))))
+
+
+def _known(names, allowed, what, mechanism) -> tuple:
+    names = (names,) if isinstance(names, str) else tuple(names)
+    for name in names:
+        if name not in allowed:
+            raise ValueError(f'{mechanism.type} has no {what} {name!r}; '
+                             f'allowed: {", ".join(allowed)}')
+    return names
+
+
+def checked_dimensions(design: Design, given: Mapping) -> dict:
+    """Return all dimensions of a design, defaults filled in; raise ValueError for a bad one."""
+    for name in given:
+        if name not in design.dimensions:
+            raise ValueError(f'{design.name} has no dimension {name!r}; '
+                             f'allowed: {", ".join(design.dimensions)}')
+    return {name: _checked(design, name, given.get(name, default))
+            for name, default in design.dimensions.items()}
+
+
+def _checked(design, name, value):
+    try:
+        if isinstance(value, (str, bytes, bool)):
+            raise TypeError
+        length = np.asarray(value, float)
+    except (TypeError, ValueError):
+        raise ValueError(f'{design.name}: dimension {name} must be a number, '
+                         f'got {value!r}') from None
+    if not np.all(np.isfinite(length)):
+        raise ValueError(f'{design.name}: dimension {name} must be finite, got {value!r}')
+    if name not in design.signed and not np.all(length > 0.0):
+        raise ValueError(f'{design.name}: dimension {name} must be positive, got {value!r}')
+    size = np.abs(length[length != 0.0])
+    if np.any((size < SHORTEST) | (size > LONGEST)):
+        raise ValueError(f'{design.name}: dimension {name} must lie between {SHORTEST:g} and '
+                         f'{LONGEST:g}, got {value!r}')
+    return length if length.ndim else float(length)
+
+
+def checked_branches(design: Design, given: Optional[Mapping]) -> dict:
+    """Return all assembly signs of a design; raise ValueError for a bad one."""
+    for name, sign in (given or {}).items():
+        if name not in design.branches:
+            allowed = ', '.join(design.branches) or 'none'
+            raise ValueError(f'{design.name} has no branch {name!r}; allowed: {allowed}')
+        if sign not in (1, -1):
+            raise ValueError(f'{design.name}: branch {name} must be +1 or -1, got {sign!r}')
+    return {**design.branches, **(given or {})}

@@ -1,0 +1,35 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The Peaucellier-Lipkin cell: a straight line from circles.
+
+The pole P = (-r, 0) lies on the crank circle OA = r; PB = PD = a, rhombus A-B-C-D of b. The
+corner C runs on x = (a - b)(a + b)/2r - r, with y = (a - b)(a + b)/2r tan(theta/2). The crank
+reaches |a - b| <= 2 r |cos(theta/2)| <= a + b.
+
+Source: Hartenberg and Denavit, "Kinematic Synthesis of Linkages", ch. 5.
+"""
+
+from ..mechanism import Design
+
+
+def _draw(sketch, size, _):
+    sketch.ground('O', 0.0, 0.0)
+    sketch.ground('P', -size.r, 0.0)
+    sketch.crank('A', 'O', size.r)
+    sketch.inversor(('B', 'D', 'C'), 'P', 'A', size.a, size.b)
+
+
+DESIGN = Design('peaucellier', {'r': 3.0, 'a': 9.0, 'b': 4.0}, _draw, tracer='C')

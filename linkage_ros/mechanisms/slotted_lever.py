@@ -1,0 +1,126 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The slotted lever, or inverted slider-crank: a crank pin moves a lever by its slot, and back.
+
+The pin A = i a e^(i theta) turns about O, the lever turns about Q = (0, -b), both angles from +y.
+The slot is parallel to the lever at distance e on its left, L is the lever's tip, 1.8 b from Q or
+as far as the pin gets if that is more. Closure: a e^(i theta) + b = e^(i phi) (t + i e) with the
+lever angle phi and the pin's place t along the slot; `slot` +1 or -1 is the half of the slot.
+
+Sources: Norton, "Design of Machinery", sec. 4.8 (inverted slider-crank); the inverse closes the
+same triangle: theta = phi + atan2(e + b sin phi, W), W = +-sqrt(a^2 - (e + b sin phi)^2).
+"""
+
+from functools import lru_cache
+import math
+
+import numpy as np
+
+from .. import mechanism
+from ..compiler import Program
+from ..expression import (
+    angle, arctangent, cosine, dimension, exact_sum, root, sine, square, where,
+)
+from ..mechanism import Design
+from ..planar import GRAZE
+from ..reach import reachable_arcs
+
+
+def _draw(sketch, size, side):
+    reach = size.a + size.b
+    sketch.ground('O', 0.0, 0.0)
+    sketch.ground('Q', 0.0, -size.b)
+    sketch.crank('A', 'O', size.a, upright=True)
+    sketch.slot('L', 'Q', 'A', size.e, side.slot, where(1.8 * size.b < reach, reach, 1.8 * size.b))
+
+
+DESIGN = Design('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 0.0}, _draw, tracer='L',
+                signed=frozenset('e'), branches={'slot': 1})
+
+
+@lru_cache(maxsize=None)
+def _inverse() -> Program:
+    """Return the code for both servo angles, each with its slide, from the lever angle."""
+    a, b, e = dimension('a'), dimension('b'), dimension('e', positive=False)
+    phi = angle(0)
+    sin, cos = sine(phi), cosine(phi)
+    # Next to a limit at +-90 degrees the gap is small: it is formed from what is small.
+    upper = where(0.7 < sin, exact_sum(a, -e, -b) + b * square(cos) / (1.0 + sin),
+                  exact_sum(a, -e) - b * sin)
+    lower = where(sin < -0.7, exact_sum(a, e, -b) + b * square(cos) / (1.0 - sin),
+                  exact_sum(a, e) + b * sin)
+    grazed = GRAZE * (a + b + abs(e))
+    height = root(upper, grazed) * root(lower, grazed)
+    outputs = []
+    for along in (height, -height):
+        outputs += [phi + arctangent(e + b * sin, along), b * cos + along]
+    return Program(outputs)
+
+
+class Mechanism(mechanism.Mechanism):
+    """A slotted lever: also solved from the lever angle."""
+
+    def servo_angle(self, lever_angle, near=None):
+        """
+        Return the crank angle that puts the lever where it is wanted.
+
+        Parameters
+        ----------
+        lever_angle : float or array-like
+            Lever angle phi [rad], from +y.
+        near : float or array-like, optional
+            The answer nearest to this angle is taken, whole turns included. Default: the working
+            branch, on which lever and crank turn the same way.
+
+        Returns
+        -------
+        float or array
+            Crank angle [rad] in the shape of the arguments broadcast; NaN where the lever cannot
+            get there on this half of the slot.
+
+        """
+        outputs = self._servo().over(np.asarray(lever_angle, float))
+        half = self.branches['slot']
+        theta, slide = outputs[0::2][::half], outputs[1::2][::half]
+        theta = np.where(half * slide > GRAZE * (self.dimensions['a'] + self.dimensions['b']),
+                         theta, np.nan)
+        if near is None:
+            return np.where(np.isnan(theta[0]), theta[1], theta[0])[()]
+        near = np.asarray(near, float)
+        turns = 2.0 * math.pi * np.round((near - theta) / (2.0 * math.pi))
+        theta = theta + turns
+        away = np.where(np.isnan(theta), np.inf, np.abs(theta - near))
+        return np.where(away[1] < away[0], theta[1], theta[0])[()]
+
+    def reduction(self, servo_angle):
+        """Return d lever / d servo at a crank angle [rad], in its shape."""
+        return self.joint_rates(servo_angle, ('lever',))['lever'][()]
+
+    def lever_reach(self) -> list:
+        """Return the arcs (lo, hi) [rad] of lever angles that the crank can bring about."""
+        a, b, e = (self.dimensions[name] for name in 'abe')
+        sines = [(a - e) / b, (-a - e) / b]
+        if e:
+            sines.append((a - b) / e * (a + b) / (2.0 * b) - e / (2.0 * b))
+        ends = [end for s in sines if abs(s) <= 1.0
+                for end in (math.asin(s), math.pi - math.asin(s))]
+        ends += [-0.5 * math.pi, 0.5 * math.pi]
+        return reachable_arcs(ends, lambda phi: not np.isnan(self.servo_angle(phi)))
+
+    def _servo(self):
+        if 'servo' not in self._poses:
+            self._poses['servo'] = _inverse().bind(self.dimensions, self._evaluated)
+        return self._poses['servo']

@@ -1,0 +1,291 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Constructions in the plane, each written once for poses, arrays, rates and the accelerator.
+
+Points and vectors are `Complex`, lengths and angles `Real`. A construction that stands on two
+points takes the `Arm` between them: the vector, its square, and how far that is from the square
+of a radius. Where an arm runs from the ground to a crank pin these come from half-angle forms,
+which keep every digit at dead points and reach limits; elsewhere from coordinates.
+
+With theta' the crank angle from the ground line (foot to crank centre), g the ground line, m the
+crank, s = sin(theta'/2) and h = cos(theta'/2), the arm w and its square are, in the line's frame,
+
+    w = (g - m) + 2 m h e^(i theta'/2),   |w|^2 = (g - m)^2 + 4 g m h^2 = (g + m)^2 - 4 g m s^2.
+
+Sources: Norton, "Design of Machinery", ch. 4 (loop closure of the four-bar and the inverted
+slider-crank); Hartenberg and Denavit, "Kinematic Synthesis of Linkages" (the inversor); Kahan,
+"Miscalculating Area and Angles of a Needle-like Triangle" (factored gaps).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, Optional, Tuple
+
+from .expression import (
+    NAN, Complex, Real, arctangent, cosine, cross, dot, exact_sum, root, sine, square,
+    square_root, where,
+)
+
+LEFT, RIGHT = 1.0, -1.0
+
+# A limit that is hit up to rounding counts as reached: eight half ulps of the scale.
+GRAZE = 8 * 2.0 ** -53
+
+
+@dataclass(frozen=True)
+class Crank:
+    """A crank: its centre, length [m], direction of the angle zero, and the angle [rad]."""
+
+    centre: Complex
+    length: Real
+    zero: Complex
+    angle: Real
+
+    def bar(self) -> Complex:
+        """Return the vector from the centre to the pin."""
+        s, h = sine(0.5 * self.angle), cosine(0.5 * self.angle)
+        return self.zero * Complex(1.0 - 2.0 * square(s), 2.0 * s * h) * self.length
+
+
+class Limit(NamedTuple):
+    """
+    A margin that is negative, by more than the tolerance, where a linkage cannot be assembled.
+
+    For a crank arm the margin is start + (end - start) s^2 with theta' = theta + turn, and
+    `smooth` is its root with the sign that carries on through a change point.
+    """
+
+    margin: Real
+    tolerance: Real
+    smooth: Optional[Real] = None
+    start: Optional[Real] = None
+    end: Optional[Real] = None
+    turn: Optional[Real] = None
+    crank: Optional[int] = None
+
+    def root(self) -> Real:
+        """Return the root of the margin."""
+        return root(self.margin, self.tolerance)
+
+
+class Arm:
+    """The arm between two points that both move, from their coordinates."""
+
+    def __init__(self, foot: Complex, end: Complex, span: Real):
+        self.foot = foot
+        self.vector = end - foot
+        self.square = self.vector.squared()
+        self._length = square_root(self.square)
+        self._span = span
+
+    def offset(self, point: Complex) -> Real:
+        """Return the cross product of the arm and the vector from its foot to a point."""
+        return cross(self.vector, point - self.foot)
+
+    def within(self, radius: Real) -> Limit:
+        """Return the margin radius^2 - square."""
+        return self._limit(radius, (radius - self._length) * (radius + self._length))
+
+    def beyond(self, radius: Real) -> Limit:
+        """Return the margin square - radius^2."""
+        return self._limit(radius, (self._length - radius) * (self._length + radius))
+
+    def _limit(self, radius, margin):
+        return Limit(margin, GRAZE * abs(radius) * (abs(radius) + self._span))
+
+
+class CrankArm(Arm):
+    """The arm from a ground point to a crank pin, or back if `reverse`, from half angles."""
+
+    def __init__(self, ground: Complex, crank: Crank, reverse: bool = False):
+        line = crank.centre - ground
+        g, m = line.length(), crank.length
+        along = line.direction()
+        turn = crank.zero * along.conjugate()
+        s, h = _half_angle(crank.angle, turn)
+        vector = along * Complex((g - m) + 2.0 * m * square(h), 2.0 * m * s * h)
+        self.foot = crank.centre + crank.bar() if reverse else ground
+        self.vector = -vector if reverse else vector
+        self.square = square(g - m) + 4.0 * g * m * square(h)
+        self._crank, self._along, self._turn = crank, -along if reverse else along, turn
+        self._area = 2.0 * g * m * s * h * (1.0 if reverse else -1.0)
+        self._g, self._m, self._s, self._h = g, m, s, h
+
+    def offset(self, point: Complex) -> Real:
+        """Return the cross product of the arm and the vector from its foot to a point."""
+        if point is self._crank.centre:
+            return self._area
+        return super().offset(point)
+
+    def within(self, radius: Real) -> Limit:
+        """Return the margin radius^2 - square."""
+        g, m = self._g, self._m
+        return self._limit(radius, 1.0,
+                           exact_sum(radius, -g, -m) * exact_sum(radius, g, m),
+                           exact_sum(radius, -g, m) * exact_sum(radius, g, -m))
+
+    def beyond(self, radius: Real) -> Limit:
+        """Return the margin square - radius^2."""
+        g, m = self._g, self._m
+        return self._limit(radius, -1.0,
+                           exact_sum(g, m, -radius) * exact_sum(g, m, radius),
+                           exact_sum(g, -m, -radius) * exact_sum(g, -m, radius))
+
+    def _limit(self, radius, sign, start, end):
+        gm, s, h = 4.0 * self._g * self._m, self._s, self._h
+        # The smaller gap is the one next to which the margin can vanish.
+        margin = where(abs(start) <= abs(end), start + sign * gm * square(s),
+                       end - sign * gm * square(h))
+        tolerance = GRAZE * (square(radius) + gm)
+        gap, half = (start, s) if sign > 0.0 else (end, h)
+        smooth = where(abs(gap) <= 0.0, square_root(gm) * half, root(margin, tolerance))
+        return Limit(margin, tolerance, smooth, start, end,
+                     arctangent(self._turn.y, self._turn.x), self._crank.angle.args[0])
+
+    def inverse_of_isosceles(self) -> Optional[Complex]:
+        """Return 1 / conjugate(arm) where foot and pin are as far from the centre, else None."""
+        if self._g is not self._m:
+            return None
+        return self._along * Complex(1.0, self._s / self._h) / (2.0 * self._m)
+
+
+def _half_angle(theta: Real, turn: Complex) -> Tuple[Real, Real]:
+    """Return sine and cosine of (theta + arg turn) / 2 for a unit vector turn."""
+    s, h = sine(0.5 * theta), cosine(0.5 * theta)
+    if turn.y.value == 0.0 and turn.x.value == 1.0:
+        return s, h
+    ahead = 0.0 <= turn.x
+    large = square_root(0.5 * (1.0 + abs(turn.x)))
+    small = 0.5 * abs(turn.y) / large
+    cos = where(ahead, large, small)
+    sin = where(ahead, small, large) * where(turn.y < 0.0, -1.0, 1.0)
+    return s * cos + h * sin, h * cos - s * sin
+
+
+class Dyad(NamedTuple):
+    """Two bars that meet in a joint: the bars from each end to it, and what limits them."""
+
+    first: Complex
+    second: Complex
+    limits: Tuple[Limit, Limit]
+
+
+def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) -> Dyad:
+    """
+    Return the RRR dyad on an arm: circles of radius first [m] and second [m] about its ends.
+
+    The joint is foot + w (u + i v) with u = 1/2 + (r1 - r2)(r1 + r2) / 2|w|^2 and
+    v = side sqrt((r1 + r2)^2 - |w|^2) sqrt(|w|^2 - (r1 - r2)^2) / 2|w|^2; left of the arm for
+    side = +1. At a change point of a crank arm the branch goes on smoothly if `smooth`.
+    """
+    limits = arm.within(first + second), arm.beyond(abs(first - second))
+    roots = [x.smooth if smooth and x.smooth else x.root() for x in limits]
+    twice = 2.0 * arm.square
+    skew = (first - second) * (first + second) / twice
+    v = roots[0] * roots[1] / twice * side
+    return Dyad(arm.vector * Complex(0.5 + skew, v), arm.vector * Complex(skew - 0.5, v), limits)
+
+
+def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
+    """
+    Return k such that P + (Q - P) k is the corner of a rigid triangle on the bar PQ.
+
+    The base is |PQ|, first and second are the corner's distances from P and Q [m]; left of
+    P -> Q for side = +1. NaN where no such triangle exists.
+    """
+    gaps = (exact_sum(first, second, -base) * exact_sum(first, second, base),
+            exact_sum(base, -first, second) * exact_sum(base, first, -second))
+    twice = 2.0 * square(base)
+    grazed = GRAZE * square(first + second)
+    height = root(gaps[0], grazed) * root(gaps[1], grazed)
+    return Complex(0.5 + (first - second) * (first + second) / twice, height / twice * side)
+
+
+def mirror(arm: Arm, point: Complex) -> Complex:
+    """Return the mirror image of a point in the line of an arm: the far corner of a kite."""
+    return point - arm.vector.turned() * (2.0 * arm.offset(point) / arm.square)
+
+
+class Inversor(NamedTuple):
+    """A Peaucellier cell on the arm pole - pin: its three joints as vectors, and its limits."""
+
+    right: Dyad
+    left: Dyad
+    inverse: Complex
+
+
+def inversor(arm: Arm, long: Real, short: Real) -> Inversor:
+    """
+    Return the Peaucellier-Lipkin cell with bars long [m] from the pole and a rhombus of short [m].
+
+    The traced corner is pole + (long^2 - short^2) / conjugate(w): it runs on a straight line
+    when the pole lies on the crank circle.
+    """
+    right = dyad(arm, long, short, RIGHT, smooth=False)
+    left = dyad(arm, long, short, LEFT, smooth=False)
+    power = (long - short) * (long + short)
+    straight = arm.inverse_of_isosceles() if isinstance(arm, CrankArm) else None
+    inverse = (arm.vector * (power / arm.square) if straight is None else straight * power)
+    return Inversor(right, left, _where_assembled(inverse, right.limits))
+
+
+def _where_assembled(vector: Complex, limits) -> Complex:
+    x, y = vector.x, vector.y
+    for limit in limits:
+        held = -limit.tolerance <= limit.margin
+        x, y = where(held, x, NAN), where(held, y, NAN)
+    return Complex(x, y)
+
+
+class Slot(NamedTuple):
+    """A lever that a pin moves by its slot: unit vector along the slot, the slide, the limit."""
+
+    along: Complex
+    slide: Real
+    limit: Limit
+
+
+def slot(arm: Arm, offset: Real, half: float) -> Slot:
+    """
+    Return the lever turning about the arm's foot whose slot, `offset` [m] to its left, takes the pin.
+
+    w = l (t + i e) with the unit vector l along the lever and t = half sqrt(|w|^2 - e^2) [m].
+    """
+    limit = arm.beyond(abs(offset))
+    slide = limit.root() * half
+    return Slot(arm.vector * Complex(slide, -offset) / arm.square, slide, limit)
+
+
+class Slider(NamedTuple):
+    """A block on a fixed line: the rod to it, its place along the line [m], and the limit."""
+
+    rod: Complex
+    place: Real
+    limit: Limit
+
+
+def slider(pin: Complex, rod: Real, origin: Complex, along: Complex, side: float,
+           span: Real) -> Slider:
+    """
+    Return the RRP dyad: a rod [m] from a pin to a block on the line origin + x along.
+
+    The block is ahead of the pin's foot on the line for side = +1. `along` is a unit vector.
+    """
+    height, foot = cross(along, pin - origin), dot(along, pin - origin)
+    limit = Limit((rod - height) * (rod + height), GRAZE * rod * (rod + span))
+    reach = limit.root() * side
+    return Slider(along * Complex(reach, -height), foot + reach, limit)

@@ -1,0 +1,191 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A linkage written down joint by joint.
+
+Each joint is placed by one construction from joints placed before it. From that follow the links,
+the bars that are drawn, the spanning tree of joint angles and the limits of the reach.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+from typing import NamedTuple, Optional, Tuple
+
+from . import planar
+from .expression import Complex, Number, Real, angle, arctangent, real
+
+GROUND = 'ground'
+
+
+class Link(NamedTuple):
+    """
+    A moving link in the spanning tree.
+
+    It turns about the point `joint` of its parent (or slides along its parent, from that point);
+    its bar points from there to `tip`. The joint angle is counted from `zero` [rad]: from +x for
+    links on the ground, else from the parent's bar.
+    """
+
+    name: str
+    parent: str
+    joint: str
+    kind: str
+    zero: float
+    tip: str
+
+
+class Bar(NamedTuple):
+    """Two points at a constant distance [m], drawn as a line."""
+
+    first: str
+    second: str
+    length: Real
+
+
+@dataclass
+class _Point:
+    place: Complex
+    home: str
+    span: Real
+    crank: Optional[planar.Crank] = None
+
+
+class _Vector(NamedTuple):
+    vector: Complex
+    length: Real
+    link: str
+
+
+class Sketch:
+    """The joints, links and limits of a linkage, as expressions of its dimensions and angles."""
+
+    def __init__(self):
+        self.points = {}
+        self.links = []
+        self.bars = []
+        self.limits = []
+        self.joint_values = {}
+        self.directions = {}
+        self.cranks = []
+        self._vectors = {}
+
+    def ground(self, name: str, x: Number, y: Number):
+        """Fix a joint to the ground at (x, y) [m]."""
+        place = Complex(x, y)
+        self.points[name] = _Point(place, GROUND, abs(place.x) + abs(place.y))
+
+    def crank(self, name: str, centre: str, length: Real, upright: bool = False,
+              link: str = 'crank'):
+        """Turn a crank of this length [m] about a ground joint; upright: its zero is +y, not +x."""
+        zero = Complex(0.0, 1.0) if upright else Complex(1.0, 0.0)
+        turning = angle(len(self.cranks))
+        crank = planar.Crank(self.points[centre].place, length, zero, turning)
+        self.cranks.append(link)
+        self._hang(link, centre, name, crank.bar(), upright, value=turning)
+        self._place(name, centre, crank.bar(), link, length)
+        self.points[name].crank = crank
+
+    def dyad(self, name: str, first: str, second: str, to_first: Real, to_second: Real,
+             side: float):
+        """Join two bars, of to_first and to_second [m], from two joints; left of first -> second."""
+        found = planar.dyad(self.arm(first, second), to_first, to_second, side)
+        self.limits += found.limits
+        self._pair(name, first, second, found, to_first, to_second)
+
+    def rigid(self, name: str, first: str, second: str, to_first: Real, to_second: Real,
+              side: float):
+        """Add the third corner of a rigid triangle on a bar; left of first -> second."""
+        vector, base, link = self._vectors[first, second]
+        corner = planar.triangle(base, to_first, to_second, side)
+        self._place(name, first, vector * corner, link, to_first)
+        self.bars.append(Bar(second, name, to_second))
+
+    def line(self, name: str, first: str, second: str, distance: Real):
+        """Add a point on the line of a bar, at a distance [m] from first; negative: beyond it."""
+        vector, base, link = self._vectors[first, second]
+        self._place(name, first, vector * (distance / base), link, abs(distance))
+
+    def mirror(self, name: str, point: str, first: str, second: str):
+        """Mirror a joint in the line of two others: the far corner of a kite."""
+        place = planar.mirror(self.arm(second, first), self.points[point].place)
+        bars = [place - self.points[end].place for end in (first, second)]
+        self._pair(name, first, second, planar.Dyad(*bars, ()),
+                   self.distance(first, point), self.distance(second, point))
+
+    def inversor(self, names: Tuple[str, str, str], pole: str, pin: str, long: Real, short: Real):
+        """Add a Peaucellier cell: joints right and left of pole -> pin, and the traced corner."""
+        right, left, corner = names
+        found = planar.inversor(self.arm(pole, pin), long, short)
+        self.limits += found.right.limits
+        self._pair(right, pole, pin, found.right, long, short)
+        self._hang(right + corner, right, corner, found.left.second)
+        self._place(corner, right, found.left.second, right + corner, short)
+        self.points[corner].place = self.points[pole].place + found.inverse
+        self._pair(left, pole, pin, found.left, long, short)
+        self._hang(left + corner, left, corner, found.right.second)
+        self.bars.append(Bar(left, corner, short))
+
+    def slot(self, tip: str, pivot: str, pin: str, offset: Real, half: float, length: Real):
+        """Turn a lever of this length [m] about a ground joint by a pin in its slot."""
+        found = planar.slot(self.arm(pivot, pin), offset, half)
+        self.limits.append(found.limit)
+        self._hang('lever', pivot, tip, found.along, upright=True)
+        self._place(tip, pivot, found.along * length, 'lever', real(length))
+        self.links.append(Link('slide', 'lever', pivot, 'prismatic', 0.0, pin))
+        self.joint_values['slide'] = found.slide
+
+    def arm(self, first: str, second: str) -> planar.Arm:
+        """Return the arm from one joint to another."""
+        ends = self.points[first], self.points[second]
+        for (foot, pin), reverse in ((ends, False), (ends[::-1], True)):
+            if pin.crank and foot.home == GROUND and foot.place is not pin.crank.centre:
+                return planar.CrankArm(foot.place, pin.crank, reverse)
+        return planar.Arm(ends[0].place, ends[1].place, ends[0].span + ends[1].span)
+
+    def distance(self, first: str, second: str) -> Real:
+        """Return the constant distance [m] of two joints on one bar or on the ground."""
+        if (first, second) in self._vectors:
+            return self._vectors[first, second].length
+        return (self.points[second].place - self.points[first].place).length()
+
+    def _pair(self, name, first, second, found, to_first, to_second):
+        """Join the two bars of a dyad: the joint belongs to the first, the second is cut there."""
+        self._hang(first + name, first, name, found.first)
+        self._place(name, first, found.first, first + name, to_first)
+        self._hang(second + name, second, name, found.second)
+        self._bar(second, name, found.second, to_second, second + name)
+
+    def _hang(self, name, joint, tip, bar, upright=False, value=None):
+        """Add a link that turns about a joint of its parent."""
+        parent = self.points[joint].home
+        zero = Complex(0.0, 1.0) if upright else Complex(1.0, 0.0)
+        relative = bar * self.directions.get(parent, zero).conjugate()
+        self.links.append(Link(name, parent, joint, 'revolute', pi / 2 if upright else 0.0, tip))
+        self.directions[name] = bar
+        self.joint_values[name] = arctangent(relative.y, relative.x) if value is None else value
+
+    def _place(self, name, start, vector, link, length):
+        """Place a joint at the end of a bar from another."""
+        origin = self.points[start]
+        self.points[name] = _Point(origin.place + vector, link, origin.span + length)
+        self._bar(start, name, vector, length, link)
+
+    def _bar(self, first, second, vector, length, link):
+        length = real(length)
+        self.bars.append(Bar(first, second, length))
+        self._vectors[first, second] = _Vector(vector, length, link)
+        self._vectors[second, first] = _Vector(-vector, length, link)
