@@ -25,7 +25,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 import math
+from struct import Struct
 from typing import Callable, Mapping, Sequence
 
 import numpy as np
@@ -242,6 +244,8 @@ class _Variant:
         self._listing = _Listing(outputs, decided)
         self._angles = angles
         self.outputs = len(outputs)
+        # Packing floats as bytes takes a quarter of the time numpy needs to convert them.
+        self.layout = Struct(f'{len(outputs)}d')
         self.constants = [self._listing.entries[n][0] for n in self._listing.constants]
         self.float = _python(self._listing, _FLOAT, angles)
 
@@ -281,6 +285,8 @@ class Program:
                 bool(evaluate(c, dimensions, known)) for c in self._conditions)
             variant = self._variant(decisions)
             constants = [evaluate(c, dimensions, known) for c in variant.constants]
+        if not swept:
+            constants = list(map(float, constants))
         shape = np.broadcast_shapes(*map(np.shape, constants)) if swept else ()
         return Pose(variant, constants, shape, accelerate)
 
@@ -314,7 +320,7 @@ class Pose:
         self._accelerate = accelerate
         self.shape = shape
         if not shape:
-            self._float = variant.float(*map(float, constants))
+            self._float = variant.float(*constants)
 
     def at(self, *angles: float) -> tuple:
         """Return the outputs at one pose, from floats."""
@@ -322,39 +328,51 @@ class Pose:
             return self._float(*angles)
         except (ArithmeticError, ValueError):
             # What Python raises for, numpy answers with inf or nan.
-            return tuple(self._blocks(np.array(angles)[:, None])[:, 0])
+            return tuple(self._blocks([np.array([a]) for a in angles], 1)[:, 0].tolist())
+
+    def pack(self, out: np.ndarray, *angles: float):
+        """Write the outputs at one pose into an array of as many float64."""
+        self._variant.layout.pack_into(out, 0, *self.at(*angles))
 
     def over(self, *angles: np.ndarray) -> np.ndarray:
         """Return the outputs over arrays that are broadcast together, shape (outputs, *shape)."""
-        shape = np.broadcast_shapes(self.shape, *map(np.shape, angles))
         if self.shape:
-            return self._swept(shape, angles)
-        given = np.array([np.broadcast_to(a, shape).ravel() for a in angles], float)
+            return self._swept(angles)
+        if len(angles) > 1:
+            angles = np.broadcast_arrays(*angles)
+        shape, size = angles[0].shape, angles[0].size
+        flat = [a.ravel() for a in angles]
         if self._accelerate:
-            out = self._by_kernel(given)
-        elif given.shape[1] < FEW:
-            poses = [self.at(*column) for column in given.T.tolist()]
-            out = np.array(poses, float).T
+            out = self._by_kernel(np.array(flat))
+        elif size < FEW:
+            out = self._one_by_one(flat, size)
         else:
-            out = self._blocks(given)
+            out = self._blocks(flat, size)
         return out.reshape(self._variant.outputs, *shape)
 
     def _by_kernel(self, given):
         out = np.empty((self._variant.outputs, given.shape[1]))
-        self._variant.accelerated(given, *map(float, self._constants), out)
+        self._variant.accelerated(given, *self._constants, out)
         return out
 
-    def _blocks(self, given):
+    def _one_by_one(self, given, size):
+        poses = map(self.at, *(a.tolist() for a in given))
+        outputs = self._variant.outputs
+        return np.fromiter(chain.from_iterable(poses), float, size * outputs).reshape(
+            size, outputs).T
+
+    def _blocks(self, given, size):
         pose = self._variant.array(*self._constants)
-        out = np.empty((self._variant.outputs, given.shape[1]))
+        out = np.empty((self._variant.outputs, size))
         with np.errstate(all='ignore'):
-            for start in range(0, given.shape[1], BLOCK):
+            for start in range(0, size, BLOCK):
                 block = slice(start, start + BLOCK)
-                for row, values in zip(out, pose(*given[:, block])):
+                for row, values in zip(out, pose(*(a[block] for a in given))):
                     row[block] = values
         return out
 
-    def _swept(self, shape, angles):
+    def _swept(self, angles):
+        shape = np.broadcast_shapes(self.shape, *map(np.shape, angles))
         with np.errstate(all='ignore'):
             rows = self._variant.array(*self._constants)(*angles)
         return np.array([np.broadcast_to(row, shape) for row in rows], float)

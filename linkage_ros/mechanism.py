@@ -251,39 +251,63 @@ class Mechanism:
             [(-pi, pi)], a linkage that cannot be assembled at all [].
 
         """
-        margins = self._pose('margins', ())
+        _, margins = self._ready('margins', ())
         return arcs(margins, self._structure.sketch.limits, self.dimensions, self._evaluated)
 
-    def _pose(self, kind: str, names: Tuple[str, ...]) -> Pose:
-        pose = self._poses.get((kind, names))
-        if pose is None:
-            program = self._structure.program(kind, names)
-            pose = program.bind(self.dimensions, self._evaluated, self._accelerate)
-            self._poses[kind, names] = pose
-        return pose
+    def function(self, points: Optional[Sequence[str]] = None) -> Callable:
+        """
+        Return the quickest way to one pose after the other.
+
+        Returns
+        -------
+        callable
+            From a crank angle, a float [rad], to the tuple (x, y, x, y, ...) [m] of the points
+            wanted, NaN where they cannot be assembled.
+
+        Raises
+        ------
+        ValueError
+            If a joint does not exist.
+
+        """
+        return self._ready('points', points)[1].at
 
     def _vectors(self, kind, theta, points):
-        names = self.points if points is None else _known(points, self.points, 'point', self)
-        pose = self._pose(kind, names)
+        names, pose = self._ready(kind, points)
         if isinstance(theta, float) and not pose.shape:
-            return dict(zip(names, np.array(pose.at(theta)).reshape(-1, 2)))
+            pairs = np.empty((len(names), 2))
+            pose.pack(pairs, theta)
+            return dict(zip(names, pairs))
         values = pose.over(np.asarray(theta, float))
         pairs = np.moveaxis(values.reshape(-1, 2, *values.shape[1:]), 1, -1)
         return dict(zip(names, pairs))
 
     def _scalars(self, kind, theta, joints):
-        names = self.joints if joints is None else _known(joints, self.joints, 'joint', self)
-        pose = self._pose(kind, names)
+        names, pose = self._ready(kind, joints)
         return dict(zip(names, pose.over(np.asarray(theta, float))))
 
+    def _ready(self, kind: str, wanted) -> Tuple[Tuple[str, ...], Pose]:
+        """Return the names that are wanted and the function that computes them."""
+        key = kind, wanted if isinstance(wanted, (tuple, str, type(None))) else tuple(wanted)
+        if key not in self._poses:
+            names = self._names(key)
+            program = self._structure.program(kind, names)
+            pose = program.bind(self.dimensions, self._evaluated, self._accelerate)
+            self._poses[key] = names, pose
+        return self._poses[key]
 
-def _known(names, allowed, what, mechanism) -> tuple:
-    names = (names,) if isinstance(names, str) else tuple(names)
-    for name in names:
-        if name not in allowed:
-            raise ValueError(f'{mechanism.type} has no {what} {name!r}; '
-                             f'allowed: {", ".join(allowed)}')
-    return names
+    def _names(self, key) -> Tuple[str, ...]:
+        kind, wanted = key
+        what, allowed = (('point', self.points) if kind in ('points', 'velocities')
+                         else ('joint', self.joints))
+        if wanted is None:
+            return allowed
+        names = (wanted,) if isinstance(wanted, str) else wanted
+        for name in names:
+            if name not in allowed:
+                raise ValueError(f'{self.type} has no {what} {name!r}; '
+                                 f'allowed: {", ".join(allowed)}')
+        return names
 
 
 def checked_dimensions(design: Design, given: Mapping) -> dict:

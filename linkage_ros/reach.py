@@ -118,7 +118,7 @@ def _bisected(margin: Callable, lo: float, hi: float) -> float:
     while True:
         middle = 0.5 * (lo + hi)
         if not lo < middle < hi:
-            return lo if within else hi
+            return float(lo if within else hi)
         if bool(margin(middle) >= 0.0) == within:
             lo = middle
         else:
