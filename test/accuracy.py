@@ -1,0 +1,362 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The measure of accuracy, and the angles and dimensions on which it is taken.
+
+A result is measured in units of its *sensitivity*: what moving each input, the crank angle and
+every length, by half an ulp does to the true result. That much uncertainty is in the question
+already. The rule is
+
+    error <= 4 x sensitivity + 1 ulp of the result,
+
+with a number wherever the linkage can be assembled and NaN wherever it cannot; within `GRAZE`
+sensitivities of a limit either will do. Points and velocities are vectors and their ulp is that
+of the larger component; angles are compared modulo a turn.
+
+Angles beyond a turn are charged half an ulp of pi only, as if they were exact: the library is to
+reduce them without loss.
+"""
+
+import math
+from typing import Dict, List, NamedTuple, Optional
+
+import numpy as np
+
+import reference
+from reference import mp
+
+RULE = 4.0
+GRAZE = 32.0
+# A velocity may also err by this many u = 2^-53 of the output's top speed.
+SPEED_RULE = 60.0
+UNIT = 2.0 ** -53
+
+_STEP = mp.mpf(10) ** -30
+
+
+class Case(NamedTuple):
+    """One linkage and the crank angles at which it is to be measured."""
+
+    kind: str
+    dimensions: Dict[str, float]
+    thetas: np.ndarray
+    branches: Optional[Dict[str, int]] = None
+    label: str = ''
+
+
+class Row(NamedTuple):
+    """
+    One output at one angle: ratio = (error - 1 ulp) / sensitivity, infinite for a wrong NaN.
+
+    `problem` is '', 'NaN' (a number was due), 'missed NaN' (a NaN was due) or 'rule'.
+    """
+
+    kind: str
+    label: str
+    output: str
+    ratio: float
+    problem: str
+    error: float
+    sensitivity: float
+    theta: float
+    dimensions: Dict[str, float]
+    branches: Optional[Dict[str, int]]
+
+
+class Truth(NamedTuple):
+    """True outputs, what half an ulp of every input does to them, and the state of closures."""
+
+    values: dict
+    sensitivity: dict
+    closures: Dict[str, str]
+
+
+# --- what a mechanism answers, under one set of names -------------------------------------------
+
+def answers(mechanism, thetas, rates=False):
+    """Return {output: array} of a mechanism of the library, `rates` with the derivatives."""
+    found = dict(mechanism.solve(thetas))
+    found.update((_joint('angle', name), value)
+                 for name, value in mechanism.joint_angles(thetas).items())
+    if rates:
+        found.update((f'velocity {name}', value)
+                     for name, value in mechanism.velocity(thetas).items())
+        found.update((_joint('rate', name), value)
+                     for name, value in mechanism.joint_rates(thetas).items())
+    return found
+
+
+def _joint(what, name):
+    return name if (what, name) == ('angle', 'slide') else f'{what} {name}'
+
+
+# --- the truth ----------------------------------------------------------------------------------
+
+def truth(case, theta, links, rates=False):
+    """Return the `Truth` of a case at a crank angle, for the links as a mechanism lists them."""
+    def evaluate(length, angle):
+        return _evaluate(case, length, angle, links, rates)
+    return _truth(evaluate, case.dimensions, float(theta))
+
+
+def servo_truth(dimensions, slot, lever_angle, cut):
+    """Return the `Truth` of a lever's inverse on one cut of its slot with the crank circle."""
+    def evaluate(length, angle):
+        found = reference.servo(length, angle, cut)
+        return ({'angle servo': mp.expj(found.angle)},
+                {'servo': found.gap, 'slide': slot * found.slide})
+    return _truth(evaluate, dimensions, float(lever_angle))
+
+
+def _truth(evaluate, dimensions, angle):
+    length = reference.exact(dimensions)
+    values, gaps = evaluate(length, mp.mpf(angle))
+    spread, slack = dict.fromkeys(values, mp.zero), dict.fromkeys(gaps, mp.zero)
+    for side in (1, -1):
+        one_side, one_slack = dict.fromkeys(values, mp.zero), dict.fromkeys(gaps, mp.zero)
+        for moved in _moves(length, dimensions, angle, side):
+            new_values, new_gaps = evaluate(*moved)
+            for name in values:
+                one_side[name] += _distance(name, values[name], new_values[name])
+            for name in gaps:
+                one_slack[name] += abs(new_gaps[name] - gaps[name])
+        spread = {name: max(spread[name], one_side[name]) for name in spread}
+        slack = {name: max(slack[name], one_slack[name]) for name in slack}
+        if all(abs(gap) > 100 * slack[name] for name, gap in gaps.items()):
+            break  # far from a limit both sides are alike
+    closures = {name: _state(gap, slack[name]) for name, gap in gaps.items()}
+    return Truth(values, spread, closures)
+
+
+def _moves(length, dimensions, angle, side):
+    """Yield the inputs with one of them moved by half an ulp; what is zero is exact."""
+    if angle:
+        yield length, mp.mpf(angle) + side * _half_ulp(min(abs(angle), math.pi))
+    for name, number in dimensions.items():
+        if number:
+            yield {**length, name: length[name] + side * _half_ulp(number)}, mp.mpf(angle)
+
+
+def _half_ulp(number):
+    return mp.mpf(float(np.spacing(abs(number)))) / 2
+
+
+def _distance(name, old, new):
+    return abs(_turned(old, new)) if name.startswith('angle') else abs(new - old)
+
+
+def _turned(old, new):
+    """Return the angle between two directions that are close to each other."""
+    return reference.cross(old, new) / (old * mp.conj(new)).real
+
+
+def _state(gap, slack):
+    if abs(gap) <= GRAZE * slack:
+        return 'grazes'
+    return 'meets' if gap > 0 else 'fails'
+
+
+def _evaluate(case, length, theta, links, rates):
+    """Return the outputs and gaps at one angle; the angle of a joint stays a direction."""
+    now = reference.place(case.kind, length, theta, case.branches)
+    values = _placed(now, links)
+    if rates:
+        before, after = (
+            _placed(reference.place(case.kind, length, theta + step, case.branches), links)
+            for step in (-_STEP, _STEP))
+        for name in list(values):
+            values[_rate_name(name)] = _difference(name, before[name], after[name]) / (2 * _STEP)
+    return values, now.gaps
+
+
+def _placed(pose, links):
+    by_name = {link.name: link for link in links}
+    values = dict(pose.points)
+    if pose.slide is not None:
+        values['slide'] = pose.slide
+    for link in links:
+        if link.kind == 'revolute':
+            values[f'angle {link.name}'] = _direction(pose.points, link, by_name)
+    return values
+
+
+def _direction(points, link, by_name):
+    """Return the direction of a link as its parent sees it."""
+    bar = points[link.tip] - points[link.joint]
+    if link.parent != 'ground':
+        parent = by_name[link.parent]
+        bar *= mp.conj(points[parent.tip] - points[parent.joint])
+    quarters = round(link.zero / (math.pi / 2))
+    return bar * (-reference.I) ** quarters
+
+
+def _rate_name(name):
+    if name.startswith('angle '):
+        return 'rate ' + name[6:]
+    return 'rate slide' if name == 'slide' else f'velocity {name}'
+
+
+def _difference(name, before, after):
+    return _turned(before, after) if name.startswith('angle') else after - before
+
+
+# --- the verdict --------------------------------------------------------------------------------
+
+def measure(mechanism, thetas, rates=False, label='') -> List[Row]:
+    """Measure all that a mechanism answers at crank angles [rad], `rates` with the derivatives."""
+    thetas = np.asarray(thetas, float)
+    case = Case(mechanism.type, mechanism.dimensions, thetas, mechanism.branches, label)
+    return judge(case, answers(mechanism, thetas, rates), mechanism.links, rates)
+
+
+def judge(case, found, links, rates=False) -> List[Row]:
+    """Measure {output: array} against the truth at every angle of a case."""
+    top = _top_speeds(case, links) if rates else {}
+    rows = []
+    for index, theta in enumerate(case.thetas):
+        exact = truth(case, theta, links, rates)
+        for output, results in found.items():
+            due = _due(case.kind, output, exact.closures, links)
+            rows.append(_row(case, theta, output, results[index], exact, due, top))
+    return rows
+
+
+def _due(kind, output, closures, links):
+    """Tell what is due: 'number', 'nan' or 'either' near a limit."""
+    return _due_of({closures[name] for name in _needs(kind, output, links)})
+
+
+def _due_of(states):
+    states = set(states)
+    if states <= {'meets'}:
+        return 'number'
+    if 'grazes' in states:
+        return 'either'
+    return 'nan'
+
+
+def _needs(kind, output, links):
+    """Return the closures that an output depends on; the tip of a link stands for the link."""
+    needs = reference.NEEDS[kind]
+    what, _, name = output.rpartition(' ')
+    if name == 'slide':
+        return needs['L']
+    if what in ('angle', 'rate'):
+        chain = _chain(name, {link.name: link for link in links})
+        return ''.join(needs.get(joint, '') for joint in chain)
+    return needs.get(name, '')
+
+
+def _chain(name, by_name):
+    link = by_name[name]
+    yield from (link.joint, link.tip)
+    if link.parent != 'ground':
+        parent = by_name[link.parent]
+        yield from (parent.joint, parent.tip)
+
+
+def _row(case, theta, output, result, exact, due, top):
+    spread = float(exact.sensitivity[output])
+    rate = output.startswith(('rate', 'velocity'))
+    error, ratio, problem = math.nan, 0.0, ''
+    if np.any(np.isnan(result)) or (rate and due != 'number' and np.any(np.isinf(result))):
+        problem = 'NaN' if due == 'number' else ''
+    elif due == 'nan':
+        problem = 'missed NaN'
+    elif not (rate and due == 'either'):
+        error = float(_error(output, result, exact.values[output]))
+        excess = max(0.0, error - _ulp(case, output, result, due))
+        ratio = excess / spread if excess else 0.0
+        if ratio > RULE and error > SPEED_RULE * UNIT * top.get(output, 0.0):
+            problem = 'rule'
+    return Row(case.kind, case.label, output, math.inf if 'NaN' in problem else ratio, problem,
+               error, spread, float(theta), case.dimensions, case.branches)
+
+
+def _ulp(case, output, result, due):
+    """Return an ulp of the result; on a limit, where it may be zero by itself, of its scale."""
+    size = np.max(np.abs(result))
+    if due == 'either':
+        scale = math.pi if output.startswith('angle') else max(case.dimensions.values())
+        size = max(size, scale)
+    return float(np.spacing(size))
+
+
+def _error(output, result, value):
+    if output.startswith('angle'):
+        return abs(mp.arg(value * mp.expj(-mp.mpf(float(result)))))
+    if np.ndim(result):
+        return abs(mp.mpc(*map(float, result)) - value)
+    return abs(mp.mpf(float(result)) - value)
+
+
+def _top_speeds(case, links, angles=24):
+    """Return every output's largest speed over a turn; at least a crank's of its own kind."""
+    length = reference.exact(case.dimensions)
+    crank = abs(reference.place(case.kind, length, mp.zero, case.branches).points['A'])
+    top = {}
+    for theta in np.arange(angles) * (2 * math.pi / angles) + 0.1:
+        values, gaps = _evaluate(case, length, mp.mpf(theta), links, True)
+        for name, value in values.items():
+            if name.startswith(('rate', 'velocity')):
+                least = 1.0 if name.startswith('rate') and name != 'rate slide' else crank
+                reached = all(gap > 0 for gap in gaps.values())
+                top[name] = max(top.get(name, 0.0), float(least),
+                                float(abs(value)) if reached else 0.0)
+    return top
+
+
+def worst(rows):
+    """Return the row with the largest ratio of every (kind, output), in the order they came."""
+    found = {}
+    for row in rows:
+        key = row.kind, row.output
+        if key not in found or row.ratio > found[key].ratio:
+            found[key] = row
+    return list(found.values())
+
+
+def broken(rows):
+    """Return the rows that break the rule, worst first."""
+    return sorted((row for row in rows if row.problem), key=lambda row: -row.ratio)
+
+
+def measure_servo(lever, angles, label='') -> List[Row]:
+    """
+    Measure a slotted lever's inverse at lever angles [rad].
+
+    Each crank angle on the lever's half of the slot is asked for as the one nearest to the truth.
+    """
+    rows = []
+    slot = lever.branches['slot']
+    case = Case(lever.type, lever.dimensions, angles, lever.branches, label)
+    for angle in angles:
+        cuts = [servo_truth(lever.dimensions, slot, angle, cut) for cut in (1, -1)]
+        due = [_due_of(exact.closures.values()) for exact in cuts]
+        wanted = 'number' if 'number' in due else 'nan' if due == ['nan', 'nan'] else ''
+        for exact, state in zip(cuts, due):
+            if state == wanted:
+                near = float(mp.arg(exact.values['angle servo']))
+                found = lever.servo_angle(float(angle), near=near)
+                rows.append(_row(case, angle, 'angle servo', found, exact, wanted, {}))
+    return rows
+
+
+def summary(rows, count=5):
+    """Return the worst failures as text that reproduces them."""
+    return '\n'.join(
+        f'{row.problem} {row.kind} {row.output} at {row.theta!r}: ratio {row.ratio:.3g}, '
+        f'error {row.error:.3g}, sensitivity {row.sensitivity:.3g}, {row.dimensions} '
+        f'{row.branches or ""}' for row in broken(rows)[:count])

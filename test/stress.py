@@ -1,0 +1,147 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Angles and dimensions that are hard on a linkage, drawn from a seeded generator.
+
+Three tenths of the random dimensions are nearly or exactly degenerate: a kite almost folded, a
+dyad that only just reaches, equal arms. Angles crowd around dead points and reach limits, down to
+1e-15 rad.
+"""
+
+import math
+
+import numpy as np
+
+HOLY = {'a': 38.0, 'b': 41.5, 'c': 39.3, 'd': 40.1, 'e': 55.8, 'f': 39.4, 'g': 36.7, 'h': 65.7,
+        'i': 49.0, 'j': 50.0, 'k': 61.9, 'l': 7.8, 'm': 15.0}
+
+# The documents' own parameter sets, the other ones people know, and every change point.
+CATALOGUE = {
+    'water_drop': [{'a': 1.0}, {'a': 0.1}, {'a': 0.7}],
+    'jansen': [HOLY],
+    'peaucellier': [
+        {'r': r, 'a': a, 'b': b} for r, a, b in (
+            (3.0, 9.0, 4.0), (4.0, 9.0, 2.0), (2.0, 5.0, 3.0), (3.0, 6.0, 3.0), (3.0, 4.0, 2.0),
+            (3.0, 4.0, 4.0), (2.0, 4.0, 4.0), (3.0, 2.0 + 1e-8, 2.0))],
+    'slotted_lever': [
+        {'a': a, 'b': b, 'e': e} for a, b, e in (
+            (80.0, 150.0, 0.0), (150.0, 80.0, 0.0), (80.0, 150.0, 25.0), (80.0, 150.0, -70.0),
+            (80.0, 150.0, 100.0), (150.0, 80.0, 30.0), (1.0, 1.0, 0.0), (1.0, 1.0 + 1e-9, 0.0),
+            (1.0, 1.0, 0.5))],
+}
+
+
+def log_uniform(rng, low, high):
+    """Return a number whose logarithm is uniform."""
+    return float(math.exp(rng.uniform(math.log(low), math.log(high))))
+
+
+def tiny(rng, exact=0.1):
+    """Return a signed distance from 1e-1 down to 1e-15, or zero with the probability `exact`."""
+    if rng.random() < exact:
+        return 0.0
+    return float(rng.choice((-1.0, 1.0)) * log_uniform(rng, 1e-15, 1e-1))
+
+
+def dimensions(kind, rng):
+    """Return random dimensions of a linkage, three tenths of them nearly degenerate."""
+    return _DIMENSIONS[kind](rng, rng.random() < 0.3)
+
+
+def _water_drop(rng, _):
+    return {'a': log_uniform(rng, 0.1, 10.0)}
+
+
+def _peaucellier(rng, degenerate):
+    """Cranks rarely too short to reach: 2 r is at least about |a - b|."""
+    r, a, b = (log_uniform(rng, 0.1, 10.0) for _ in range(3))
+    r = max(r, abs(a - b) * log_uniform(rng, 0.45, 2.0))
+    if degenerate:
+        near = 1.0 + tiny(rng)
+        way = rng.integers(3)
+        if way == 0:
+            a = b * near
+        elif way == 1:
+            r = 0.5 * (a + b) * near
+        else:
+            r = 0.5 * abs(a - b) * near
+    return {'r': r, 'a': a, 'b': b}
+
+
+def _slotted_lever(rng, degenerate):
+    a, b = (log_uniform(rng, 0.1, 10.0) for _ in range(2))
+    e = 0.0
+    if rng.random() < 0.6:
+        e = float(rng.choice((-1.0, 1.0))) * log_uniform(rng, 0.01, 10.0)
+    if degenerate:
+        near = 1.0 + tiny(rng)
+        way = rng.integers(3)
+        if way == 0:
+            a = b * near
+        else:
+            e = math.copysign((abs(b - a) if way == 1 else a + b) * near, rng.random() - 0.5)
+    return {'a': a, 'b': b, 'e': e}
+
+
+def _jansen(rng, degenerate):
+    """Legs within 35 % of the holy numbers, of any size; few other designs can walk at all."""
+    size = log_uniform(rng, 0.01, 1.0)
+    leg = {name: size * number * float(rng.uniform(0.65, 1.35)) for name, number in HOLY.items()}
+    if degenerate:
+        near = 1.0 + tiny(rng, exact=0.0)
+        arm = math.hypot(leg['a'], leg['l'])
+        far, close = arm + leg['m'], abs(arm - leg['m'])
+        way = rng.integers(6)
+        if way == 0:
+            leg['j'] = far * near - leg['b'] if far > leg['b'] else leg['j']
+        elif way == 1:
+            leg['k'] = far * near - leg['c'] if far > leg['c'] else leg['k']
+        elif way == 2:
+            leg['j'] = leg['b'] + close * near
+        elif way == 3:
+            leg['k'] = leg['c'] + close * near
+        elif way == 4:
+            leg['e'] = (leg['b'] + leg['d']) * near
+        else:
+            leg['h'] = (leg['g'] + leg['i']) * near
+    return leg
+
+
+_DIMENSIONS = {'water_drop': _water_drop, 'jansen': _jansen, 'peaucellier': _peaucellier,
+               'slotted_lever': _slotted_lever}
+
+
+def angles(rng, count, limits=(), turns=1e9):
+    """
+    Return crank angles: half of them anywhere, half close to 0, pi or the given limits [rad].
+
+    A tenth of them is moved by whole turns, up to so many.
+    """
+    spots = [0.0, math.pi, -math.pi, math.pi / 2, *limits]
+    found = []
+    for _ in range(count):
+        theta = float(rng.uniform(-math.pi, math.pi))
+        if rng.random() < 0.5:
+            theta = float(rng.choice(spots)) + tiny(rng)
+        if rng.random() < 0.1:
+            theta += 2 * math.pi * round(log_uniform(rng, 1.0, turns))
+        found.append(theta)
+    return np.array(found)
+
+
+def approach(spot, near=1e-1, far=1e-15):
+    """Return angles on both sides of a spot, at every decade of distance, and the spot itself."""
+    steps = 10.0 ** -np.arange(-math.log10(near), -math.log10(far) + 0.5)
+    return np.concatenate((spot - steps, [spot], spot + steps[::-1]))

@@ -1,0 +1,199 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The truth is true: it keeps every length and agrees with numbers that others published."""
+
+import numpy as np
+import pytest
+import reference
+from reference import LEFT, mp, RIGHT
+import stress
+
+KINDS = list(stress.CATALOGUE)
+FLIPPED = {
+    'water_drop': [{}],
+    'jansen': [{}, {'C': RIGHT}, {'E': LEFT}, {'F': RIGHT}, {'C': RIGHT, 'E': LEFT, 'F': RIGHT}],
+    'peaucellier': [{}],
+    'slotted_lever': [{}, {'slot': -1}],
+}
+
+# deg, A, C, D, E, F, G: rows of the table that comes with the original Jansen program
+# (H. Shigeyoshi, jansen-linkage, MIT licence), rounded to three decimals there.
+JANSEN_TABLE = """
+45.0 10.607 10.607 -33.849 33.492 -77.553 -1.2 -20.427 -42.952 -56.076 -34.232 -24.399 -91.791
+90.0 0.0 15.0 -46.736 32.77 -77.668 -13.672 -20.995 -43.231 -57.448 -47.487 -7.689 -90.389
+180.0 -15.0 0.0 -54.934 30.088 -75.597 -21.745 -65.315 -36.056 -96.76 -54.979 -33.73 -73.517
+191.6 -14.694 -3.016 -50.654 31.724 -76.905 -17.515 -70.338 -30.132 -102.841 -47.175 -41.009 -69.385
+315.0 10.607 -10.607 -19.472 29.334 -72.64 12.4 -39.41 -47.075 -70.078 -26.916 -59.513 -91.761
+"""
+
+# deg, A, B, P: likewise from water-drop-linkage by the same author, a = 1.
+WATER_DROP_TABLE = """
+1.0 -0.017 1.0 -0.023 0.0 0.0 4.0
+60.0 -0.866 0.5 -1.237 -0.429 0.247 3.286
+120.0 -0.866 -0.5 -1.732 -1.0 1.732 1.0
+170.0 -0.174 -0.985 -0.665 -0.114 1.3 -3.598
+185.0 0.087 -0.996 0.345 -0.03 -0.685 -3.895
+"""
+
+
+def drawn(kind, seed, count=100):
+    """Yield random lengths and angles of a linkage, as (lengths, theta, branches)."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        dimensions = stress.dimensions(kind, rng)
+        branches = FLIPPED[kind][rng.integers(len(FLIPPED[kind]))]
+        yield reference.exact(dimensions), mp.mpf(stress.angles(rng, 1)[0]), branches
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_every_bar_keeps_its_length_to_1e_45(kind):
+    assembled = 0
+    for length, theta, branches in drawn(kind, seed=1):
+        pose = reference.place(kind, length, theta, branches)
+        if pose.assembled:
+            assembled += 1
+            for (p, q), bar in reference.bars(kind, length).items():
+                distance = abs(pose.points[p] - pose.points[q])
+                assert abs(distance - bar) < 1e-45 * bar, (p, q)
+    assert assembled >= 15
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_every_bar_keeps_its_length_through_the_dead_points(kind):
+    for dimensions in stress.CATALOGUE[kind]:
+        length = reference.exact(dimensions)
+        for spot in (0.0, float(mp.pi)):
+            for theta in stress.approach(spot):
+                pose = reference.place(kind, length, mp.mpf(theta))
+                if pose.assembled:
+                    for (p, q), bar in reference.bars(kind, length).items():
+                        distance = abs(pose.points[p] - pose.points[q])
+                        assert abs(distance - bar) < 1e-45 * bar, (p, q, theta)
+
+
+def test_the_jansen_leg_agrees_with_the_table_of_the_original_program():
+    for line in JANSEN_TABLE.split('\n')[1:-1]:
+        degrees, *published = map(mp.mpf, line.split())
+        pose = reference.place('jansen', reference.exact(stress.HOLY), mp.radians(degrees))
+        check_rounded(pose, 'ACDEFG', published)
+
+
+def test_the_water_drop_agrees_with_the_table_of_the_original_program():
+    for line in WATER_DROP_TABLE.split('\n')[1:-1]:
+        degrees, *published = map(mp.mpf, line.split())
+        pose = reference.place('water_drop', {'a': mp.one}, mp.radians(degrees))
+        check_rounded(pose, 'ABP', published)
+
+
+def check_rounded(pose, joints, published):
+    """Compare joints with published x y x y ..., which have three decimals."""
+    ours = [number for name in joints
+            for number in (pose.points[name].real, pose.points[name].imag)]
+    assert len(ours) == len(published)
+    assert max(abs(x - y) for x, y in zip(ours, published)) <= 0.0005
+
+
+def test_circles_give_the_published_angles_of_andrews_squeezer():
+    """Check the start angles of the IVP test set (Hairer and Wanner, Solving ODEs II, VII.7)."""
+    A, B = mp.mpc('-0.06934', '-0.00227'), mp.mpc('-0.03635', '0.03273')
+    ss, e, zt, u = (mp.mpf(digits) for digits in ('0.035', '0.02', '0.04', '0.04'))
+    E, _ = reference.circles(mp.mpc(0), mp.mpf('0.021'), B, ss, LEFT)
+    G, _ = reference.circles(A, u, E, e, RIGHT)
+    H, _ = reference.circles(A, zt, E, e, LEFT)
+    angles = {
+        '-0.0617138900142764496358948458001': mp.arg(-E),
+        '0.455279819163070380255912382449': mp.arg((B - E) / reference.I),
+        '0.487364979543842550225598953530': mp.arg(H - A),
+        '0.222668390165885884674473185609': mp.arg((H - E) / reference.I) - mp.arg(H - A),
+        '1.23054744454982119249735015568': mp.arg((A - G) / reference.I),
+    }
+    for published, angle in angles.items():
+        assert abs(angle - mp.mpf(published)) < 1e-28
+
+
+def test_the_inversor_draws_a_straight_line():
+    for length, theta, branches in drawn('peaucellier', seed=2):
+        pose = reference.place('peaucellier', length, theta, branches)
+        if pose.assembled:
+            r, a, b = (length[name] for name in 'rab')
+            line = (a - b) * (a + b) / (2 * r) - r
+            assert abs(pose.points['C'].real - line) < 1e-45 * (a + b + r)
+
+
+def test_the_inversor_ends_where_the_original_document_says():
+    r, a, b = mp.mpf(3), mp.mpf(9), mp.mpf(4)
+    half = mp.acos((a - b) / (2 * r))
+    inside, outside = (
+        reference.place('peaucellier', {'r': r, 'a': a, 'b': b}, 2 * half + step)
+        for step in (mp.mpf('-1e-40'), mp.mpf('1e-40')))
+    assert inside.assembled and not outside.assembled
+    assert abs(inside.points['C'].imag - (a + b) * mp.sin(half)) < 1e-38
+
+
+def test_the_drop_has_the_area_of_eight_circles_of_the_crank():
+    count, step = 200, mp.mpf('1e-30')
+    area = 0
+    for turn in range(count):
+        theta = 2 * mp.pi * turn / count
+        before, now, after = (
+            reference.place('water_drop', {'a': mp.one}, theta + shift).points['P']
+            for shift in (-step, 0, step))
+        area += reference.cross(now, after - before) / (4 * step) * 2 * mp.pi / count
+    assert abs(abs(area) - 8 * mp.pi) < 1e-45
+
+
+def test_the_pin_lies_in_the_slot():
+    """Check a e^(i theta) + b = e^(i phi) (t + i e), the loop equation."""
+    for length, theta, branches in drawn('slotted_lever', seed=3):
+        pose = reference.place('slotted_lever', length, theta, branches)
+        if pose.assembled:
+            a, b, e = (length[name] for name in 'abe')
+            lever = pose.points['L'] - pose.points['Q']
+            turn = lever / abs(lever) / reference.I
+            loop = a * mp.expj(theta) + b - turn * mp.mpc(pose.slide, e)
+            assert abs(loop) < 1e-45 * (a + b)
+
+
+def test_the_inverse_of_the_lever_leads_back():
+    for length, theta, branches in drawn('slotted_lever', seed=4):
+        pose = reference.place('slotted_lever', length, theta, branches)
+        if pose.assembled:
+            lever = mp.arg((pose.points['L'] - pose.points['Q']) / reference.I)
+            found = [reference.servo(length, lever, cut) for cut in (1, -1)]
+            misses = [abs(mp.expj(theta) - mp.expj(answer.angle)) for answer in found]
+            slides = [abs(pose.slide - answer.slide) for answer in found]
+            assert min(misses) < 1e-30
+            assert min(slides) < 1e-30 * (length['a'] + length['b'])
+
+
+def test_the_lever_returns_quickly_by_the_textbook_ratio():
+    """Check (pi + 2 asin(a/b)) / (pi - 2 asin(a/b)) between the two ends of the stroke."""
+    length = reference.exact({'a': 80.0, 'b': 150.0, 'e': 0.0})
+    end = mp.asin(length['a'] / length['b'])
+    first, last = (reference.servo(length, side * end, 1).angle for side in (-1, 1))
+    forth = last - first
+    ratio = forth / (2 * mp.pi - forth)
+    assert abs(ratio - (mp.pi + 2 * end) / (mp.pi - 2 * end)) < 1e-35
+
+
+@pytest.mark.parametrize('kind, dimensions, theta', [
+    ('peaucellier', {'r': 3.0, 'a': 9.0, 'b': 4.0}, 3.0),
+    ('peaucellier', {'r': 9.0, 'a': 4.0, 'b': 3.0}, 0.0),
+    ('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 100.0}, 3.0),
+    ('jansen', {**stress.HOLY, 'j': 90.0}, 3.0),
+    ('jansen', {**stress.HOLY, 'e': 82.0}, 0.0),
+])
+def test_what_cannot_be_assembled_has_no_pose(kind, dimensions, theta):
+    assert reference.pose(kind, dimensions, theta) is None
