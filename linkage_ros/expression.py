@@ -24,6 +24,7 @@ operations is kept exactly as written, because the accuracy of a stable form liv
 from __future__ import annotations
 
 from functools import reduce
+from math import cos, sin
 from typing import Union
 
 
@@ -139,6 +140,8 @@ _FOLDED = {
     'multiply': lambda x, y: x * y,
     'negative': lambda x: -x,
     'absolute': abs,
+    'sin': sin,
+    'cos': cos,
 }
 
 

@@ -16,14 +16,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from types import SimpleNamespace
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Callable, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
+from . import language
 from .compiler import Pose, Program, evaluate
-from .expression import Real, cross, derivative, dimension, real
+from .expression import Real, cross, derivative, real
 from .reach import arcs
 from .sketch import Sketch
 
@@ -34,7 +35,7 @@ SHORTEST, LONGEST = 1e-150, 1e151
 @dataclass(frozen=True)
 class Design:
     """
-    What a type of mechanism is: its dimensions and how it is drawn.
+    What a type of mechanism is.
 
     Parameters
     ----------
@@ -42,23 +43,30 @@ class Design:
         The name that users type.
     dimensions : mapping
         Defaults [m].
-    draw : callable
-        Gets a Sketch, the dimensions and the branches, each as attributes of a namespace.
+    joints : tuple of str
+        One line a joint, as `language` reads them.
     tracer : str
         The joint whose curve is the locus.
     signed : frozenset
         Dimensions that may be zero or negative.
-    branches : mapping
-        Assembly signs, +1 or -1, by name.
 
     """
 
     name: str
     dimensions: Mapping[str, float]
-    draw: Callable
+    joints: Tuple[str, ...]
     tracer: str
     signed: frozenset = frozenset()
-    branches: Mapping[str, int] = field(default_factory=dict)
+
+    @cached_property
+    def lines(self) -> list:
+        """The joints as constructions."""
+        return language.parse(self.joints)
+
+    @property
+    def branches(self) -> dict:
+        """The assembly sign, +1 or -1, of each joint that has two."""
+        return language.branches(self.lines)
 
 
 class Structure:
@@ -66,8 +74,8 @@ class Structure:
 
     def __init__(self, design: Design, branches: Mapping[str, int]):
         self.sketch = Sketch()
-        symbols = {n: dimension(n, n not in design.signed) for n in design.dimensions}
-        design.draw(self.sketch, SimpleNamespace(**symbols), SimpleNamespace(**branches))
+        language.draw(self.sketch, design.lines,
+                      language.symbols_of(design.dimensions, design.signed), branches)
         self._programs = {}
 
     def program(self, kind: str, names: Tuple[str, ...]) -> Program:
@@ -127,7 +135,6 @@ class Mechanism:
         self.tracer = design.tracer
         sketch = structure.sketch
         self.points = tuple(sketch.points)
-        self.links = tuple(sketch.links)
         self.joints = tuple(sketch.joint_values)
         self.bars = tuple((bar.first, bar.second) for bar in sketch.bars)
         self._design = design
@@ -135,6 +142,8 @@ class Mechanism:
         self._accelerate = accelerate
         self._evaluated = {}
         self._poses = {}
+        self.links = tuple(link._replace(zero=float(self._value(link.zero)))
+                           for link in sketch.links)
 
     def __repr__(self):
         lengths = ', '.join(f'{k}={v}' for k, v in self.dimensions.items())
@@ -143,10 +152,19 @@ class Mechanism:
     @property
     def bar_lengths(self) -> dict:
         """The length [m] of each bar."""
+        return {(bar.first, bar.second): self._value(bar.length)
+                for bar in self._structure.sketch.bars}
+
+    @property
+    def frames(self) -> dict:
+        """Where each link's joints lie [m], seen from the link: x along its bar."""
+        return {link: {name: (self._value(place.x), self._value(place.y))
+                       for name, place in frame.items()}
+                for link, frame in self._structure.sketch.frames.items()}
+
+    def _value(self, expression: Real):
         with np.errstate(all='ignore'):
-            return {(bar.first, bar.second): evaluate(bar.length, self.dimensions,
-                                                      self._evaluated)
-                    for bar in self._structure.sketch.bars}
+            return evaluate(expression, self.dimensions, self._evaluated)
 
     @property
     def longest(self) -> float:

@@ -26,9 +26,13 @@ from math import pi
 from typing import NamedTuple, Optional, Tuple
 
 from . import planar
-from .expression import Complex, Number, Real, angle, arctangent, real
+from .expression import Complex, Number, Real, angle, arctangent, cosine, real, sine
 
 GROUND = 'ground'
+
+
+class SketchError(ValueError):
+    """A construction that cannot be on the joints it is given."""
 
 
 class Link(NamedTuple):
@@ -44,7 +48,7 @@ class Link(NamedTuple):
     parent: str
     joint: str
     kind: str
-    zero: float
+    zero: Real
     tip: str
 
 
@@ -78,6 +82,8 @@ class Sketch:
         self.links = []
         self.bars = []
         self.limits = []
+        self.triangles = {}
+        self.frames = {}
         self.joint_values = {}
         self.directions = {}
         self.cranks = []
@@ -88,14 +94,16 @@ class Sketch:
         place = Complex(x, y)
         self.points[name] = _Point(place, GROUND, abs(place.x) + abs(place.y))
 
-    def crank(self, name: str, centre: str, length: Real, upright: bool = False,
-              link: str = 'crank'):
+    def crank(self, name: str, centre: str, length: Real, upright: bool = False):
         """Turn a crank of this length [m] about a ground joint; upright: its zero is +y, not +x."""
+        self._on_ground(centre)
+        link = f'crank{len(self.cranks) + 1}' if self.cranks else 'crank'
         zero = Complex(0.0, 1.0) if upright else Complex(1.0, 0.0)
         turning = angle(len(self.cranks))
         crank = planar.Crank(self.points[centre].place, length, zero, turning)
         self.cranks.append(link)
-        self._hang(link, centre, name, crank.bar(), upright, value=turning)
+        self._hang(centre, name, crank.bar(), length, upright, link)
+        self.joint_values[link] = turning
         self._place(name, centre, crank.bar(), link, length)
         self.points[name].crank = crank
 
@@ -109,15 +117,18 @@ class Sketch:
     def rigid(self, name: str, first: str, second: str, to_first: Real, to_second: Real,
               side: float):
         """Add the third corner of a rigid triangle on a bar; left of first -> second."""
-        vector, base, link = self._vectors[first, second]
+        vector, base, link = self._bar_between(first, second)
         corner = planar.triangle(base, to_first, to_second, side)
+        self.triangles[name] = corner.y
         self._place(name, first, vector * corner, link, to_first)
-        self.bars.append(Bar(second, name, to_second))
+        self._bar(second, name, vector * (corner - Complex(1.0, 0.0)), to_second, link)
+        self._add_to_frame(name, first, second, link, corner)
 
     def line(self, name: str, first: str, second: str, distance: Real):
-        """Add a point on the line of a bar, at a distance [m] from first; negative: beyond it."""
-        vector, base, link = self._vectors[first, second]
+        """Add a point on the line of a bar, at a distance [m] from first; negative: away from second."""
+        vector, base, link = self._bar_between(first, second)
         self._place(name, first, vector * (distance / base), link, abs(distance))
+        self._add_to_frame(name, first, second, link, Complex(distance / base, 0.0))
 
     def mirror(self, name: str, point: str, first: str, second: str):
         """Mirror a joint in the line of two others: the far corner of a kite."""
@@ -127,26 +138,57 @@ class Sketch:
                    self.distance(first, point), self.distance(second, point))
 
     def inversor(self, names: Tuple[str, str, str], pole: str, pin: str, long: Real, short: Real):
-        """Add a Peaucellier cell: joints right and left of pole -> pin, and the traced corner."""
-        right, left, corner = names
+        """Add a Peaucellier cell: the joint right of pole -> pin, the traced corner, the left joint."""
+        right, corner, left = names
         found = planar.inversor(self.arm(pole, pin), long, short)
         self.limits += found.right.limits
         self._pair(right, pole, pin, found.right, long, short)
-        self._hang(right + corner, right, corner, found.left.second)
-        self._place(corner, right, found.left.second, right + corner, short)
+        link = self._hang(right, corner, found.left.second, short)
+        self._place(corner, right, found.left.second, link, short)
         self.points[corner].place = self.points[pole].place + found.inverse
         self._pair(left, pole, pin, found.left, long, short)
-        self._hang(left + corner, left, corner, found.right.second)
-        self.bars.append(Bar(left, corner, short))
+        link = self._hang(left, corner, found.right.second, short)
+        self._bar(left, corner, found.right.second, short, link)
 
     def slot(self, tip: str, pivot: str, pin: str, offset: Real, half: float, length: Real):
         """Turn a lever of this length [m] about a ground joint by a pin in its slot."""
+        self._on_ground(pivot)
         found = planar.slot(self.arm(pivot, pin), offset, half)
         self.limits.append(found.limit)
-        self._hang('lever', pivot, tip, found.along, upright=True)
-        self._place(tip, pivot, found.along * length, 'lever', real(length))
-        self.links.append(Link('slide', 'lever', pivot, 'prismatic', 0.0, pin))
-        self.joint_values['slide'] = found.slide
+        lever = self._hang(pivot, tip, found.along, length, True, self._numbered('lever'))
+        self._place(tip, pivot, found.along * length, lever, length)
+        self._slide('slide', lever, pivot, pin, found.slide, Complex(0.0, offset))
+
+    def slider(self, name: str, pin: str, rod: Real, origin: str, direction: Real, side: float):
+        """Join a rod [m] from a joint to a block on a line through a ground joint."""
+        self._on_ground(origin)
+        along = Complex(cosine(direction), sine(direction))
+        start, end = self.points[origin], self.points[pin]
+        found = planar.slider(end.place, rod, start.place, along, side, start.span + end.span)
+        self.limits.append(found.limit)
+        link = self._hang(pin, name, found.rod, rod)
+        self._place(name, pin, found.rod, link, rod)
+        self._slide('block', GROUND, origin, name, found.place, Complex(0.0, 0.0), direction)
+
+    def _on_ground(self, name):
+        if self.points[name].home != GROUND:
+            raise SketchError(f'joint {name} must be on the ground')
+
+    def _bar_between(self, first, second):
+        if (first, second) not in self._vectors:
+            raise SketchError(f'{first} and {second} are not on one bar')
+        return self._vectors[first, second]
+
+    def _numbered(self, word):
+        taken = sum(link.name.rstrip('0123456789') == word for link in self.links)
+        return f'{word}{taken + 1}' if taken else word
+
+    def _slide(self, word, parent, joint, tip, place, local, direction=0.0):
+        """Add a link that slides along its parent."""
+        name = self._numbered(word)
+        self.links.append(Link(name, parent, joint, 'prismatic', real(direction), tip))
+        self.joint_values[name] = place
+        self.frames[name] = {tip: local}
 
     def arm(self, first: str, second: str) -> planar.Arm:
         """Return the arm from one joint to another."""
@@ -164,19 +206,28 @@ class Sketch:
 
     def _pair(self, name, first, second, found, to_first, to_second):
         """Join the two bars of a dyad: the joint belongs to the first, the second is cut there."""
-        self._hang(first + name, first, name, found.first)
-        self._place(name, first, found.first, first + name, to_first)
-        self._hang(second + name, second, name, found.second)
-        self._bar(second, name, found.second, to_second, second + name)
+        link = self._hang(first, name, found.first, to_first)
+        self._place(name, first, found.first, link, to_first)
+        link = self._hang(second, name, found.second, to_second)
+        self._bar(second, name, found.second, to_second, link)
 
-    def _hang(self, name, joint, tip, bar, upright=False, value=None):
-        """Add a link that turns about a joint of its parent."""
+    def _hang(self, joint, tip, bar, length, upright=False, name=None):
+        """Add a link that turns about a joint of its parent, and return its name."""
+        name = name or ('' if len(joint + tip) == 2 else '_').join((joint, tip))
         parent = self.points[joint].home
         zero = Complex(0.0, 1.0) if upright else Complex(1.0, 0.0)
         relative = bar * self.directions.get(parent, zero).conjugate()
-        self.links.append(Link(name, parent, joint, 'revolute', pi / 2 if upright else 0.0, tip))
+        self.links.append(Link(name, parent, joint, 'revolute',
+                               real(pi / 2 if upright else 0.0), tip))
         self.directions[name] = bar
-        self.joint_values[name] = arctangent(relative.y, relative.x) if value is None else value
+        self.joint_values[name] = arctangent(relative.y, relative.x)
+        self.frames[name] = {joint: Complex(0.0, 0.0), tip: Complex(length, 0.0)}
+        return name
+
+    def _add_to_frame(self, name, first, second, link, corner):
+        """Note where a point of a rigid link lies, seen from that link."""
+        frame = self.frames[link]
+        frame[name] = frame[first] + (frame[second] - frame[first]) * corner
 
     def _place(self, name, start, vector, link, length):
         """Place a joint at the end of a bar from another."""

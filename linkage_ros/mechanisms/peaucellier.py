@@ -24,12 +24,8 @@ Source: Hartenberg and Denavit, "Kinematic Synthesis of Linkages", ch. 5.
 
 from ..mechanism import Design
 
-
-def _draw(sketch, size, _):
-    sketch.ground('O', 0.0, 0.0)
-    sketch.ground('P', -size.r, 0.0)
-    sketch.crank('A', 'O', size.r)
-    sketch.inversor(('B', 'D', 'C'), 'P', 'A', size.a, size.b)
-
-
-DESIGN = Design('peaucellier', {'r': 3.0, 'a': 9.0, 'b': 4.0}, _draw, tracer='C')
+DESIGN = Design('peaucellier', {'r': 3.0, 'a': 9.0, 'b': 4.0}, tracer='C', joints=(
+    'O ground 0 0',
+    'P ground -r 0',
+    'A crank O r',
+    'B C D inversor P A a b'))

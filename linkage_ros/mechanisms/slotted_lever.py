@@ -18,7 +18,7 @@ The slotted lever, or inverted slider-crank: a crank pin moves a lever by its sl
 The pin A = i a e^(i theta) turns about O, the lever turns about Q = (0, -b), both angles from +y.
 The slot is parallel to the lever at distance e on its left, L is the lever's tip, 1.8 b from Q or
 as far as the pin gets if that is more. Closure: a e^(i theta) + b = e^(i phi) (t + i e) with the
-lever angle phi and the pin's place t along the slot; `slot` +1 or -1 is the half of the slot.
+lever angle phi and the pin's place t along the slot; branch L, +1 or -1, is the half of the slot.
 
 Sources: Norton, "Design of Machinery", sec. 4.8 (inverted slider-crank); the inverse closes the
 same triangle: theta = phi + atan2(e + b sin phi, W), W = +-sqrt(a^2 - (e + b sin phi)^2).
@@ -39,16 +39,12 @@ from ..planar import GRAZE
 from ..reach import reachable_arcs
 
 
-def _draw(sketch, size, side):
-    reach = size.a + size.b
-    sketch.ground('O', 0.0, 0.0)
-    sketch.ground('Q', 0.0, -size.b)
-    sketch.crank('A', 'O', size.a, upright=True)
-    sketch.slot('L', 'Q', 'A', size.e, side.slot, where(1.8 * size.b < reach, reach, 1.8 * size.b))
-
-
-DESIGN = Design('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 0.0}, _draw, tracer='L',
-                signed=frozenset('e'), branches={'slot': 1})
+DESIGN = Design('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 0.0}, tracer='L',
+                signed=frozenset('e'), joints=(
+    'O ground 0 0',
+    'Q ground 0 -b',
+    'A crank O a up',
+    'L slot Q A e out max(1.8*b,a+b)'))
 
 
 @lru_cache(maxsize=None)
@@ -93,7 +89,7 @@ class Mechanism(mechanism.Mechanism):
 
         """
         outputs = self._servo().over(np.asarray(lever_angle, float))
-        half = self.branches['slot']
+        half = self.branches['L']
         theta, slide = outputs[0::2][::half], outputs[1::2][::half]
         theta = np.where(half * slide > GRAZE * (self.dimensions['a'] + self.dimensions['b']),
                          theta, np.nan)
