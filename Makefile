@@ -1,0 +1,81 @@
+# linkage_ros without an installed ROS: ROS 2 comes as wheels from the Python package index, in a
+# virtual environment beside the sources. Where a ROS 2 is sourced, use `colcon build` instead.
+
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+
+DISTRO ?= kilted
+ifeq ($(wildcard wheels/$(DISTRO).txt),)
+$(error DISTRO is '$(DISTRO)', but must be kilted or jazzy)
+endif
+
+suffix := $(if $(filter kilted,$(DISTRO)),,-$(DISTRO))
+venv := .venv$(suffix)
+build := build$(suffix)
+install := install$(suffix)
+log := log$(suffix)
+bin := $(CURDIR)/$(venv)/bin
+
+requirements := wheels/$(DISTRO).txt wheels/build.txt wheels/dev.txt
+sources := package.xml setup.py setup.cfg resource/linkage_ros wheels/prefix.cmake \
+  $(shell find linkage_ros config launch linkage_interfaces -type f ! -name '*.pyc' 2>/dev/null)
+
+# The first Python that runs, is new enough for the wheels, and can build against itself.
+usable := import ensurepip, os, sys, sysconfig; sys.exit(not ((3, 10) <= sys.version_info < (3, 15) \
+  and os.path.exists(os.path.join(sysconfig.get_path('include'), 'Python.h'))))
+candidates := python3.12 python3.11 python3.13 python3.10 python3
+PYTHON ?= $(shell for python in $(candidates); do \
+  $$python -c "$(usable)" 2>/dev/null && echo $$python && break; done)
+
+# No other ROS than this one, and no talk with other machines.
+unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH
+unexport PYTHONDONTWRITEBYTECODE
+export RMW_IMPLEMENTATION := rmw_fastrtps_cpp
+export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+export PATH := $(bin):$(PATH)
+in_ros := source $(install)/setup.bash &&
+
+.PHONY: help
+help: ## Show what can be made
+	@echo 'make TARGET [DISTRO=kilted|jazzy] [PYTHON=python3.x]'
+	@sed -n 's/^\([a-z]*\):.*## /  \1\t/p' $(firstword $(MAKEFILE_LIST))
+
+.PHONY: demo
+demo: build ## Run the nodes, measure what they send, draw it to demo/out/
+	@$(in_ros) python demo/demo.py
+
+.PHONY: test
+test: build ## Run the tests
+	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest
+
+.PHONY: lint
+lint: $(venv)/.installed ## Check the style
+	@ruff check .
+	@python -c 'import sys; from xml.dom.minidom import parse; [parse(f) for f in sys.argv[1:]]' \
+	  package.xml linkage_interfaces/package.xml
+
+.PHONY: build
+build: $(install)/.built ## Build both packages
+
+.PHONY: clean
+clean: ## Remove everything that was made
+	rm -rf .venv .venv-* build build-* install install-* log log-* demo/out
+
+$(install)/.built: $(venv)/.installed $(sources)
+	@command -v cmake >/dev/null || { echo 'cmake is missing: install it.' >&2; exit 1; }
+	@command -v $${CXX:-c++} >/dev/null && command -v $${CC:-cc} >/dev/null \
+	  || { echo 'A C and C++ compiler is missing: install gcc and g++.' >&2; exit 1; }
+	@colcon --log-base $(log) build --build-base $(build) --install-base $(install) --cmake-args \
+	  -DBUILD_TESTING=OFF -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH=$(CURDIR)/$(venv) \
+	  -DCMAKE_PROJECT_INCLUDE=$(CURDIR)/wheels/prefix.cmake -DPython3_EXECUTABLE=$(bin)/python
+	@touch $@
+
+$(venv)/.installed: $(requirements)
+	@test -n '$(PYTHON)' || { echo 'No Python from 3.10 to 3.14 with its headers and venv was found' \
+	  'among $(candidates): install one or name it with PYTHON=.' >&2; exit 1; }
+	@$(PYTHON) -c "$(usable)" 2>/dev/null || { echo '$(PYTHON) does not run, is not from 3.10 to' \
+	  '3.14, or lacks its headers or venv.' >&2; exit 1; }
+	@echo 'Installing ROS 2 $(DISTRO) into $(venv): about a minute, once.'
+	@$(PYTHON) -m venv $(venv)
+	@python -m pip install -qq $(requirements:%=-r %)
+	@touch $@
