@@ -278,7 +278,7 @@ class Program:
         self._variants = {}
 
     def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False) -> Pose:
-        """Return the outputs as functions of the angles, for dimensions that are floats or arrays."""
+        """Return the outputs as functions of the angles; dimensions are floats or arrays."""
         swept = any(np.ndim(v) for v in dimensions.values())
         with np.errstate(all='ignore'):
             decisions = () if swept else tuple(
@@ -334,8 +334,9 @@ class Pose:
         """Write the outputs at one pose into an array of as many float64."""
         self._variant.layout.pack_into(out, 0, *self.at(*angles))
 
-    def over(self, *angles: np.ndarray) -> np.ndarray:
+    def over(self, *angles) -> np.ndarray:
         """Return the outputs over arrays that are broadcast together, shape (outputs, *shape)."""
+        angles = [np.asarray(a, float) for a in angles]
         if self.shape:
             return self._swept(angles)
         if len(angles) > 1:

@@ -25,9 +25,9 @@ Linkages written down: one line a joint, in the order they are placed.
     L slot Q A e out d        tip, d from Q, of a lever about Q; A slides in its slot, e to its left
     S slider A r G p out      block on a line through G in direction p [rad], on a rod r from A
 
-`left` and `right` are as seen along the first two joints; `out` is the half of a slot on the tip's
-side, or the block ahead of the pin; `in` the other. A number is a length [m], an angle [rad], a
-dimension's name, or a sum, product, quotient or max() of these, written without spaces.
+`left` and `right` are as seen along the first two joints; `out` is the half of a slot on the
+tip's side, or the block ahead of the pin; `in` the other. A number is a length [m], an angle
+[rad], a dimension's name, or a sum, product, quotient or max() of these, without spaces.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ import ast
 import operator
 from typing import Iterable, List, Mapping, NamedTuple, Tuple
 
-from .expression import Number, Real, dimension, real, where
+from .expression import dimension, Number, Real, real, where
 from .planar import LEFT, RIGHT
 from .sketch import Sketch, SketchError
 

@@ -23,8 +23,8 @@ from typing import Callable, Mapping, Optional, Sequence, Tuple
 import numpy as np
 
 from . import language
-from .compiler import Pose, Program, evaluate
-from .expression import Real, cross, derivative, real
+from .compiler import evaluate, Pose, Program
+from .expression import Complex, cross, derivative, Real, real
 from .reach import arcs
 from .sketch import Sketch
 
@@ -32,7 +32,7 @@ from .sketch import Sketch
 SHORTEST, LONGEST = 1e-150, 1e151
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Design:
     """
     What a type of mechanism is.
@@ -78,41 +78,42 @@ class Structure:
                       language.symbols_of(design.dimensions, design.signed), branches)
         self._programs = {}
 
-    def program(self, kind: str, names: Tuple[str, ...]) -> Program:
+    def program(self, kind: str, names: Tuple[str, ...], *crank: int) -> Program:
         """Return the code for outputs of one kind; what they do not depend on is left out."""
-        if (kind, names) not in self._programs:
-            outputs = getattr(self, f'_{kind}')(names)
-            self._programs[kind, names] = Program(outputs, len(self.sketch.cranks))
-        return self._programs[kind, names]
+        key = (kind, names, *crank)
+        if key not in self._programs:
+            outputs = getattr(self, f'_{kind}')(names, *crank)
+            self._programs[key] = Program(outputs, len(self.sketch.cranks))
+        return self._programs[key]
 
     def _points(self, names):
         places = [self.sketch.points[n].place for n in names]
         return [part for place in places for part in (place.x, place.y)]
 
-    def _velocities(self, names):
+    def _velocities(self, names, crank=0):
         known = {}
-        return [derivative(part, {0: 1.0}, known) for part in self._points(names)]
+        return [derivative(part, {crank: 1.0}, known) for part in self._points(names)]
 
     def _angles(self, names):
         return [self.sketch.joint_values[n] for n in names]
 
-    def _rates(self, names):
-        known = {}
+    def _rates(self, names, crank=0):
+        known, turning = {}, {crank: 1.0}
+
+        def spin(name):
+            bar = self.sketch.directions.get(name)
+            if bar is None:
+                return real(0.0)
+            moving = Complex(*(derivative(part, turning, known) for part in (bar.x, bar.y)))
+            return cross(bar, moving) / bar.squared()
+
+        def rate(link):
+            if link.kind == 'prismatic' or link.name in self.sketch.cranks:
+                return derivative(self.sketch.joint_values[link.name], turning, known)
+            return spin(link.name) - spin(link.parent)
+
         links = {link.name: link for link in self.sketch.links}
-        return [self._rate(links[n], known) for n in names]
-
-    def _rate(self, link, known):
-        if link.kind == 'prismatic' or link.name in self.sketch.cranks:
-            return derivative(self.sketch.joint_values[link.name], {0: 1.0}, known)
-        return self._spin(link.name, known) - self._spin(link.parent, known)
-
-    def _spin(self, name, known) -> Real:
-        """Return the angular velocity of a link."""
-        if name not in self.sketch.directions:
-            return real(0.0)
-        bar = self.sketch.directions[name]
-        moving = type(bar)(*(derivative(part, {0: 1.0}, known) for part in (bar.x, bar.y)))
-        return cross(bar, moving) / bar.squared()
+        return [rate(links[n]) for n in names]
 
     def _margins(self, _):
         """Return each limit's margin, so much above its tolerance that a reached one is >= 0."""
@@ -136,6 +137,7 @@ class Mechanism:
         sketch = structure.sketch
         self.points = tuple(sketch.points)
         self.joints = tuple(sketch.joint_values)
+        self.cranks = tuple(sketch.cranks)
         self.bars = tuple((bar.first, bar.second) for bar in sketch.bars)
         self._design = design
         self._structure = structure
@@ -154,6 +156,12 @@ class Mechanism:
         """The length [m] of each bar."""
         return {(bar.first, bar.second): self._value(bar.length)
                 for bar in self._structure.sketch.bars}
+
+    def triangles(self) -> dict:
+        """Return for each line of a rigid triangle whether the dimensions allow it."""
+        lines = {line.names[0]: line for line in self._design.lines}
+        return {lines[name]: np.isfinite(self._value(height))
+                for name, height in self._structure.sketch.triangles.items()}
 
     @property
     def frames(self) -> dict:
@@ -203,7 +211,7 @@ class Mechanism:
         Parameters
         ----------
         theta : float or array-like
-            Crank angle [rad].
+            Crank angle [rad]; for a linkage with several cranks a sequence of as many.
         points : sequence of str, optional
             The joints wanted; only what they depend on is computed. Default: all.
 
@@ -221,13 +229,13 @@ class Mechanism:
         """
         return self._vectors('points', theta, points)
 
-    def velocity(self, theta, points: Optional[Sequence[str]] = None) -> dict:
+    def velocity(self, theta, points: Optional[Sequence[str]] = None, crank: int = 0) -> dict:
         """
-        Differentiate the joints' places with respect to the crank angle [m/rad].
+        Differentiate the joints' places with respect to one crank's angle [m/rad].
 
         Takes, returns and raises what `solve` does; infinite or NaN at a dead point.
         """
-        return self._vectors('velocities', theta, points)
+        return self._vectors('velocities', theta, points, crank)
 
     def joint_angles(self, theta, joints: Optional[Sequence[str]] = None) -> dict:
         """
@@ -254,13 +262,18 @@ class Mechanism:
         """
         return self._scalars('angles', theta, joints)
 
-    def joint_rates(self, theta, joints: Optional[Sequence[str]] = None) -> dict:
-        """Differentiate the joint angles with respect to the crank angle; see `joint_angles`."""
-        return self._scalars('rates', theta, joints)
+    def joint_rates(self, theta, joints: Optional[Sequence[str]] = None, crank: int = 0) -> dict:
+        """Differentiate the joint angles with respect to one crank's; see `joint_angles`."""
+        return self._scalars('rates', theta, joints, crank)
 
-    def reach(self) -> list:
+    def reach(self, *others: float) -> list:
         """
-        Return the crank angles that can be assembled.
+        Return the angles of the first crank that can be assembled.
+
+        Parameters
+        ----------
+        *others : float
+            The angles [rad] at which further cranks are held, if there are any.
 
         Returns
         -------
@@ -268,9 +281,20 @@ class Mechanism:
             Arcs (lo, hi) [rad] with lo in [-pi, pi) and hi > lo; a full turn is
             [(-pi, pi)], a linkage that cannot be assembled at all [].
 
+        Raises
+        ------
+        ValueError
+            If not every other crank is given, or a dimension is an array.
+
         """
         _, margins = self._ready('margins', ())
-        return arcs(margins, self._structure.sketch.limits, self.dimensions, self._evaluated)
+        if margins.shape:
+            raise ValueError('reach() is for one set of dimensions, not for arrays')
+        if len(others) != len(self.cranks) - 1:
+            raise ValueError(f'{self.type} has {len(self.cranks)} cranks: reach() needs the '
+                             f'angles of the {len(self.cranks) - 1} others, got {len(others)}')
+        return arcs(lambda theta: margins.over(theta, *others),
+                    self._structure.sketch.limits, self._value)
 
     def function(self, points: Optional[Sequence[str]] = None) -> Callable:
         """
@@ -279,8 +303,8 @@ class Mechanism:
         Returns
         -------
         callable
-            From a crank angle, a float [rad], to the tuple (x, y, x, y, ...) [m] of the points
-            wanted, NaN where they cannot be assembled.
+            From the crank angle, a float [rad] (or as many as there are cranks), to the tuple
+            (x, y, x, y, ...) [m] of the points wanted, NaN where they cannot be assembled.
 
         Raises
         ------
@@ -290,32 +314,41 @@ class Mechanism:
         """
         return self._ready('points', points)[1].at
 
-    def _vectors(self, kind, theta, points):
-        names, pose = self._ready(kind, points)
+    def _vectors(self, kind, theta, points, *crank):
+        names, pose = self._ready(kind, points, *crank)
         if isinstance(theta, float) and not pose.shape:
             pairs = np.empty((len(names), 2))
             pose.pack(pairs, theta)
             return dict(zip(names, pairs))
-        values = pose.over(np.asarray(theta, float))
+        values = pose.over(*self._each_crank(theta))
         pairs = np.moveaxis(values.reshape(-1, 2, *values.shape[1:]), 1, -1)
         return dict(zip(names, pairs))
 
-    def _scalars(self, kind, theta, joints):
-        names, pose = self._ready(kind, joints)
-        return dict(zip(names, pose.over(np.asarray(theta, float))))
+    def _scalars(self, kind, theta, joints, *crank):
+        names, pose = self._ready(kind, joints, *crank)
+        return dict(zip(names, pose.over(*self._each_crank(theta))))
 
-    def _ready(self, kind: str, wanted) -> Tuple[Tuple[str, ...], Pose]:
+    def _each_crank(self, theta):
+        if len(self.cranks) == 1:
+            return (theta,)
+        if not hasattr(theta, '__len__') or len(theta) != len(self.cranks):
+            raise ValueError(f'{self.type} has {len(self.cranks)} cranks: '
+                             'theta must be a sequence of as many angles')
+        return theta
+
+    def _ready(self, kind: str, wanted, *crank: int) -> Tuple[Tuple[str, ...], Pose]:
         """Return the names that are wanted and the function that computes them."""
-        key = kind, wanted if isinstance(wanted, (tuple, str, type(None))) else tuple(wanted)
+        if not isinstance(wanted, (tuple, str, type(None))):
+            wanted = tuple(wanted)
+        key = (kind, wanted, *crank)
         if key not in self._poses:
-            names = self._names(key)
-            program = self._structure.program(kind, names)
+            names = self._names(kind, wanted)
+            program = self._structure.program(kind, names, *crank)
             pose = program.bind(self.dimensions, self._evaluated, self._accelerate)
             self._poses[key] = names, pose
         return self._poses[key]
 
-    def _names(self, key) -> Tuple[str, ...]:
-        kind, wanted = key
+    def _names(self, kind, wanted) -> Tuple[str, ...]:
         what, allowed = (('point', self.points) if kind in ('points', 'velocities')
                          else ('joint', self.joints))
         if wanted is None:

@@ -36,8 +36,19 @@ from dataclasses import dataclass
 from typing import NamedTuple, Optional, Tuple
 
 from .expression import (
-    NAN, Complex, Real, arctangent, cosine, cross, dot, exact_sum, root, sine, square,
-    square_root, where,
+    arctangent,
+    Complex,
+    cosine,
+    cross,
+    dot,
+    exact_sum,
+    NAN,
+    Real,
+    root,
+    sine,
+    square,
+    square_root,
+    where,
 )
 
 LEFT, RIGHT = 1.0, -1.0
@@ -152,9 +163,15 @@ class CrankArm(Arm):
                        end - sign * gm * square(h))
         tolerance = GRAZE * (square(radius) + gm)
         gap, half = (start, s) if sign > 0.0 else (end, h)
-        smooth = where(abs(gap) <= 0.0, square_root(gm) * half, root(margin, tolerance))
+        grown = square_root(gm) * self._first_sign(sign)
+        smooth = where(abs(gap) <= 0.0, grown * half, root(margin, tolerance))
         return Limit(margin, tolerance, smooth, start, end,
                      arctangent(self._turn.y, self._turn.x), self._crank.angle.args[0])
+
+    def _first_sign(self, sign):
+        """Return the sign that makes s (sign +1) or h positive for crank angles in (0, pi)."""
+        left = where(0.0 <= self._turn.y, sign, -sign)
+        return where(0.0 <= self._turn.x, 1.0, left)
 
     def inverse_of_isosceles(self) -> Optional[Complex]:
         """Return 1 / conjugate(arm) where foot and pin are as far from the centre, else None."""
@@ -261,7 +278,7 @@ class Slot(NamedTuple):
 
 def slot(arm: Arm, offset: Real, half: float) -> Slot:
     """
-    Return the lever turning about the arm's foot whose slot, `offset` [m] to its left, takes the pin.
+    Return the lever about the arm's foot whose slot, `offset` [m] to its left, takes the pin.
 
     w = l (t + i e) with the unit vector l along the lever and t = half sqrt(|w|^2 - e^2) [m].
     """

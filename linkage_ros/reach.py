@@ -27,7 +27,6 @@ from typing import Callable, Iterable, List, Sequence, Tuple
 
 import numpy as np
 
-from .compiler import Pose, evaluate
 from .planar import Limit
 
 Arc = Tuple[float, float]
@@ -38,17 +37,27 @@ SAMPLES = 720
 NARROWEST = 2e-15
 
 
-def arcs(margins: Pose, limits: Sequence[Limit], dimensions, known: dict) -> List[Arc]:
-    """Return the arcs (lo, hi) [rad] on which every margin is at least zero."""
-    with np.errstate(all='ignore'):
-        ends = [end for limit in limits if limit.start is not None
-                for end in _crank_ends(*(float(evaluate(x, dimensions, known)) for x in (
-                    limit.start, limit.end, limit.turn)))]
-    free = [i for i, limit in enumerate(limits) if limit.start is None]
-    for lo, hi in _between(ends):
-        for i in free:
-            ends += _bracketed(lambda theta: margins.over(theta)[i], lo, hi)
-    return reachable_arcs(ends, lambda theta: all(x >= 0.0 for x in margins.at(theta)))
+def arcs(margins: Callable, limits: Sequence[Limit], value: Callable) -> List[Arc]:
+    """
+    Return the arcs (lo, hi) [rad] of the first crank on which every margin is at least zero.
+
+    Parameters
+    ----------
+    margins : callable
+        From crank angles, shape (n,), to margins, shape (limits, n).
+    limits : sequence of Limit
+        What the margins belong to.
+    value : callable
+        From an expression of dimensions to its value.
+
+    """
+    closed = [limit.crank == 0 for limit in limits]
+    ends = [end for limit, known in zip(limits, closed) if known
+            for end in _crank_ends(*map(value, (limit.start, limit.end, limit.turn)))]
+    for i in [i for i, known in enumerate(closed) if not known]:
+        for lo, hi in _between(ends):
+            ends += _bracketed(lambda theta, i=i: margins(theta)[i], lo, hi)
+    return reachable_arcs(ends, lambda theta: bool(np.all(margins(theta) >= 0.0)))
 
 
 def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool]) -> List[Arc]:
@@ -74,7 +83,7 @@ def _crank_ends(start: float, end: float, turn: float) -> List[float]:
     if not min(start, end) <= 0.0 <= max(start, end):
         return []
     half = math.atan2(math.sqrt(abs(start)), math.sqrt(abs(end)))
-    return [2.0 * half - turn, -2.0 * half - turn]
+    return [float(2.0 * half - turn), float(-2.0 * half - turn)]
 
 
 def _between(ends: Iterable[float]) -> List[Arc]:

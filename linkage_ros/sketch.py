@@ -26,7 +26,7 @@ from math import pi
 from typing import NamedTuple, Optional, Tuple
 
 from . import planar
-from .expression import Complex, Number, Real, angle, arctangent, cosine, real, sine
+from .expression import angle, arctangent, Complex, cosine, Number, Real, real, sine
 
 GROUND = 'ground'
 
@@ -95,7 +95,7 @@ class Sketch:
         self.points[name] = _Point(place, GROUND, abs(place.x) + abs(place.y))
 
     def crank(self, name: str, centre: str, length: Real, upright: bool = False):
-        """Turn a crank of this length [m] about a ground joint; upright: its zero is +y, not +x."""
+        """Turn a crank [m] about a ground joint; upright: its zero is +y, not +x."""
         self._on_ground(centre)
         link = f'crank{len(self.cranks) + 1}' if self.cranks else 'crank'
         zero = Complex(0.0, 1.0) if upright else Complex(1.0, 0.0)
@@ -109,7 +109,7 @@ class Sketch:
 
     def dyad(self, name: str, first: str, second: str, to_first: Real, to_second: Real,
              side: float):
-        """Join two bars, of to_first and to_second [m], from two joints; left of first -> second."""
+        """Join bars of to_first and to_second [m] from two joints, left of first -> second."""
         found = planar.dyad(self.arm(first, second), to_first, to_second, side)
         self.limits += found.limits
         self._pair(name, first, second, found, to_first, to_second)
@@ -125,7 +125,7 @@ class Sketch:
         self._add_to_frame(name, first, second, link, corner)
 
     def line(self, name: str, first: str, second: str, distance: Real):
-        """Add a point on the line of a bar, at a distance [m] from first; negative: away from second."""
+        """Add a point on the line of a bar, a distance [m] from first, towards second."""
         vector, base, link = self._bar_between(first, second)
         self._place(name, first, vector * (distance / base), link, abs(distance))
         self._add_to_frame(name, first, second, link, Complex(distance / base, 0.0))
@@ -138,7 +138,7 @@ class Sketch:
                    self.distance(first, point), self.distance(second, point))
 
     def inversor(self, names: Tuple[str, str, str], pole: str, pin: str, long: Real, short: Real):
-        """Add a Peaucellier cell: the joint right of pole -> pin, the traced corner, the left joint."""
+        """Add a Peaucellier cell: the joint right of pole -> pin, the corner, the left joint."""
         right, corner, left = names
         found = planar.inversor(self.arm(pole, pin), long, short)
         self.limits += found.right.limits

@@ -18,44 +18,70 @@ The catalogue: mechanisms by the names that users type.
     from linkage_ros import mechanisms
     leg = mechanisms.create('jansen', m=15.0)
     leg.solve(0.5, points=('G',))
+
+    mechanisms.create('custom', d=0.08, joints=(
+        'O ground 0 0', 'Q ground d 0', 'A crank O 0.03', 'B dyad A Q 0.07 0.05 left'))
 """
 
 from functools import lru_cache
 from types import MappingProxyType
 
-from . import jansen, peaucellier, slotted_lever, water_drop
-from ..mechanism import Mechanism, Structure, checked_branches, checked_dimensions
+from . import custom, jansen, peaucellier, slotted_lever, water_drop
+from ..mechanism import checked_branches, checked_dimensions, Design, Mechanism, Structure
 
 TYPES = MappingProxyType({m.DESIGN.name: m for m in (
     water_drop, jansen, peaucellier, slotted_lever)})
 
-
-@lru_cache(maxsize=None)
-def _structure(type_, branches):
-    return Structure(TYPES[type_].DESIGN, dict(branches))
+CUSTOM = 'custom'
 
 
-def _module(type_):
+@lru_cache(maxsize=64)
+def _structure(design, branches):
+    return Structure(design, dict(branches))
+
+
+def design(type_: str, /, joints=None, tracer=None, dimensions=()) -> Design:
+    """
+    Return what a type is: its dimensions, joints, branches and tracer.
+
+    For 'custom' these follow from the lines of `joints` and the names of the dimensions given.
+
+    Raises
+    ------
+    ValueError
+        For an unknown type or a bad line; the text says what is allowed.
+
+    """
+    if type_ == CUSTOM:
+        return custom.design(custom.given_lines(joints), tracer, tuple(dimensions))
     if type_ not in TYPES:
-        raise ValueError(f'unknown mechanism type {type_!r}; allowed: {", ".join(TYPES)}')
-    return TYPES[type_]
+        raise ValueError(f'unknown mechanism type {type_!r}; allowed: {", ".join((*TYPES, CUSTOM))}')
+    if joints is not None or tracer is not None:
+        raise ValueError(f'joints and tracer are for type custom, not for {type_}')
+    return TYPES[type_].DESIGN
 
 
 def defaults(type_: str, /) -> dict:
-    """Return the catalogue dimensions [m] of a type; ValueError if there is no such type."""
-    return dict(_module(type_).DESIGN.dimensions)
+    """Return the dimensions [m] of a type; ValueError if it is not in the catalogue."""
+    if type_ not in TYPES:
+        raise ValueError(f'no defaults for type {type_!r}; allowed: {", ".join(TYPES)}')
+    return dict(TYPES[type_].DESIGN.dimensions)
 
 
-def create(type_: str, /, *, branches=None, **dimensions) -> Mechanism:
+def create(type_: str, /, *, branches=None, joints=None, tracer=None, **dimensions) -> Mechanism:
     """
-    Make a mechanism of the catalogue.
+    Make a mechanism.
 
     Parameters
     ----------
     type_ : str
-        One of TYPES.
+        One of TYPES, or 'custom'.
     branches : mapping, optional
-        Assembly signs, +1 or -1, by name; what is left out is as in the catalogue.
+        Assembly signs, +1 or -1, by joint; what is left out is as in the catalogue or as written.
+    joints : sequence of str, optional
+        For type 'custom': one line a joint, as `language` describes.
+    tracer : str, optional
+        For type 'custom': the joint whose curve is the locus. Default: the last.
     **dimensions : float or array-like
         Lengths [m]; what is left out is as in the catalogue. Arrays are broadcast against the
         crank angle.
@@ -67,13 +93,16 @@ def create(type_: str, /, *, branches=None, **dimensions) -> Mechanism:
     Raises
     ------
     ValueError
-        For an unknown type, dimension or branch, and for a dimension that is not a finite
-        positive number; the text says what is allowed.
+        For an unknown type, dimension or branch, a dimension that is not a finite positive
+        number, and a line that is wrong; the text says what is allowed.
 
     """
-    module = _module(type_)
-    design = module.DESIGN
-    signs = checked_branches(design, branches)
-    lengths = checked_dimensions(design, dimensions)
-    structure = _structure(type_, tuple(signs.items()))
-    return getattr(module, 'Mechanism', Mechanism)(design, structure, lengths, signs)
+    chosen = design(type_, joints, tracer, dimensions)
+    lengths = checked_dimensions(chosen, dimensions)
+    signs = checked_branches(chosen, branches)
+    structure = _structure(chosen, tuple(signs.items()))
+    kind = getattr(TYPES.get(type_), 'Mechanism', Mechanism)
+    made = kind(chosen, structure, lengths, signs)
+    if type_ == CUSTOM:
+        custom.check(made)
+    return made

@@ -32,12 +32,19 @@ import numpy as np
 from .. import mechanism
 from ..compiler import Program
 from ..expression import (
-    angle, arctangent, cosine, dimension, exact_sum, root, sine, square, where,
+    angle,
+    arctangent,
+    cosine,
+    dimension,
+    exact_sum,
+    root,
+    sine,
+    square,
+    where,
 )
 from ..mechanism import Design
 from ..planar import GRAZE
 from ..reach import reachable_arcs
-
 
 DESIGN = Design('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 0.0}, tracer='L',
                 signed=frozenset('e'), joints=(
@@ -88,7 +95,7 @@ class Mechanism(mechanism.Mechanism):
             get there on this half of the slot.
 
         """
-        outputs = self._servo().over(np.asarray(lever_angle, float))
+        outputs = self._servo().over(lever_angle)
         half = self.branches['L']
         theta, slide = outputs[0::2][::half], outputs[1::2][::half]
         theta = np.where(half * slide > GRAZE * (self.dimensions['a'] + self.dimensions['b']),
