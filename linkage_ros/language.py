@@ -22,7 +22,7 @@ Linkages written down: one line a joint, in the order they are placed.
     P line A B d              on the line of bar AB, d from A; negative: on the other side of A
     B mirror O A C            mirror image of O in the line AC: the far corner of a kite
     B C D inversor P A a b    Peaucellier cell from pole P to pin A: long bars a, rhombus b
-    L slot Q A e out d        tip, d from Q, of a lever about Q; A slides in its slot, e to its left
+    L slot Q A e out d        tip, d from Q, of a lever about Q; A in its slot, e to its left
     S slider A r G p out      block on a line through G in direction p [rad], on a rod r from A
 
 `left` and `right` are as seen along the first two joints; `out` is the half of a slot on the

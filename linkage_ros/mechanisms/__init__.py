@@ -55,7 +55,8 @@ def design(type_: str, /, joints=None, tracer=None, dimensions=()) -> Design:
     if type_ == CUSTOM:
         return custom.design(custom.given_lines(joints), tracer, tuple(dimensions))
     if type_ not in TYPES:
-        raise ValueError(f'unknown mechanism type {type_!r}; allowed: {", ".join((*TYPES, CUSTOM))}')
+        raise ValueError(f'unknown mechanism type {type_!r}; '
+                         f'allowed: {", ".join((*TYPES, CUSTOM))}')
     if joints is not None or tracer is not None:
         raise ValueError(f'joints and tracer are for type custom, not for {type_}')
     return TYPES[type_].DESIGN
