@@ -136,6 +136,7 @@ class Sketch:
         bars = [place - self.points[end].place for end in (first, second)]
         self._pair(name, first, second, planar.Dyad(*bars, ()),
                    self.distance(first, point), self.distance(second, point))
+        self.points[name].place = place
 
     def inversor(self, names: Tuple[str, str, str], pole: str, pin: str, long: Real, short: Real):
         """Add a Peaucellier cell: the joint right of pole -> pin, the corner, the left joint."""
