@@ -62,9 +62,6 @@ clean: ## Remove everything that was made
 	rm -rf .venv .venv-* build build-* install install-* log log-* demo/out
 
 $(install)/.built: $(venv)/.installed $(sources)
-	@command -v cmake >/dev/null || { echo 'cmake is missing: install it.' >&2; exit 1; }
-	@command -v $${CXX:-c++} >/dev/null && command -v $${CC:-cc} >/dev/null \
-	  || { echo 'A C and C++ compiler is missing: install gcc and g++.' >&2; exit 1; }
 	@colcon --log-base $(log) build --build-base $(build) --install-base $(install) --cmake-args \
 	  -DBUILD_TESTING=OFF -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH=$(CURDIR)/$(venv) \
 	  -DCMAKE_PROJECT_INCLUDE=$(CURDIR)/wheels/prefix.cmake -DPython3_EXECUTABLE=$(bin)/python
@@ -75,6 +72,9 @@ $(venv)/.installed: $(requirements)
 	  'among $(candidates): install one or name it with PYTHON=.' >&2; exit 1; }
 	@$(PYTHON) -c "$(usable)" 2>/dev/null || { echo '$(PYTHON) does not run, is not from 3.10 to' \
 	  '3.14, or lacks its headers or venv.' >&2; exit 1; }
+	@command -v cmake >/dev/null || { echo 'cmake is missing: install it.' >&2; exit 1; }
+	@command -v $${CXX:-c++} >/dev/null && command -v $${CC:-cc} >/dev/null \
+	  || { echo 'A C and C++ compiler is missing: install gcc and g++.' >&2; exit 1; }
 	@echo 'Installing ROS 2 $(DISTRO) into $(venv): about a minute, once.'
 	@$(PYTHON) -m venv $(venv)
 	@python -m pip install -qq $(requirements:%=-r %)

@@ -1,0 +1,132 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Run a scene's nodes, listen to them from outside, check what they sent, and draw it.
+
+Ends with an error if anything is missing, if a bar's length is off, or if a node does not end
+well when it is interrupted.
+"""
+
+import math
+from pathlib import Path
+import signal
+import sys
+
+try:
+    from linkage_ros import scene
+    from listener import Listener
+    from motion import lever_error, Motion
+    from nodes import DemoError, Nodes, unused_domain
+    import pictures
+    from tqdm import tqdm
+except ImportError as error:
+    sys.exit(f'demo: {error}; `make demo` installs and builds what is needed')
+
+HERE = Path(__file__).parent
+SCENE = HERE.parent / 'config' / 'all.yaml'
+OUT = HERE / 'out'
+SECONDS = 10.0
+ANIMATED_SECONDS = 2.0 * math.pi
+
+# Lever angles [degrees] for the service; the last is out of reach.
+LEVER_ANGLES = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)
+LENGTH_TOLERANCE = 1e-12
+ANGLE_TOLERANCE = 1e-12
+
+
+def main() -> int:
+    """Run the demo; return the exit code of the process."""
+    # However it ends, no node is left behind.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        machines = list(scene.load(SCENE).machines.values())
+        motions, answer = observe(machines)
+        report_motions(motions)
+        report_answer(next(m for m in machines if m.linkage.type == 'slotted_lever'), answer)
+        draw(motions)
+    except DemoError as error:
+        print(f'demo: {error}', file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+def observe(machines):
+    """Return what the mechanisms sent, and what the service answered."""
+    domain = unused_domain()
+    print(f'Starting three nodes on {SCENE.name}, ROS_DOMAIN_ID {domain} ...')
+    names = [machine.name for machine in machines]
+    with Nodes(SCENE, domain) as nodes, Listener(names, domain, nodes.check) as listener:
+        listener.discover()
+        print(f'Listening for {SECONDS:g} s ...')
+        listener.listen(SECONDS)
+        answer = listener.servo_angles([math.radians(angle) for angle in LEVER_ANGLES])
+        for name, code in nodes.stop().items():
+            if code != 0:
+                raise DemoError(f'{name} ended with exit code {code} when it was interrupted')
+    return [Motion(machine, listener.joint_states[machine.name], listener.markers[machine.name],
+                   listener.locus[machine.name][-1]) for machine in machines], answer
+
+
+def report_motions(motions):
+    """Print a line a mechanism; raise DemoError if a bar's length is off."""
+    print('\nmechanism      joint states  markers  rate [Hz]  length error  traced curve [m]')
+    worst = 0.0
+    for motion in motions:
+        error = motion.length_error()
+        worst = max(worst, error)
+        width, height = motion.extent
+        print(f'{motion.machine.name:14} {motion.joint_states:12} {len(motion.times):8} '
+              f'{motion.rate:10.1f}  {error:12.1e}  {width:.3g} x {height:.3g}')
+    print('(length error: largest of all bars and messages, as a part of the longest bar)')
+    if not worst <= LENGTH_TOLERANCE:
+        raise DemoError(f'a bar is off by {worst:.1e} of the longest bar, more than '
+                        f'{LENGTH_TOLERANCE:.0e}')
+
+
+def report_answer(machine, answer):
+    """Print a line a lever angle; raise DemoError if the answer is not what was asked for."""
+    print('\nlever [deg]  servo [deg]  d lever / d servo  error [rad]')
+    for lever, servo, reduction, reachable in zip(
+            LEVER_ANGLES, answer.servo_angle, answer.reduction, answer.reachable):
+        if reachable:
+            error = lever_error(machine.linkage, math.radians(lever), servo)
+            print(f'{lever:11.1f}  {math.degrees(servo):11.4f}  {reduction:17.6f}  {error:11.1e}')
+            if not error <= ANGLE_TOLERANCE:
+                raise DemoError(f'the servo angle for {lever:g} degrees puts the lever '
+                                f'{error:.1e} rad off')
+        else:
+            print(f'{lever:11.1f}  unreachable')
+    print(f'servo_inverse says: {answer.message}')
+    if list(answer.reachable) != [True] * (len(LEVER_ANGLES) - 1) + [False]:
+        raise DemoError('servo_inverse did not reach all lever angles but the last')
+
+
+def draw(motions):
+    """Draw the pictures."""
+    OUT.mkdir(exist_ok=True)
+    print()
+    for motion in tqdm(motions, 'portraits', unit='picture'):
+        pictures.portrait(motion, OUT / f'{motion.machine.name}.png')
+    pictures.animation(motions, OUT / 'all.gif', ANIMATED_SECONDS,
+                       lambda times: tqdm(times, 'animation', unit='frame'))
+    print(f'\nPictures: {OUT}')
+    for file in sorted(OUT.iterdir()):
+        print(f'  {file.name}')
+
+
+if __name__ == '__main__':
+    sys.exit(main())

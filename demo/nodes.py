@@ -1,0 +1,94 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The three nodes of linkage_ros as processes of their own, as `ros2 run` would start them."""
+
+import os
+from pathlib import Path
+import signal
+import socket
+import subprocess
+
+from ament_index_python.packages import get_package_prefix, PackageNotFoundError
+
+EXECUTABLES = ('crank_driver', 'kinematics', 'servo_inverse')
+SECONDS_TO_END = 10.0
+
+# Where DDS listens: the first participant of each domain, and the domains below the ports that
+# Linux hands out to everybody.
+FIRST_PORT, PORTS_PER_DOMAIN, DOMAINS = 7410, 250, 101
+
+
+class DemoError(Exception):
+    """What is missing or went wrong, in one sentence."""
+
+
+def unused_domain() -> int:
+    """Return a ROS_DOMAIN_ID that nobody on this machine uses."""
+    start = os.getpid()
+    for domain in (1 + (start + i) % DOMAINS for i in range(DOMAINS)):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(('', FIRST_PORT + PORTS_PER_DOMAIN * domain))
+                return domain
+            except OSError:
+                continue
+    raise DemoError(f'every ROS_DOMAIN_ID from 1 to {DOMAINS} is in use on this machine')
+
+
+class Nodes:
+    """The running nodes of a scene; a context that leaves none behind."""
+
+    def __init__(self, scene_file: Path, domain: int):
+        try:
+            folder = Path(get_package_prefix('linkage_ros'), 'lib', 'linkage_ros')
+        except PackageNotFoundError:
+            raise DemoError('linkage_ros is not installed where ROS looks: build it and source '
+                            'install/setup.bash') from None
+        self._commands = {name: [folder / name, '--ros-args', '--params-file', scene_file]
+                          for name in EXECUTABLES}
+        self._environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
+        self._processes = {}
+
+    def __enter__(self):
+        for name, command in self._commands.items():
+            try:
+                # In a session of its own: Ctrl-C reaches the demo alone, which ends the nodes.
+                self._processes[name] = subprocess.Popen(
+                    command, env=self._environment, start_new_session=True)
+            except OSError as error:
+                self.stop()
+                raise DemoError(f'{name} cannot be started: {error}') from None
+        return self
+
+    def __exit__(self, *_):
+        self.stop()
+
+    def check(self):
+        """Raise DemoError if a node is no longer there."""
+        for name, process in self._processes.items():
+            if process.poll() is not None:
+                raise DemoError(f'{name} died with exit code {process.returncode}')
+
+    def stop(self) -> dict:
+        """Interrupt the nodes that still run; return the exit code of each."""
+        for process in self._processes.values():
+            process.send_signal(signal.SIGINT)
+        for process in self._processes.values():
+            try:
+                process.wait(SECONDS_TO_END)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        return {name: process.returncode for name, process in self._processes.items()}
