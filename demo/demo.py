@@ -67,11 +67,11 @@ def main() -> int:
 def observe(machines):
     """Return what the mechanisms sent, and what the service answered."""
     domain = unused_domain()
-    print(f'Starting three nodes on {SCENE.name}, ROS_DOMAIN_ID {domain} ...')
+    print(f'Starting three nodes on {SCENE.name}, ROS_DOMAIN_ID {domain} ...', flush=True)
     names = [machine.name for machine in machines]
     with Nodes(SCENE, domain) as nodes, Listener(names, domain, nodes.check) as listener:
         listener.discover()
-        print(f'Listening for {SECONDS:g} s ...')
+        print(f'Listening for {SECONDS:g} s ...', flush=True)
         listener.listen(SECONDS)
         answer = listener.servo_angles([math.radians(angle) for angle in LEVER_ANGLES])
         for name, code in nodes.stop().items():
