@@ -23,7 +23,7 @@ already. The rule is
 
 with a number wherever the linkage can be assembled and NaN wherever it cannot; within `GRAZE`
 sensitivities of a limit either will do. Points and velocities are vectors and their ulp is that
-of the larger component; angles are compared modulo a turn.
+of the larger component; angles are compared modulo a turn, so that theirs is the ulp of pi.
 
 Angles beyond a turn are charged half an ulp of pi only, as if they were exact: the library is to
 reduce them without loss.
@@ -33,13 +33,13 @@ import math
 from typing import Dict, List, NamedTuple, Optional
 
 import numpy as np
-
 import reference
 from reference import mp
 
 RULE = 4.0
 GRAZE = 32.0
-# A velocity may also err by this many u = 2^-53 of the output's top speed.
+# A velocity or rate may also err by this many u = 2^-53 of its top speed over a turn; its ratio
+# is counted so that this, too, is RULE.
 SPEED_RULE = 60.0
 UNIT = 2.0 ** -53
 
@@ -111,12 +111,12 @@ def truth(case, theta, links, rates=False):
     return _truth(evaluate, case.dimensions, float(theta))
 
 
-def servo_truth(dimensions, slot, lever_angle, cut):
+def servo_truth(dimensions, half, lever_angle, cut):
     """Return the `Truth` of a lever's inverse on one cut of its slot with the crank circle."""
     def evaluate(length, angle):
         found = reference.servo(length, angle, cut)
         return ({'angle servo': mp.expj(found.angle)},
-                {'servo': found.gap, 'slide': slot * found.slide})
+                {'servo': found.gap, 'slide': half * found.slide})
     return _truth(evaluate, dimensions, float(lever_angle))
 
 
@@ -216,21 +216,29 @@ def _difference(name, before, after):
 
 def measure(mechanism, thetas, rates=False, label='') -> List[Row]:
     """Measure all that a mechanism answers at crank angles [rad], `rates` with the derivatives."""
-    thetas = np.asarray(thetas, float)
-    case = Case(mechanism.type, mechanism.dimensions, thetas, mechanism.branches, label)
-    return judge(case, answers(mechanism, thetas, rates), mechanism.links, rates)
+    case = case_of(mechanism, thetas, label)
+    return judge(case, answers(mechanism, case.thetas, rates), mechanism.links, rates)
 
 
-def judge(case, found, links, rates=False) -> List[Row]:
-    """Measure {output: array} against the truth at every angle of a case."""
+def case_of(mechanism, thetas, label=''):
+    """Return a mechanism and its crank angles [rad] as a `Case`."""
+    return Case(mechanism.type, mechanism.dimensions, np.asarray(thetas, float),
+                mechanism.branches, label)
+
+
+def judge(case, found, links, rates=False, exact=None) -> List[Row]:
+    """Measure {output: array} at every angle of a case; `exact` are its truths, if known."""
+    exact = exact or [truth(case, theta, links, rates) for theta in case.thetas]
     top = _top_speeds(case, links) if rates else {}
-    rows = []
-    for index, theta in enumerate(case.thetas):
-        exact = truth(case, theta, links, rates)
-        for output, results in found.items():
-            due = _due(case.kind, output, exact.closures, links)
-            rows.append(_row(case, theta, output, results[index], exact, due, top))
-    return rows
+    return [_row(case, theta, output, results[index], exact[index],
+                 _due(case.kind, output, exact[index].closures, links), top)
+            for index, theta in enumerate(case.thetas) for output, results in found.items()]
+
+
+def verdict(case, angle, output, result, exact):
+    """Return the `Row` of one result that depends on every closure of its truth."""
+    return _row(case, angle, output, np.asarray(result), exact,
+                _due_of(exact.closures.values()), {})
 
 
 def _due(kind, output, closures, links):
@@ -279,7 +287,9 @@ def _row(case, theta, output, result, exact, due, top):
         error = float(_error(output, result, exact.values[output]))
         excess = max(0.0, error - _ulp(case, output, result, due))
         ratio = excess / spread if excess else 0.0
-        if ratio > RULE and error > SPEED_RULE * UNIT * top.get(output, 0.0):
+        if rate:
+            ratio = min(ratio, RULE * error / (SPEED_RULE * UNIT * top[output]))
+        if ratio > RULE:
             problem = 'rule'
     return Row(case.kind, case.label, output, math.inf if 'NaN' in problem else ratio, problem,
                error, spread, float(theta), case.dimensions, case.branches)
@@ -287,10 +297,11 @@ def _row(case, theta, output, result, exact, due, top):
 
 def _ulp(case, output, result, due):
     """Return an ulp of the result; on a limit, where it may be zero by itself, of its scale."""
+    if output.startswith('angle'):
+        return float(np.spacing(math.pi))
     size = np.max(np.abs(result))
     if due == 'either':
-        scale = math.pi if output.startswith('angle') else max(case.dimensions.values())
-        size = max(size, scale)
+        size = max(size, *case.dimensions.values())
     return float(np.spacing(size))
 
 
@@ -340,10 +351,10 @@ def measure_servo(lever, angles, label='') -> List[Row]:
     Each crank angle on the lever's half of the slot is asked for as the one nearest to the truth.
     """
     rows = []
-    slot = lever.branches['slot']
+    half = lever.branches['L']
     case = Case(lever.type, lever.dimensions, angles, lever.branches, label)
     for angle in angles:
-        cuts = [servo_truth(lever.dimensions, slot, angle, cut) for cut in (1, -1)]
+        cuts = [servo_truth(lever.dimensions, half, angle, cut) for cut in (1, -1)]
         due = [_due_of(exact.closures.values()) for exact in cuts]
         wanted = 'number' if 'number' in due else 'nan' if due == ['nan', 'nan'] else ''
         for exact, state in zip(cuts, due):

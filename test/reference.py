@@ -70,7 +70,7 @@ BRANCHES = {
     'water_drop': {},
     'jansen': {'C': LEFT, 'E': RIGHT, 'F': LEFT},
     'peaucellier': {},
-    'slotted_lever': {'slot': 1},
+    'slotted_lever': {'L': 1},
 }
 
 
@@ -137,7 +137,7 @@ def servo(length, lever_angle, cut):
 
 
 def _water_drop(theta, sides, a):
-    """The angle OCB is twice OCA, which has the sign of the crank's sine."""
+    """Turn CO by twice the angle OCA, which has the sign of the crank's sine."""
     sine = mp.sin(theta)
     with mp.extraprec(-2 * min(0, mp.mag(sine)) if sine else 0):
         A = I * a * mp.expj(theta)
@@ -181,11 +181,11 @@ def _other_corner(A, B, D, b):
 
 
 def _slotted_lever(theta, sides, a, b, e):
-    """The slot touches the circle about Q whose radius is the slot's offset, at the foot."""
+    """Lay the slot from the pin as a tangent, at the foot, to the circle of its offset about Q."""
     A = I * a * mp.expj(theta)
     Q = mp.mpc(0, -b)
     gap = squared(A - Q) - e * e
-    slide = sides['slot'] * mp.sqrt(gap if gap > 0 else mp.zero)
+    slide = sides['L'] * mp.sqrt(gap if gap > 0 else mp.zero)
     foot, _ = circles(Q, abs(e), A, abs(slide), LEFT if slide * e > 0 else RIGHT)
     lever = (A - foot) / slide if abs(slide) > abs(e) else (foot - Q) / (I * e)
     tip = Q + lever * max(9 * b / 5, a + b)
@@ -202,7 +202,7 @@ _PLACE = {
 _BARS = {
     'water_drop': lambda a: {
         'OA': a, 'AB': a, 'CB': 2 * a, 'AP': 3 * a, 'BP': 4 * a, 'OC': 2 * a},
-    'jansen': lambda a, b, c, d, e, f, g, h, i, j, k, l, m: {
+    'jansen': lambda a, b, c, d, e, f, g, h, i, j, k, l, m: {  # noqa: E741
         'OA': m, 'BC': b, 'AC': j, 'BD': d, 'CD': e, 'BE': c, 'AE': k, 'EF': g, 'DF': f,
         'EG': i, 'FG': h, 'OB': mp.hypot(a, l)},
     'peaucellier': lambda r, a, b: {

@@ -1,0 +1,307 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Measure how many digits the linkages keep, against the truth in 80 digits.
+
+    python benchmark/stability.py --samples 100000
+
+Three questions are asked of every mechanism of the catalogue: do the bars keep their length and is
+NaN given exactly where nothing can be assembled (all samples, in float64); how large is the error
+in units of the input's own uncertainty (a part of them, against multiprecision, on the catalogue's
+dimensions and on random and degenerate ones); is the reach what brute force finds. The formulas of
+the original documents go through the same check. The measure and the hard cases are those of
+the tests: test/accuracy.py, test/stress.py. Exits with 1 if the library breaks a rule.
+"""
+
+import argparse
+import json
+import math
+import multiprocessing
+from pathlib import Path
+import platform
+import sys
+
+import numpy as np
+from tqdm import tqdm
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
+
+import accuracy  # noqa: E402
+import brute_force  # noqa: E402
+from linkage_ros import mechanisms  # noqa: E402
+import reference  # noqa: E402
+import stress  # noqa: E402
+
+from benchmark import original_formulas  # noqa: E402
+
+# One in so many samples is compared with the multiprecision truth, once on the catalogue's
+# dimensions and once on random ones; one in four of these with its velocities and rates.
+EXACT, RATES = 25, 4
+CHUNK = 50
+UNIT = 2.0 ** -53
+
+
+def main(args=None):
+    """Run all tasks on all cores, print the tables and write them as JSON."""
+    options = parse(args)
+    tasks = [task for kind in options.mechanisms for task in plan(kind, options)]
+    with multiprocessing.get_context('spawn').Pool(options.jobs) as pool:
+        done = list(tqdm(pool.imap_unordered(run, tasks), total=len(tasks), unit='chunk'))
+    report = {
+        'seed': options.seed, 'samples': options.samples, 'python': platform.python_version(),
+        'numpy': np.__version__, 'machine': platform.machine(),
+        'accuracy': accuracy_table([result for name, result in done if name == 'accuracy']),
+        'closure': closure_table([result for name, result in done if name == 'closure']),
+        'reach': reach_table([result for name, result in done if name == 'reach']),
+    }
+    if options.output:
+        Path(options.output).write_text(json.dumps(report, indent=1) + '\n')
+    show(report)
+    return int(any(row['broken'] for row in report['accuracy'] if row['method'] == 'library')
+               or any(row['wrong'] for row in report['closure'] + report['reach']))
+
+
+def parse(args):
+    """Return the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
+    parser.add_argument('--samples', type=int, default=100_000, help='angles a mechanism')
+    parser.add_argument('--designs', type=int, default=10_000, help='reaches a mechanism')
+    parser.add_argument('--mechanisms', nargs='+', default=list(stress.CATALOGUE),
+                        choices=list(stress.CATALOGUE))
+    parser.add_argument('--jobs', type=int, default=2)
+    parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--output', default='stability.json', help='JSON file, "" for none')
+    return parser.parse_args(args)
+
+
+def plan(kind, options):
+    """Return the tasks of a mechanism as (function name, kind, seed, count, ...)."""
+    exact = max(1, options.samples // EXACT // CHUNK)
+    tasks = [('closure', kind, (options.seed, 0, i), max(1, options.samples // 20), False)
+             for i in range(20)]
+    for i in range(exact):
+        rates = i % RATES == 0
+        tasks += [('catalogue', kind, (options.seed, 1, i), CHUNK, rates),
+                  ('random', kind, (options.seed, 2, i), CHUNK, rates)]
+        if kind == 'slotted_lever':
+            tasks.append(('servo', kind, (options.seed, 3, i), CHUNK, False))
+    tasks += [('reach', kind, (options.seed, 4, i), max(1, options.designs // 20), False)
+              for i in range(20)]
+    return tasks
+
+
+def run(task):
+    """Run one task with a generator of its own; returns (table, rows)."""
+    name, kind, seed, count, rates = task
+    return TASKS[name](kind, np.random.default_rng(seed), count, rates)
+
+
+# --- tasks --------------------------------------------------------------------------------------
+
+def closure(kind, rng, count, _):
+    """Check bars and NaN of many angles in float64, on the catalogue's dimensions."""
+    mechanism = catalogued(kind, rng)
+    theta = stress.angles(rng, count, ends(mechanism.reach()))
+    gap = brute_force.gap(kind, mechanism.dimensions, theta, mechanism.branches)
+    points = mechanism.solve(theta)
+    placed = np.all([np.isfinite(place).all(-1) for place in points.values()], axis=0)
+    wrong = (np.abs(gap) > brute_force.DOUBT) & (placed != (gap > 0.0))
+    stretch = max(np.max(np.abs(np.hypot(*(points[p] - points[q])[placed].T) - length), initial=0)
+                  for (p, q), length in mechanism.bar_lengths.items())
+    return 'closure', (kind, count, int(np.isnan(gap).sum() + (~placed).sum()), int(wrong.sum()),
+                       float(stretch / mechanism.longest / UNIT))
+
+
+def catalogue(kind, rng, count, rates):
+    """Measure one of the catalogue's dimensions, on random branches."""
+    return 'accuracy', measured(catalogued(kind, rng), rng, count, rates, 'catalogue')
+
+
+def random(kind, rng, count, rates):
+    """Measure random and nearly degenerate dimensions, a few angles each."""
+    rows = []
+    for _ in range(count // 5):
+        branches = branched(kind, rng)
+        mechanism = mechanisms.create(kind, branches=branches, **stress.dimensions(kind, rng))
+        rows += measured(mechanism, rng, 5, rates, 'random')
+    return 'accuracy', rows
+
+
+def servo(kind, rng, count, _):
+    """Measure the inverse of the slotted lever on random dimensions."""
+    rows = []
+    for _ in range(count // 5):
+        lever = mechanisms.create(kind, branches=branched(kind, rng),
+                                  **stress.dimensions(kind, rng))
+        angles = stress.angles(rng, 5, ends(lever.lever_reach()), turns=1.0)
+        rows += with_method('library', accuracy.measure_servo(lever, angles, 'random'))
+        rows += with_method('original', original_servo(lever, angles))
+    return 'accuracy', rows
+
+
+def reach(kind, rng, count, _):
+    """Compare the reach of random dimensions with brute force."""
+    theta = np.linspace(-math.pi, math.pi, 721)
+    wrong, full, partial = [], 0, 0
+    for _ in range(count):
+        mechanism = mechanisms.create(kind, branches=branched(kind, rng),
+                                      **stress.dimensions(kind, rng))
+        arcs = mechanism.reach()
+        full += arcs == [(-math.pi, math.pi)]
+        partial += len(arcs) > 0 and arcs != [(-math.pi, math.pi)]
+        gap = brute_force.gap(kind, mechanism.dimensions, theta, mechanism.branches)
+        held = brute_force.inside(arcs, theta)
+        if np.any((np.abs(gap) > brute_force.DOUBT) & (held != (gap > 0.0))):
+            wrong.append((mechanism.dimensions, mechanism.branches))
+    return 'reach', (kind, count, full, partial, wrong)
+
+
+TASKS = {'closure': closure, 'catalogue': catalogue, 'random': random, 'servo': servo,
+         'reach': reach}
+
+
+def measured(mechanism, rng, count, rates, label):
+    """Measure the library and, where they know the design, the original formulas."""
+    case = accuracy.case_of(mechanism, stress.angles(rng, count, ends(mechanism.reach())), label)
+    links = mechanism.links
+    exact = [accuracy.truth(case, theta, links, rates) for theta in case.thetas]
+    found = accuracy.answers(mechanism, case.thetas, rates)
+    rows = with_method('library', accuracy.judge(case, found, links, rates, exact))
+    usual = mechanism.branches == reference.BRANCHES[mechanism.type]
+    if usual and not (case.kind == 'slotted_lever' and case.dimensions['e']):
+        found = original_formulas.solve(case.kind, case.dimensions, case.thetas)
+        if case.kind == 'slotted_lever':
+            found['angle lever'] = original_formulas.lever_angle(
+                case.thetas, case.dimensions['a'], case.dimensions['b'])
+        rows += with_method('original', accuracy.judge(case, found, links, False, exact))
+    return rows
+
+
+def original_servo(lever, angles):
+    """Measure the second sketch's asin, which knows one of the two branches."""
+    a, b, e = (lever.dimensions[name] for name in 'abe')
+    if e or lever.branches['L'] < 0:
+        return []
+    case = accuracy.case_of(lever, angles, 'random')
+    rows = []
+    for angle, found in zip(angles, original_formulas.servo_angle(angles, a, b)):
+        exact = accuracy.servo_truth(lever.dimensions, 1, angle, 1)
+        rows.append(accuracy.verdict(case, angle, 'angle servo', found, exact))
+    return rows
+
+
+def with_method(method, rows):
+    """Return rows as (method, row) without the outputs that cannot be wrong."""
+    return [(method, row) for row in rows if row.sensitivity > 0.0]
+
+
+def catalogued(kind, rng):
+    """Return one of the catalogue's linkages on random branches."""
+    designs = stress.CATALOGUE[kind]
+    return mechanisms.create(kind, branches=branched(kind, rng),
+                             **designs[rng.integers(len(designs))])
+
+
+def branched(kind, rng):
+    """Return random assembly signs, the usual ones half of the time."""
+    usual = reference.BRANCHES[kind]
+    if rng.random() < 0.5:
+        return dict(usual)
+    return {name: int(rng.choice((-1, 1))) for name in usual}
+
+
+def ends(arcs):
+    """Return the limits of a reach, none for a full turn."""
+    return [] if arcs == [(-math.pi, math.pi)] else [end for arc in arcs for end in arc]
+
+
+# --- tables -------------------------------------------------------------------------------------
+
+def accuracy_table(chunks):
+    """Return one row a mechanism, set, output and method: ratios, wrong NaN, worst case."""
+    groups = {}
+    for method, row in (entry for chunk in chunks for entry in chunk):
+        groups.setdefault((row.kind, row.label, row.output, method), []).append(row)
+    table = []
+    for (kind, label, output, method), rows in sorted(groups.items()):
+        ratios = np.array([row.ratio for row in rows if math.isfinite(row.ratio)] or [math.nan])
+        worst = max(rows, key=lambda row: (bool(row.problem), row.ratio))
+        problems = [row.problem for row in rows]
+        table.append({
+            'mechanism': kind, 'set': label, 'output': output, 'method': method,
+            'samples': len(rows), 'max': float(np.max(ratios)),
+            'p99.9': float(np.quantile(ratios, 0.999)), 'median': float(np.median(ratios)),
+            'nan': problems.count('NaN'), 'missed_nan': problems.count('missed NaN'),
+            'broken': sum(map(bool, problems)),
+            'worst': {'theta': worst.theta, 'dimensions': worst.dimensions,
+                      'branches': worst.branches, 'error': worst.error,
+                      'sensitivity': worst.sensitivity, 'problem': worst.problem}})
+    return table
+
+
+def closure_table(results):
+    """Return one row a mechanism: angles, NaN, wrong NaN, largest error of a bar in u L."""
+    return [{'mechanism': kind, 'samples': sum(r[1] for r in rows), 'nan': sum(r[2] for r in rows),
+             'wrong': sum(r[3] for r in rows), 'bar_error': max(r[4] for r in rows)}
+            for kind, rows in grouped(results)]
+
+
+def reach_table(results):
+    """Return one row a mechanism: designs, full turns, partial ones, disagreements."""
+    return [{'mechanism': kind, 'designs': sum(r[1] for r in rows),
+             'full': sum(r[2] for r in rows), 'partial': sum(r[3] for r in rows),
+             'wrong': sum(len(r[4]) for r in rows),
+             'examples': [example for r in rows for example in r[4]][:5]}
+            for kind, rows in grouped(results)]
+
+
+def grouped(results):
+    """Return results by their first entry, the mechanism."""
+    groups = {}
+    for result in results:
+        groups.setdefault(result[0], []).append(result)
+    return sorted(groups.items())
+
+
+def show(report):
+    """Print the tables."""
+    print('\nerror / sensitivity (rule: <= 4, after 1 ulp of the result); NaN wrong / missed')
+    print(f'{"mechanism":14}{"set":10}{"output":18}{"method":9}{"samples":>8}{"max":>9}'
+          f'{"99.9 %":>9}{"median":>9}{"NaN":>6}{"missed":>7}{"broken":>7}')
+    for row in report['accuracy']:
+        print(f'{row["mechanism"]:14}{row["set"]:10}{row["output"]:18}{row["method"]:9}'
+              f'{row["samples"]:8}{row["max"]:9.2g}{row["p99.9"]:9.2g}{row["median"]:9.2g}'
+              f'{row["nan"]:6}{row["missed_nan"]:7}{row["broken"]:7}')
+    print('\nworst output of the library')
+    for kind, rows in grouped([(row['mechanism'], row) for row in report['accuracy']
+                               if row['method'] == 'library']):
+        worst = max((row for _, row in rows), key=lambda row: (row['broken'], row['max']))
+        print(f'{kind:14}{worst["output"]} ({worst["set"]}): {worst["max"]:.3g}, '
+              f'{worst["worst"]}')
+    print('\nbars in float64: largest error in u x longest bar; NaN given, NaN wrong or missed')
+    for row in report['closure']:
+        print(f'{row["mechanism"]:14}{row["samples"]:8} angles  {row["bar_error"]:.3g} uL  '
+              f'{row["nan"]} NaN  {row["wrong"]} wrong')
+    print('\nreach against brute force')
+    for row in report['reach']:
+        print(f'{row["mechanism"]:14}{row["designs"]:8} designs  {row["full"]} full turns  '
+              f'{row["partial"]} partial  {row["wrong"]} disagreements')
+        for example in row['examples']:
+            print(' ' * 14, *example)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,141 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The reach is what brute force finds, to the last digits of its ends."""
+
+from fractions import Fraction
+import math
+
+from accuracy import Case, truth
+import brute_force
+from linkage_ros import mechanisms
+import numpy as np
+import pytest
+import reference
+import stress
+
+KINDS = list(stress.CATALOGUE)
+TURN = [(-math.pi, math.pi)]
+
+
+def drawn(kind, seed, count):
+    """Yield random mechanisms of a kind, on random branches."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        branches = {name: int(rng.choice((-1, 1))) for name in reference.BRANCHES[kind]}
+        yield mechanisms.create(kind, branches=branches, **stress.dimensions(kind, rng))
+
+
+def told(mechanism, *more):
+    """Return what reproduces a failure."""
+    return f'{mechanism.type} {mechanism.dimensions} {mechanism.branches} {more}'
+
+
+@pytest.mark.parametrize('kind, count', [
+    ('water_drop', 5), ('jansen', 100), ('peaucellier', 300), ('slotted_lever', 300)])
+def test_the_reach_is_what_brute_force_finds(kind, count):
+    theta = np.linspace(-math.pi, math.pi, 1441)
+    for mechanism in drawn(kind, 1, count):
+        gap = brute_force.gap(kind, mechanism.dimensions, theta, mechanism.branches)
+        held = brute_force.inside(mechanism.reach(), theta)
+        wrong = (np.abs(gap) > brute_force.DOUBT) & (held != (gap > 0.0))
+        assert not wrong.any(), told(mechanism, theta[wrong])
+
+
+@pytest.mark.parametrize('kind, count', [
+    ('water_drop', 5), ('jansen', 40), ('peaucellier', 200), ('slotted_lever', 200)])
+def test_a_pose_exists_exactly_inside_the_reach(kind, count):
+    for mechanism in drawn(kind, 2, count):
+        arcs = mechanism.reach()
+        ends = [end for arc in arcs for end in arc]
+        theta = np.concatenate([np.linspace(-math.pi, math.pi, 101)] + [
+            end + np.array([-1e-6, 1e-6]) for end in ends])
+        theta = theta[(brute_force.distance(arcs, theta) > 1e-8) | (arcs == TURN)]
+        placed = np.isfinite(mechanism.solve(theta)[mechanism.tracer]).all(-1)
+        held = brute_force.inside(arcs, theta)
+        assert (placed == held).all(), told(mechanism, theta[placed != held])
+
+
+@pytest.mark.parametrize('kind, count', [
+    ('jansen', 25), ('peaucellier', 60), ('slotted_lever', 100)])
+def test_every_end_of_the_reach_is_a_limit_to_the_last_digits(kind, count):
+    ends = 0
+    for mechanism in drawn(kind, 3, count):
+        case = Case(kind, mechanism.dimensions, [], mechanism.branches)
+        for end in (end for arc in mechanism.reach() if [arc] != TURN for end in arc):
+            ends += 1
+            closures = truth(case, end, ()).closures
+            assert 'grazes' in closures.values(), told(mechanism, end, closures)
+    assert ends > 20
+
+
+@pytest.mark.parametrize('kind, count', [
+    ('water_drop', 5), ('jansen', 40), ('peaucellier', 200), ('slotted_lever', 200)])
+def test_arcs_are_given_in_order_and_start_in_the_first_turn(kind, count):
+    for mechanism in drawn(kind, 4, count):
+        arcs = mechanism.reach()
+        assert all(-math.pi <= lo < math.pi and lo < hi <= lo + 2 * math.pi for lo, hi in arcs)
+        assert all(before[1] < after[0] for before, after in zip(arcs, arcs[1:]))
+
+
+def test_an_inversor_turns_fully_only_with_equal_arms_and_a_short_crank():
+    for mechanism in drawn('peaucellier', 5, 300):
+        r, a, b = (Fraction(mechanism.dimensions[name]) for name in 'rab')
+        margin = (abs(a + b - 2 * r) if a == b else abs(a - b)) / (a + b)
+        if margin > 1e-14:
+            assert (mechanism.reach() == TURN) == (a == b and 2 * r <= a + b), told(mechanism)
+
+
+def test_a_lever_lets_the_crank_turn_fully_unless_the_offset_is_in_the_way():
+    for mechanism in drawn('slotted_lever', 6, 300):
+        a, b, e = (Fraction(mechanism.dimensions[name]) for name in 'abe')
+        if min(abs(abs(e) - abs(b - a)), abs(abs(e) - a - b)) / (a + b) > 1e-14:
+            assert (mechanism.reach() == TURN) == (abs(e) <= abs(b - a)), told(mechanism)
+            assert (mechanism.reach() == []) == (abs(e) > a + b), told(mechanism)
+
+
+@pytest.mark.parametrize('kind', ['water_drop', 'jansen', 'slotted_lever'])
+def test_the_catalogue_turns_fully(kind):
+    assert mechanisms.create(kind).reach() == TURN
+
+
+def test_the_inversor_of_the_original_document_ends_at_its_published_angle():
+    (lo, hi), = mechanisms.create('peaucellier').reach()
+    assert hi == -lo == pytest.approx(2 * math.acos(5 / 6), rel=1e-15)
+
+
+@pytest.mark.parametrize('half', [1, -1])
+def test_the_lever_reach_is_what_brute_force_finds(half):
+    lever = np.linspace(-math.pi, math.pi, 1441)
+    for mechanism in drawn('slotted_lever', 7, 300):
+        mechanism = mechanisms.create('slotted_lever', branches={'L': half},
+                                      **mechanism.dimensions)
+        gap = brute_force.lever_gap(mechanism.dimensions, lever, half)
+        held = brute_force.inside(mechanism.lever_reach(), lever)
+        wrong = (np.abs(gap) > brute_force.DOUBT) & (held != (gap > 0.0))
+        assert not wrong.any(), told(mechanism, lever[wrong])
+
+
+def test_the_lever_swings_between_the_textbook_angles():
+    (lo, hi), = mechanisms.create('slotted_lever', a=80.0, b=150.0).lever_reach()
+    assert hi == -lo == pytest.approx(math.asin(80 / 150), rel=1e-15)
+
+
+def test_the_lever_returns_quickly_by_the_textbook_ratio():
+    lever = mechanisms.create('slotted_lever', a=80.0, b=150.0)
+    (lo, hi), = lever.lever_reach()
+    forth = lever.servo_angle(hi) - lever.servo_angle(lo)
+    stroke = math.asin(80 / 150)
+    expected = (math.pi + 2 * stroke) / (math.pi - 2 * stroke)
+    assert forth / (2 * math.pi - forth) == pytest.approx(expected, rel=1e-6)
