@@ -118,6 +118,22 @@ def lengths(lines: Iterable[Line]) -> dict:
     return found
 
 
+def has_literal_lengths(lines: Iterable[Line]) -> bool:
+    """Return whether any line has a length, other than zero, that is no dimension's multiple."""
+    def literal(tree):
+        if isinstance(tree, ast.Constant):
+            return tree.value != 0.0
+        if isinstance(tree, ast.UnaryOp):
+            return literal(tree.operand)
+        if isinstance(tree, ast.BinOp) and isinstance(tree.op, (ast.Mult, ast.Div)):
+            return literal(tree.left) and literal(tree.right)
+        children = tree.args if isinstance(tree, ast.Call) else ast.iter_child_nodes(tree)
+        return any(map(literal, children))
+
+    return any(literal(_tree(line, arg)) for line in lines for kind, arg in line.arguments()
+               if kind in _NUMBERS and kind != 'ANGLE')
+
+
 def draw(sketch: Sketch, lines: Iterable[Line], symbols: Mapping[str, Real],
          signs: Mapping[str, int]):
     """Place the joints of a linkage, one line after the other."""

@@ -24,12 +24,16 @@ import numpy as np
 
 from . import language
 from .compiler import evaluate, Pose, Program
-from .expression import Complex, cross, derivative, Real, real
+from .expression import Complex, cross, derivative, dimension, Real, real, where
 from .reach import arcs
 from .sketch import Sketch
 
-# Squares of lengths, and sums of a few of them, must stay inside the range of float64.
-SHORTEST, LONGEST = 1e-150, 1e151
+SHORTEST, LONGEST = 1e-300, 1e300
+
+# Lengths beyond these are counted in a power of two of their own, which changes no bit of a
+# result and keeps squares and products of lengths inside the range of float64.
+SMALL, LARGE = 1e-30, 1e30
+UNIT = dimension('[m]')
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +67,11 @@ class Design:
         """The joints as constructions."""
         return language.parse(self.joints)
 
+    @cached_property
+    def has_literal_lengths(self) -> bool:
+        """Whether a length is written as a number, so that all count in metres."""
+        return language.has_literal_lengths(self.lines)
+
     @property
     def branches(self) -> dict:
         """The assembly sign, +1 or -1, of each joint that has two."""
@@ -88,14 +97,18 @@ class Structure:
 
     def _points(self, names):
         places = [self.sketch.points[n].place for n in names]
-        return [part for place in places for part in (place.x, place.y)]
+        return [in_metres(part) for place in places for part in (place.x, place.y)]
 
     def _velocities(self, names, crank=0):
         known = {}
         return [derivative(part, {crank: 1.0}, known) for part in self._points(names)]
 
     def _angles(self, names):
-        return [self.sketch.joint_values[n] for n in names]
+        values = self.sketch.joint_values
+        return [in_metres(values[n]) if self._slides(n) else values[n] for n in names]
+
+    def _slides(self, name):
+        return any(x.name == name and x.kind == 'prismatic' for x in self.sketch.links)
 
     def _rates(self, names, crank=0):
         known, turning = {}, {crank: 1.0}
@@ -109,7 +122,7 @@ class Structure:
 
         def rate(link):
             if link.kind == 'prismatic' or link.name in self.sketch.cranks:
-                return derivative(self.sketch.joint_values[link.name], turning, known)
+                return derivative(self._angles([link.name])[0], turning, known)
             return spin(link.name) - spin(link.parent)
 
         links = {link.name: link for link in self.sketch.links}
@@ -118,6 +131,11 @@ class Structure:
     def _margins(self, _):
         """Return each limit's margin, so much above its tolerance that a reached one is >= 0."""
         return [limit.margin + limit.tolerance for limit in self.sketch.limits]
+
+
+def in_metres(length: Real) -> Real:
+    """Return a length counted in metres."""
+    return where(abs(UNIT - 1.0) <= 0.0, length, length * UNIT)
 
 
 class Mechanism:
@@ -142,6 +160,7 @@ class Mechanism:
         self._design = design
         self._structure = structure
         self._accelerate = accelerate
+        self._lengths = _in_own_unit(self.dimensions, design.has_literal_lengths)
         self._evaluated = {}
         self._poses = {}
         self.links = tuple(link._replace(zero=float(self._value(link.zero)))
@@ -154,7 +173,7 @@ class Mechanism:
     @property
     def bar_lengths(self) -> dict:
         """The length [m] of each bar."""
-        return {(bar.first, bar.second): self._value(bar.length)
+        return {(bar.first, bar.second): self._value(in_metres(bar.length))
                 for bar in self._structure.sketch.bars}
 
     def triangles(self) -> dict:
@@ -166,13 +185,13 @@ class Mechanism:
     @property
     def frames(self) -> dict:
         """Where each link's joints lie [m], seen from the link: x along its bar."""
-        return {link: {name: (self._value(place.x), self._value(place.y))
+        return {link: {name: tuple(self._value(in_metres(x)) for x in (place.x, place.y))
                        for name, place in frame.items()}
                 for link, frame in self._structure.sketch.frames.items()}
 
     def _value(self, expression: Real):
         with np.errstate(all='ignore'):
-            return evaluate(expression, self.dimensions, self._evaluated)
+            return evaluate(expression, self._lengths, self._evaluated)
 
     @property
     def longest(self) -> float:
@@ -344,7 +363,7 @@ class Mechanism:
         if key not in self._poses:
             names = self._names(kind, wanted)
             program = self._structure.program(kind, names, *crank)
-            pose = program.bind(self.dimensions, self._evaluated, self._accelerate)
+            pose = program.bind(self._lengths, self._evaluated, self._accelerate)
             self._poses[key] = names, pose
         return self._poses[key]
 
@@ -359,6 +378,15 @@ class Mechanism:
                 raise ValueError(f'{self.type} has no {what} {name!r}; '
                                  f'allowed: {", ".join(allowed)}')
         return names
+
+
+def _in_own_unit(dimensions: Mapping, fixed: bool) -> dict:
+    """Return dimensions counted in a unit that is a power of two, and that unit in metres."""
+    longest = max((np.max(np.abs(length)) for length in dimensions.values()), default=1.0)
+    if fixed or SMALL < longest < LARGE:
+        return {**dimensions, UNIT.args[0]: 1.0}
+    unit = 2.0 ** np.frexp(longest)[1]
+    return {UNIT.args[0]: unit, **{name: length / unit for name, length in dimensions.items()}}
 
 
 def checked_dimensions(design: Design, given: Mapping) -> dict:

@@ -107,16 +107,17 @@ class Arm:
         """Return the cross product of the arm and the vector from its foot to a point."""
         return cross(self.vector, point - self.foot)
 
-    def within(self, radius: Real) -> Limit:
-        """Return the margin radius^2 - square."""
-        return self._limit(radius, (radius - self._length) * (radius + self._length))
+    def within(self, radius: Real, size: Real) -> Limit:
+        """Return the margin radius^2 - square; the radius is made from lengths up to size."""
+        return self._limit(radius, size, (radius - self._length) * (radius + self._length))
 
-    def beyond(self, radius: Real) -> Limit:
-        """Return the margin square - radius^2."""
-        return self._limit(radius, (self._length - radius) * (self._length + radius))
+    def beyond(self, radius: Real, size: Real) -> Limit:
+        """Return the margin square - radius^2; the radius is made from lengths up to size."""
+        return self._limit(radius, size, (self._length - radius) * (self._length + radius))
 
-    def _limit(self, radius, margin):
-        return Limit(margin, GRAZE * abs(radius) * (abs(radius) + self._span))
+    def _limit(self, radius, size, margin):
+        # At the limit the length is the radius: the square moves by that times what lengths do.
+        return Limit(margin, GRAZE * radius * (size + self._span))
 
 
 class CrankArm(Arm):
@@ -142,26 +143,26 @@ class CrankArm(Arm):
             return self._area
         return super().offset(point)
 
-    def within(self, radius: Real) -> Limit:
-        """Return the margin radius^2 - square."""
+    def within(self, radius: Real, size: Real) -> Limit:
+        """Return the margin radius^2 - square; the radius is made from lengths up to size."""
         g, m = self._g, self._m
-        return self._limit(radius, 1.0,
+        return self._limit(radius, size, 1.0,
                            exact_sum(radius, -g, -m) * exact_sum(radius, g, m),
                            exact_sum(radius, -g, m) * exact_sum(radius, g, -m))
 
-    def beyond(self, radius: Real) -> Limit:
-        """Return the margin square - radius^2."""
+    def beyond(self, radius: Real, size: Real) -> Limit:
+        """Return the margin square - radius^2; the radius is made from lengths up to size."""
         g, m = self._g, self._m
-        return self._limit(radius, -1.0,
+        return self._limit(radius, size, -1.0,
                            exact_sum(g, m, -radius) * exact_sum(g, m, radius),
                            exact_sum(g, -m, -radius) * exact_sum(g, -m, radius))
 
-    def _limit(self, radius, sign, start, end):
+    def _limit(self, radius, size, sign, start, end):
         gm, s, h = 4.0 * self._g * self._m, self._s, self._h
         # The smaller gap is the one next to which the margin can vanish.
         margin = where(abs(start) <= abs(end), start + sign * gm * square(s),
                        end - sign * gm * square(h))
-        tolerance = GRAZE * (square(radius) + gm)
+        tolerance = GRAZE * radius * (size + self._g + self._m)
         gap, half = (start, s) if sign > 0.0 else (end, h)
         grown = square_root(gm) * self._first_sign(sign)
         smooth = where(abs(gap) <= 0.0, grown * half, root(margin, tolerance))
@@ -209,7 +210,8 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) 
     v = side sqrt((r1 + r2)^2 - |w|^2) sqrt(|w|^2 - (r1 - r2)^2) / 2|w|^2; left of the arm for
     side = +1. At a change point of a crank arm the branch goes on smoothly if `smooth`.
     """
-    limits = arm.within(first + second), arm.beyond(abs(first - second))
+    size = first + second
+    limits = arm.within(size, size), arm.beyond(abs(first - second), size)
     roots = [x.smooth if smooth and x.smooth else x.root() for x in limits]
     twice = 2.0 * arm.square
     skew = (first - second) * (first + second) / twice
@@ -282,9 +284,13 @@ def slot(arm: Arm, offset: Real, half: float) -> Slot:
 
     w = l (t + i e) with the unit vector l along the lever and t = half sqrt(|w|^2 - e^2) [m].
     """
-    limit = arm.beyond(abs(offset))
+    limit = arm.beyond(abs(offset), abs(offset))
     slide = limit.root() * half
-    return Slot(arm.vector * Complex(slide, -offset) / arm.square, slide, limit)
+    skew = arm.vector * Complex(slide, -offset) / arm.square
+    central = abs(offset) <= 0.0
+    along = Complex(where(central, arm.vector.x / slide, skew.x),
+                    where(central, arm.vector.y / slide, skew.y))
+    return Slot(along, slide, limit)
 
 
 class Slider(NamedTuple):

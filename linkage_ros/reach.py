@@ -51,10 +51,11 @@ def arcs(margins: Callable, limits: Sequence[Limit], value: Callable) -> List[Ar
         From an expression of dimensions to its value.
 
     """
-    closed = [limit.crank == 0 for limit in limits]
-    ends = [end for limit, known in zip(limits, closed) if known
-            for end in _crank_ends(*map(value, (limit.start, limit.end, limit.turn)))]
-    for i in [i for i, known in enumerate(closed) if not known]:
+    closed = [limit for limit in limits if limit.crank == 0]
+    ends = [end for limit in closed
+            for end in _crank_ends(*map(value, (
+                limit.start, limit.end, limit.turn, limit.tolerance)))]
+    for i in [i for i, x in enumerate(limits) if x.margin.varies and x.crank != 0]:
         for lo, hi in _between(ends):
             ends += _bracketed(lambda theta, i=i: margins(theta)[i], lo, hi)
     return reachable_arcs(ends, lambda theta: bool(np.all(margins(theta) >= 0.0)))
@@ -78,9 +79,11 @@ def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool]) ->
             for lo, hi in joined]
 
 
-def _crank_ends(start: float, end: float, turn: float) -> List[float]:
+def _crank_ends(start: float, end: float, turn: float, tolerance: float) -> List[float]:
     """Return the crank angles where start h^2 + end s^2 vanishes; theta' = theta + turn."""
-    if not min(start, end) <= 0.0 <= max(start, end):
+    # A gap of nothing but rounding is a limit that is touched, and may be all there is.
+    start, end = (0.0 if abs(gap) <= tolerance else gap for gap in (start, end))
+    if start * end > 0.0:
         return []
     half = math.atan2(math.sqrt(abs(start)), math.sqrt(abs(end)))
     return [float(2.0 * half - turn), float(-2.0 * half - turn)]

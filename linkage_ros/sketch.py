@@ -120,6 +120,7 @@ class Sketch:
         vector, base, link = self._bar_between(first, second)
         corner = planar.triangle(base, to_first, to_second, side)
         self.triangles[name] = corner.y
+        self.limits.append(planar.Limit(abs(corner.y), real(0.0)))
         self._place(name, first, vector * corner, link, to_first)
         self._bar(second, name, vector * (corner - Complex(1.0, 0.0)), to_second, link)
         self._add_to_frame(name, first, second, link, corner)

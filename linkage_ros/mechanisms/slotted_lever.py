@@ -98,7 +98,7 @@ class Mechanism(mechanism.Mechanism):
         outputs = self._servo().over(lever_angle)
         half = self.branches['L']
         theta, slide = outputs[0::2][::half], outputs[1::2][::half]
-        theta = np.where(half * slide > GRAZE * (self.dimensions['a'] + self.dimensions['b']),
+        theta = np.where(half * slide > GRAZE * (self._lengths['a'] + self._lengths['b']),
                          theta, np.nan)
         if near is None:
             return np.where(np.isnan(theta[0]), theta[1], theta[0])[()]
@@ -125,5 +125,5 @@ class Mechanism(mechanism.Mechanism):
 
     def _servo(self):
         if 'servo' not in self._poses:
-            self._poses['servo'] = _inverse().bind(self.dimensions, self._evaluated)
+            self._poses['servo'] = _inverse().bind(self._lengths, self._evaluated)
         return self._poses['servo']
