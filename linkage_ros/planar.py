@@ -117,7 +117,7 @@ class Arm:
 
     def _limit(self, radius, size, margin):
         # At the limit the length is the radius: the square moves by that times what lengths do.
-        return Limit(margin, GRAZE * radius * (size + self._span))
+        return Limit(margin, GRAZE * abs(radius) * (size + self._span))
 
 
 class CrankArm(Arm):
@@ -134,6 +134,7 @@ class CrankArm(Arm):
         self.vector = -vector if reverse else vector
         self.square = square(g - m) + 4.0 * g * m * square(h)
         self._crank, self._along, self._turn = crank, -along if reverse else along, turn
+        self._line = along
         self._area = 2.0 * g * m * s * h * (1.0 if reverse else -1.0)
         self._g, self._m, self._s, self._h = g, m, s, h
 
@@ -162,12 +163,26 @@ class CrankArm(Arm):
         # The smaller gap is the one next to which the margin can vanish.
         margin = where(abs(start) <= abs(end), start + sign * gm * square(s),
                        end - sign * gm * square(h))
-        tolerance = GRAZE * radius * (size + self._g + self._m)
+        tolerance = GRAZE * abs(radius) * (size + self._g + self._m)
         gap, half = (start, s) if sign > 0.0 else (end, h)
         grown = square_root(gm) * self._first_sign(sign)
-        smooth = where(abs(gap) <= 0.0, grown * half, root(margin, tolerance))
+        smooth = where(abs(gap) <= tolerance, grown * half, root(margin, tolerance))
         return Limit(margin, tolerance, smooth, start, end,
                      arctangent(self._turn.y, self._turn.x), self._crank.angle.args[0])
+
+    def beyond_kite(self, k: Real) -> Complex:
+        """
+        Return pin + k (pin - image), the image being the crank centre's in the line of the arm.
+
+        The cross component is one product: next to a cusp, where its leading terms cancel, it
+        keeps every digit.
+        """
+        g, m, s, sin = self._g, self._m, self._s, 2.0 * self._s * self._h
+        lead = (g + m) * ((g + m) + k * (m - g))
+        across = m * sin * (lead - 4.0 * g * m * square(s)) / self.square
+        along = (1.0 + k) * m * (1.0 - 2.0 * square(s)) + \
+            2.0 * k * g * square(m * sin) / self.square
+        return self._crank.centre + self._line * Complex(along, across)
 
     def _first_sign(self, sign):
         """Return the sign that makes s (sign +1) or h positive for crank angles in (0, pi)."""
@@ -211,7 +226,7 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) 
     side = +1. At a change point of a crank arm the branch goes on smoothly if `smooth`.
     """
     size = first + second
-    limits = arm.within(size, size), arm.beyond(abs(first - second), size)
+    limits = arm.within(size, size), arm.beyond(first - second, size)
     roots = [x.smooth if smooth and x.smooth else x.root() for x in limits]
     twice = 2.0 * arm.square
     skew = (first - second) * (first + second) / twice
@@ -284,7 +299,7 @@ def slot(arm: Arm, offset: Real, half: float) -> Slot:
 
     w = l (t + i e) with the unit vector l along the lever and t = half sqrt(|w|^2 - e^2) [m].
     """
-    limit = arm.beyond(abs(offset), abs(offset))
+    limit = arm.beyond(offset, abs(offset))
     slide = limit.root() * half
     skew = arm.vector * Complex(slide, -offset) / arm.square
     central = abs(offset) <= 0.0

@@ -88,6 +88,7 @@ class Sketch:
         self.directions = {}
         self.cranks = []
         self._vectors = {}
+        self._kites = {}
 
     def ground(self, name: str, x: Number, y: Number):
         """Fix a joint to the ground at (x, y) [m]."""
@@ -129,15 +130,20 @@ class Sketch:
         """Add a point on the line of a bar, a distance [m] from first, towards second."""
         vector, base, link = self._bar_between(first, second)
         self._place(name, first, vector * (distance / base), link, abs(distance))
+        if (first, second) in self._kites:
+            self.points[name].place = self._kites[first, second].beyond_kite(-(distance / base))
         self._add_to_frame(name, first, second, link, Complex(distance / base, 0.0))
 
     def mirror(self, name: str, point: str, first: str, second: str):
         """Mirror a joint in the line of two others: the far corner of a kite."""
-        place = planar.mirror(self.arm(second, first), self.points[point].place)
+        arm, pin = self.arm(second, first), self.points[first].crank
+        place = planar.mirror(arm, self.points[point].place)
         bars = [place - self.points[end].place for end in (first, second)]
         self._pair(name, first, second, planar.Dyad(*bars, ()),
                    self.distance(first, point), self.distance(second, point))
         self.points[name].place = place
+        if isinstance(arm, planar.CrankArm) and pin and pin.centre is self.points[point].place:
+            self._kites[first, name] = arm
 
     def inversor(self, names: Tuple[str, str, str], pole: str, pin: str, long: Real, short: Real):
         """Add a Peaucellier cell: the joint right of pole -> pin, the corner, the left joint."""
