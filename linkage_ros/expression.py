@@ -210,11 +210,22 @@ def arctangent(y: Real, x: Real) -> Real:
 
 
 def exact_sum(*terms: Number) -> Real:
-    """Return the exactly rounded sum of dimensions, however much of it cancels."""
-    kept = [t for t in map(real, terms) if t.value != 0.0]
+    """Return the exactly rounded sum of dimensions and sums of them, however much cancels."""
+    kept = [t for term in terms for t in _summands(real(term)) if t.value != 0.0]
     if len(kept) < 3:
         return reduce(lambda x, y: x + y, kept, real(0.0))
     return _node('fsum', *kept)
+
+
+def _summands(x: Real) -> list:
+    """Return the terms that a sum or difference is made of."""
+    if x.op == 'negative':
+        return [-term for term in _summands(x.args[0])]
+    if x.op == 'subtract':
+        return _summands(x.args[0]) + _summands(-x.args[1])
+    if x.op == 'add':
+        return _summands(x.args[0]) + _summands(x.args[1])
+    return [x]
 
 
 def where(condition: Real, chosen: Number, otherwise: Number) -> Real:
