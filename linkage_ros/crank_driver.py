@@ -1,0 +1,84 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Node that turns the cranks of a scene."""
+
+import sys
+
+from rclpy.clock import Clock, ClockType
+from sensor_msgs.msg import JointState
+
+from . import node, scene
+from .messages import JointStates
+from .motion import Motion
+
+
+class CrankDriver(node.SceneNode):
+    """Publishes every crank's angle as a function of the node's time, on `crank_states`."""
+
+    def __init__(self, **kwargs):
+        super().__init__(scene.DRIVER, **kwargs)
+        self._motions = {}
+        self._cranks = {}
+        self._now = None
+        self._messages = JointStates()
+        self._publisher = self.create_publisher(JointState, 'crank_states', 10)
+        self._timer = self.create_timer(1.0 / self.scene.rate, self._tick)
+        # On system time a timer sleeps until an old time comes round again, if that is set back.
+        self.create_timer(1.0, self._wake, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.follow(self.scene)
+
+    def follow(self, new):
+        """Let every crank go on as the scene says: from where it is, or from a new start."""
+        now = 0 if self._now is None else max(self._now, self._time().nanoseconds)
+        for name, machine in new.machines.items():
+            old, crank = self._cranks.get(name), machine.crank
+            if old is None or old.start != crank.start:
+                self._motions[name] = Motion(crank.speed, crank.sweep, crank.start, now)
+            elif old != crank:
+                self._motions[name] = self._motions[name].changed(crank.speed, crank.sweep, now)
+            self._cranks[name] = crank
+        period = round(1e9 / new.rate)
+        if self._timer.timer_period_ns != period:
+            self._timer.timer_period_ns = period
+            self._timer.reset()
+
+    def _time(self):
+        return self.get_clock().now()
+
+    def _tick(self):
+        time = self._time()
+        now = time.nanoseconds
+        if self._now is None or now < self._now:
+            # The first time there is, or one before the last: carry on from the angle reached.
+            before = self._now or 0
+            self._motions = {n: m.moved(before, now) for n, m in self._motions.items()}
+        self._now = now
+        if self._publisher.get_subscription_count():
+            angles, speeds = zip(*(motion.at(now) for motion in self._motions.values()))
+            names = [f'{name}_crank' for name in self._motions]
+            self._publisher.publish(self._messages.message(time.to_msg(), names, angles, speeds))
+
+    def _wake(self):
+        if self._now is not None and self._time().nanoseconds < self._now:
+            self._timer.reset()
+
+
+def main(args=None):
+    """Run the node; return the exit code."""
+    return node.run(CrankDriver, scene.DRIVER, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

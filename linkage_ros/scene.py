@@ -1,0 +1,314 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Scenes: which mechanisms there are, how large, where, and how their cranks move.
+
+The only place that knows the names of parameters. `read` turns given values into a Scene, or says
+in one sentence which parameter is wrong and what it may be; the scene's `parameters` are what a
+node declares. No ROS is needed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+import math
+import re
+from typing import Any, Mapping, Optional, Tuple
+
+from . import mechanisms
+from .assembly import Assembly, is_full_turn
+from .mechanism import Mechanism
+from .parameters import Field, Parameter, plain, SceneError, Values
+
+__all__ = ['Crank', 'Machine', 'Scene', 'SceneError', 'in_words', 'load', 'plain', 'read']
+
+DRIVER, KINEMATICS, INVERSE = ALL = 'crank_driver', 'kinematics', 'servo_inverse'
+
+TYPES = (*mechanisms.TYPES, mechanisms.CUSTOM)
+# What a crank that swings by default leaves of its reach at each end, as a part of its width.
+MARGIN = 0.01
+NARROWEST_SWEEP = 1e-6
+
+# What the client library declares for itself.
+_ROS = re.compile(r'(use_sim_time|start_type_description_service|qos_overrides\..*)$')
+_NAME = re.compile(r'[A-Za-z](_?[A-Za-z0-9])*$')
+
+MECHANISMS = Field(
+    'string_array', 'Names of the mechanisms in the scene.', readers=ALL, read_only=True,
+    rule='at least one, each once, of letters, digits and single underscores, a letter first')
+FRAME_ID = Field('string', 'Frame that the poses are in.', readers=(KINEMATICS,))
+RATE = Field('double', 'Crank messages in a second [Hz].', 0.0, 1000.0, positive=True,
+             readers=(DRIVER,))
+TYPE = Field('string', 'Type of the mechanism.', readers=ALL, read_only=True,
+             rule=f'one of {", ".join(TYPES)}')
+JOINTS = Field('string_array', 'The linkage, one line a joint.', readers=ALL, read_only=True)
+TRACER = Field('string', 'Joint whose curve is the locus; empty: the last.', readers=ALL,
+               read_only=True)
+DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [m].', positive=True,
+                  readers=ALL)
+BRANCH = Field('integer', 'Assembly sign {0} of the {1}.', -1, 1, rule='except 0', readers=ALL)
+SCALE = Field('double', 'Factor of every length.', 0.0, 1000.0, positive=True,
+              readers=(KINEMATICS,))
+LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.', 1, 50,
+                  readers=(KINEMATICS,))
+MIRRORED = Field('bool', 'Whether each leg has a mirror image on the other side; '
+                 'if never set: where there is more than one pair.', readers=(KINEMATICS,))
+POINTS = Field('string_array', 'Joints that are wanted in the markers.', readers=(KINEMATICS,))
+POSE = Field('double_array', "Pose of the linkage's plane in frame_id: "
+             'x, y, z [m], roll, pitch, yaw [rad].', rule='six of them', readers=(KINEMATICS,))
+SPEED = Field('double', 'Speed of the crank [rad/s].', -100.0, 100.0, readers=(DRIVER,))
+START = Field('double', 'Crank angle at the start [rad]; setting it moves the crank there.',
+              -4.0 * math.pi, 4.0 * math.pi, readers=(DRIVER,))
+SWEEP = Field('double_array', 'Crank angles [rad] between which the crank swings; '
+              'empty: it turns all round, or swings through its reach.', readers=(DRIVER,),
+              rule='the lower end and the higher end, or none')
+
+
+@dataclass(frozen=True)
+class Crank:
+    """How a crank moves: speed [rad/s], start [rad], and the ends of its swing [rad] or None."""
+
+    speed: float
+    start: float
+    sweep: Optional[Tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A mechanism in a scene: one leg, its reach and scale, its legs, its look and its crank."""
+
+    name: str
+    linkage: Mechanism
+    reach: Tuple[Tuple[float, float], ...]
+    scale: float
+    leg_pairs: int
+    mirrored: bool
+    points: Tuple[str, ...]
+    pose: Tuple[float, ...]
+    crank: Crank
+
+    def assembly(self) -> Assembly:
+        """Return its legs on their crank."""
+        return Assembly(self.linkage, self.leg_pairs, self.mirrored, self.scale, self.reach)
+
+    @property
+    def tracer(self) -> str:
+        """The joint whose curve is shown: the linkage's own tracer if it is wanted."""
+        return self.linkage.tracer if self.linkage.tracer in self.points else self.points[-1]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Machines by name, the frame they are in, and the rate of the crank messages [Hz]."""
+
+    machines: Mapping[str, Machine]
+    frame_id: str
+    rate: float
+    parameters: Tuple[Parameter, ...]
+
+
+def load(path: str) -> Scene:
+    """Read a scene from a parameter file, its `/**` section; needs PyYAML."""
+    import yaml
+
+    try:
+        with open(path) as file:
+            given = dict(_flattened(yaml.safe_load(file)['/**']['ros__parameters']))
+    except (yaml.YAMLError, KeyError, TypeError, AttributeError) as error:
+        raise SceneError(f"{path} must be YAML with '/**:' and below it 'ros__parameters:' "
+                         f'({error!r})') from None
+    return read(given)
+
+
+def read(given: Mapping[str, Any]) -> Scene:
+    """
+    Read a scene from the values that are given, by full parameter name.
+
+    Raises
+    ------
+    SceneError
+        If a parameter is unknown or cannot be what it is.
+
+    """
+    values = Values(given)
+    names = values.take('mechanisms', MECHANISMS, tuple(mechanisms.TYPES))
+    if not names or len(set(names)) < len(names) or not all(map(_NAME.match, names)):
+        raise MECHANISMS.error('mechanisms', names)
+    frame_id = values.take('frame_id', FRAME_ID, 'world')
+    rate = values.take('rate', RATE, 50.0)
+    machines = {name: _machine(name, values) for name in names}
+    _refuse_unknown(values, names)
+    return Scene(machines, frame_id, rate, tuple(values.parameters))
+
+
+def in_words(arcs) -> str:
+    """Return arcs as text, for messages."""
+    return ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in arcs)
+
+
+def _refuse_unknown(values, names):
+    for name in values.left():
+        if not _ROS.match(name):
+            mechanism = name.split('.')[0]
+            known = [p.name for p in values.parameters if p.name.startswith(f'{mechanism}.')]
+            known = known or ['mechanisms', 'frame_id', 'rate', *(f'{n}.*' for n in names)]
+            raise SceneError(f'{name} is not a parameter of the scene; allowed: '
+                             f'{", ".join(known)}')
+
+
+def _machine(name: str, values: Values) -> Machine:
+    type_ = values.take(f'{name}.type', TYPE, name)
+    if type_ not in TYPES:
+        raise SceneError(f'{name}.type must be {TYPE.rule}, not {type_!r}')
+    linkage, reach = _linkage(name, type_, values)
+    scale = values.take(f'{name}.scale', SCALE, 1.0)
+    return Machine(name, linkage, reach, scale, *_legs(name, linkage, values),
+                   _points(name, linkage, values), _pose(name, values),
+                   _crank(name, reach, values))
+
+
+def _linkage(name, type_, values):
+    design = _design(name, type_, values)
+    dimensions = _dimensions(name, design, values)
+    branches = _branches(name, design, values)
+    try:
+        linkage, reach = _built(design, tuple(dimensions.items()), tuple(branches.items()))
+    except ValueError as error:
+        raise SceneError(f'{name}.dimensions: {error}') from None
+    if not reach:
+        lengths = ', '.join(f'{key}={value:g}' for key, value in dimensions.items())
+        raise SceneError(f'{name}.dimensions must let the {type_} be assembled at some crank '
+                         f'angle, which {lengths} do not')
+    return linkage, reach
+
+
+def _design(name, type_, values):
+    if type_ in mechanisms.TYPES:
+        return mechanisms.design(type_)
+    joints = values.take(f'{name}.joints', JOINTS, ())
+    tracer = values.take(f'{name}.tracer', TRACER, '')
+    start = f'{name}.dimensions.'
+    dimensions = [key[len(start):] for key in values.left(start)]
+    try:
+        design = mechanisms.design(type_, joints, tracer or None, dimensions)
+    except ValueError as error:
+        raise SceneError(f'{name}.joints: {error}') from None
+    if sum(line.word == 'crank' for line in design.lines) != 1:
+        raise SceneError(f'{name}.joints must have one crank line, not several')
+    return design
+
+
+def _dimensions(name, design, values):
+    taken = {}
+    for key in sorted(design.dimensions, key=lambda key: key in design.signed):
+        field = _about(DIMENSION, key, design.name)
+        if key in design.signed:
+            most = 10.0 * max(taken.values()) if design.name in mechanisms.TYPES else None
+            field = replace(field, positive=False, low=most and -most, high=most)
+        taken[key] = values.take(f'{name}.dimensions.{key}', field, design.dimensions[key])
+    return taken
+
+
+def _branches(name, design, values):
+    taken = {}
+    for key, sign in design.branches.items():
+        field = _about(BRANCH, key, design.name)
+        taken[key] = values.take(f'{name}.branches.{key}', field, sign)
+        if not taken[key]:
+            raise field.error(f'{name}.branches.{key}', 0)
+    return taken
+
+
+def _about(field, *words):
+    return replace(field, meaning=field.meaning.format(*words))
+
+
+@lru_cache(maxsize=64)
+def _built(design, dimensions, branches):
+    """Return a linkage and its reach; the same ones for the same dimensions."""
+    own = {} if design.name in mechanisms.TYPES else {
+        'joints': design.joints, 'tracer': design.tracer}
+    linkage = mechanisms.create(design.name, branches=dict(branches), **own, **dict(dimensions))
+    return linkage, tuple(linkage.reach())
+
+
+def _legs(name, linkage, values):
+    pairs = values.take(f'{name}.leg_pairs', LEG_PAIRS, 1)
+    mirrored = values.take(f'{name}.mirrored', MIRRORED, pairs > 1)
+    if pairs > 1 or mirrored:
+        crank = next(link for link in linkage.links if link.name == 'crank')
+        centre = linkage.solve(0.0, (crank.joint,))[crank.joint]
+        if centre[0] or crank.zero:
+            what, allowed = ('leg_pairs', '1') if pairs > 1 else ('mirrored', 'false')
+            raise SceneError(f'{name}.{what} must be {allowed}: only a linkage whose crank turns '
+                             'about x = 0, its angle counted from +x, can have more legs')
+    return pairs, mirrored
+
+
+def _points(name, linkage, values):
+    points = values.take(f'{name}.points', POINTS, linkage.points)
+    if not points or len(set(points)) < len(points) or set(points) - set(linkage.points):
+        raise SceneError(f'{name}.points must name some of {", ".join(linkage.points)}, each '
+                         f'once, not {list(points)}')
+    return points
+
+
+def _pose(name, values):
+    pose = values.take(f'{name}.pose', POSE, (0.0,) * 6)
+    if len(pose) != 6:
+        raise POSE.error(f'{name}.pose', pose)
+    return pose
+
+
+def _crank(name, reach, values) -> Crank:
+    speed = values.take(f'{name}.crank.speed', SPEED, 1.0)
+    chosen = values.left(f'{name}.crank.start')
+    start = values.take(f'{name}.crank.start', START, 0.0)
+    sweep = values.take(f'{name}.crank.sweep', SWEEP, ())
+    if sweep:
+        _check_sweep(f'{name}.crank.sweep', sweep, reach)
+    elif is_full_turn(reach):
+        return Crank(speed, start, None)
+    arcs = [sweep] if sweep else reach
+    home = [arc for arc in arcs if _inside(start, start, arc)]
+    if chosen and not home:
+        raise SceneError(f'{name}.crank.start must be inside the {"sweep" if sweep else "reach"} '
+                         f'{in_words(arcs)} rad, not {start}')
+    low, high = (home or arcs)[0]
+    trimmed = 0.0 if sweep else MARGIN * (high - low)
+    return Crank(speed, start, (low + trimmed, high - trimmed))
+
+
+def _check_sweep(name, sweep, reach):
+    if len(sweep) != 2 or not sweep[0] + NARROWEST_SWEEP <= sweep[1]:
+        raise SWEEP.error(name, sweep)
+    if not is_full_turn(reach) and not any(_inside(*sweep, arc) for arc in reach):
+        raise SceneError(f'{name} must be inside the reach {in_words(reach)} rad, '
+                         f'not {list(sweep)}')
+
+
+def _inside(low, high, arc) -> bool:
+    """Return whether an arc holds another, up to whole turns."""
+    turns = math.tau * math.floor((high - arc[0]) / math.tau)
+    return arc[0] <= low - turns and high - turns <= arc[1]
+
+
+def _flattened(values, prefix=''):
+    for key, value in values.items():
+        if isinstance(value, dict):
+            yield from _flattened(value, f'{prefix}{key}.')
+        else:
+            yield f'{prefix}{key}', value

@@ -1,0 +1,156 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Real nodes on real topics: in this process, or as the processes that users start."""
+
+import itertools
+import math
+import os
+import subprocess
+import sys
+import time
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+
+DEADLINE = 20.0
+# Between publishing once more what may have been lost because nobody was found yet [s].
+RETRY = 0.1
+_domains = (1 + (7 * os.getpid() + i) % 100 for i in itertools.count())
+
+
+class Graph:
+    """
+    Nodes in a context and a domain of their own.
+
+    `node` is there to publish, subscribe and call with; nothing moves but in `until`.
+    """
+
+    def __init__(self, domain=None):
+        self._domain = domain or next(_domains)
+
+    def __enter__(self):
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context, domain_id=self._domain)
+        self._executor = SingleThreadedExecutor(context=self.context)
+        self._nodes = []
+        self._stamps = itertools.count(1)
+        self.node = self._add(rclpy.create_node('tester', context=self.context))
+        return self
+
+    def __exit__(self, *_):
+        self._executor.shutdown()
+        for node in self._nodes:
+            node.destroy_node()
+        rclpy.try_shutdown(context=self.context)
+
+    def _add(self, node):
+        self._nodes.append(node)
+        self._executor.add_node(node)
+        return node
+
+    def start(self, node_class, parameters=None, **kwargs):
+        """Start a node of this package with parameter values by name."""
+        overrides = [Parameter(name, value=value) for name, value in (parameters or {}).items()]
+        return self._add(node_class(
+            context=self.context, parameter_overrides=overrides, **kwargs))
+
+    def listen(self, type_, topic, qos=10):
+        """Return the list that the messages of a topic are gathered in."""
+        gathered = []
+        self.node.create_subscription(type_, topic, gathered.append, qos)
+        return gathered
+
+    def until(self, predicate, seconds=DEADLINE):
+        """Let the nodes work until something holds; return what the predicate returned."""
+        deadline = time.monotonic() + seconds
+        while not (held := predicate()):
+            assert time.monotonic() < deadline, 'did not happen in time'
+            self._executor.spin_once(timeout_sec=0.02)
+        return held
+
+    def set(self, node, atomically=True, **values):
+        """Set parameters through the node's service; __ stands for a point in a name."""
+        client = AsyncParameterClient(self.node, node.get_fully_qualified_name())
+        self.until(client.services_are_ready)
+        parameters = [value if isinstance(value, Parameter) else
+                      Parameter(name.replace('__', '.'), value=value)
+                      for name, value in values.items()]
+        future = client.set_parameters_atomically(parameters)
+        self.until(future.done)
+        return future.result().result
+
+    def clock(self):
+        """Return a function that sets the simulated time [ns] that the nodes see."""
+        publisher = self.node.create_publisher(Clock, '/clock', 10)
+
+        def tick(nanoseconds):
+            message = Clock()
+            message.clock.sec, message.clock.nanosec = divmod(nanoseconds, 10 ** 9)
+            publisher.publish(message)
+
+        return tick
+
+    def crank(self, names, topic='crank_states'):
+        """Return a function that publishes crank angles until an answer is there."""
+        publisher = self.node.create_publisher(JointState, topic, 10)
+
+        def turn(angles, answers, velocities=(), seconds=DEADLINE):
+            message = JointState(name=names, position=angles, velocity=velocities)
+            message.header.stamp.sec = stamp = next(self._stamps)
+
+            published = -math.inf
+
+            def answered():
+                nonlocal published
+                if time.monotonic() > published + RETRY:
+                    publisher.publish(message)
+                    published = time.monotonic()
+                return [m for m in answers if _stamp(m) == stamp]
+
+            return self.until(answered, seconds)[0]
+
+        return turn
+
+
+def _stamp(message):
+    header = message.markers[0].header if hasattr(message, 'markers') else message.header
+    return header.stamp.sec
+
+
+class Process:
+    """An executable of this package as users start it, with a parameter file."""
+
+    def __init__(self, name, parameter_file):
+        self.domain = next(_domains)
+        self._process = subprocess.Popen(
+            [sys.executable, '-m', f'linkage_ros.{name}', '--ros-args', '--params-file',
+             str(parameter_file)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            env=dict(os.environ, ROS_DOMAIN_ID=str(self.domain)))
+
+    def interrupt(self, signal):
+        """Send a signal."""
+        self._process.send_signal(signal)
+
+    def end(self, seconds=DEADLINE):
+        """Wait for the end; return exit code and all that was printed."""
+        try:
+            printed, _ = self._process.communicate(timeout=seconds)
+        finally:
+            self._process.kill()
+        return self._process.returncode, printed

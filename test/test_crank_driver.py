@@ -1,0 +1,218 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The crank driver as a node: what it publishes, when, and what may be changed meanwhile."""
+
+import math
+import re
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from linkage_ros.crank_driver import CrankDriver  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+
+SECOND = 10 ** 9
+YEAR = 365 * 86400 * SECOND
+DROP = {'mechanisms': ['drop'], 'drop.type': 'water_drop', 'use_sim_time': True}
+CELL = {'mechanisms': ['cell'], 'cell.type': 'peaucellier', 'use_sim_time': True}
+REACH = 2.0 * math.acos(5.0 / 6.0)
+
+
+class Driver:
+    """A crank driver on simulated time."""
+
+    def __init__(self, graph, parameters, **kwargs):
+        self.node = graph.start(CrankDriver, parameters, **kwargs)
+        self._graph = graph
+        self._heard = graph.listen(JointState, 'crank_states')
+        self._clock = graph.clock()
+
+    def at(self, now):
+        """Return position and velocity in the message with a stamp [ns]."""
+        def message():
+            self._clock(now)
+            return [m for m in self._heard if m.header.stamp.sec * SECOND
+                    + m.header.stamp.nanosec == now]
+
+        found = self._graph.until(message)[0]
+        return found.position[0], found.velocity[0]
+
+    def back_to(self, now):
+        """Set the time back and let the node notice."""
+        def noticed():
+            self._clock(now)
+            return self.node.get_clock().now().nanoseconds == now
+
+        self._graph.until(noticed)
+
+    def set(self, **values):
+        """Set parameters; return the result."""
+        return self._graph.set(self.node, **values)
+
+
+def test_all_cranks_of_the_catalogue_turn_on_system_time(graph):
+    graph.start(CrankDriver)
+    heard = graph.listen(JointState, 'crank_states')
+    graph.until(lambda: len(heard) > 10)
+    for message in heard:
+        assert list(message.name) == [
+            'water_drop_crank', 'jansen_crank', 'peaucellier_crank', 'slotted_lever_crank']
+        assert all(abs(v) == 1.0 for v in message.velocity)
+    first, last = heard[0], heard[-1]
+    elapsed = (last.header.stamp.sec - first.header.stamp.sec
+               + 1e-9 * (last.header.stamp.nanosec - first.header.stamp.nanosec))
+    assert last.position[0] - first.position[0] == pytest.approx(elapsed, abs=1e-12)
+
+
+def test_the_angle_is_start_plus_speed_times_time_a_turn_taken_off(graph):
+    driver = Driver(graph, {**DROP, 'drop.crank.speed': 2.0, 'drop.crank.start': 0.5})
+    assert driver.at(5 * SECOND) == (0.5, 2.0)
+    assert driver.at(6 * SECOND) == (2.5, 2.0)
+    assert driver.at(9 * SECOND) == (pytest.approx(8.5 - math.tau, abs=1e-15), 2.0)
+
+
+def test_years_of_turning_lose_nothing(graph):
+    mpmath = pytest.importorskip('mpmath')
+    driver = Driver(graph, {**DROP, 'drop.crank.speed': 3.7})
+    driver.at(SECOND)
+    later = SECOND + 60 * YEAR + 123456789
+    with mpmath.workdps(50):
+        truth = mpmath.mpf(3.7) * (later - SECOND) / SECOND % (2 * mpmath.pi)
+        assert abs(driver.at(later)[0] - truth) < 1e-15
+
+
+def test_a_crank_that_cannot_turn_swings_within_its_reach(graph):
+    driver = Driver(graph, CELL)
+    end = 0.98 * REACH
+    assert driver.at(SECOND) == (0.0, 1.0)
+    assert driver.at(2 * SECOND) == (1.0, 1.0)
+    assert driver.at(3 * SECOND) == (pytest.approx(2.0 * end - 2.0, abs=1e-12), -1.0)
+    assert driver.at(5 * SECOND) == (pytest.approx(4.0 - 4.0 * end, abs=1e-12), 1.0)
+
+
+def test_a_sweep_is_a_triangle_wave(graph):
+    driver = Driver(graph, {**DROP, 'drop.crank.sweep': [-0.5, 1.0], 'drop.crank.speed': -1.0})
+    assert driver.at(SECOND) == (0.0, -1.0)
+    assert driver.at(SECOND * 5 // 4) == (-0.25, -1.0)
+    assert driver.at(SECOND * 7 // 4) == (-0.25, 1.0)
+    assert driver.at(SECOND * 13 // 4) == (0.75, -1.0)
+
+
+def test_a_change_of_speed_makes_no_jump(graph):
+    driver = Driver(graph, DROP)
+    driver.at(SECOND)
+    assert driver.at(3 * SECOND) == (2.0, 1.0)
+    assert driver.set(drop__crank__speed=-0.5).successful
+    assert driver.at(4 * SECOND) == (1.5, -0.5)
+    assert driver.at(5 * SECOND) == (1.0, -0.5)
+
+
+def test_a_new_sweep_takes_the_crank_where_it_is(graph):
+    driver = Driver(graph, DROP)
+    driver.at(SECOND)
+    driver.at(2 * SECOND)
+    assert driver.set(drop__crank__sweep=[0.5, 1.5]).successful
+    assert driver.at(2 * SECOND + SECOND // 4) == (1.25, 1.0)
+    assert driver.at(3 * SECOND) == (1.0, -1.0)
+    empty = Parameter('drop.crank.sweep', Parameter.Type.BOOL_ARRAY, [])
+    assert driver.set(sweep=empty).successful
+    assert driver.at(5 * SECOND) == (3.0, 1.0)
+
+
+def test_a_new_start_puts_the_crank_there(graph):
+    driver = Driver(graph, {**DROP, 'drop.crank.speed': 0.0})
+    assert driver.at(SECOND) == (0.0, 0.0)
+    assert driver.set(drop__crank__start=1.25).successful
+    assert driver.at(2 * SECOND) == (1.25, 0.0)
+
+
+def test_a_new_dimension_keeps_the_crank_in_its_new_reach(graph):
+    driver = Driver(graph, {**CELL, 'cell.crank.speed': 0.0, 'cell.crank.start': 1.1})
+    assert driver.at(SECOND) == (1.1, 0.0)
+    assert driver.set(cell__dimensions__r=3.25, cell__crank__start=0.9).successful
+    assert driver.at(2 * SECOND) == (0.9, 0.0)
+    refused = driver.set(cell__dimensions__r=2.6)
+    assert not refused.successful and 'cell.crank.start must be inside the reach' in refused.reason
+    assert driver.at(3 * SECOND) == (0.9, 0.0)
+
+
+@pytest.mark.parametrize('name, value, reason', [
+    ('drop.crank.speed', 1000.0, 'drop.crank.speed .*100'),
+    ('drop.crank.speed', 1, 'drop.crank.speed must be .* decimal point'),
+    ('drop.crank.speed', math.nan, 'drop.crank.speed .*100'),
+    ('drop.crank.speed', 'fast', 'drop.crank.speed must be'),
+    ('drop.crank.sweep', [2.0, 1.0], 'drop.crank.sweep must be .* lower end'),
+    ('drop.dimensions.a', -1.0, 'drop.dimensions.a .*0.1'),
+    ('rate', 0.0, 'rate must be .* above 0 up to 1000'),
+    ('rate', 1e9, 'rate .*1000'),
+    ('mechanisms', ['water_drop'], 'mechanisms'),
+    ('drop.type', 'jansen', 'drop.type'),
+])
+def test_a_bad_value_is_refused_with_a_reason_and_the_node_runs_on(graph, name, value, reason):
+    driver = Driver(graph, DROP)
+    driver.at(SECOND)
+    result = driver.set(**{name: value})
+    assert not result.successful and re.search(reason, result.reason)
+    assert driver.at(2 * SECOND) == (1.0, 1.0)
+    assert driver.node.scene.machines['drop'].crank.speed == 1.0
+
+
+def test_a_parameter_cannot_be_removed(graph):
+    driver = Driver(graph, DROP)
+    gone = Parameter('drop.crank.sweep', Parameter.Type.NOT_SET, None)
+    assert 'cannot be removed' in driver.set(gone=gone).reason
+
+
+def test_several_parameters_are_set_together_or_not_at_all(graph):
+    driver = Driver(graph, {**DROP, 'drop.crank.sweep': [0.0, 1.0], 'drop.crank.start': 0.5})
+    assert not driver.set(drop__crank__sweep=[2.0, 3.0]).successful
+    assert not driver.set(drop__crank__sweep=[2.0, 3.0], drop__crank__start=0.0).successful
+    assert list(driver.node.get_parameter('drop.crank.sweep').value) == [0.0, 1.0]
+    assert driver.set(drop__crank__sweep=[2.0, 3.0], drop__crank__start=2.5).successful
+    assert driver.at(SECOND) == (2.5, 1.0)
+
+
+def test_a_new_rate_takes_effect_at_once(graph):
+    driver = Driver(graph, {**DROP, 'rate': 0.001})
+    assert driver.set(rate=100.0).successful
+    assert driver.at(SECOND) == (0.0, 1.0)
+
+
+def test_time_that_goes_back_makes_no_jump(graph):
+    driver = Driver(graph, DROP)
+    driver.at(100 * SECOND)
+    assert driver.at(102 * SECOND) == (2.0, 1.0)
+    driver.back_to(50 * SECOND)
+    assert driver.at(51 * SECOND) == (2.0, 1.0)
+    assert driver.at(52 * SECOND) == (3.0, 1.0)
+
+
+def test_a_namespace_is_put_before_the_topic(graph):
+    graph.start(CrankDriver, namespace='left')
+    heard = graph.listen(JointState, '/left/crank_states')
+    graph.until(lambda: heard)
+
+
+def test_each_parameter_describes_itself(graph):
+    node = graph.start(CrankDriver, DROP)
+    speed = node.describe_parameter('drop.crank.speed')
+    assert '[rad/s]' in speed.description
+    assert (speed.floating_point_range[0].from_value, speed.floating_point_range[0].to_value) == (
+        -100.0, 100.0)
+    assert node.describe_parameter('mechanisms').read_only
+    assert not node.has_parameter('drop.pose')
+    assert node.get_parameter('drop.crank.sweep').type_ == Parameter.Type.DOUBLE_ARRAY

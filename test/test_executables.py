@@ -1,0 +1,126 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The executables as users start them: how they end, and what they say of a bad scene."""
+
+from pathlib import Path
+import re
+import signal
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+NODES = ('crank_driver', 'kinematics', 'servo_inverse')
+
+
+@pytest.fixture(scope='module')
+def harness():
+    """Return the module that starts processes."""
+    pytest.importorskip('rclpy')
+    pytest.importorskip('linkage_interfaces')
+    import ros_harness
+    return ros_harness
+
+
+@pytest.mark.parametrize('name', NODES)
+@pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_node_quietly(harness, name, stop):
+    process = harness.Process(name, ROOT / 'config' / 'all.yaml')
+    with harness.Graph(process.domain) as graph:
+        graph.until(lambda: name in graph.node.get_node_names())
+    process.interrupt(stop)
+    code, printed = process.end()
+    assert (code, printed) == (0, '')
+
+
+def test_a_signal_while_a_message_is_published_is_no_failure(harness):
+    from linkage_ros.node import run
+    import rclpy
+    from sensor_msgs.msg import JointState
+
+    class Ended(rclpy.node.Node):
+        def __init__(self):
+            super().__init__('ended')
+            self._publisher = self.create_publisher(JointState, 'topic', 1)
+            self.create_timer(0.001, self._end)
+
+        def _end(self):
+            signal.raise_signal(signal.SIGTERM)
+            while rclpy.ok():
+                pass
+            self._publisher.publish(JointState())
+
+    assert run(Ended, 'ended', args=[]) == 0
+
+
+@pytest.mark.parametrize('name, text, named', [
+    ('kinematics', 'mechanisms: [leg]', 'leg.type must be one of water_drop, '),
+    ('kinematics', 'mechanisms: []', 'mechanisms must be'),
+    ('kinematics', 'jansen.dimensions.q: 1.0', 'jansen.dimensions.q is not a parameter'),
+    ('kinematics', 'jansen.dimension.a: 1.0', 'jansen.dimension.a is not a parameter'),
+    ('kinematics', 'jansen.pose: [0, 0, 0, 0, 0, 0]', 'jansen.pose must be'),
+    ('kinematics', 'jansen.pose: [0, 0, 0.5, 0, 0, 0]', 'Sequence should be of same type'),
+    ('crank_driver', 'rate: 20', 'rate must be a finite number with a decimal point'),
+    ('crank_driver', 'jansen.crank.speed: fast', 'jansen.crank.speed must be'),
+    ('crank_driver', 'jansen.dimensions.m: -1.0', 'jansen.dimensions.m must be .* above 0'),
+    ('crank_driver', 'peaucellier.dimensions.r: 1.0', 'peaucellier.dimensions must let'),
+    ('servo_inverse', 'slotted_lever.dimensions.a: 80', 'slotted_lever.dimensions.a must be'),
+])
+def test_a_bad_scene_ends_in_one_sentence(harness, tmp_path, name, text, named):
+    path = tmp_path / 'scene.yaml'
+    path.write_text(f'/**:\n  ros__parameters:\n    {text}\n')
+    code, printed = harness.Process(name, path).end()
+    said = [line for line in printed.splitlines() if '[FATAL]' in line]
+    assert code == 1 and 'Traceback' not in printed
+    assert len(said) == 1 and re.search(named, said[0])
+
+
+def without(module, code):
+    """Run code in a Python that cannot import a module."""
+    blocker = f"""
+        import sys
+
+        class Blocker:
+            def find_spec(self, name, path=None, target=None):
+                if name.split('.')[0] == {module!r}:
+                    raise ImportError('blocked: ' + name)
+
+        sys.meta_path.insert(0, Blocker())
+        """
+    return subprocess.run([sys.executable, '-c', textwrap.dedent(blocker) + textwrap.dedent(code)],
+                          cwd=ROOT, capture_output=True, text=True, timeout=60)
+
+
+def test_the_library_works_where_there_is_no_ros():
+    done = without('rclpy', """
+        from linkage_ros import motion, scene
+        machine = scene.read({}).machines['jansen']
+        assert machine.assembly().points([0.3], ('G',)).shape == (1, 1, 2)
+        assert motion.Motion(1.0).at(10 ** 9) == (1.0, 1.0)
+        try:
+            import linkage_ros.kinematics
+        except ImportError as error:
+            print(error)
+        """)
+    assert (done.returncode, done.stdout) == (0, 'blocked: rclpy\n'), done.stderr
+
+
+def test_without_the_interfaces_the_service_says_how_to_build_them(harness):
+    done = without('linkage_interfaces', 'import linkage_ros.servo_inverse')
+    assert 'colcon build' in done.stderr.splitlines()[-1]
+    others = without('linkage_interfaces', 'from linkage_ros import crank_driver, kinematics')
+    assert others.returncode == 0, others.stderr

@@ -1,0 +1,457 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The kinematics node: what arrives on its topics is the linkage."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from linkage_ros.crank_driver import CrankDriver  # noqa: E402
+from linkage_ros.kinematics import Kinematics  # noqa: E402
+from rcl_interfaces.msg import Log  # noqa: E402
+from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+HOLY = {'a': 38.0, 'b': 41.5, 'c': 39.3, 'd': 40.1, 'e': 55.8, 'f': 39.4, 'g': 36.7, 'h': 65.7,
+        'i': 49.0, 'j': 50.0, 'k': 61.9, 'l': 7.8, 'm': 15.0}
+# The links of each type with their lengths, and the points in their order, from the catalogue.
+LENGTHS = {
+    'water_drop': {'OA': 1.0, 'AB': 1.0, 'OC': 2.0, 'CB': 2.0, 'AP': 3.0, 'BP': 4.0},
+    'jansen': {**{bar: HOLY[name] for bar, name in zip(
+        'BC AC BD CD BE AE EF DF EG FG OA'.split(), 'bjdeckgfihm')}, 'OB': math.hypot(38.0, 7.8)},
+    'peaucellier': {'OP': 3.0, 'OA': 3.0, 'PB': 9.0, 'PD': 9.0, 'AB': 4.0, 'BC': 4.0, 'CD': 4.0,
+                    'AD': 4.0},
+    'slotted_lever': {'OA': 80.0, 'OQ': 150.0, 'QL': 270.0},
+}
+ANGLES = [0.0, 0.5, math.pi / 2, 3.0, math.pi, 4.0, -1.0, 6.2, 2.0 * math.pi, 7.0, 100.0]
+WALKER = {'mechanisms': ['walker'], 'walker.type': 'jansen', 'walker.scale': 0.01,
+          'walker.leg_pairs': 3}
+CELL = {'mechanisms': ['cell'], 'cell.type': 'peaucellier'}
+REACH = 2.0 * math.acos(5.0 / 6.0)
+
+
+class Bench:
+    """A kinematics node, a hand on one of its cranks, and ears on its topics."""
+
+    def __init__(self, graph, name, parameters=None, joints=True, markers=True):
+        self.node = graph.start(Kinematics, parameters)
+        self._graph = graph
+        self._name = name
+        self._turn = graph.crank([f'{name}_crank'])
+        self.joints = graph.listen(JointState, f'{name}/joint_states') if joints else []
+        self.markers = graph.listen(MarkerArray, f'{name}/markers') if markers else []
+
+    def joints_at(self, theta, *speed):
+        """Return the joint states at a crank angle."""
+        return self._turn([theta], self.joints, list(speed))
+
+    def links_and_joints_at(self, theta):
+        """Return both markers at a crank angle."""
+        return self._turn([theta], self.markers).markers
+
+    def legs_at(self, theta):
+        """Return the joints' places at a crank angle, of each leg by name."""
+        points = self.node.scene.machines[self._name].points
+        rows = places(self.links_and_joints_at(theta)[-1]).reshape(-1, len(points), 2)
+        return [dict(zip(points, row)) for row in rows]
+
+    def set(self, **values):
+        """Set parameters; return the result."""
+        return self._graph.set(self.node, **values)
+
+
+def places(marker):
+    assert all(point.z == 0.0 for point in marker.points)
+    return np.array([[point.x, point.y] for point in marker.points])
+
+
+def distance(leg, bar):
+    return math.dist(leg[bar[0]], leg[bar[1]])
+
+
+@pytest.mark.parametrize('name', LENGTHS)
+def test_links_keep_their_lengths_at_every_angle(graph, name):
+    bench = Bench(graph, name, joints=False)
+    longest = max(LENGTHS[name].values())
+    for theta in ANGLES if name != 'peaucellier' else [-1.17, -0.5, 0.0, 0.5, 1.17, 6.0]:
+        leg, = bench.legs_at(theta)
+        for bar, length in LENGTHS[name].items():
+            assert distance(leg, bar) == pytest.approx(length, abs=1e-12 * longest, rel=0.0)
+
+
+@pytest.mark.parametrize('name', LENGTHS)
+def test_markers_are_one_list_of_links_and_one_of_joints(graph, name):
+    links, joints = Bench(graph, name).links_and_joints_at(0.3)
+    assert (links.type, joints.type) == (Marker.LINE_LIST, Marker.SPHERE_LIST)
+    assert (links.id, joints.id) == (0, 1)
+    for marker in links, joints:
+        assert (marker.ns, marker.header.frame_id, marker.action) == (name, 'world', Marker.ADD)
+        assert marker.color.a == 1.0 and marker.scale.x > 0.0
+        assert marker.pose.orientation.w == 1.0
+    spheres = {tuple(place) for place in places(joints)}
+    ends = places(links).reshape(-1, 2, 2)
+    assert {tuple(end) for pair in ends for end in pair} <= spheres
+    lengths = sorted(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+    assert all(any(length == pytest.approx(known) for known in LENGTHS[name].values())
+               for length in lengths)
+
+
+@pytest.mark.parametrize('theta', [0.0, math.pi, -math.pi / 2, 2.5 * math.pi, 400.0, -7.0])
+def test_the_drops_joint_b_mirrors_o_in_line_ac(graph, theta):
+    drop, = Bench(graph, 'water_drop').legs_at(theta)
+    along = (drop['A'] - drop['C']) / np.linalg.norm(drop['A'] - drop['C'])
+    image = drop['C'] + 2.0 * along * (along @ (drop['O'] - drop['C'])) - (drop['O'] - drop['C'])
+    assert drop['A'] == pytest.approx([-math.sin(theta), math.cos(theta)], abs=1e-15)
+    assert drop['B'] == pytest.approx(image, abs=4e-15)
+
+
+def test_a_lever_follows_a_pin_that_goes_round_its_pivot(graph):
+    bench = Bench(graph, 'slotted_lever', {
+        'slotted_lever.dimensions.a': 150.0, 'slotted_lever.dimensions.b': 80.0})
+    before = None
+    for theta in np.linspace(0.0, 4.0 * math.pi, 49):
+        lever, = bench.legs_at(theta)
+        along, pin = lever['L'] - lever['Q'], lever['A'] - lever['Q']
+        assert abs(along[0] * pin[1] - along[1] * pin[0]) < 1e-12 * 150.0 * np.linalg.norm(along)
+        assert along @ pin > 0.0
+        angle = math.atan2(-along[0], along[1])
+        assert bench.joints_at(theta).position[1] == pytest.approx(angle, abs=1e-14)
+        if before is not None:
+            assert 0.0 < (angle - before) % math.tau < 0.6
+        before = angle
+
+
+def test_the_cells_corner_draws_a_straight_line(graph):
+    bench = Bench(graph, 'peaucellier')
+    x = [bench.legs_at(theta)[0]['C'][0] for theta in np.linspace(-1.17, 1.17, 41)]
+    assert max(x) - min(x) <= np.spacing(max(x))
+    assert x[0] == pytest.approx(65.0 / 6.0 - 3.0, rel=1e-15)
+
+
+def test_right_legs_share_their_pin_with_left_legs(graph):
+    legs = Bench(graph, 'walker', WALKER).legs_at(0.7)
+    assert len(legs) == 6
+    for j, (left, right) in enumerate(zip(legs[0::2], legs[1::2])):
+        angle = 0.7 - math.tau * j / 3.0
+        pin = 0.15 * np.array([math.cos(angle), math.sin(angle)])
+        assert left['A'] == pytest.approx(pin, abs=1e-15)
+        assert right['A'] == pytest.approx(pin, abs=1e-15)
+        assert left['B'] * [-1.0, 1.0] == pytest.approx(right['B'])
+        for bar, length in LENGTHS['jansen'].items():
+            assert distance(right, bar) == pytest.approx(0.01 * length, abs=1e-12 * 0.657, rel=0.0)
+
+
+def walk(links, frames, angles, turn, side, ground):
+    """Return where the joints of a leg are, from joint to joint along its spanning tree."""
+    found = dict(ground)
+    directions = {}
+    for link in links:
+        if link.kind == 'prismatic':
+            found[link.tip] = found[link.joint] + angles[link.name] * np.array(
+                [math.cos(directions[link.parent]), math.sin(directions[link.parent])])
+            continue
+        if link.parent == 'ground':
+            zero = link.zero if side > 0.0 or link.name == 'crank' else math.pi - link.zero
+        else:
+            zero = directions[link.parent] + side * link.zero
+        along = zero + (angles['crank'] - turn if link.name == 'crank' else angles[link.name])
+        directions[link.name] = along
+        rotation = np.array([[math.cos(along), -math.sin(along)],
+                             [math.sin(along), math.cos(along)]])
+        for name, (x, y) in frames[link.name].items():
+            found[name] = found[link.joint] + rotation @ [x, side * y]
+    return found
+
+
+@pytest.mark.parametrize('name', [*LENGTHS, 'walker'])
+def test_joint_angles_along_the_tree_lead_to_the_joints(graph, name):
+    bench = Bench(graph, name, WALKER if name == 'walker' else None)
+    machine = bench.node.scene.machines[name]
+    linkage = machine.linkage
+    frames = {link: {joint: (machine.scale * float(x), machine.scale * float(y))
+                     for joint, (x, y) in frame.items()}
+              for link, frame in linkage.frames.items()}
+    for theta in (0.0, 0.4, 1.1, -0.9):
+        state = bench.joints_at(theta)
+        angles = dict(zip(state.name, state.position))
+        assert len(angles) == len(state.name) == len(state.position)
+        for index, leg in enumerate(bench.legs_at(theta)):
+            pair, right = divmod(index, 2)
+            prefix = f'{("left", "right")[right]}{pair}_' if name == 'walker' else ''
+            own = {link.name: angles[f'{name}_{"" if link.name == "crank" else prefix}{link.name}']
+                   for link in linkage.links}
+            reached = walk(linkage.links, frames, own, math.tau * pair / 3, -1.0 if right else 1.0,
+                           {joint: leg[joint] for joint in 'OBPCQ' if joint in leg})
+            for joint, place in reached.items():
+                assert place == pytest.approx(leg[joint], abs=1e-13 * 300.0)
+
+
+def test_velocities_are_the_slopes_of_positions(graph):
+    bench = Bench(graph, 'walker', WALKER)
+    step = 1e-6
+    before, after = (bench.joints_at(0.7 + sign * step).position for sign in (-1.0, 1.0))
+    slopes = (np.array(after) - np.array(before)) / (2.0 * step)
+    moving = bench.joints_at(0.7, 3.0)
+    assert list(moving.velocity) == pytest.approx(list(3.0 * slopes), abs=1e-6)
+
+
+def test_velocities_are_left_out_where_the_cranks_is_unknown(graph):
+    bench = Bench(graph, 'jansen')
+    assert not bench.joints_at(0.3).velocity
+    assert not bench.joints_at(0.3, math.nan).velocity
+    assert len(bench.joints_at(0.3, 1.0).velocity) == 7
+
+
+def test_velocities_are_left_out_where_they_are_infinite(graph):
+    bench = Bench(graph, 'own', {
+        'mechanisms': ['own'], 'own.type': 'custom', 'own.joints': [
+            'O ground 0 0', 'Q ground 4 0', 'A crank O 3', 'B dyad A Q 2.5 2.5 left']})
+    (_, high), = bench.node.scene.machines['own'].reach
+    states = [bench.joints_at(high + k * math.ulp(high), 1.0) for k in range(-2, 2)]
+    assert all(np.isfinite(state.velocity).all() for state in states)
+    assert any(not state.velocity for state in states)
+    assert len(bench.joints_at(0.9 * high, 1.0).velocity) == 3
+
+
+def test_an_angle_out_of_reach_is_passed_over_with_a_warning(graph):
+    logged = graph.listen(Log, '/rosout')
+    bench = Bench(graph, 'cell', CELL)
+    graph.until(lambda: bench.node.count_subscribers('/rosout'))
+    bench.joints_at(1.0)
+    turn = graph.crank(['cell_crank'])
+    for unreachable in (2.0, math.nan, math.inf, REACH + 1e-9):
+        nothing = graph.listen(JointState, 'nothing')
+
+        def warned():
+            return [m for m in logged if 'cell' in m.name and 'cannot be assembled' in m.msg]
+
+        with pytest.raises(AssertionError, match='in time'):
+            turn([unreachable], nothing, seconds=0.3)
+    message = graph.until(warned)[0].msg
+    assert 'cell cannot be assembled at crank angle 2 rad' in message
+    assert '[-1.17137, 1.17137]' in message
+    assert len(warned()) == 1
+    bench.legs_at(0.5)
+    assert all(abs(m.position[0]) <= 1.0 for m in bench.joints)
+    assert all(np.isfinite(m.position).all() for m in bench.joints)
+    assert all(len(m.markers[1].points) == 6 for m in bench.markers)
+
+
+def test_a_leg_that_cannot_be_assembled_is_left_out_and_the_others_stay(graph):
+    bench = Bench(graph, 'walker', {**WALKER, 'walker.dimensions.m': 24.0})
+    state = bench.joints_at(0.2)
+    there = dict.fromkeys(name.split('_')[1] for name in state.name if 'crank' not in name)
+    assert list(there) == ['left1', 'right1', 'left2', 'right2']
+    assert len(state.name) == 1 + 6 * 4 and np.isfinite(state.position).all()
+    legs = bench.legs_at(0.2)
+    assert len(legs) == 4 and np.isfinite([list(leg.values()) for leg in legs]).all()
+
+
+def test_only_wanted_joints_are_drawn_in_the_order_they_are_wanted(graph):
+    bench = Bench(graph, 'jansen', {'jansen.points': ['G', 'E', 'A']})
+    links, joints = bench.links_and_joints_at(0.3)
+    foot, knee, pin = places(joints)
+    assert math.dist(foot, knee) == pytest.approx(HOLY['i'])
+    assert math.dist(knee, pin) == pytest.approx(HOLY['k'])
+    assert len(links.points) == 4
+    assert bench.set(jansen__points=['G']).successful
+    assert [marker.type for marker in bench.links_and_joints_at(0.4)] == [Marker.SPHERE_LIST]
+
+
+def test_the_pose_of_the_plane_is_the_pose_of_the_markers(graph):
+    bench = Bench(graph, 'jansen', {
+        'jansen.pose': [1.0, 2.0, 3.0, math.pi / 2, 0.0, 0.0], 'frame_id': 'floor'})
+    for marker in bench.links_and_joints_at(0.3):
+        p, q = marker.pose.position, marker.pose.orientation
+        assert (p.x, p.y, p.z) == (1.0, 2.0, 3.0)
+        up = [2 * (q.x * q.y - q.w * q.z), 1 - 2 * (q.x ** 2 + q.z ** 2),
+              2 * (q.y * q.z + q.w * q.x)]
+        assert up == pytest.approx([0.0, 0.0, 1.0], abs=1e-15)
+        assert marker.header.frame_id == 'floor'
+
+
+def test_roll_pitch_and_yaw_turn_about_fixed_axes():
+    from linkage_ros.messages import quaternion
+
+    def about(axis, angle):
+        turn = np.eye(3)
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        turn[[i, j], [i, j]] = math.cos(angle)
+        turn[i, j], turn[j, i] = -math.sin(angle), math.sin(angle)
+        return turn
+
+    q = quaternion(0.3, -1.2, 2.5)
+    w, v = q.w, np.array([q.x, q.y, q.z])
+    cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+    matrix = np.eye(3) + 2 * w * cross + 2 * cross @ cross
+    assert matrix == pytest.approx(about(2, 2.5) @ about(1, -1.2) @ about(0, 0.3))
+
+
+def test_stamps_are_those_of_the_crank(graph):
+    bench = Bench(graph, 'jansen')
+    stamp = bench.joints_at(0.3).header.stamp.sec
+    links, joints = bench.links_and_joints_at(0.3)
+    assert links.header.stamp == joints.header.stamp
+    assert joints.header.stamp.sec > stamp > 0
+
+
+def test_cranks_are_found_by_name_whoever_else_is_in_the_message(graph):
+    graph.start(Kinematics)
+    heard = graph.listen(JointState, 'jansen/joint_states')
+    turn = graph.crank(['wheel', 'jansen_crank', 'slotted_lever_crank'])
+    state = turn([9.0, 0.3, 0.1], heard, [9.0, 2.0, 1.0])
+    assert (state.name[0], state.position[0], state.velocity[0]) == ('jansen_crank', 0.3, 2.0)
+
+
+def test_a_message_without_positions_is_passed_over(graph):
+    bench = Bench(graph, 'jansen')
+    bench.joints_at(0.3)
+    speeds_only = graph.crank(['jansen_crank'])
+    with pytest.raises(AssertionError, match='in time'):
+        speeds_only([], bench.joints, [1.0], seconds=0.3)
+    bench.joints_at(0.4)
+
+
+def test_a_late_subscriber_gets_the_curve(graph):
+    node = graph.start(Kinematics)
+    curves = {}
+    for name in LENGTHS:
+        heard = graph.listen(Marker, f'{name}/locus', LATCHED)
+        curves[name], = graph.until(heard.copy)
+        assert curves[name].type == Marker.LINE_STRIP and curves[name].ns == name
+        assert len(curves[name].points) > 300 and curves[name].scale.x > 0.0
+    drop = places(curves['water_drop'])
+    assert drop[0] == pytest.approx(drop[-1], abs=1e-14)
+    x, y = drop.T
+    area = abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])) / 2.0
+    assert area == pytest.approx(8.0 * math.pi, rel=1e-3)
+    cell = places(curves['peaucellier'])
+    assert np.ptp(cell[:, 0]) <= np.spacing(8.0)
+    assert cell[-1, 1] == pytest.approx(65.0 / 6.0 * math.tan(0.5 * REACH))
+    assert node.count_publishers('/jansen/locus') == 1
+
+
+def test_the_curve_is_sent_once_for_each_change_of_dimensions(graph):
+    node = graph.start(Kinematics)
+    loci = {name: graph.listen(Marker, f'{name}/locus', LATCHED) for name in LENGTHS}
+    graph.until(lambda: all(loci.values()))
+    turn = graph.crank(['water_drop_crank'])
+    heard = graph.listen(MarkerArray, 'water_drop/markers')
+    for theta in (0.0, 1.0, 2.0):
+        turn([theta], heard)
+    assert graph.set(node, water_drop__dimensions__a=2.0).successful
+    graph.until(lambda: len(loci['water_drop']) == 2)
+    turn([3.0], heard)
+    assert {name: len(curves) for name, curves in loci.items()} == {
+        'water_drop': 2, 'jansen': 1, 'peaucellier': 1, 'slotted_lever': 1}
+    assert places(loci['water_drop'][1]) == pytest.approx(2.0 * places(loci['water_drop'][0]))
+
+
+def test_a_dimension_changes_while_the_node_runs(graph):
+    bench = Bench(graph, 'jansen')
+    assert distance(bench.legs_at(0.3)[0], 'OA') == pytest.approx(15.0)
+    assert bench.set(jansen__dimensions__m=14.0).successful
+    assert distance(bench.legs_at(0.3)[0], 'OA') == pytest.approx(14.0)
+    assert bench.set(jansen__scale=0.5, jansen__branches__F=-1).successful
+    leg, = bench.legs_at(0.3)
+    assert distance(leg, 'OA') == pytest.approx(7.0)
+    assert distance(leg, 'DF') == pytest.approx(0.5 * HOLY['f'])
+
+
+def test_only_the_mechanism_that_is_changed_is_made_anew(graph):
+    node = graph.start(Kinematics)
+    before = dict(node.scene.machines)
+    assert graph.set(node, jansen__dimensions__m=14.0).successful
+    assert {name for name, machine in node.scene.machines.items()
+            if machine != before[name]} == {'jansen'}
+
+
+@pytest.mark.parametrize('values, reason', [
+    ({'jansen.dimensions.m': -1.0}, 'jansen.dimensions.m out of range .*1.5'),
+    ({'jansen.dimensions.m': 20}, 'jansen.dimensions.m must be .* decimal point'),
+    ({'jansen.dimensions.m': 'long'}, "jansen.dimensions.m must be .* not 'long'"),
+    ({'jansen.dimensions.b': 4.2}, 'jansen.dimensions must let the jansen be assembled'),
+    ({'jansen.dimensions.m': 14.0, 'jansen.dimensions.b': 4.2}, 'jansen.dimensions must let'),
+    ({'jansen.points': ['Z']}, 'jansen.points must name some of O, B'),
+    ({'jansen.pose': [1.0]}, 'jansen.pose must be .* six'),
+    ({'jansen.branches.C': 0}, 'jansen.branches.C must be .* except 0'),
+    ({'jansen.leg_pairs': 0}, 'jansen.leg_pairs out of range'),
+    ({'jansen.scale': 0.0}, 'jansen.scale must be .* above 0'),
+    ({'water_drop.leg_pairs': 2}, 'water_drop.leg_pairs must be 1'),
+    ({'jansen.type': 'water_drop'}, 'read-only.* jansen.type'),
+])
+def test_a_bad_value_is_refused_with_a_reason_and_the_node_runs_on(graph, values, reason):
+    bench = Bench(graph, 'jansen')
+    before = bench.legs_at(0.3)[0]
+    refused = bench.set(**values)
+    assert not refused.successful
+    assert re.search(reason, refused.reason)
+    after = bench.legs_at(0.3)[0]
+    assert all((before[name] == after[name]).all() for name in before)
+
+
+def test_legs_are_added_while_the_node_runs(graph):
+    bench = Bench(graph, 'jansen')
+    assert len(bench.joints_at(0.3).name) == 7
+    assert bench.set(jansen__leg_pairs=2).successful
+    assert len(bench.legs_at(0.3)) == 4
+    assert bench.node.get_parameter('jansen.mirrored').value is True
+    assert len(bench.joints_at(0.3).name) == 1 + 4 * 6
+    assert bench.set(jansen__mirrored=False).successful
+    assert len(bench.legs_at(0.3)) == 2
+
+
+def test_nothing_is_solved_that_nobody_listens_to(graph, monkeypatch):
+    from linkage_ros.assembly import Assembly
+
+    solved = []
+
+    def counted(name):
+        done = getattr(Assembly, name)
+        return lambda assembly, *args: (
+            solved.append((assembly.linkage.type, name)) or done(assembly, *args))
+
+    for name in ('points', 'joint_angles', 'joint_rates'):
+        monkeypatch.setattr(Assembly, name, counted(name))
+    graph.start(Kinematics)
+    heard = graph.listen(MarkerArray, 'jansen/markers')
+    turn = graph.crank(['water_drop_crank', 'jansen_crank', 'peaucellier_crank'])
+    turn([0.1, 0.2, 0.3], heard, [1.0, 1.0, 1.0])
+    assert set(solved) == {('jansen', 'points')}
+
+
+def test_driver_and_kinematics_go_together_in_a_namespace(graph):
+    for node_class in (CrankDriver, Kinematics):
+        graph.start(node_class, WALKER, namespace='/left/side')
+    heard = graph.listen(MarkerArray, '/left/side/walker/markers')
+    graph.until(lambda: len(heard) > 5)
+    assert len(heard[-1].markers[1].points) == 6 * 8
+
+
+def test_a_linkage_of_ones_own_is_shown_like_any_other(graph):
+    bench = Bench(graph, 'rocker', {
+        'mechanisms': ['rocker'], 'rocker.type': 'custom', 'rocker.dimensions.g': 0.8,
+        'rocker.joints': ['O ground 0 0', 'Q ground g 0', 'A crank O 0.3',
+                          'B dyad A Q 0.7 0.6 left']})
+    leg, = bench.legs_at(0.3)
+    assert distance(leg, 'AB') == pytest.approx(0.7) and distance(leg, 'QB') == pytest.approx(0.6)
+    assert bench.set(rocker__dimensions__g=0.9).successful
+    assert distance(bench.legs_at(0.3)[0], 'OQ') == pytest.approx(0.9)

@@ -1,0 +1,301 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a scene may be, what it says about one that cannot be, and how its cranks move. No ROS."""
+
+from glob import glob
+import math
+import os
+
+from linkage_ros import mechanisms, scene
+from linkage_ros.assembly import Assembly
+from linkage_ros.motion import Motion
+import numpy as np
+import pytest
+
+CONFIG = os.path.join(os.path.dirname(__file__), '..', 'config')
+CELL = {'mechanisms': ['cell'], 'cell.type': 'peaucellier'}
+OWN = {'mechanisms': ['own'], 'own.type': 'custom'}
+YEAR = 365 * 86400 * 10 ** 9
+
+
+def whole_motion(machine):
+    """Return all joints at angles all along the motion, shape (..., 2), moved by the pose."""
+    assembly = machine.assembly()
+    low, high = machine.crank.sweep or (0.0, math.tau)
+    return np.array([assembly.points(assembly.angles(theta), machine.points)
+                     for theta in np.linspace(low, high, 361)]) + machine.pose[0:3:2]
+
+
+def test_without_parameters_the_scene_is_the_catalogue():
+    machines = scene.read({}).machines
+    assert list(machines) == ['water_drop', 'jansen', 'peaucellier', 'slotted_lever']
+    for name, machine in machines.items():
+        assert machine.linkage.type == name
+        assert machine.linkage.dimensions == mechanisms.defaults(name)
+        assert machine.crank.speed == 1.0 and machine.crank.start == 0.0
+    assert scene.read({}).rate == 50.0
+
+
+def test_scale_multiplies_every_length():
+    lever = mechanisms.create('slotted_lever')
+    small, large = (Assembly(lever, scale=scale) for scale in (0.001, 1.0))
+    angles = large.angles(0.4)
+    assert small.points(angles, lever.points) == pytest.approx(
+        0.001 * large.points(angles, lever.points))
+    assert small.joints == ('lever', 'slide')
+    for solved in ('joint_angles', 'joint_rates'):
+        (turn, slide), = getattr(large, solved)(angles)
+        assert getattr(small, solved)(angles)[0] == pytest.approx([turn, 0.001 * slide])
+
+
+def test_a_linkage_of_ones_own_is_written_joint_by_joint():
+    machine = scene.read({
+        'mechanisms': ['rocker'], 'rocker.type': 'custom', 'rocker.tracer': 'P',
+        'rocker.joints': ['O ground 0 0', 'Q ground g 0', 'A crank O 0.3',
+                          'B dyad A Q 0.7 0.6 left', 'P line A B h', 'R line A B 0.1'],
+        'rocker.dimensions.g': 0.8, 'rocker.dimensions.h': -0.2,
+        'rocker.branches.B': -1}).machines['rocker']
+    places = machine.linkage.solve(0.3)
+    assert machine.linkage.tracer == 'P'
+    assert np.linalg.norm(places['B'] - places['A']) == pytest.approx(0.7)
+    assert places['B'][1] < places['A'][1]
+
+
+def test_a_branch_is_the_assembly_sign_of_the_linkage():
+    given = {'mechanisms': ['jansen'], 'jansen.branches.F': -1}
+    assert scene.read(given).machines['jansen'].linkage.branches['F'] == -1
+
+
+def test_only_more_than_one_pair_is_mirrored_by_default():
+    def mirrored(**given):
+        given = {f'jansen.{key}': value for key, value in given.items()}
+        return scene.read({'mechanisms': ['jansen'], **given}).machines['jansen'].mirrored
+
+    assert not mirrored() and mirrored(leg_pairs=2)
+    assert mirrored(mirrored=True) and not mirrored(leg_pairs=3, mirrored=False)
+
+
+@pytest.mark.parametrize('given, named', [
+    ({'mechanisms': []}, 'mechanisms must be'),
+    ({'mechanisms': None}, 'mechanisms must be'),
+    ({'mechanisms': ['jansen', 'jansen']}, 'mechanisms must be .* each once'),
+    ({'mechanisms': ['two words']}, 'mechanisms must be .* letters'),
+    ({'mechanisms': ['2nd'], '2nd.type': 'jansen'}, 'mechanisms must be'),
+    ({'mechanisms': ['a__b'], 'a__b.type': 'jansen'}, 'mechanisms must be'),
+    ({'mechanisms': 'jansen'}, 'mechanisms must be a list'),
+    ({'mechanisms': ['leg']}, "leg.type must be one of water_drop, .*, not 'leg'"),
+    ({'mechanisms': ['leg'], 'leg.type': 'klann'}, "leg.type must be one of .*, not 'klann'"),
+    ({'jansen.dimensions.m': -1.0}, 'jansen.dimensions.m must be .* above 0, not -1.0'),
+    ({'jansen.dimensions.m': 0.0}, 'jansen.dimensions.m must be .* above 0'),
+    ({'jansen.dimensions.m': 15}, 'jansen.dimensions.m must be .* decimal point .* not 15'),
+    ({'jansen.dimensions.m': 'long'}, "jansen.dimensions.m must be .* not 'long'"),
+    ({'jansen.dimensions.m': True}, 'jansen.dimensions.m must be'),
+    ({'jansen.dimensions.m': math.nan}, 'jansen.dimensions.m must be a finite'),
+    ({'jansen.dimensions.m': math.inf}, 'jansen.dimensions.m must be a finite'),
+    ({'jansen.dimensions.m': 500.0}, 'jansen.dimensions must let the jansen be assembled'),
+    ({'jansen.dimensions.q': 1.0}, 'jansen.dimensions.q is not a .* jansen.dimensions.a, '),
+    ({'jansen.dimension.a': 1.0}, 'jansen.dimension.a is not a parameter .* jansen.dimensions.a'),
+    ({'jansen': None}, 'jansen is not a parameter .* jansen.type'),
+    ({'leg.type': 'jansen'}, r'leg.type is not a parameter .* mechanisms, .* jansen\.\*'),
+    ({'jansen.branches.C': 0}, 'jansen.branches.C must be .* -1 to 1, except 0, not 0'),
+    ({'jansen.branches.C': 1.0}, 'jansen.branches.C must be a whole number'),
+    ({'jansen.scale': 0.0}, 'jansen.scale must be .* above 0'),
+    ({'jansen.leg_pairs': 0}, 'jansen.leg_pairs must be a whole number from 1'),
+    ({'water_drop.leg_pairs': 2}, 'water_drop.leg_pairs must be 1: only'),
+    ({'water_drop.mirrored': True}, 'water_drop.mirrored must be false: only'),
+    ({'jansen.mirrored': 1}, 'jansen.mirrored must be true or false'),
+    ({'jansen.points': ['G', 'Z']}, 'jansen.points must name some of O, .* G'),
+    ({'jansen.points': []}, 'jansen.points must name'),
+    ({'jansen.points': ['G', 'G']}, 'jansen.points must name .* each once'),
+    ({'jansen.pose': [0.0] * 5}, 'jansen.pose must be .* six'),
+    ({'jansen.pose': [0] * 6}, 'jansen.pose must be .* decimal point'),
+    ({'jansen.pose': [math.nan] * 6}, 'jansen.pose must be .* finite'),
+    ({'jansen.crank.speed': 1}, 'jansen.crank.speed must be .* decimal point'),
+    ({'jansen.crank.speed': 101.0}, 'jansen.crank.speed must be .* from -100 to 100'),
+    ({'jansen.crank.start': math.nan}, 'jansen.crank.start must be'),
+    ({'jansen.crank.sweep': [1.0]}, 'jansen.crank.sweep must be .* lower end and the higher end'),
+    ({'jansen.crank.sweep': [1.0, 1.0]}, 'jansen.crank.sweep must be'),
+    ({'jansen.crank.sweep': [1.0, 2.0], 'jansen.crank.start': 0.5},
+     r'jansen.crank.start must be inside the sweep \[1, 2\]'),
+    ({'peaucellier.crank.sweep': [-1.2, 1.0]},
+     r'peaucellier.crank.sweep must be inside the reach \[-1.17137, 1.17137\] rad'),
+    ({'peaucellier.crank.start': 2.0}, r'peaucellier.crank.start must be inside the reach \[-1.1'),
+    ({'rate': 0.0}, 'rate must be .* above 0 up to 1000'),
+    ({'rate': 50}, 'rate must be .* decimal point'),
+    ({'frame_id': 3}, 'frame_id must be a text'),
+    ({'mechanisms': ['custom']}, 'custom.joints: joints must be a list of lines'),
+    ({**OWN, 'own.joints': ['A crunk O 1']}, 'own.joints: joint line "A crunk O 1": expected'),
+    ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O r']}, 'own.joints: .* dimension r'),
+    ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O 1', 'B crank O 1']},
+     'own.joints must have one crank line'),
+    ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O r'], 'own.dimensions.r': 0.0},
+     'own.dimensions.r must be .* above 0'),
+    ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O 1'], 'own.dimensions.r': 1.0},
+     'own.dimensions.r is not a parameter'),
+    ({'jansen.joints': ['O ground 0 0']}, 'jansen.joints is not a parameter'),
+])
+def test_a_wrong_parameter_is_named_with_what_is_allowed(given, named):
+    with pytest.raises(scene.SceneError, match='^' + named) as refused:
+        scene.read(given)
+    assert '\n' not in str(refused.value)
+
+
+def test_parameters_of_the_client_library_are_none_of_the_scenes_business():
+    scene.read({'use_sim_time': True, 'qos_overrides./crank_states.publisher.depth': 5})
+
+
+def test_a_crank_that_cannot_turn_swings_within_its_reach():
+    machine = scene.read(CELL).machines['cell']
+    (low, high), = machine.reach
+    assert machine.crank.sweep == pytest.approx((0.98 * low, 0.98 * high))
+
+
+def test_a_crank_swings_in_the_arc_that_its_start_is_in():
+    stiff = {**CELL, 'cell.dimensions.r': 10.0}
+    first, second = scene.read(stiff).machines['cell'].reach
+    middle = 0.5 * (second[0] + second[1])
+    assert scene.read(stiff).machines['cell'].crank.sweep[1] < first[1]
+    crank = scene.read({**stiff, 'cell.crank.start': middle - math.tau}).machines['cell'].crank
+    assert second[0] < crank.sweep[0] < middle < crank.sweep[1] < second[1]
+
+
+@pytest.mark.parametrize('path', sorted(glob(os.path.join(CONFIG, '*.yaml'))))
+def test_every_scene_in_config_stands_above_the_floor(path):
+    pytest.importorskip('yaml')
+    for machine in scene.load(path).machines.values():
+        assert machine.pose[3:] == (math.pi / 2, 0.0, 0.0)
+        assert 0.0 < whole_motion(machine)[..., 1].min() < 0.2
+
+
+def test_the_mechanisms_of_the_scene_of_all_stand_apart():
+    pytest.importorskip('yaml')
+    boxes = []
+    for machine in scene.load(os.path.join(CONFIG, 'all.yaml')).machines.values():
+        places = whole_motion(machine)
+        boxes.append((places[..., 0].min(), places[..., 0].max()))
+    boxes.sort()
+    assert all(left[1] < right[0] for left, right in zip(boxes, boxes[1:]))
+
+
+@pytest.mark.parametrize('text', ['', 'mechanisms: [jansen]', '/**: 3', '/**: {', '[]'])
+def test_a_file_that_is_no_scene_says_so(tmp_path, text):
+    pytest.importorskip('yaml')
+    path = tmp_path / 'scene.yaml'
+    path.write_text(text)
+    with pytest.raises(scene.SceneError, match='scene.yaml must be YAML with'):
+        scene.load(path)
+
+
+def test_the_ends_of_every_slider_are_stops_that_are_allowed():
+    """A slider of rqt_reconfigure has stops at whole multiples of a hundredth of its range."""
+    given = {'mechanisms': ['leg', 'lever'], 'leg.type': 'jansen', 'lever.type': 'slotted_lever',
+             'leg.dimensions.m': 0.15, 'lever.dimensions.e': 3.0}
+    ranged = [p for p in scene.read(given).parameters if p.range and p.field.kind == 'double']
+    assert len(ranged) > 16
+    for parameter in ranged:
+        low, high = parameter.range
+        stop = (high - low) / 100.0
+        for end in (low, high):
+            assert math.isclose(round(end / stop) * stop, end, rel_tol=1e-6, abs_tol=1e-12)
+        assert low <= parameter.value <= high
+
+
+def test_every_parameter_says_what_it_means_and_who_reads_it():
+    for parameter in scene.read({}).parameters:
+        field = parameter.field
+        assert field.meaning.endswith('.') and field.allowed and field.readers
+        assert field.read_only == (parameter.name == 'mechanisms'
+                                   or parameter.name.endswith('.type'))
+
+
+def test_a_year_of_turning_loses_nothing():
+    mpmath = pytest.importorskip('mpmath')
+    with mpmath.workdps(60):
+        for speed in (1.0, -2.0 / 3.0, 99.9, 1e-9):
+            for elapsed in (1, 10 ** 9 + 7, YEAR + 123456789, 50 * YEAR + 987654321):
+                truth = (mpmath.mpf(0.3) + mpmath.mpf(speed) * elapsed / 10 ** 9) % (2 * mpmath.pi)
+                angle, velocity = Motion(speed, None, 0.3, 5).at(5 + elapsed)
+                assert abs(angle - truth) < 1e-15 and velocity == speed
+
+
+def test_a_year_of_swinging_loses_nothing():
+    mpmath = pytest.importorskip('mpmath')
+    low, high, speed = -0.7, 1.1, 2.3
+    with mpmath.workdps(60):
+        for elapsed in (1, 10 ** 9 + 7, YEAR + 123456789, 50 * YEAR + 987654321):
+            width = mpmath.mpf(high) - low
+            phase = (-low + mpmath.mpf(speed) * elapsed / 10 ** 9) % (2 * width)
+            angle, velocity = Motion(speed, (low, high), 0.0).at(elapsed)
+            assert abs(angle - (low + width - abs(width - phase))) < 1e-15
+            assert velocity == (speed if phase < width else -speed)
+
+
+def test_an_angle_is_in_a_turn_or_in_the_sweep():
+    generator = np.random.default_rng(0)
+    turning = [Motion(1e-9, None, start) for start in (0.0, math.tau, -1e-17, 7.0)]
+    swinging = Motion(1.0, (-0.5, 0.25))
+    for now in map(int, generator.integers(0, 10 ** 15, 500)):
+        assert all(0.0 <= motion.at(now)[0] < math.tau for motion in turning)
+        assert -0.5 <= swinging.at(now)[0] <= 0.25
+    assert all(0.0 <= motion.at(0)[0] < math.tau for motion in turning)
+
+
+def test_a_start_outside_the_sweep_is_moved_to_its_nearer_end():
+    assert Motion(1.0, (-0.5, 0.5), 2.0).at(0) == (0.5, -1.0)
+    assert Motion(1.0, (-0.5, 0.5), math.tau - 0.1).at(0)[0] == pytest.approx(-0.1)
+
+
+@pytest.mark.parametrize('sweep', [None, (-0.5, 0.25)])
+@pytest.mark.parametrize('speed', [2.0, -3.0, 0.0])
+def test_a_change_of_speed_makes_no_jump(sweep, speed):
+    motion = Motion(1.0, sweep, 0.1)
+    for now in range(0, 10 ** 10, 10 ** 9 // 3):
+        angle, velocity = motion.at(now)
+        after, turned = motion.changed(speed, sweep, now).at(now)
+        assert after == angle and turned == velocity * speed
+
+
+def test_a_change_of_sweep_goes_on_the_same_way():
+    motion = Motion(1.0, (-0.5, 0.25), 0.1)
+    for now in range(10 ** 8, 10 ** 10, 10 ** 9 // 3):
+        wider = motion.changed(1.0, (-0.75, 0.5), now)
+        assert wider.at(now) == pytest.approx(motion.at(now), abs=1e-15)
+        assert motion.changed(1.0, None, now).at(now)[0] == pytest.approx(
+            motion.at(now)[0] % math.tau)
+
+
+def test_right_legs_share_their_pin_with_left_legs():
+    assembly = Assembly(mechanisms.create('jansen'), 3, True)
+    for theta in np.linspace(-7.0, 7.0, 57):
+        pins = assembly.points(assembly.angles(theta), ('A',))[:, 0]
+        assert pins[0::2] == pytest.approx(pins[1::2], abs=1e-12)
+        for j, pin in enumerate(pins[0::2]):
+            angle = theta - math.tau * j / 3
+            assert pin == pytest.approx([15.0 * math.cos(angle), 15.0 * math.sin(angle)])
+
+
+def test_a_walker_of_one_pair_is_its_own_mirror_image():
+    assembly = Assembly(mechanisms.create('jansen'), 1, True)
+    here = assembly.points(assembly.angles(0.4), assembly.linkage.points)
+    there = assembly.points(assembly.angles(math.pi - 0.4), assembly.linkage.points)
+    assert here[1] == pytest.approx(there[0] * [-1.0, 1.0], abs=1e-12)
+
+
+def test_joint_rates_are_the_slopes_of_joint_angles():
+    assembly = Assembly(mechanisms.create('jansen'), 3, True)
+    step = 1e-6
+    slopes = (assembly.joint_angles(assembly.angles(0.7 + step))
+              - assembly.joint_angles(assembly.angles(0.7 - step))) / (2.0 * step)
+    assert assembly.joint_rates(assembly.angles(0.7)) == pytest.approx(slopes, abs=1e-7)
