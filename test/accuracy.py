@@ -286,7 +286,7 @@ def _row(case, theta, output, result, exact, due, top):
     elif not (rate and due == 'either'):
         error = float(_error(output, result, exact.values[output]))
         excess = max(0.0, error - _ulp(case, output, result, due))
-        ratio = excess / spread if excess else 0.0
+        ratio = 0.0 if not excess else excess / spread if spread else math.inf
         if rate:
             ratio = min(ratio, RULE * error / (SPEED_RULE * UNIT * top[output]))
         if ratio > RULE:
