@@ -70,7 +70,7 @@ POINTS = Field('string_array', 'Joints that are wanted in the markers.', readers
 POSE = Field('double_array', "Pose of the linkage's plane in frame_id: "
              'x, y, z [m], roll, pitch, yaw [rad].', rule='six of them', readers=(KINEMATICS,))
 SPEED = Field('double', 'Speed of the crank [rad/s].', -100.0, 100.0, readers=(DRIVER,))
-START = Field('double', 'Crank angle at the start [rad]; setting it moves the crank there.',
+START = Field('double', 'Crank angle at the start [rad]; a new one moves the crank there.',
               -4.0 * math.pi, 4.0 * math.pi, readers=(DRIVER,))
 SWEEP = Field('double_array', 'Crank angles [rad] between which the crank swings; '
               'empty: it turns all round, or swings through its reach.', readers=(DRIVER,),
@@ -144,7 +144,7 @@ def read(given: Mapping[str, Any]) -> Scene:
 
     """
     values = Values(given)
-    names = values.take('mechanisms', MECHANISMS, tuple(mechanisms.TYPES))
+    names = values.take('mechanisms', MECHANISMS, mechanisms.CATALOGUE)
     if not names or len(set(names)) < len(names) or not all(map(_NAME.match, names)):
         raise MECHANISMS.error('mechanisms', names)
     frame_id = values.take('frame_id', FRAME_ID, 'world')

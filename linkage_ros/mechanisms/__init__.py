@@ -26,11 +26,31 @@ The catalogue: mechanisms by the names that users type.
 from functools import lru_cache
 from types import MappingProxyType
 
-from . import custom, jansen, peaucellier, slotted_lever, water_drop
+from . import (
+    chebyshev_lambda,
+    custom,
+    five_bar,
+    four_bar,
+    hoeken,
+    jansen,
+    klann,
+    pantograph,
+    peaucellier,
+    slider_crank,
+    slotted_lever,
+    water_drop,
+    watt,
+    whitworth,
+)
 from ..mechanism import checked_branches, checked_dimensions, Design, Mechanism, Structure
 
+# What a scene shows when it names no mechanism.
+CATALOGUE = 'water_drop', 'jansen', 'peaucellier', 'slotted_lever'
+
 TYPES = MappingProxyType({m.DESIGN.name: m for m in (
-    water_drop, jansen, peaucellier, slotted_lever)})
+    water_drop, jansen, peaucellier, slotted_lever,
+    four_bar, slider_crank, hoeken, chebyshev_lambda, watt, klann, whitworth, pantograph,
+    five_bar)})
 
 CUSTOM = 'custom'
 

@@ -1,0 +1,32 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Chebyshev's lambda: the four-bar of his walking machine.
+
+Built like Hoeken's linkage, with ground OQ = a (4 + sqrt 7)/3 and AB = QB = BP = a (3 + sqrt 7)/2.
+These make the straight part of P's curve as straight as it can be over half a turn of the crank:
+its height has seven extremes, equally high and low in turn.
+
+Source: Chebyshev, "Les plus simples systemes de tiges articulees", 1878.
+"""
+
+from ..mechanism import Design
+
+DESIGN = Design('chebyshev_lambda', {'a': 1.0}, tracer='P', joints=(
+    'O ground 0 0',
+    'Q ground 2.2152504370215302*a 0',
+    'A crank O a',
+    'B dyad A Q 2.8228756555322954*a 2.8228756555322954*a left',
+    'P line A B 5.6457513110645907*a'))
