@@ -25,15 +25,25 @@ Linkages written down: one line a joint, in the order they are placed.
     L slot Q A e out d        tip, d from Q, of a lever about Q; A in its slot, e to its left
     S slider A r G p out      block on a line through G in direction p [rad], on a rod r from A
 
-`left` and `right` are as seen along the first two joints; `out` is the half of a slot on the
-tip's side, or the block ahead of the pin; `in` the other. A number is a length [m], an angle
-[rad], a dimension's name, or a sum, product, quotient or max() of these, without spaces.
+A joint's name begins with a letter, and a letter, digit or underscore follows. `left` and `right`
+are as seen along the first two joints; `out` is the half of a slot on the tip's side, or the block
+ahead of the pin; `in` the other. A number is a length [m], an angle [rad], a dimension's name, or
+a sum, difference, product, quotient or max() of these, without spaces. A dimension that is the
+length of a bar must be positive; one that is not may be zero or negative.
+
+A dyad keeps to its side of first -> second for as long as it can be assembled. Only where it is
+hung between a ground joint and a crank pin, and stretches or folds just as the crank passes the
+ground line (a change point: the longest and shortest of the four bars together as long as the
+other two), it goes on smoothly, which changes sides: a parallelogram stays a parallelogram. The
+side written is then the one at a crank angle of a quarter turn.
 """
 
 from __future__ import annotations
 
 import ast
+import math
 import operator
+import re
 from typing import Iterable, List, Mapping, NamedTuple, Tuple
 
 from .expression import dimension, Number, Real, real, where
@@ -54,6 +64,7 @@ _FORMS = {
     'slot': 'slot PIVOT PIN OFFSET out|in LENGTH',
     'slider': 'slider PIN LENGTH ORIGIN ANGLE out|in',
 }
+_NAME = re.compile(r'[A-Za-z][A-Za-z0-9_]*')
 _OPERATORS = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
               ast.Div: operator.truediv}
 
@@ -94,6 +105,10 @@ def _parsed(text: str) -> Line:
     if len(line.names) != names or not least <= len(line.args) <= len(form):
         expected = ' '.join(['NAME'] * names)
         raise line.error(f'expected "{expected} {_FORMS[line.word]}"')
+    for name in line.names:
+        if not _NAME.fullmatch(name) or name in _FORMS:
+            raise line.error(f'{name!r} is no name for a joint: a letter, then letters, digits '
+                             'and underscores, but none of the constructions')
     for kind, arg in zip(form, line.args):
         if '|' in kind and arg not in kind.split('|') or kind == '[up]' and arg != 'up':
             raise line.error(f'{arg!r} must be {kind.strip("[]").replace("|", " or ")}')
@@ -171,7 +186,7 @@ def _argument(sketch, line, kind, arg, symbols, signs):
 def _tree(line: Line, text: str) -> ast.expr:
     try:
         return ast.parse(text, mode='eval').body
-    except SyntaxError:
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise line.error(f'{text!r} is no number, dimension or arithmetic on them') from None
 
 
@@ -182,14 +197,18 @@ def _names(line: Line, text: str) -> set:
 
 def _value(line: Line, tree: ast.expr, symbols: Mapping[str, Real]) -> Number:
     if isinstance(tree, ast.Constant) and type(tree.value) in (int, float):
+        if not abs(tree.value) < math.inf:
+            raise line.error(f'{ast.unparse(tree)} is too large')
         return real(tree.value)
     if isinstance(tree, ast.Name) and tree.id in symbols:
         return symbols[tree.id]
     if isinstance(tree, ast.UnaryOp) and isinstance(tree.op, ast.USub):
         return -real(_value(line, tree.operand, symbols))
     if isinstance(tree, ast.BinOp) and type(tree.op) in _OPERATORS:
-        return _OPERATORS[type(tree.op)](*(_value(line, side, symbols)
-                                           for side in (tree.left, tree.right)))
+        left, right = (_value(line, side, symbols) for side in (tree.left, tree.right))
+        if isinstance(tree.op, ast.Div) and right.value == 0.0:
+            raise line.error(f'{ast.unparse(tree)} divides by zero')
+        return _OPERATORS[type(tree.op)](left, right)
     if isinstance(tree, ast.Call) and getattr(tree.func, 'id', '') == 'max' \
             and len(tree.args) == 2:
         first, second = (_value(line, arg, symbols) for arg in tree.args)

@@ -183,9 +183,19 @@ class Sketch:
             raise SketchError(f'joint {name} must be on the ground')
 
     def _bar_between(self, first, second):
+        """Return the vector between two joints of one link."""
         if (first, second) not in self._vectors:
-            raise SketchError(f'{first} and {second} are not on one bar')
+            link, frame = self._link_of(first, second)
+            length = (frame[second] - frame[first]).length()
+            vector = self.points[second].place - self.points[first].place
+            self._vectors[first, second] = _Vector(vector, length, link)
         return self._vectors[first, second]
+
+    def _link_of(self, first, second):
+        for link, frame in self.frames.items():
+            if first in frame and second in frame:
+                return link, frame
+        raise SketchError(f'{first} and {second} are not joints of one moving link')
 
     def _numbered(self, word):
         taken = sum(link.name.rstrip('0123456789') == word for link in self.links)
@@ -207,10 +217,11 @@ class Sketch:
         return planar.Arm(ends[0].place, ends[1].place, ends[0].span + ends[1].span)
 
     def distance(self, first: str, second: str) -> Real:
-        """Return the constant distance [m] of two joints on one bar or on the ground."""
-        if (first, second) in self._vectors:
-            return self._vectors[first, second].length
-        return (self.points[second].place - self.points[first].place).length()
+        """Return the constant distance [m] of two joints of one link or of the ground."""
+        ends = self.points[first], self.points[second]
+        if ends[0].home == ends[1].home == GROUND:
+            return (ends[1].place - ends[0].place).length()
+        return self._bar_between(first, second).length
 
     def _pair(self, name, first, second, found, to_first, to_second):
         """Join the two bars of a dyad: the joint belongs to the first, the second is cut there."""
