@@ -80,8 +80,11 @@ class Markers:
             marker.points = self._filled(marker.id, row.reshape(-1, 2).tolist())
         return self._message
 
-    def _filled(self, key, pairs):
-        points = self._points.setdefault((key, len(pairs)), [Point() for _ in pairs])
+    def _filled(self, id_, pairs):
+        """Return points at x, y pairs; for as many as before, the same ones."""
+        points = self._points.get((id_, len(pairs)))
+        if points is None:
+            points = self._points[id_, len(pairs)] = [Point() for _ in pairs]
         for point, (x, y) in zip(points, pairs):
             point.x, point.y = x, y
         return points

@@ -30,14 +30,13 @@ from typing import Any, Mapping, Optional, Tuple
 
 from . import mechanisms
 from .assembly import Assembly, is_full_turn
-from .mechanism import Mechanism
+from .mechanism import Design, Mechanism
 from .parameters import Field, Parameter, plain, SceneError, Values
 
 __all__ = ['Crank', 'Machine', 'Scene', 'SceneError', 'in_words', 'load', 'plain', 'read']
 
 DRIVER, KINEMATICS, INVERSE = ALL = 'crank_driver', 'kinematics', 'servo_inverse'
 
-TYPES = (*mechanisms.TYPES, mechanisms.CUSTOM)
 # What a crank that swings by default leaves of its reach at each end, as a part of its width.
 MARGIN = 0.01
 NARROWEST_SWEEP = 1e-6
@@ -45,6 +44,15 @@ NARROWEST_SWEEP = 1e-6
 # What the client library declares for itself.
 _ROS = re.compile(r'(use_sim_time|start_type_description_service|qos_overrides\..*)$')
 _NAME = re.compile(r'[A-Za-z](_?[A-Za-z0-9])*$')
+
+
+def has_one_crank(design: Design) -> bool:
+    """Return whether a linkage can be in a scene: one crank moves all of it."""
+    return sum(line.word == 'crank' for line in design.lines) == 1
+
+
+TYPES = (*(name for name in mechanisms.TYPES if has_one_crank(mechanisms.design(name))),
+         mechanisms.CUSTOM)
 
 MECHANISMS = Field(
     'string_array', 'Names of the mechanisms in the scene.', readers=ALL, read_only=True,
@@ -206,7 +214,7 @@ def _design(name, type_, values):
         design = mechanisms.design(type_, joints, tracer or None, dimensions)
     except ValueError as error:
         raise SceneError(f'{name}.joints: {error}') from None
-    if sum(line.word == 'crank' for line in design.lines) != 1:
+    if not has_one_crank(design):
         raise SceneError(f'{name}.joints must have one crank line, not several')
     return design
 

@@ -201,6 +201,17 @@ def test_time_that_goes_back_makes_no_jump(graph):
     assert driver.at(52 * SECOND) == (3.0, 1.0)
 
 
+def test_a_timer_that_sleeps_since_system_time_went_back_is_woken(graph):
+    node = graph.start(CrankDriver, {'mechanisms': ['drop'], 'drop.type': 'water_drop'})
+    heard = graph.listen(JointState, 'crank_states')
+    graph.until(lambda: heard)
+    # What is left by time that was set back an hour: a last tick in the future, and silence.
+    node._now += 3600 * SECOND
+    node._timer.cancel()
+    del heard[:]
+    graph.until(lambda: len(heard) > 2)
+
+
 def test_a_namespace_is_put_before_the_topic(graph):
     graph.start(CrankDriver, namespace='left')
     heard = graph.listen(JointState, '/left/crank_states')

@@ -22,6 +22,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from linkage_ros import scene  # noqa: E402
 from linkage_ros.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.kinematics import Kinematics  # noqa: E402
 from rcl_interfaces.msg import Log  # noqa: E402
@@ -164,14 +165,16 @@ def walk(links, frames, angles, turn, side, ground):
     found = dict(ground)
     directions = {}
     for link in links:
-        if link.kind == 'prismatic':
-            found[link.tip] = found[link.joint] + angles[link.name] * np.array(
-                [math.cos(directions[link.parent]), math.sin(directions[link.parent])])
-            continue
         if link.parent == 'ground':
             zero = link.zero if side > 0.0 or link.name == 'crank' else math.pi - link.zero
         else:
             zero = directions[link.parent] + side * link.zero
+        if link.kind == 'prismatic':
+            directions[link.name] = zero
+            slid = found[link.joint] + angles[link.name] * np.array(
+                [math.cos(zero), math.sin(zero)])
+            assert slid == pytest.approx(found.setdefault(link.tip, slid), abs=1e-10)
+            continue
         along = zero + (angles['crank'] - turn if link.name == 'crank' else angles[link.name])
         directions[link.name] = along
         rotation = np.array([[math.cos(along), -math.sin(along)],
@@ -181,15 +184,17 @@ def walk(links, frames, angles, turn, side, ground):
     return found
 
 
-@pytest.mark.parametrize('name', [*LENGTHS, 'walker'])
+@pytest.mark.parametrize('name', [*scene.TYPES[:-1], 'walker'])
 def test_joint_angles_along_the_tree_lead_to_the_joints(graph, name):
-    bench = Bench(graph, name, WALKER if name == 'walker' else None)
+    bench = Bench(graph, name, WALKER if name == 'walker' else {'mechanisms': [name]})
     machine = bench.node.scene.machines[name]
     linkage = machine.linkage
     frames = {link: {joint: (machine.scale * float(x), machine.scale * float(y))
                      for joint, (x, y) in frame.items()}
               for link, frame in linkage.frames.items()}
-    for theta in (0.0, 0.4, 1.1, -0.9):
+    low, high = machine.crank.sweep or (-math.pi, math.pi)
+    fixed = {link.joint for link in linkage.links if link.parent == 'ground'}
+    for theta in np.linspace(low, high, 5).tolist():
         state = bench.joints_at(theta)
         angles = dict(zip(state.name, state.position))
         assert len(angles) == len(state.name) == len(state.position)
@@ -199,9 +204,11 @@ def test_joint_angles_along_the_tree_lead_to_the_joints(graph, name):
             own = {link.name: angles[f'{name}_{"" if link.name == "crank" else prefix}{link.name}']
                    for link in linkage.links}
             reached = walk(linkage.links, frames, own, math.tau * pair / 3, -1.0 if right else 1.0,
-                           {joint: leg[joint] for joint in 'OBPCQ' if joint in leg})
+                           {joint: leg[joint] for joint in fixed})
+            size = machine.scale * float(linkage.longest)
+            assert set(reached) | fixed == set(leg) and len(reached) > len(fixed)
             for joint, place in reached.items():
-                assert place == pytest.approx(leg[joint], abs=1e-13 * 300.0)
+                assert place == pytest.approx(leg[joint], abs=1e-13 * size)
 
 
 def test_velocities_are_the_slopes_of_positions(graph):
@@ -249,10 +256,14 @@ def test_an_angle_out_of_reach_is_passed_over_with_a_warning(graph):
     assert 'cell cannot be assembled at crank angle 2 rad' in message
     assert '[-1.17137, 1.17137]' in message
     assert len(warned()) == 1
+    assert bench.set(cell__points=['A']).successful
+    with pytest.raises(AssertionError, match='in time'):
+        turn([2.0], nothing, seconds=0.3)
     bench.legs_at(0.5)
+    assert all(math.atan2(*places(m.markers[0])[0][::-1]) == pytest.approx(0.5)
+               for m in bench.markers)
     assert all(abs(m.position[0]) <= 1.0 for m in bench.joints)
     assert all(np.isfinite(m.position).all() for m in bench.joints)
-    assert all(len(m.markers[1].points) == 6 for m in bench.markers)
 
 
 def test_a_leg_that_cannot_be_assembled_is_left_out_and_the_others_stay(graph):

@@ -96,7 +96,7 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'mechanisms': ['a__b'], 'a__b.type': 'jansen'}, 'mechanisms must be'),
     ({'mechanisms': 'jansen'}, 'mechanisms must be a list'),
     ({'mechanisms': ['leg']}, "leg.type must be one of water_drop, .*, not 'leg'"),
-    ({'mechanisms': ['leg'], 'leg.type': 'klann'}, "leg.type must be one of .*, not 'klann'"),
+    ({'mechanisms': ['leg'], 'leg.type': 'camel'}, "leg.type must be one of .*, not 'camel'"),
     ({'jansen.dimensions.m': -1.0}, 'jansen.dimensions.m must be .* above 0, not -1.0'),
     ({'jansen.dimensions.m': 0.0}, 'jansen.dimensions.m must be .* above 0'),
     ({'jansen.dimensions.m': 15}, 'jansen.dimensions.m must be .* decimal point .* not 15'),
@@ -144,6 +144,7 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
      'own.dimensions.r must be .* above 0'),
     ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O 1'], 'own.dimensions.r': 1.0},
      'own.dimensions.r is not a parameter'),
+    ({'mechanisms': ['five_bar']}, "five_bar.type must be one of .*, not 'five_bar'"),
     ({'jansen.joints': ['O ground 0 0']}, 'jansen.joints is not a parameter'),
 ])
 def test_a_wrong_parameter_is_named_with_what_is_allowed(given, named):
