@@ -20,7 +20,8 @@ leg at pi - (theta - 2 pi j/N), on the same crank pin. All legs are solved in on
 """
 
 import math
-from typing import NamedTuple, Optional, Sequence
+from struct import Struct
+from typing import Callable, NamedTuple, Optional, Sequence
 
 import numpy as np
 
@@ -67,8 +68,9 @@ class Assembly:
                     for j, lag in enumerate(lags) for side, sign in sides.items()]
         self.linkage = linkage
         self.legs = tuple(legs)
-        self.joints = tuple(name for name in linkage.joints if name != 'crank')
+        self.joints = tuple(name for name in linkage.joints if name not in linkage.cranks)
         self.reach = linkage.reach() if reach is None else reach
+        self._everywhere = np.ones(len(legs), bool)
         self._lags = np.array([leg.lag for leg in legs])
         self._sides = np.array([leg.side for leg in legs])
         self._sizes = scale * np.stack([self._sides, np.ones(len(legs))], axis=1)[:, None]
@@ -80,11 +82,45 @@ class Assembly:
         angles = theta - self._lags
         return np.where(self._sides > 0.0, angles, math.pi - angles)
 
-    def within_reach(self, angles: np.ndarray) -> np.ndarray:
-        """Return which of the legs' angles can be assembled."""
-        if is_full_turn(self.reach):
-            return np.isfinite(angles)
+    def solver(self, points: Sequence[str] = (), joints: Sequence[str] = (),
+               rates: Sequence[str] = ()) -> Callable:
+        """
+        Return the function that solves all legs for what is wanted and nothing else.
+
+        Returns
+        -------
+        callable
+            From the crank angles [rad] to an array of shape (legs, n): x, y [m] of each point,
+            the joint angles [rad; a slide: m], their derivatives by each crank.
+
+        """
+        pose = self.linkage.function(points, joints, rates)
+        cranks = len(self.linkage.cranks)
+        units = [self._units[self.joints.index(name)] for name in (*joints, *rates * cranks)]
+        # A mirrored leg's own crank turns backwards, which mirrors its rates once more.
+        factors = np.array([[*np.ravel(self._sizes[i] * np.ones((len(points), 1))), *units]
+                            for i in range(len(self.legs))])
+        turned = slice(2 * len(points), 2 * len(points) + len(joints))
+        factors[:, turned] *= self._sides[:, None]
+        out = np.empty_like(factors)
+        pack = Struct(f'{out.shape[1]}d').pack_into
+        rows = [(i * out.strides[0], leg.lag, leg.side > 0.0) for i, leg in enumerate(self.legs)]
+
+        def solve(*thetas):
+            first, *others = thetas
+            for place, lag, left in rows:
+                angle = first - lag
+                pack(out, place, *pose(angle if left else math.pi - angle, *others))
+            return out * factors
+
+        return solve
+
+    def within_reach(self, thetas: Sequence[float]) -> np.ndarray:
+        """Return which legs can be assembled at crank angles [rad], as far as reach tells."""
+        if is_full_turn(self.reach) or len(thetas) > 1:
+            return self._everywhere
         with np.errstate(invalid='ignore'):
+            angles = self.angles(thetas[0])
             return np.any([(angles - lo + WRAPPED) % math.tau <= hi - lo + 2.0 * WRAPPED
                            for lo, hi in self.reach], axis=0)
 

@@ -14,8 +14,8 @@
 
 """Node that publishes joint angles, markers and loci of a scene's mechanisms."""
 
-import math
 import sys
+from typing import NamedTuple, Sequence
 
 import numpy as np
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -23,6 +23,7 @@ from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
 from . import messages, node, scene
+from .wire import Wire
 
 ANY = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -49,19 +50,29 @@ class Kinematics(node.SceneNode):
         if cranks.name != self._names:
             self._names = list(cranks.name)
             self._places = {name: i for i, name in enumerate(self._names)}
+        positions, speeds = cranks.position, cranks.velocity
+        known = len(speeds) == len(cranks.name)
         for outlet in self._outlets.values():
-            place = self._places.get(outlet.crank)
-            if place is not None and place < len(cranks.position):
-                known = len(cranks.velocity) == len(cranks.name)
-                outlet.turn(cranks.header.stamp, cranks.position[place],
-                            cranks.velocity[place] if known else math.nan)
+            places = [self._places.get(name, len(positions)) for name in outlet.cranks]
+            if max(places) < len(positions):
+                outlet.turn(cranks.header.stamp, [positions[i] for i in places],
+                            [speeds[i] for i in places] if known else [])
+
+
+class Drive(NamedTuple):
+    """What a pose is made from: crank angles [rad], speeds [rad/s] if known, and who listens."""
+
+    thetas: Sequence[float]
+    speeds: Sequence[float]
+    joints: bool
+    markers: bool
 
 
 class Outlet:
     """The topics of one mechanism."""
 
     def __init__(self, node_, name: str):
-        self.crank = f'{name}_crank'
+        self._name = name
         self._joint_states = node_.create_publisher(JointState, f'{name}/joint_states', 10)
         self._markers = node_.create_publisher(MarkerArray, f'{name}/markers', 1)
         self._locus = node_.create_publisher(Marker, f'{name}/locus', LATCHED)
@@ -74,64 +85,100 @@ class Outlet:
         if self._made_for == (machine, frame_id):
             return
         self._made_for = machine, frame_id
-        self._name, self._points = machine.name, machine.points
+        self._points = machine.points
         self._assembly = machine.assembly()
+        self.cranks = [f'{self._name}_{crank}' for crank in machine.linkage.cranks]
         self._joint_names = np.array([
-            [f'{machine.name}_{leg.prefix}{joint}' for joint in self._assembly.joints]
+            [f'{self._name}_{leg.prefix}{joint}' for joint in self._assembly.joints]
             for leg in self._assembly.legs])
-        drawn = machine.name, frame_id, machine.pose
+        drawn = self._name, frame_id, machine.pose
         place = {point: i for i, point in enumerate(machine.points)}
         bars = [(place[p], place[q]) for p, q in machine.linkage.bars
                 if p in place and q in place]
         size = machine.scale * float(machine.linkage.longest)
         self._marker_array = messages.Markers(*drawn, bars, size)
         self._joint_state = messages.JointStates()
+        self._drive, self._solvers, self._wires = None, {}, {}
         curve = self._assembly.locus(machine.tracer)
         if len(curve) > 1:
             self._locus.publish(messages.locus(*drawn, curve, size))
 
-    def turn(self, stamp, theta: float, speed: float):
-        """Publish what is listened to at a crank angle [rad]; speed [rad/s] or NaN if unknown."""
-        joints = self._joint_states.get_subscription_count()
-        markers = self._markers.get_subscription_count()
-        if not joints and not markers:
+    def turn(self, stamp, thetas: Sequence[float], speeds: Sequence[float]):
+        """Publish what is listened to at crank angles [rad]; speeds [rad/s], or none."""
+        drive = Drive(thetas, speeds, self._joint_states.get_subscription_count() > 0,
+                      self._markers.get_subscription_count() > 0)
+        if not (drive.joints or drive.markers):
             return
-        angles = self._assembly.angles(theta)
-        reached = self._assembly.within_reach(angles)
-        if joints and reached.any():
-            reached &= self._send_joints(stamp, theta, speed, angles, reached)
-        if markers and reached.any():
-            reached &= self._send_markers(stamp, angles, reached)
-        if not reached.all():
-            self._warn(theta, reached)
+        if drive != self._drive:
+            self._drive = drive
+            self._solve(drive)
+        if not self._whole:
+            self._warn(thetas)
+        if drive.joints:
+            self._send_joints(stamp, drive)
+        if drive.markers:
+            self._send_markers(stamp)
 
-    def _warn(self, theta, reached):
+    def _solve(self, drive):
+        """Solve the legs, once for each drive, for those who listen."""
+        points = self._points if drive.markers else ()
+        joints = self._assembly.joints if drive.joints else ()
+        rates = joints if drive.speeds else ()
+        wanted = points, joints, rates
+        if wanted not in self._solvers:
+            self._solvers[wanted] = self._assembly.solver(*wanted)
+        solved = self._solvers[wanted](*drive.thetas)
+        self._places = solved[:, :2 * len(points)]
+        self._angles = solved[:, 2 * len(points):2 * len(points) + len(joints)]
+        turning = solved[:, 2 * len(points) + len(joints):]
+        self._rates = sum(speed * turning[:, i * len(rates):(i + 1) * len(rates)]
+                          for i, speed in enumerate(drive.speeds))
+        posed = solved[:, :2 * len(points) + len(joints)]
+        self._legs = self._assembly.within_reach(drive.thetas) & np.isfinite(posed).all(axis=1)
+        self._whole = bool(self._legs.all())
+
+    def _warn(self, thetas):
         legs = [f'{self._name}_{leg.prefix}'.rstrip('_')
-                for leg, held in zip(self._assembly.legs, reached) if not held]
+                for leg, held in zip(self._assembly.legs, self._legs) if not held]
+        angles = ', '.join(f'{theta:.6g}' for theta in thetas)
         self._logger.warning(
-            f'{", ".join(legs)} cannot be assembled at crank angle {theta:.6g} rad; the reach is '
+            f'{", ".join(legs)} cannot be assembled at crank angle {angles} rad; the reach is '
             f'{scene.in_words(self._assembly.reach)} rad',
             throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
 
-    def _send_joints(self, stamp, theta, speed, angles, reached):
-        positions = self._assembly.joint_angles(angles)
-        legs = reached & np.isfinite(positions).all(axis=1)
-        if legs.any():
-            names = [self.crank, *self._joint_names[legs].ravel().tolist()]
-            velocities = ()
-            if math.isfinite(speed):
-                rates = self._assembly.joint_rates(angles)[legs] * speed
-                velocities = [speed, *rates.flat] if np.isfinite(rates).all() else ()
-            self._joint_states.publish(self._joint_state.message(
-                stamp, names, [theta, *positions[legs].flat], velocities))
-        return legs
+    def _send_joints(self, stamp, drive):
+        moving = bool(drive.speeds) and np.isfinite(self._rates[self._legs]).all()
+        parts = [[drive.thetas], self._angles[self._legs]]
+        if moving:
+            parts += [[drive.speeds], self._rates[self._legs]]
+        values = np.concatenate([np.ravel(part) for part in parts])
+        self._send('joints', moving, self._joint_states, self._joint_message, stamp, values)
 
-    def _send_markers(self, stamp, angles, reached):
-        places = self._assembly.points(angles, self._points)
-        legs = reached & np.isfinite(places).all(axis=(1, 2))
-        if legs.any():
-            self._markers.publish(self._marker_array.message(stamp, places[legs]))
-        return legs
+    def _joint_message(self, stamp, values, legs, moving):
+        names = [*self.cranks, *self._joint_names[legs].ravel().tolist()]
+        return self._joint_state.message(stamp, names, values[:len(names)],
+                                         values[len(names):] if moving else ())
+
+    def _send_markers(self, stamp):
+        values = self._places[self._legs].ravel()
+        self._send('markers', False, self._markers, self._marker_message, stamp, values)
+
+    def _marker_message(self, stamp, values, legs, _):
+        return self._marker_array.message(stamp, values.reshape(-1, len(self._points), 2))
+
+    def _send(self, what, moving, publisher, build, stamp, values):
+        """Publish all legs by patching one message; where some are left out, build another."""
+        if not self._legs.any():
+            return
+        if not self._whole:
+            publisher.publish(build(stamp, values, self._legs, moving))
+            return
+        if (what, moving) not in self._wires:
+            legs = self._legs
+            self._wires[what, moving] = Wire(
+                publisher, lambda stamp, values: build(stamp, values, legs, moving),
+                len(values), self._logger)
+        self._wires[what, moving].send(stamp, values)
 
 
 def main(args=None):

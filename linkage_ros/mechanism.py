@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from typing import Callable, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
@@ -106,6 +107,11 @@ class Structure:
     def _angles(self, names):
         values = self.sketch.joint_values
         return [in_metres(values[n]) if self._slides(n) else values[n] for n in names]
+
+    def _parts(self, wanted):
+        points, joints, rates = wanted
+        turning = [self._rates(rates, crank) for crank in range(len(self.sketch.cranks))]
+        return [*self._points(points), *self._angles(joints), *chain.from_iterable(turning)]
 
     def _slides(self, name):
         return any(x.name == name and x.kind == 'prismatic' for x in self.sketch.links)
@@ -315,15 +321,17 @@ class Mechanism:
         return arcs(lambda theta: margins.over(theta, *others),
                     self._structure.sketch.limits, self._value)
 
-    def function(self, points: Optional[Sequence[str]] = None) -> Callable:
+    def function(self, points: Optional[Sequence[str]] = None, joints: Sequence[str] = (),
+                 rates: Sequence[str] = ()) -> Callable:
         """
         Return the quickest way to one pose after the other.
 
         Returns
         -------
         callable
-            From the crank angle, a float [rad] (or as many as there are cranks), to the tuple
-            (x, y, x, y, ...) [m] of the points wanted, NaN where they cannot be assembled.
+            From the crank angle, a float [rad] (or as many as there are cranks), to a tuple of
+            floats: x, y [m] of each point wanted, then the joint angles wanted, then the joint
+            rates by each crank, from one list of operations; NaN where it cannot be assembled.
 
         Raises
         ------
@@ -331,7 +339,10 @@ class Mechanism:
             If a joint does not exist.
 
         """
-        return self._ready('points', points)[1].at
+        wanted = tuple(self._names(kind, names if names is None else tuple(names))
+                       for kind, names in (('points', points), ('angles', joints),
+                                           ('rates', rates)))
+        return self._bound('parts', wanted).at
 
     def _vectors(self, kind, theta, points, *crank):
         names, pose = self._ready(kind, points, *crank)
@@ -362,10 +373,12 @@ class Mechanism:
         key = (kind, wanted, *crank)
         if key not in self._poses:
             names = self._names(kind, wanted)
-            program = self._structure.program(kind, names, *crank)
-            pose = program.bind(self._lengths, self._evaluated, self._accelerate)
-            self._poses[key] = names, pose
+            self._poses[key] = names, self._bound(kind, names, *crank)
         return self._poses[key]
+
+    def _bound(self, kind: str, names, *crank: int) -> Pose:
+        program = self._structure.program(kind, names, *crank)
+        return program.bind(self._lengths, self._evaluated, self._accelerate)
 
     def _names(self, kind, wanted) -> Tuple[str, ...]:
         what, allowed = (('point', self.points) if kind in ('points', 'velocities')

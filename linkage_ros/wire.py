@@ -1,0 +1,135 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Messages that are serialised once and patched in place.
+
+Where the values of a message lie among its bytes is found by serialising values that occur nowhere
+else, so nothing here knows a message type or the wire format. What was found is tried before it is
+used: a patched message has to read back equal to one that is built.
+"""
+
+import struct
+from typing import Callable
+
+from builtin_interfaces.msg import Time
+import numpy as np
+from rclpy.serialization import deserialize_message, serialize_message
+
+# The bytes that say how a message is encoded; what follows is aligned from its end.
+HEADER = 4
+
+_STAMP = struct.Struct('=iI')
+_SENTINEL = Time(sec=0x5EC0_1234, nanosec=0x2A0C_4321)
+
+
+class NoTemplate(Exception):
+    """A message that cannot be patched in place."""
+
+
+class Template:
+    """
+    The bytes of a message whose stamp and float64 values change.
+
+    Parameters
+    ----------
+    build : callable
+        From a stamp and `count` floats, an array, to a message.
+    count : int
+        How many values the message is made from.
+
+    Raises
+    ------
+    NoTemplate
+        If the values are not found, or a patched message reads differently from a built one.
+
+    """
+
+    def __init__(self, build: Callable, count: int):
+        values = _distinct(count)
+        message = build(_SENTINEL, values)
+        text = serialize_message(message)
+        self._length = len(text)
+        self._bytes = bytearray(text + bytes(-(len(text) - HEADER) % 8))
+        self._stamps = _places(self._bytes, _STAMP.pack(_SENTINEL.sec, _SENTINEL.nanosec))
+        numbers = np.frombuffer(self._bytes, float, offset=HEADER)
+        order = np.argsort(values)
+        found = order[np.searchsorted(values, numbers, sorter=order) % max(count, 1)]
+        self._slots = np.flatnonzero(values[found] == numbers) if count else np.empty(0, int)
+        self._sources = found[self._slots] if count else self._slots
+        self._numbers = numbers
+        if len(set(self._sources)) < count:
+            raise NoTemplate('some values are not stored as aligned float64')
+        self._check(build, type(message), count)
+
+    def patched(self, stamp, values: np.ndarray) -> bytes:
+        """Return the message with this stamp and these values, serialised."""
+        self._numbers[self._slots] = values[self._sources]
+        for place in self._stamps:
+            _STAMP.pack_into(self._bytes, place, stamp.sec, stamp.nanosec)
+        return bytes(memoryview(self._bytes)[:self._length])
+
+    def _check(self, build, kind, count):
+        stamp, values = Time(sec=12, nanosec=345), np.linspace(-1.5, 7.25, count)
+        built = serialize_message(build(stamp, values))
+        if deserialize_message(self.patched(stamp, values), kind) != deserialize_message(
+                built, kind):
+            raise NoTemplate('a patched message does not read back as it was written')
+
+
+class Wire:
+    """
+    A publisher of one message that is sent again and again with other values.
+
+    Parameters
+    ----------
+    publisher : rclpy.publisher.Publisher
+        Where it goes.
+    build, count
+        As for Template.
+    logger : rclpy logger
+        Told once if messages have to be built one by one.
+
+    """
+
+    def __init__(self, publisher, build: Callable, count: int, logger):
+        self._publisher = publisher
+        self._build = build
+        try:
+            self._template = Template(build, count)
+        except NoTemplate as reason:
+            self._template = None
+            logger.warning(f'{publisher.topic_name}: {reason}; publishing ordinary messages',
+                           once=True)
+
+    def send(self, stamp, values: np.ndarray):
+        """Publish the message with this stamp and these values."""
+        if self._template:
+            self._publisher.publish(self._template.patched(stamp, values))
+        else:
+            self._publisher.publish(self._build(stamp, values))
+
+
+def _distinct(count: int) -> np.ndarray:
+    """Return numbers of which no other bytes of a message are made."""
+    return -1.2345678901234567e+201 * (1.0 + np.arange(count) / (count + 1.0))
+
+
+def _places(text: bytearray, wanted: bytes) -> list:
+    """Return where some bytes stand."""
+    found, place = [], text.find(wanted)
+    while place >= 0:
+        found.append(place)
+        place = text.find(wanted, place + 1)
+    return found

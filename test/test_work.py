@@ -1,0 +1,200 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the kinematics node does and what it leaves undone, counted."""
+
+from collections import Counter
+import math
+
+from builtin_interfaces.msg import Time
+from linkage_ros import kinematics, mechanisms, messages, wire
+from linkage_ros.assembly import Assembly
+from linkage_ros.kinematics import Kinematics, LATCHED
+import numpy as np
+import pytest
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import JointState
+from visualization_msgs.msg import Marker, MarkerArray
+
+CRANKS = ['water_drop_crank', 'jansen_crank', 'peaucellier_crank', 'slotted_lever_crank']
+WALKER = {'mechanisms': ['walker'], 'walker.type': 'jansen', 'walker.leg_pairs': 3}
+
+
+@pytest.fixture
+def work(monkeypatch):
+    """Count solutions by mechanism and by how many points, joints and rates were wanted."""
+    done = Counter()
+    make = Assembly.solver
+
+    def counted(assembly, *wanted):
+        solve = make(assembly, *wanted)
+
+        def run(*thetas):
+            done[(assembly.linkage.type, *map(len, wanted))] += 1
+            return solve(*thetas)
+        return run
+
+    monkeypatch.setattr(Assembly, 'solver', counted)
+    return done
+
+
+def test_a_mechanism_nobody_listens_to_is_not_solved(graph, work):
+    graph.start(Kinematics)
+    heard = graph.listen(MarkerArray, 'jansen/markers')
+    graph.crank(CRANKS)([0.1, 0.2, 0.3, 0.4], heard, [1.0] * 4)
+    assert {key[0] for key in work} == {'jansen'}
+
+
+def test_for_markers_alone_no_joint_angle_is_computed_and_the_reverse(graph, work):
+    graph.start(Kinematics)
+    turn = graph.crank(CRANKS)
+    turn([0.1, 0.2, 0.3, 0.4], graph.listen(MarkerArray, 'jansen/markers'), [1.0] * 4)
+    turn([0.1, 0.2, 0.3, 0.4], graph.listen(JointState, 'peaucellier/joint_states'), [1.0] * 4)
+    turn([0.1, 0.2, 0.3, 0.4], graph.listen(JointState, 'water_drop/joint_states'))
+    assert {key for key in work if key[0] == 'jansen'} == {('jansen', 8, 0, 0)}
+    assert {key for key in work if key[0] == 'peaucellier'} == {
+        ('peaucellier', 0, 6, 6), ('peaucellier', 0, 6, 0)}
+    assert {key for key in work if key[0] == 'water_drop'} == {('water_drop', 0, 2, 0)}
+
+
+def test_a_topic_nobody_listens_to_is_not_built(graph, monkeypatch):
+    sent = Counter()
+    send = wire.Wire.send
+    monkeypatch.setattr(wire.Wire, 'send', lambda self, *args: (
+        sent.update([self._publisher.topic_name]) or send(self, *args)))
+    graph.start(Kinematics)
+    graph.crank(CRANKS)([0.1] * 4, graph.listen(JointState, 'jansen/joint_states'), [1.0] * 4)
+    assert set(sent) == {'/jansen/joint_states'}
+
+
+def test_only_what_the_wanted_points_stand_on_is_computed():
+    leg = mechanisms.create('jansen')
+    operations = {point: len(_operations(leg, point)) for point in leg.points}
+    assert operations['O'] == operations['B'] == 0
+    assert operations['A'] < operations['C'] < operations['D'] < operations['F']
+    assert operations['E'] < operations['F'] < operations['G']
+    assert operations['G'] < len(_operations(leg, *leg.points))
+
+
+def _operations(linkage, *points):
+    """Return the operations that depend on the crank angle behind some points."""
+    listing = linkage._ready('points', points)[1]._variant._listing
+    return [number for number in listing._uses if listing.entries[number][0].varies]
+
+
+def test_a_crank_that_stands_still_is_not_solved_again(graph, work):
+    graph.start(Kinematics)
+    heard = graph.listen(MarkerArray, 'jansen/markers')
+    turn = graph.crank(['jansen_crank'])
+    first = turn([0.7], heard, [1.0])
+    again = turn([0.7], heard, [1.0])
+    assert sum(work.values()) == 1
+    assert again.markers[1].points == first.markers[1].points
+    assert again.markers[1].header.stamp.sec > first.markers[1].header.stamp.sec
+    turn([0.8], heard, [1.0])
+    assert sum(work.values()) == 2
+
+
+def test_the_locus_is_sent_once_and_a_late_subscriber_gets_it(graph, monkeypatch):
+    drawn = Counter()
+    locus = messages.locus
+    monkeypatch.setattr(messages, 'locus', lambda name, *args: (
+        drawn.update([name]) or locus(name, *args)))
+    node = graph.start(Kinematics)
+    heard = graph.listen(MarkerArray, 'jansen/markers')
+    turn = graph.crank(CRANKS)
+    for theta in (0.1, 0.2, 0.3):
+        turn([theta] * 4, heard)
+    late = graph.listen(Marker, 'jansen/locus', LATCHED)
+    graph.until(lambda: late)
+    assert set(drawn.values()) == {1}
+    assert graph.set(node, water_drop__dimensions__a=2.0).successful
+    assert drawn['water_drop'] == 2 and drawn['jansen'] == 1 and len(late) == 1
+
+
+def test_a_change_of_dimensions_rebuilds_only_that_mechanism(graph, monkeypatch):
+    node = graph.start(Kinematics)
+    built = []
+    assembly = kinematics.scene.Machine.assembly
+    monkeypatch.setattr(kinematics.scene.Machine, 'assembly', lambda machine: (
+        built.append(machine.name) or assembly(machine)))
+    assert graph.set(node, jansen__dimensions__m=14.0).successful
+    assert built == ['jansen']
+
+
+def test_a_subscriber_that_comes_or_goes_is_served_or_spared_from_the_next_tick(graph, work):
+    node = graph.start(Kinematics)
+    joints = graph.listen(JointState, 'jansen/joint_states')
+    turn = graph.crank(['jansen_crank'])
+    turn([0.1], joints)
+    markers = []
+    subscription = graph.node.create_subscription(
+        MarkerArray, 'jansen/markers', markers.append, 10)
+    graph.until(lambda: node.count_subscribers('jansen/markers'))
+    turn([0.2], markers)
+    turn([0.2], joints)
+    graph.node.destroy_subscription(subscription)
+    graph.until(lambda: not node.count_subscribers('jansen/markers'))
+    seen = len(markers)
+    turn([0.3], joints)
+    assert len(markers) == seen
+    assert ('jansen', 0, 6, 0) in work and ('jansen', 8, 6, 0) in work
+
+
+def test_all_legs_of_a_walker_are_solved_in_one_call(graph, work):
+    graph.start(Kinematics, WALKER)
+    turn = graph.crank(['walker_crank'])
+    message = turn([0.1], graph.listen(MarkerArray, 'walker/markers'))
+    assert len(message.markers[1].points) == 6 * 8
+    assert sum(work.values()) == 1
+
+
+@pytest.mark.parametrize('count', [1, 7, 288])
+def test_a_patched_message_reads_like_one_that_is_built(count):
+    random = np.random.default_rng(count)
+    markers = messages.Markers('walker', 'world', [0.1, 0.2, 0.3, 0.4, 0.5, 0.6],
+                               [(0, 0)] if count == 1 else [(0, 1), (1, 0)], 1.0)
+    states = messages.JointStates()
+    names = [f'walker_joint{i}' for i in range(count)]
+
+    def drawn(stamp, values):
+        return markers.message(stamp, values.reshape(-1, 1 if count == 1 else 2, 2))
+
+    def joined(stamp, values):
+        return states.message(stamp, names, values[:count], values[count:])
+
+    for build, kind, size in ((drawn, MarkerArray, 2 * count if count == 1 else 4 * count),
+                              (joined, JointState, count), (joined, JointState, 2 * count)):
+        template = wire.Template(build, size)
+        for values in (random.normal(size=size), np.zeros(size), -np.arange(size) * 1e300):
+            stamp = Time(sec=int(random.integers(2 ** 31)), nanosec=int(random.integers(10 ** 9)))
+            assert deserialize_message(template.patched(stamp, values), kind) == \
+                deserialize_message(serialize_message(build(stamp, values)), kind)
+
+
+def test_what_cannot_be_patched_is_published_as_an_ordinary_message(graph, monkeypatch):
+    def refuse(*_):
+        raise wire.NoTemplate('not on this middleware')
+
+    monkeypatch.setattr(wire.Template, '_check', refuse)
+    graph.start(Kinematics, WALKER)
+    turn = graph.crank(['walker_crank'])
+    plain = turn([0.4], graph.listen(JointState, 'walker/joint_states'), [2.0])
+    assert plain.position[0] == 0.4 and plain.velocity[0] == 2.0
+    monkeypatch.undo()
+    patched = wire.Template(
+        lambda stamp, values: JointState(name=plain.name, position=values), len(plain.name))
+    read = deserialize_message(patched.patched(Time(), np.array(plain.position)), JointState)
+    assert read.position == plain.position
+    assert all(math.isfinite(x) for x in plain.position)
