@@ -22,10 +22,11 @@ setup(
     name=package_name,
     version='0.1.0',
     packages=find_packages(include=[f'{package_name}*']),
+    package_data={f'{package_name}.web': ['page/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
-        (f'share/{package_name}/config', glob('config/*.yaml')),
+        (f'share/{package_name}/config', glob('config/*')),
         (f'share/{package_name}/launch', glob('launch/*.launch.py')),
     ],
     python_requires='>=3.10',
@@ -33,6 +34,7 @@ setup(
     extras_require={
         'fast': ['numba'],
         'test': ['gmpy2', 'hypothesis', 'mpmath', 'pytest', 'pyyaml'],
+        'viewer': ['aiohttp>=3.9'],
     },
     zip_safe=True,
     maintainer='linkage_ros contributors',
@@ -42,7 +44,7 @@ setup(
     entry_points={
         'console_scripts': [
             f'{name} = {package_name}.{name}:main'
-            for name in ('crank_driver', 'kinematics', 'servo_inverse')
+            for name in ('crank_driver', 'kinematics', 'servo_inverse', 'viewer')
         ],
     },
 )

@@ -62,7 +62,7 @@ def test_every_executable_can_be_called(arguments):
     pytest.importorskip('rclpy')
     lines = arguments['entry_points']['console_scripts']
     executables = [EntryPoint(*re.split(r'\s*=\s*', line), 'console_scripts') for line in lines]
-    assert [e.name for e in executables] == ['crank_driver', 'kinematics', 'servo_inverse']
+    assert {'crank_driver', 'kinematics', 'servo_inverse'} <= {e.name for e in executables}
     assert all(callable(e.load()) for e in executables)
 
 

@@ -1,0 +1,107 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The way from the web's thread to a node, whose entities only the executor's thread touches."""
+
+import asyncio
+from queue import Empty, SimpleQueue
+
+SECONDS_TO_ANSWER = 3.0
+SECONDS_BETWEEN_TRIES = 0.02
+
+
+class NoAnswer(Exception):
+    """A service that is not there or does not answer; the text names it."""
+
+
+class Bridge:
+    """
+    What the web's thread asks of a node.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        A node that some executor spins.
+
+    Attributes
+    ----------
+    loop : asyncio.AbstractEventLoop
+        The web's event loop, once there is one.
+
+    """
+
+    def __init__(self, node):
+        self.node = node
+        self.loop = None
+        self._tasks = SimpleQueue()
+        self._wake = node.create_guard_condition(self._work)
+
+    def ask(self, function, *args):
+        """
+        Have a function called in the executor's thread, after those that were asked for before.
+
+        Returns
+        -------
+        asyncio.Future
+            What it returns.
+
+        """
+        future = self.loop.create_future()
+        self._tasks.put((function, args, future))
+        self._wake.trigger()
+        return future
+
+    async def call(self, client, request):
+        """Return a service's response; raise NoAnswer if there is none in time."""
+        try:
+            return await asyncio.wait_for(self._called(client, request), SECONDS_TO_ANSWER)
+        except asyncio.TimeoutError:
+            raise NoAnswer(f'{client.srv_name} does not answer') from None
+
+    def hand_over(self, function, *args):
+        """Let a function run in the web's thread, if that is still there."""
+        try:
+            self.loop.call_soon_threadsafe(function, *args)
+        except RuntimeError:
+            pass
+
+    async def _called(self, client, request):
+        while not await self.ask(client.service_is_ready):
+            await asyncio.sleep(SECONDS_BETWEEN_TRIES)
+        future = self.loop.create_future()
+        asked = await self.ask(client.call_async, request)
+        asked.add_done_callback(lambda done: self.hand_over(_settle, future, done.result()))
+        return await future
+
+    def _work(self):
+        while True:
+            try:
+                function, args, future = self._tasks.get_nowait()
+            except Empty:
+                return
+            try:
+                self.hand_over(_settle, future, function(*args))
+            except Exception as error:
+                # Raised where it was asked for, not in the executor, which would end.
+                self.hand_over(_fail, future, error)
+
+
+def _settle(future, result):
+    if not future.done():
+        future.set_result(result)
+
+
+def _fail(future, error):
+    if not future.done():
+        future.set_exception(error)

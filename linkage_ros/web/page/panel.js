@@ -1,0 +1,300 @@
+// Copyright 2026 linkage_ros contributors
+//
+// Licensed under the Apache License, Version 2.0 (the "License");
+// you may not use this file except in compliance with the License.
+// You may obtain a copy of the License at
+//
+//     http://www.apache.org/licenses/LICENSE-2.0
+//
+// Unless required by applicable law or agreed to in writing, software
+// distributed under the License is distributed on an "AS IS" BASIS,
+// WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+// See the License for the specific language governing permissions and
+// limitations under the License.
+
+// The panel: a slider for each number that can be changed, and the reason where it is refused.
+
+const STOPS = 1000;
+const STILL = 2000;
+const RIGHT_ANGLE = Math.PI / 2;
+
+/** How a slider's place in [0, 1] becomes a value, and back. */
+const LINEAR = {
+  value: (place, low, high) => low + (high - low) * place,
+  place: (value, low, high) => (value - low) / (high - low),
+};
+const BY_FACTOR = {
+  value: (place, low, high) => low * (high / low) ** place,
+  place: (value, low, high) => Math.log(value / low) / Math.log(high / low),
+};
+const FINE_ABOUT_ZERO = {
+  value: (place, low, high) => high * (2 * place - 1) ** 3,
+  place: (value, low, high) => (Math.cbrt(value / high) + 1) / 2,
+};
+
+function law({ name, kind, low, high }) {
+  if (kind === 'integer' || name === 'crank.start') return LINEAR;
+  if (low > 0) return BY_FACTOR;
+  return low === -high ? FINE_ABOUT_ZERO : LINEAR;
+}
+
+const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+
+function element(tag, properties = {}, ...children) {
+  const made = Object.assign(document.createElement(tag), properties);
+  made.append(...children);
+  return made;
+}
+
+/** Return a function that passes on a value, the newest only, when the one before is through. */
+function newest(pass) {
+  let busy = false;
+  let waiting = null;
+  return async function offer(value) {
+    waiting = { value };
+    if (busy) return;
+    busy = true;
+    while (waiting) {
+      const { value: next } = waiting;
+      waiting = null;
+      await pass(next);
+    }
+    busy = false;
+  };
+}
+
+/** A number with a slider; what is refused springs back, with the reason below. */
+class Slider {
+  constructor({ label, title, unit, low, high, kind, value, scale, step, digits = 6 }, request) {
+    Object.assign(this, { low, high, kind, scale, digits, accepted: value, held: false });
+    const id = `s${Slider.made = (Slider.made ?? 0) + 1}`;
+    this.range = element('input', { type: 'range', id });
+    this.range.min = kind === 'integer' ? low : 0;
+    this.range.max = kind === 'integer' ? high : STOPS;
+    this.range.step = kind === 'integer' ? step || 1 : 1;
+    this.number = element('input', { type: 'number', step: 'any', ariaLabel: label });
+    this.reason = element('p', { className: 'reason', id: `${id}r`, hidden: true });
+    this.reason.setAttribute('role', 'alert');
+    this.answer = element('p', { className: 'answer', hidden: true });
+    this.range.setAttribute('aria-describedby', this.reason.id);
+    this.row = element('div', { className: 'row', title },
+      element('label', { htmlFor: id, textContent: label }), this.range, this.number,
+      element('span', { className: 'unit', textContent: unit }), this.answer, this.reason);
+    this.offer = newest(async wanted => {
+      const answer = await request(wanted);
+      this.settle(answer.reason, answer.reason ? this.accepted : wanted, answer);
+    });
+    this.range.oninput = () => {
+      this.held = true;
+      this.number.value = this.shortened(this.chosen());
+      this.offer(this.chosen());
+    };
+    this.range.onchange = () => this.release();
+    this.number.onfocus = () => { this.held = true; };
+    this.number.onblur = () => this.release();
+    this.number.onchange = () => {
+      if (this.number.value !== '') this.offer(Number(this.number.value));
+      this.number.blur();
+    };
+    this.render();
+  }
+
+  chosen() {
+    if (this.kind === 'integer') return Number(this.range.value);
+    const value = this.scale.value(this.range.value / STOPS, this.low, this.high);
+    return clamp(Number(value.toPrecision(4)), this.low, this.high);
+  }
+
+  settle(reason, value, answer = {}) {
+    this.accepted = value;
+    this.reason.textContent = reason && `Refused: ${reason}`;
+    this.reason.hidden = !reason;
+    this.row.classList.toggle('refused', !!reason);
+    this.told?.(answer);
+    if (!this.held) this.render();
+  }
+
+  release() {
+    this.held = false;
+    this.render();
+  }
+
+  /** Show a value that somebody else has set. */
+  update(value) {
+    this.accepted = value;
+    if (!this.held) this.render();
+  }
+
+  render() {
+    if (this.accepted === null || this.accepted === undefined) return;
+    const place = this.kind === 'integer' ? this.accepted
+      : STOPS * clamp(this.scale.place(this.accepted, this.low, this.high), 0, 1);
+    this.range.value = place;
+    this.number.value = this.shortened(this.accepted);
+  }
+
+  shortened(value) {
+    return String(Number(value.toPrecision(this.digits)));
+  }
+}
+
+/** A switch. */
+class Switch {
+  constructor({ label, title, value }, request) {
+    const id = `s${Slider.made = (Slider.made ?? 0) + 1}`;
+    this.box = element('input', { type: 'checkbox', id, checked: value });
+    this.reason = element('p', { className: 'reason', hidden: true });
+    this.reason.setAttribute('role', 'alert');
+    this.row = element('div', { className: 'row', title },
+      element('label', { htmlFor: id, textContent: label }), this.box, this.reason);
+    this.box.onchange = async () => {
+      const { reason } = await request(this.box.checked);
+      this.reason.textContent = reason && `Refused: ${reason}`;
+      this.reason.hidden = !reason;
+      if (reason) this.box.checked = !this.box.checked;
+    };
+  }
+
+  update(value) {
+    this.box.checked = value;
+  }
+}
+
+/** The sliders of one mechanism. */
+class Section {
+  constructor(mechanism, wire, folded) {
+    const { key, name, settings, lever } = mechanism;
+    this.mechanism = mechanism;
+    this.wire = wire;
+    this.controls = new Map();
+    this.still = element('p', { className: 'still', hidden: true });
+    const parts = [this.title(mechanism), this.still];
+    const groups = { crank: [], lever: [], dimensions: [], more: [] };
+    for (const setting of settings.values()) {
+      const control = this.control(setting);
+      if (!control) continue;
+      this.controls.set(setting.name, control);
+      const group = setting.name.split('.')[0];
+      (groups[group] ?? groups.more).push(control.row);
+    }
+    if (lever) groups.lever.push(this.leverSlider().row);
+    parts.push(...groups.crank, ...groups.lever);
+    if (groups.dimensions.length) parts.push(folding('Dimensions', groups.dimensions, !folded));
+    if (groups.more.length) parts.push(folding('More', groups.more, false));
+    this.element = element('section', { ariaLabel: name }, ...parts);
+    this.element.dataset.key = key;
+  }
+
+  title({ name, settings }) {
+    const type = settings.get('type')?.value ?? '';
+    const heading = element('header', {}, element('h2', { textContent: name }),
+      element('span', { className: 'about', textContent: type === name ? '' : type }));
+    if (settings.has('crank.speed')) {
+      this.button = element('button');
+      this.speed = settings.get('crank.speed').value || 1;
+      this.button.onclick = () => {
+        const now = this.mechanism.value('crank.speed');
+        this.controls.get('crank.speed').offer(now ? 0 : this.speed);
+      };
+      heading.append(this.button);
+      this.renderButton();
+    }
+    return heading;
+  }
+
+  renderButton() {
+    const speed = this.mechanism.value('crank.speed');
+    if (speed) this.speed = speed;
+    this.button.textContent = speed ? 'Stop' : 'Turn';
+  }
+
+  control(setting) {
+    const { name, kind, meaning, allowed, fixed, low, high } = setting;
+    const described = {
+      ...setting, label: name.replace(/^(crank|dimensions)\./, '').replace(/^branches\./, 'branch '),
+      title: `${meaning}\nMay be: ${allowed}.`, unit: /\[([^\]]+)\]/.exec(meaning)?.[1] ?? '',
+      scale: law(setting),
+    };
+    const request = value => this.wire.ask(
+      { op: 'set', mechanism: this.mechanism.key, values: { [name]: value } });
+    if (fixed) return null;
+    if (kind === 'bool') return new Switch(described, request);
+    const ranged = low !== null && high !== null && low < high;
+    return ranged && (kind === 'double' || kind === 'integer') ? new Slider(described, request) : null;
+  }
+
+  leverSlider() {
+    this.lever = new Slider({
+      label: 'lever', unit: 'rad', kind: 'double', value: 0, digits: 3, low: -RIGHT_ANGLE, high: RIGHT_ANGLE, scale: LINEAR,
+      title: 'Lever angle [rad]. Drag it here or in the picture: the servo_inverse service says\n'
+        + 'which crank angle puts the lever there, and the crank is stopped at it.',
+    }, angle => this.wire.ask({ op: 'drag', mechanism: this.mechanism.key, angle }));
+    this.lever.told = ({ servo, reduction }) => {
+      this.lever.answer.hidden = servo === undefined;
+      if (servo === undefined) return;
+      const ratio = reduction === null ? '' : `, d lever / d servo ${reduction.toFixed(4)}`;
+      this.lever.answer.textContent = `servo ${servo.toFixed(4)} rad (${(servo * 180 / Math.PI).toFixed(1)}°)${ratio}`;
+    };
+    return this.lever;
+  }
+
+  update(name, value) {
+    this.controls.get(name)?.update(value);
+    if (name === 'crank.speed' && this.button) this.renderButton();
+  }
+}
+
+function folding(title, rows, open) {
+  return element('details', { open }, element('summary', { textContent: title }), ...rows);
+}
+
+/** All sections that are shown. */
+export class Panel {
+  constructor(place, wire) {
+    this.place = place;
+    this.wire = wire;
+    this.sections = new Map();
+    this.built = '';
+  }
+
+  /** Show mechanisms; sections that stay as they are keep what is unfolded and typed. */
+  show(mechanisms, folded) {
+    const built = JSON.stringify([folded, mechanisms.map(({ key, lever, settings }) => [
+      key, lever, [...settings.values()].map(({ value, ...rest }) => rest)])]);
+    if (built !== this.built) {
+      this.built = built;
+      this.sections = new Map(mechanisms.map(one => [one.key, new Section(one, this.wire, folded)]));
+      this.place.replaceChildren(...[...this.sections.values()].map(section => section.element));
+      return;
+    }
+    for (const { key, settings } of mechanisms) {
+      for (const { name, value } of settings.values()) this.update(key, name, value);
+    }
+  }
+
+  update(key, name, value) {
+    this.sections.get(key)?.update(name, value);
+  }
+
+  /** Ask for a lever angle; return whether the last one was refused. */
+  drag(key, angle) {
+    const slider = this.sections.get(key)?.lever;
+    if (!slider) return false;
+    slider.offer(angle);
+    return !slider.reason.hidden;
+  }
+
+  /** Let the lever sliders follow the levers. */
+  follow(levers) {
+    for (const [key, angle] of levers) this.sections.get(key)?.lever?.update(angle);
+  }
+
+  /** Say which mechanisms send nothing. */
+  check(now) {
+    for (const { mechanism, still } of this.sections.values()) {
+      const silent = now - mechanism.heard;
+      still.hidden = silent < STILL;
+      still.textContent = `No markers for ${Math.round(silent / 1000)} s`;
+    }
+  }
+}

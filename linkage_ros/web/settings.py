@@ -1,0 +1,118 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The parameters of other nodes, as the page shows and sets them."""
+
+import asyncio
+from dataclasses import dataclass
+import math
+
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    ListParameters,
+    SetParametersAtomically,
+)
+from rclpy.parameter import Parameter, parameter_value_to_python
+
+SERVICES = {'list_parameters': ListParameters, 'describe_parameters': DescribeParameters,
+            'get_parameters': GetParameters, 'set_parameters_atomically': SetParametersAtomically}
+
+
+class RemoteNode:
+    """The parameter services of one node; made and closed in the executor's thread."""
+
+    def __init__(self, bridge, name: str):
+        self.name = name
+        self._bridge = bridge
+        self._clients = {service: bridge.node.create_client(type_, f'{name}/{service}')
+                         for service, type_ in SERVICES.items()}
+
+    def close(self):
+        """Destroy the clients."""
+        for client in self._clients.values():
+            self._bridge.node.destroy_client(client)
+
+    async def parameters(self, prefixes) -> dict:
+        """Return descriptor and value message by name; raise NoAnswer if the node is silent."""
+        listed = await self._call('list_parameters', prefixes=prefixes)
+        names = listed.result.names
+        if not names:
+            return {}
+        described, got = await asyncio.gather(
+            self._call('describe_parameters', names=names),
+            self._call('get_parameters', names=names))
+        return dict(zip(names, zip(described.descriptors, got.values)))
+
+    async def set(self, parameters) -> str:
+        """Set all parameters or none; return the reason of a refusal, or nothing."""
+        response = await self._call('set_parameters_atomically', parameters=parameters)
+        result = response.result
+        return '' if result.successful else result.reason or f'{self.name} gives no reason'
+
+    async def _call(self, service, **request):
+        return await self._bridge.call(
+            self._clients[service], SERVICES[service].Request(**request))
+
+
+@dataclass
+class Setting:
+    """A parameter that one or more nodes have; the first of them says what its value is."""
+
+    name: str
+    descriptor: object
+    messages: dict
+
+    @property
+    def nodes(self):
+        """The nodes' names."""
+        return list(self.messages)
+
+    @property
+    def value(self):
+        """Its value, as JSON has it."""
+        value = parameter_value_to_python(next(iter(self.messages.values())))
+        if isinstance(value, float):
+            return _finite(value)
+        return value if isinstance(value, (bool, int, str, type(None))) else list(value)
+
+    def described(self) -> dict:
+        """Return what the page needs to draw it."""
+        about = self.descriptor
+        ranges = [*about.floating_point_range, *about.integer_range]
+        low, high, step = (ranges[0].from_value, ranges[0].to_value,
+                           ranges[0].step) if ranges else (None, None, None)
+        return {'name': self.name, 'value': self.value, 'kind': self._type.name.lower(),
+                'meaning': about.description, 'allowed': about.additional_constraints,
+                'fixed': about.read_only, 'low': _finite(low), 'high': _finite(high),
+                'step': _finite(step)}
+
+    def message(self, full_name: str, value):
+        """Return a parameter message with a value from JSON; ValueError if it cannot hold it."""
+        wanted = {Parameter.Type.DOUBLE: (int, float), Parameter.Type.INTEGER: (int,),
+                  Parameter.Type.BOOL: (bool,)}.get(self._type, ())
+        if not isinstance(value, wanted) or isinstance(value, bool) != (wanted == (bool,)):
+            raise ValueError(f'{full_name} must be {self.descriptor.additional_constraints}, '
+                             f'not {value!r}')
+        if self._type == Parameter.Type.DOUBLE:
+            value = float(value)
+        return Parameter(full_name, self._type, value).to_parameter_msg()
+
+    @property
+    def _type(self):
+        return Parameter.Type(next(iter(self.messages.values())).type)
+
+
+def _finite(value):
+    return value if value is not None and math.isfinite(value) else None
