@@ -430,24 +430,6 @@ def test_legs_are_added_while_the_node_runs(graph):
     assert len(bench.legs_at(0.3)) == 2
 
 
-def test_nothing_is_solved_that_nobody_listens_to(graph, monkeypatch):
-    from linkage_ros.assembly import Assembly
-
-    asked, solver = [], Assembly.solver
-
-    def noted(assembly, *wanted):
-        asked.append((assembly.linkage.type, *map(tuple, wanted)))
-        return solver(assembly, *wanted)
-
-    monkeypatch.setattr(Assembly, 'solver', noted)
-    graph.start(Kinematics, {'jansen.points': ['G']})
-    heard = graph.listen(MarkerArray, 'jansen/markers')
-    turn = graph.crank(['water_drop_crank', 'jansen_crank', 'peaucellier_crank'])
-    turn([0.1, 0.2, 0.3], heard, [1.0, 1.0, 1.0])
-    assert asked and all(mechanism == 'jansen' and points == ('G',) and not joints
-                         for mechanism, points, joints, _ in asked)
-
-
 def test_driver_and_kinematics_go_together_in_a_namespace(graph):
     for node_class in (CrankDriver, Kinematics):
         graph.start(node_class, WALKER, namespace='/left/side')
