@@ -43,9 +43,12 @@ from .expression import (
     dot,
     exact_sum,
     NAN,
+    rated,
     Real,
     root,
     sine,
+    spin,
+    spun,
     square,
     square_root,
     where,
@@ -69,7 +72,8 @@ class Crank:
     def bar(self) -> Complex:
         """Return the vector from the centre to the pin."""
         s, h = sine(0.5 * self.angle), cosine(0.5 * self.angle)
-        return self.zero * Complex(1.0 - 2.0 * square(s), 2.0 * s * h) * self.length
+        turned = self.zero * Complex(1.0 - 2.0 * square(s), 2.0 * s * h)
+        return spun(turned * self.length, lambda d: d(self.angle))
 
 
 class Limit(NamedTuple):
@@ -109,13 +113,19 @@ class Arm:
 
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
-        return self._limit(radius, size, (radius - self._length) * (radius + self._length))
+        margin = (radius - self._length) * (radius + self._length)
+        return self._limit(radius, size, 1.0, margin)
 
     def beyond(self, radius: Real, size: Real) -> Limit:
         """Return the margin square - radius^2; the radius is made from lengths up to size."""
-        return self._limit(radius, size, (self._length - radius) * (self._length + radius))
+        margin = (self._length - radius) * (self._length + radius)
+        return self._limit(radius, size, -1.0, margin)
 
-    def _limit(self, radius, size, margin):
+    def _rate(self, margin, sign):
+        return rated(margin, lambda d: -(sign * d(self.square)))
+
+    def _limit(self, radius, size, sign, margin):
+        self._rate(margin, sign)
         # At the limit the length is the radius: the square moves by that times what lengths do.
         return Limit(margin, GRAZE * abs(radius) * (size + self._span))
 
@@ -137,6 +147,9 @@ class CrankArm(Arm):
         self._line = along
         self._area = 2.0 * g * m * s * h * (1.0 if reverse else -1.0)
         self._g, self._m, self._s, self._h = g, m, s, h
+        bar = crank.bar() * (-1.0 if reverse else 1.0)
+        rated(self.vector.x, lambda d: -(d(crank.angle) * bar.y))
+        rated(self.vector.y, lambda d: d(crank.angle) * bar.x)
 
     def offset(self, point: Complex) -> Real:
         """Return the cross product of the arm and the vector from its foot to a point."""
@@ -163,6 +176,7 @@ class CrankArm(Arm):
         # The smaller gap is the one next to which the margin can vanish.
         margin = where(abs(start) <= abs(end), start + sign * gm * square(s),
                        end - sign * gm * square(h))
+        self._rate(margin, sign)
         tolerance = GRAZE * abs(radius) * (size + self._g + self._m)
         gap, half = (start, s) if sign > 0.0 else (end, h)
         grown = square_root(gm) * self._first_sign(sign)
@@ -195,6 +209,20 @@ class CrankArm(Arm):
             return None
         return self._along * Complex(1.0, self._s / self._h) / (2.0 * self._m)
 
+    def crank_of_inverse(self, axis: str, value: Real, power: Real) -> Optional[Complex]:
+        """
+        Return a vector along the crank, seen from its zero, that puts an inverse somewhere.
+
+        It is the inverse of the pin in the foot by `power`; its x or y coordinate is to be the
+        value. None where that is not a straight line, as with `inverse_of_isosceles`.
+        """
+        if self._g is not self._m:
+            return None
+        along, scaled = self._along, (value - getattr(self.foot, axis)) * (2.0 * self._m) / power
+        tangent = (along.x - scaled) / along.y if axis == 'x' else (scaled - along.y) / along.x
+        half = Complex(1.0, tangent)
+        return half * half * self._turn.conjugate()
+
 
 def _half_angle(theta: Real, turn: Complex) -> Tuple[Real, Real]:
     """Return sine and cosine of (theta + arg turn) / 2 for a unit vector turn."""
@@ -206,7 +234,8 @@ def _half_angle(theta: Real, turn: Complex) -> Tuple[Real, Real]:
     small = 0.5 * abs(turn.y) / large
     cos = where(ahead, large, small)
     sin = where(ahead, small, large) * where(turn.y < 0.0, -1.0, 1.0)
-    return s * cos + h * sin, h * cos - s * sin
+    s, h = s * cos + h * sin, h * cos - s * sin
+    return (rated(s, lambda d: 0.5 * d(theta) * h), rated(h, lambda d: -(0.5 * d(theta) * s)))
 
 
 class Dyad(NamedTuple):
@@ -230,8 +259,16 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) 
     roots = [x.smooth if smooth and x.smooth else x.root() for x in limits]
     twice = 2.0 * arm.square
     skew = (first - second) * (first + second) / twice
-    v = roots[0] * roots[1] / twice * side
-    return Dyad(arm.vector * Complex(0.5 + skew, v), arm.vector * Complex(skew - 0.5, v), limits)
+    u, v = 0.5 + skew, roots[0] * roots[1] / twice * side
+    bars = arm.vector * Complex(u, v), arm.vector * Complex(skew - 0.5, v)
+
+    def turning(along, length):
+        """Add to the arm's turning that of a bar, along + i v, on the arm."""
+        return lambda d: spin(arm.vector, d) + (
+            (along * d(v) - v * d(skew)) * arm.square / square(length))
+
+    return Dyad(spun(bars[0], turning(u, first)), spun(bars[1], turning(skew - 0.5, second)),
+                limits)
 
 
 def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
@@ -252,6 +289,18 @@ def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
 def mirror(arm: Arm, point: Complex) -> Complex:
     """Return the mirror image of a point in the line of an arm: the far corner of a kite."""
     return point - arm.vector.turned() * (2.0 * arm.offset(point) / arm.square)
+
+
+def transmission(found: Dyad) -> Real:
+    """
+    Return the angle [rad] in [0, pi] between the two bars of a dyad, at their joint.
+
+    With the arm w, tan^2(mu/2) = (|w|^2 - (r1 - r2)^2) / ((r1 + r2)^2 - |w|^2).
+    """
+    if not found.limits:
+        return arctangent(abs(cross(found.first, found.second)), dot(found.first, found.second))
+    within, beyond = found.limits
+    return 2.0 * arctangent(beyond.root(), within.root())
 
 
 class Inversor(NamedTuple):
@@ -309,11 +358,17 @@ def slot(arm: Arm, offset: Real, half: float) -> Slot:
 
 
 class Slider(NamedTuple):
-    """A block on a fixed line: the rod to it, its place along the line [m], and the limit."""
+    """
+    A block on a fixed line: the rod to it, its place along the line [m], and the limit.
+
+    Also how far along the line, and how high above it, the pin is seen from the block [m].
+    """
 
     rod: Complex
     place: Real
     limit: Limit
+    reach: Real
+    height: Real
 
 
 def slider(pin: Complex, rod: Real, origin: Complex, along: Complex, side: float,
@@ -326,4 +381,4 @@ def slider(pin: Complex, rod: Real, origin: Complex, along: Complex, side: float
     height, foot = cross(along, pin - origin), dot(along, pin - origin)
     limit = Limit((rod - height) * (rod + height), GRAZE * rod * (rod + span))
     reach = limit.root() * side
-    return Slider(along * Complex(reach, -height), foot + reach, limit)
+    return Slider(along * Complex(reach, -height), foot + reach, limit, reach, height)
