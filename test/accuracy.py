@@ -163,8 +163,9 @@ def _turned(old, new):
 
 
 def _state(gap, slack):
+    """Tell whether a closure meets, fails, or would do the other within rounding."""
     if abs(gap) <= GRAZE * slack:
-        return 'grazes'
+        return 'grazes' if gap >= 0 else 'slips'
     return 'meets' if gap > 0 else 'fails'
 
 
@@ -242,7 +243,7 @@ def verdict(case, angle, output, result, exact):
 
 
 def _due(kind, output, closures, links):
-    """Tell what is due: 'number', 'nan' or 'either' near a limit."""
+    """Tell what is due: 'number', 'nan', 'either', or 'any' where no true pose exists nearby."""
     return _due_of({closures[name] for name in _needs(kind, output, links)})
 
 
@@ -250,9 +251,9 @@ def _due_of(states):
     states = set(states)
     if states <= {'meets'}:
         return 'number'
-    if 'grazes' in states:
-        return 'either'
-    return 'nan'
+    if 'slips' in states:
+        return 'any'
+    return 'either' if 'grazes' in states else 'nan'
 
 
 def _needs(kind, output, links):
@@ -283,7 +284,7 @@ def _row(case, theta, output, result, exact, due, top):
         problem = 'NaN' if due == 'number' else ''
     elif due == 'nan':
         problem = 'missed NaN'
-    elif not (rate and due == 'either'):
+    elif due == 'number' or due == 'either' and not rate:
         error = float(_error(output, result, exact.values[output]))
         excess = max(0.0, error - _ulp(case, output, result, due))
         ratio = 0.0 if not excess else excess / spread if spread else math.inf

@@ -48,11 +48,11 @@ def log_uniform(rng, low, high):
     return float(math.exp(rng.uniform(math.log(low), math.log(high))))
 
 
-def tiny(rng, exact=0.1):
-    """Return a signed distance from 1e-1 down to 1e-15, or zero with the probability `exact`."""
+def tiny(rng, least=1e-15, exact=0.1):
+    """Return a signed distance of 1e-1 at most, or zero with the probability `exact`."""
     if rng.random() < exact:
         return 0.0
-    return float(rng.choice((-1.0, 1.0)) * log_uniform(rng, 1e-15, 1e-1))
+    return float(rng.choice((-1.0, 1.0)) * log_uniform(rng, least, 1e-1))
 
 
 def dimensions(kind, rng):
@@ -96,11 +96,15 @@ def _slotted_lever(rng, degenerate):
 
 
 def _jansen(rng, degenerate):
-    """Legs within 35 % of the holy numbers, of any size; few other designs can walk at all."""
+    """
+    Return a leg within 35 % of the holy numbers, of any size; few other designs can walk at all.
+
+    Never a change point: its ground line is oblique, so that rounding decides about that.
+    """
     size = log_uniform(rng, 0.01, 1.0)
     leg = {name: size * number * float(rng.uniform(0.65, 1.35)) for name, number in HOLY.items()}
     if degenerate:
-        near = 1.0 + tiny(rng, exact=0.0)
+        near = 1.0 + tiny(rng, least=1e-13, exact=0.0)
         arm = math.hypot(leg['a'], leg['l'])
         far, close = arm + leg['m'], abs(arm - leg['m'])
         way = rng.integers(6)

@@ -43,7 +43,7 @@ def told(mechanism, *more):
 
 
 @pytest.mark.parametrize('kind, count', [
-    ('water_drop', 5), ('jansen', 100), ('peaucellier', 300), ('slotted_lever', 300)])
+    ('water_drop', 5), ('jansen', 60), ('peaucellier', 300), ('slotted_lever', 300)])
 def test_the_reach_is_what_brute_force_finds(kind, count):
     theta = np.linspace(-math.pi, math.pi, 1441)
     for mechanism in drawn(kind, 1, count):
@@ -54,7 +54,7 @@ def test_the_reach_is_what_brute_force_finds(kind, count):
 
 
 @pytest.mark.parametrize('kind, count', [
-    ('water_drop', 5), ('jansen', 40), ('peaucellier', 200), ('slotted_lever', 200)])
+    ('water_drop', 5), ('jansen', 20), ('peaucellier', 200), ('slotted_lever', 200)])
 def test_a_pose_exists_exactly_inside_the_reach(kind, count):
     for mechanism in drawn(kind, 2, count):
         arcs = mechanism.reach()
@@ -78,12 +78,12 @@ def test_every_end_of_the_reach_is_a_limit_to_the_last_digits(kind, count):
         for end in (end for arc in mechanism.reach() if [arc] != TURN for end in arc):
             ends += 1
             closures = truth(case, end, ()).closures
-            assert 'grazes' in closures.values(), told(mechanism, end, closures)
+            assert {'grazes', 'slips'} & {*closures.values()}, told(mechanism, end, closures)
     assert ends > 20
 
 
 @pytest.mark.parametrize('kind, count', [
-    ('water_drop', 5), ('jansen', 40), ('peaucellier', 200), ('slotted_lever', 200)])
+    ('water_drop', 5), ('jansen', 20), ('peaucellier', 200), ('slotted_lever', 200)])
 def test_arcs_are_given_in_order_and_start_in_the_first_turn(kind, count):
     for mechanism in drawn(kind, 4, count):
         arcs = mechanism.reach()
