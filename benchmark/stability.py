@@ -68,8 +68,8 @@ def main(args=None):
         'closure': closure_table([result for name, result in done if name == 'closure']),
         'reach': reach_table([result for name, result in done if name == 'reach']),
     }
-    if options.output:
-        Path(options.output).write_text(json.dumps(report, indent=1) + '\n')
+    options.output.parent.mkdir(parents=True, exist_ok=True)
+    options.output.write_text(json.dumps(report, indent=1) + '\n')
     show(report)
     return int(any(row['broken'] for row in report['accuracy'] if row['method'] == 'library')
                or any(row['wrong'] for row in report['closure'] + report['reach']))
@@ -84,7 +84,8 @@ def parse(args):
                         choices=list(stress.CATALOGUE))
     parser.add_argument('--jobs', type=int, default=2)
     parser.add_argument('--seed', type=int, default=1)
-    parser.add_argument('--output', default='stability.json', help='JSON file, "" for none')
+    parser.add_argument('--output', type=Path, metavar='JSON',
+                        default=ROOT / 'benchmark' / 'results' / 'stability.json')
     return parser.parse_args(args)
 
 
