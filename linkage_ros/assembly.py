@@ -90,30 +90,40 @@ class Assembly:
         Returns
         -------
         callable
-            From the crank angles [rad] to an array of shape (legs, n): x, y [m] of each point,
-            the joint angles [rad; a slide: m], their derivatives by each crank.
+            From the crank angles [rad] and `speeds` [rad/s] to an array of shape (legs, n): x, y
+            [m] of each point, the joint angles [rad; a slide: m] and, for those in rates, the
+            joint velocities.
 
         """
         pose = self.linkage.function(points, joints, rates)
-        cranks = len(self.linkage.cranks)
-        units = [self._units[self.joints.index(name)] for name in (*joints, *rates * cranks)]
-        # A mirrored leg's own crank turns backwards, which mirrors its rates once more.
-        factors = np.array([[*np.ravel(self._sizes[i] * np.ones((len(points), 1))), *units]
-                            for i in range(len(self.legs))])
-        turned = slice(2 * len(points), 2 * len(points) + len(joints))
-        factors[:, turned] *= self._sides[:, None]
+        cranks, posed = len(self.linkage.cranks), 2 * len(points) + len(joints)
+        factors = self._factors(len(points), joints, rates * cranks)
         out = np.empty_like(factors)
         pack = Struct(f'{out.shape[1]}d').pack_into
         rows = [(i * out.strides[0], leg.lag, leg.side > 0.0) for i, leg in enumerate(self.legs)]
 
-        def solve(*thetas):
-            first, *others = thetas
+        def solve(first, *others, speeds=()):
             for place, lag, left in rows:
                 angle = first - lag
                 pack(out, place, *pose(angle if left else math.pi - angle, *others))
-            return out * factors
+            solved = out * factors
+            if not rates:
+                return solved
+            turning = solved[:, posed:].reshape(len(rows), cranks, -1)
+            velocities = np.tensordot(turning, speeds, (1, 0)) if cranks > 1 else \
+                turning[:, 0] * speeds[0]
+            return np.hstack([solved[:, :posed], velocities])
 
         return solve
+
+    def _factors(self, points, joints, rates):
+        """Return what a leg's own numbers are multiplied by, shape (legs, n)."""
+        units = dict(zip(self.joints, self._units))
+        # A mirrored leg's own crank turns backwards, which mirrors its rates once more.
+        return np.hstack([
+            np.tile(self._sizes[:, 0], (1, points)),
+            np.outer(self._sides, [units[name] for name in joints]),
+            np.outer(self._everywhere, [units[name] for name in rates])])
 
     def within_reach(self, thetas: Sequence[float]) -> np.ndarray:
         """Return which legs can be assembled at crank angles [rad], as far as reach tells."""

@@ -14,8 +14,9 @@
 
 """Node that publishes joint angles, markers and loci of a scene's mechanisms."""
 
+import math
 import sys
-from typing import NamedTuple, Sequence
+from typing import NamedTuple, Optional, Sequence
 
 import numpy as np
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -68,6 +69,34 @@ class Drive(NamedTuple):
     markers: bool
 
 
+class Pose(NamedTuple):
+    """
+    A mechanism at one drive, as numbers: `legs` rows, the crank angles, the crank speeds.
+
+    A row holds points up to `points`, joint angles up to `posed`, then joint velocities; `held`
+    tells which legs can be assembled, None that all can; `moving` whether velocities are known.
+    """
+
+    values: np.ndarray
+    legs: int
+    cranks: int
+    points: int
+    posed: int
+    row: int
+    held: Optional[np.ndarray]
+    moving: bool
+
+    def rows(self) -> np.ndarray:
+        """Return the rows of the legs that can be assembled."""
+        rows = self.values[:self.legs * self.row].reshape(self.legs, self.row)
+        return rows if self.held is None else rows[self.held]
+
+    def drives(self) -> Sequence[np.ndarray]:
+        """Return crank angles and speeds."""
+        rest = self.values[self.legs * self.row:]
+        return rest[:self.cranks], rest[self.cranks:]
+
+
 class Outlet:
     """The topics of one mechanism."""
 
@@ -112,12 +141,14 @@ class Outlet:
         if drive != self._drive:
             self._drive = drive
             self._solve(drive)
-        if not self._whole:
-            self._warn(thetas)
-        if drive.joints:
-            self._send_joints(stamp, drive)
-        if drive.markers:
-            self._send_markers(stamp)
+        held = self._pose.held
+        if held is not None:
+            self._warn(thetas, held)
+        if held is None or held.any():
+            if drive.joints:
+                self._send('joints', self._joint_states, self._joint_message, stamp)
+            if drive.markers:
+                self._send('markers', self._markers, self._marker_message, stamp)
 
     def _solve(self, drive):
         """Solve the legs, once for each drive, for those who listen."""
@@ -127,58 +158,50 @@ class Outlet:
         wanted = points, joints, rates
         if wanted not in self._solvers:
             self._solvers[wanted] = self._assembly.solver(*wanted)
-        solved = self._solvers[wanted](*drive.thetas)
-        self._places = solved[:, :2 * len(points)]
-        self._angles = solved[:, 2 * len(points):2 * len(points) + len(joints)]
-        turning = solved[:, 2 * len(points) + len(joints):]
-        self._rates = sum(speed * turning[:, i * len(rates):(i + 1) * len(rates)]
-                          for i, speed in enumerate(drive.speeds))
-        posed = solved[:, :2 * len(points) + len(joints)]
-        self._legs = self._assembly.within_reach(drive.thetas) & np.isfinite(posed).all(axis=1)
-        self._whole = bool(self._legs.all())
+        solved = self._solvers[wanted](*drive.thetas, speeds=drive.speeds)
+        posed = 2 * len(points) + len(joints)
+        held, moving = self._assembly.within_reach(drive.thetas), bool(rates)
+        # One sum tells of all values whether each is finite; it is rarely asked which.
+        if not math.isfinite(solved.sum()):
+            held = held & np.isfinite(solved[:, :posed]).all(axis=1)
+            moving = moving and bool(np.isfinite(solved[held, posed:]).all())
+        self._pose = Pose(np.concatenate([solved.ravel(), drive.thetas, drive.speeds]),
+                          len(solved), len(drive.thetas), 2 * len(points), posed,
+                          solved.shape[1], None if held.all() else held, moving)
 
-    def _warn(self, thetas):
+    def _warn(self, thetas, held):
         legs = [f'{self._name}_{leg.prefix}'.rstrip('_')
-                for leg, held in zip(self._assembly.legs, self._legs) if not held]
+                for leg, placed in zip(self._assembly.legs, held) if not placed]
         angles = ', '.join(f'{theta:.6g}' for theta in thetas)
         self._logger.warning(
             f'{", ".join(legs)} cannot be assembled at crank angle {angles} rad; the reach is '
             f'{scene.in_words(self._assembly.reach)} rad',
             throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
 
-    def _send_joints(self, stamp, drive):
-        moving = bool(drive.speeds) and np.isfinite(self._rates[self._legs]).all()
-        parts = [[drive.thetas], self._angles[self._legs]]
-        if moving:
-            parts += [[drive.speeds], self._rates[self._legs]]
-        values = np.concatenate([np.ravel(part) for part in parts])
-        self._send('joints', moving, self._joint_states, self._joint_message, stamp, values)
-
-    def _joint_message(self, stamp, values, legs, moving):
-        names = [*self.cranks, *self._joint_names[legs].ravel().tolist()]
-        return self._joint_state.message(stamp, names, values[:len(names)],
-                                         values[len(names):] if moving else ())
-
-    def _send_markers(self, stamp):
-        values = self._places[self._legs].ravel()
-        self._send('markers', False, self._markers, self._marker_message, stamp, values)
-
-    def _marker_message(self, stamp, values, legs, _):
-        return self._marker_array.message(stamp, values.reshape(-1, len(self._points), 2))
-
-    def _send(self, what, moving, publisher, build, stamp, values):
+    def _send(self, what, publisher, build, stamp):
         """Publish all legs by patching one message; where some are left out, build another."""
-        if not self._legs.any():
+        pose = self._pose
+        if pose.held is not None:
+            publisher.publish(build(pose, stamp))
             return
-        if not self._whole:
-            publisher.publish(build(stamp, values, self._legs, moving))
-            return
-        if (what, moving) not in self._wires:
-            legs = self._legs
-            self._wires[what, moving] = Wire(
-                publisher, lambda stamp, values: build(stamp, values, legs, moving),
-                len(values), self._logger)
-        self._wires[what, moving].send(stamp, values)
+        kind = what, pose.moving, pose.values.size
+        if kind not in self._wires:
+            self._wires[kind] = Wire(
+                publisher, lambda stamp, values: build(pose._replace(values=values), stamp),
+                pose.values.size, self._logger)
+        self._wires[kind].send(stamp, pose.values)
+
+    def _joint_message(self, pose, stamp):
+        legs = slice(None) if pose.held is None else pose.held
+        names = [*self.cranks, *self._joint_names[legs].ravel().tolist()]
+        rows, (thetas, speeds) = pose.rows(), pose.drives()
+        return self._joint_state.message(
+            stamp, names, [*thetas, *rows[:, pose.points:pose.posed].flat],
+            [*speeds, *rows[:, pose.posed:].flat] if pose.moving else ())
+
+    def _marker_message(self, pose, stamp):
+        places = pose.rows()[:, :pose.points]
+        return self._marker_array.message(stamp, places.reshape(len(places), -1, 2))
 
 
 def main(args=None):

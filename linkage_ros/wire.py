@@ -45,14 +45,14 @@ class Template:
     Parameters
     ----------
     build : callable
-        From a stamp and `count` floats, an array, to a message.
+        From a stamp and `count` floats, an array, to a message that shows some of them.
     count : int
         How many values the message is made from.
 
     Raises
     ------
     NoTemplate
-        If the values are not found, or a patched message reads differently from a built one.
+        If a patched message reads differently from one that is built.
 
     """
 
@@ -69,13 +69,11 @@ class Template:
         self._slots = np.flatnonzero(values[found] == numbers) if count else np.empty(0, int)
         self._sources = found[self._slots] if count else self._slots
         self._numbers = numbers
-        if len(set(self._sources)) < count:
-            raise NoTemplate('some values are not stored as aligned float64')
         self._check(build, type(message), count)
 
     def patched(self, stamp, values: np.ndarray) -> bytes:
         """Return the message with this stamp and these values, serialised."""
-        self._numbers[self._slots] = values[self._sources]
+        self._numbers[self._slots] = values.take(self._sources)
         for place in self._stamps:
             _STAMP.pack_into(self._bytes, place, stamp.sec, stamp.nanosec)
         return bytes(memoryview(self._bytes)[:self._length])

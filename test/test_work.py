@@ -40,9 +40,9 @@ def work(monkeypatch):
     def counted(assembly, *wanted):
         solve = make(assembly, *wanted)
 
-        def run(*thetas):
+        def run(*thetas, **speeds):
             done[(assembly.linkage.type, *map(len, wanted))] += 1
-            return solve(*thetas)
+            return solve(*thetas, **speeds)
         return run
 
     monkeypatch.setattr(Assembly, 'solver', counted)
