@@ -1,0 +1,216 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Words and tables from the rows of a run."""
+
+from .errors import ENDLESS
+from .timing import BATCHES
+
+TITLES = {'water_drop': 'Water drop', 'jansen': 'Jansen leg', 'peaucellier': 'Peaucellier cell',
+          'slotted_lever': 'Slotted lever'}
+FAILURES = ('nan', 'raised', 'astray', 'made_up')
+
+# What was tried and is not among the methods.
+OMISSIONS = (
+    ('compas 2.15.1', 'geometry, data structures and a scene; nothing that closes a loop of bars'),
+)
+
+
+def document(result):
+    """Return the whole report as Markdown."""
+    machine = result['machine']
+    packages = ', '.join(f'{name} {number}' for name, number in machine['packages'].items())
+    parts = [
+        '# Run time against error',
+        f'{machine["date"]}, {machine["cpu"]}, one core; {machine["system"]}; Python '
+        f'{machine["python"]}, {machine["compiler"]}; {packages}. Commit {machine["commit"]}. '
+        f'The run took {result["seconds"]} s.',
+        LEGEND,
+    ]
+    for kind, title in TITLES.items():
+        parts += [f'## {title}', f'![{title}: run time against error]({kind}.png)',
+                  table(result, kind)]
+    parts += ['## Targets', targets(result), '## Omissions', omissions(result)]
+    return '\n\n'.join(parts) + '\n'
+
+
+LEGEND = """\
+Times are medians [us a pose, all points], with the 95th percentile of single poses. Errors are
+those of the worst point of a pose, in uL = 2^-53 x the longest bar, over the poses that did not
+fail: the median and the largest within a turn, awkward angles included, then the largest over
+all angles, some of them 1e9 turns out. *x sens* is the largest error within a turn in units of
+what half an ulp of every input does, after one ulp of the result. Failures are counted over all
+angles: no number (NaN), an exception, astray (off by more than 5 % of the longest bar: another
+assembly, or no convergence), and made up (a pose where there is none). *>* marks methods
+that follow: each pose is found from the one before, two degrees away at most."""
+
+
+def table(result, kind):
+    """Return the rows of a linkage as a Markdown table."""
+    lines = ['| method | knob | 1 | p95 | 12 | 1000 | 100000 | median uL | max uL | x sens '
+             '| max uL, all angles | failures |', '|---|---' + '|--:' * 9 + '|---|']
+    for rows in methods(result, kind).values():
+        one, many = rows[1], rows.get(1000, rows[1])
+        lines.append('| ' + ' | '.join((
+            ('> ' if one['follows'] else '') + one['method'], one['knob'],
+            _time(one), _number(one['p95_us']), *(_time(rows.get(batch)) for batch in BATCHES[1:]),
+            *(_number(many[name]) for name in ('median_uL', 'max_uL', 'max_sensitivity',
+                                               'max_uL_all')),
+            failures(many))) + ' |')
+    return '\n'.join(lines)
+
+
+def methods(result, kind):
+    """Return {(method, knob): {batch: row}} of a linkage, in the order they were run."""
+    found = {}
+    for row in result['rows']:
+        if row['mechanism'] == kind:
+            found.setdefault((row['method'], row['knob']), {})[row['batch']] = row
+    return found
+
+
+def failures(row):
+    """Return the failures of a row in words."""
+    told = [f'{row[f"failed_{name}"]} {name.replace("_", " ")}' for name in FAILURES
+            if row[f'failed_{name}']]
+    return f'{", ".join(told)} of {row["angles"]}' if told else 'none'
+
+
+def failed(row):
+    """Return the number of all failures of a row."""
+    return sum(row[f'failed_{name}'] for name in FAILURES)
+
+
+def _time(row):
+    if row is None:
+        return ''
+    return 'over budget' if row['median_us'] is None else _number(row['median_us'])
+
+
+def _number(value):
+    if value is None:
+        return ''
+    if value == 0:
+        return '0'
+    if value >= ENDLESS:
+        return 'inf'
+    if 1e-3 <= value < 1e5:
+        digits = max(0, 2 - len(str(int(value))) + (value < 1)) + (value < 0.1)
+        return f'{value:.{digits + (value < 10)}f}'
+    return f'{value:.0e}'.replace('e-0', 'e-').replace('e+0', 'e+')
+
+
+def omissions(result):
+    """Return what is not among the methods, and why."""
+    lines = ['| what | why |', '|---|---|']
+    lines += [f'| {what} | {why} |' for what, why in OMISSIONS]
+    lines += [f'| {family} | not installed here: {why} |'
+              for family, why in result['absent'].items()]
+    return '\n'.join(lines)
+
+
+def targets(result):
+    """Return the ratios that are aimed at, from the medians of this run."""
+    lines = ['| aim | wanted | measured |', '|---|---|---|']
+    jansen = methods(result, 'jansen')
+    step = jansen.get(('pylinkage', 'step()'))
+    for ours in (FLOATS, OURS):
+        if ours in jansen and step:
+            lines.append(_aim(f"Jansen leg, one pose, all points, {ours[1]}, to pylinkage's step",
+                              jansen[ours][1], step[1], 0.2))
+    for point in 'GC':
+        part = jansen.get((OURS[0], f'{point} alone'))
+        for batch, ours in ((1, FLOATS), (BATCHES[-1], OURS)):
+            if part:
+                lines.append(_aim(f'Jansen leg, {_poses(batch)}, {point} alone, to all points',
+                                  part[batch], jansen[ours][batch], 1.0))
+    for kind, title in TITLES.items():
+        found = methods(result, kind)
+        for limit in [key for key in found if key[0] == 'C through ctypes']:
+            for method, wanted in ((OURS, 4.0), (FAST, 1.5)):
+                if method in found:
+                    lines.append(_aim(
+                        f'{title}, {_poses(BATCHES[-1])}, {method[1]}, to C ({limit[1]})',
+                        found[method][BATCHES[-1]], found[limit][BATCHES[-1]], wanted))
+    return '\n'.join([*lines, '', *_against_peers(result)])
+
+
+OURS = ('linkage_ros', 'numpy')
+FAST = ('linkage_ros', 'numba')
+FLOATS = ('linkage_ros', 'function()')
+# Right: all but one in a hundred poses, and these to the last three digits, whatever the angle.
+ACCURATE = 1e3
+RARE = 0.01
+
+
+def _against_peers(result):
+    """Compare with the fastest peer, and with the fastest that is right at every angle."""
+    yield ('| us a pose | function() | numpy | numba | fastest peer that is right '
+           '| fastest peer of all |')
+    yield '|---|--:|--:|--:|---|---|'
+    for kind, title in TITLES.items():
+        found = methods(result, kind)
+        for batch in BATCHES:
+            timed = [rows[batch] for rows in found.values()
+                     if rows[1]['kind'] == 'peer' and rows[batch]['median_us'] is not None]
+            right = [row for row in timed
+                     if failed(row) < RARE * row['angles'] and row['max_scaled_all'] < ACCURATE]
+            ours = (found.get(key, {}).get(batch) for key in (FLOATS, OURS, FAST))
+            yield '| ' + ' | '.join((
+                f'{title}, {_poses(batch)}', *map(_time, ours),
+                *(_fastest(rows) for rows in (right, timed)))) + ' |'
+
+
+def _fastest(rows):
+    if not rows:
+        return 'none'
+    row = min(rows, key=lambda row: row['median_us'])
+    return (f'{_number(row["median_us"])}: {row["method"]}, {row["knob"]} '
+            f'(max {_number(row["max_uL_all"])} uL, failures: {failures(row)})')
+
+
+def _poses(batch):
+    return 'one pose' if batch == 1 else f'{batch} poses'
+
+
+def _aim(what, row, other, wanted):
+    if row['median_us'] is None or other['median_us'] is None:
+        return f'| {what} | <= {wanted:g} | not run |'
+    ratio = row['median_us'] / other['median_us']
+    missed = '' if ratio <= wanted else ' **missed**'
+    return (f'| {what} | <= {wanted:g} | {ratio:.2f}{missed} '
+            f'({_number(row["median_us"])} / {_number(other["median_us"])} us) |')
+
+
+def comparison(old, new):
+    """Return the ratios new / old of median times and largest errors, for rows in both."""
+    before = {_key(row): row for row in old['rows']}
+    lines = [f'{old["machine"]["date"]} {old["machine"]["commit"]} -> '
+             f'{new["machine"]["date"]} {new["machine"]["commit"]}', '',
+             '| linkage | method | knob | batch | time | max error |', '|---|---|---|--:|--:|--:|']
+    for row in new['rows']:
+        was = before.get(_key(row))
+        if was:
+            time, error = (_ratio(row[name], was[name]) for name in ('median_us', 'max_scaled'))
+            lines.append(f'| {row["mechanism"]} | {row["method"]} | {row["knob"]} '
+                         f'| {row["batch"]} | {time} | {error} |')
+    return '\n'.join(lines)
+
+
+def _key(row):
+    return row['mechanism'], row['method'], row['knob'], row['batch']
+
+
+def _ratio(new, old):
+    return f'{new / old:.2f}' if new is not None and old else '-'
