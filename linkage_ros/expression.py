@@ -233,7 +233,7 @@ def _summands(x: Real) -> list:
 def where(condition: Real, chosen: Number, otherwise: Number) -> Real:
     """Return chosen where the condition holds, else otherwise."""
     chosen, otherwise = real(chosen), real(otherwise)
-    if chosen is otherwise:
+    if chosen is otherwise or (chosen.value is not None and chosen.value == otherwise.value):
         return chosen
     return _node('where', condition, chosen, otherwise,
                  positive=chosen.positive and otherwise.positive)

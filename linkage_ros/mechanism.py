@@ -23,9 +23,10 @@ from typing import Callable, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from . import language
+from . import inverse, language
+from .analysis import Analysis
 from .compiler import evaluate, Pose, Program
-from .expression import Complex, cross, derivative, dimension, Real, real, where
+from .expression import angle, derivative, dimension, Real, real, spin, where
 from .reach import arcs
 from .sketch import Sketch
 
@@ -86,6 +87,7 @@ class Structure:
         self.sketch = Sketch()
         language.draw(self.sketch, design.lines,
                       language.symbols_of(design.dimensions, design.signed), branches)
+        self.branches = dict(branches)
         self._programs = {}
 
     def program(self, kind: str, names: Tuple[str, ...], *crank: int) -> Program:
@@ -117,19 +119,19 @@ class Structure:
         return any(x.name == name and x.kind == 'prismatic' for x in self.sketch.links)
 
     def _rates(self, names, crank=0):
-        known, turning = {}, {crank: 1.0}
+        known = {}
 
-        def spin(name):
+        def d(expression):
+            return derivative(expression, {crank: 1.0}, known)
+
+        def turning(name):
             bar = self.sketch.directions.get(name)
-            if bar is None:
-                return real(0.0)
-            moving = Complex(*(derivative(part, turning, known) for part in (bar.x, bar.y)))
-            return cross(bar, moving) / bar.squared()
+            return real(0.0) if bar is None else spin(bar, d)
 
         def rate(link):
             if link.kind == 'prismatic' or link.name in self.sketch.cranks:
-                return derivative(self._angles([link.name])[0], turning, known)
-            return spin(link.name) - spin(link.parent)
+                return d(self._angles([link.name])[0])
+            return turning(link.name) - turning(link.parent)
 
         links = {link.name: link for link in self.sketch.links}
         return [rate(links[n]) for n in names]
@@ -138,13 +140,57 @@ class Structure:
         """Return each limit's margin, so much above its tolerance that a reached one is >= 0."""
         return [limit.margin + limit.tolerance for limit in self.sketch.limits]
 
+    def _transmissions(self, names):
+        return [self.sketch.transmissions[n] for n in names]
+
+    @property
+    def closures(self) -> list:
+        """What vanishes where a dyad, a slot, a slider or a kite stretches or folds."""
+        return [limit for limit in (*self.sketch.limits, *self.sketch.folds)
+                if limit.margin.varies]
+
+    def _closures(self, _):
+        """Return each closure and its rate by the first crank."""
+        known = {}
+        return [part for limit in self.closures
+                for part in (limit.margin, derivative(limit.margin, {0: 1.0}, known))]
+
+    def _output(self, name):
+        """Return an output, as `crank_angle` names it, and its rate by the first crank."""
+        joint, _, axis = name.rpartition('.')
+        if not joint:
+            return self._angles([name]) + self._rates([name])
+        place = self._points([joint])['xy'.index(axis)]
+        return [place, derivative(place, {0: 1.0}, {})]
+
+    def turns(self, output: str) -> bool:
+        """Return whether an output is an angle, not a length."""
+        return '.' not in output and not self._slides(output)
+
+    def moves(self, output: str) -> bool:
+        """Return whether an output depends on the first crank."""
+        return self._output(output)[1].value != 0.0
+
+    def backward(self, output: str) -> Optional[inverse.Backward]:
+        """Return how an output drives the linkage backwards, if there is a closed form."""
+        given = angle(0) if self.turns(output) else in_own_unit(angle(0))
+        return inverse.backward(self.sketch, output, given, self.branches)
+
+    def _backward(self, output):
+        return self.backward(output).angles
+
 
 def in_metres(length: Real) -> Real:
     """Return a length counted in metres."""
     return where(abs(UNIT - 1.0) <= 0.0, length, length * UNIT)
 
 
-class Mechanism:
+def in_own_unit(length: Real) -> Real:
+    """Return a length that is counted in metres, counted in the unit of the dimensions."""
+    return where(abs(UNIT - 1.0) <= 0.0, length, length / UNIT)
+
+
+class Mechanism(Analysis):
     """
     A linkage whose dimensions are set.
 
@@ -209,6 +255,11 @@ class Mechanism:
         return type(self)(self._design, self._structure,
                           checked_dimensions(self._design, {**self.dimensions, **changed}),
                           self.branches, self._accelerate)
+
+    def _on_other_branch(self, joint: str) -> Mechanism:
+        branches = {**self.branches, joint: -self.branches[joint]}
+        return type(self)(self._design, Structure(self._design, branches), self.dimensions,
+                          branches)
 
     def accelerated(self) -> Mechanism:
         """
@@ -314,10 +365,11 @@ class Mechanism:
         """
         _, margins = self._ready('margins', ())
         if margins.shape:
-            raise ValueError('reach() is for one set of dimensions, not for arrays')
+            raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
+                             'not for arrays')
         if len(others) != len(self.cranks) - 1:
-            raise ValueError(f'{self.type} has {len(self.cranks)} cranks: reach() needs the '
-                             f'angles of the {len(self.cranks) - 1} others, got {len(others)}')
+            raise ValueError(f'{self.type} has {len(self.cranks)} cranks: the angles of the '
+                             f'{len(self.cranks) - 1} others are needed, got {len(others)}')
         return arcs(lambda theta: margins.over(theta, *others),
                     self._structure.sketch.limits, self._value)
 
@@ -381,8 +433,11 @@ class Mechanism:
         return program.bind(self._lengths, self._evaluated, self._accelerate)
 
     def _names(self, kind, wanted) -> Tuple[str, ...]:
-        what, allowed = (('point', self.points) if kind in ('points', 'velocities')
-                         else ('joint', self.joints))
+        what, allowed = {
+            'points': ('point', self.points), 'velocities': ('point', self.points),
+            'transmissions': ('transmission angle at', tuple(
+                self._structure.sketch.transmissions)),
+        }.get(kind, ('joint', self.joints))
         if wanted is None:
             return allowed
         names = (wanted,) if isinstance(wanted, str) else wanted

@@ -56,16 +56,16 @@ def arcs(margins: Callable, limits: Sequence[Limit], value: Callable) -> List[Ar
             for end in _crank_ends(*map(value, (
                 limit.start, limit.end, limit.turn, limit.tolerance)))]
     for i in [i for i, x in enumerate(limits) if x.margin.varies and x.crank != 0]:
-        for lo, hi in _between(ends):
-            ends += _bracketed(lambda theta, i=i: margins(theta)[i], lo, hi)
+        for lo, hi in between(ends):
+            ends += sign_changes(lambda theta, i=i: margins(theta)[i], lo, hi)
     return reachable_arcs(ends, lambda theta: bool(np.all(margins(theta) >= 0.0)))
 
 
 def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool]) -> List[Arc]:
     """Return the arcs between angles where reachability may change, joined where they touch."""
-    between = _between(ends)
-    held = [arc for arc in between if reachable(0.5 * (arc[0] + arc[1]))]
-    if held == between:
+    parts = between(ends)
+    held = [arc for arc in parts if reachable(0.5 * (arc[0] + arc[1]))]
+    if held == parts:
         return [(-math.pi, math.pi)]
     joined: List[Arc] = []
     for lo, hi in held:
@@ -89,7 +89,7 @@ def _crank_ends(start: float, end: float, turn: float, tolerance: float) -> List
     return [float(2.0 * half - turn), float(-2.0 * half - turn)]
 
 
-def _between(ends: Iterable[float]) -> List[Arc]:
+def between(ends: Iterable[float]) -> List[Arc]:
     """Return the arcs of one turn between angles, in order, from the least in [-pi, pi)."""
     marks: List[float] = []
     for end in sorted(end - 2.0 * math.pi * math.floor((end + math.pi) / (2.0 * math.pi))
@@ -101,9 +101,10 @@ def _between(ends: Iterable[float]) -> List[Arc]:
     return list(zip(marks, marks[1:] + [marks[0] + 2.0 * math.pi]))
 
 
-def _bracketed(margin: Callable, lo: float, hi: float) -> List[float]:
+def sign_changes(margin: Callable, lo: float, hi: float, samples: int = SAMPLES) -> List[float]:
     """Return the angles where a margin changes sign, or stops existing, on an arc."""
-    theta = 0.5 * (lo + hi) - 0.5 * (hi - lo) * np.cos(np.linspace(0.0, math.pi, SAMPLES))
+    theta = 0.5 * (lo + hi) - 0.5 * (hi - lo) * np.cos(np.linspace(0.0, math.pi, samples))
+    theta[0], theta[-1] = lo, hi
     theta = np.unique(np.concatenate([theta, _turning_points(margin, theta)]))
     above = margin(theta) >= 0.0
     return [_bisected(margin, *theta[i:i + 2]) for i in np.flatnonzero(above[1:] != above[:-1])]
@@ -117,7 +118,7 @@ def _turning_points(margin: Callable, theta: np.ndarray) -> np.ndarray:
     bumps = (inner < 0.0) & (inner >= before) & (inner >= after)
     found = np.flatnonzero(dips | bumps) + 1
     lo, hi = theta[found - 1], theta[found + 1]
-    for _ in range(60):
+    for _ in range(60 if len(found) else 0):
         third = (hi - lo) / 3.0
         left, right = np.abs(margin(lo + third)), np.abs(margin(hi - third))
         lo, hi = np.where(left > right, lo + third, lo), np.where(left > right, hi, hi - third)

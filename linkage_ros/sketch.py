@@ -86,6 +86,10 @@ class Sketch:
         self.frames = {}
         self.joint_values = {}
         self.directions = {}
+        self.lines = {}
+        self.corners = {}
+        self.transmissions = {}
+        self.folds = []
         self.cranks = []
         self._vectors = {}
         self._kites = {}
@@ -137,6 +141,9 @@ class Sketch:
     def mirror(self, name: str, point: str, first: str, second: str):
         """Mirror a joint in the line of two others: the far corner of a kite."""
         arm, pin = self.arm(second, first), self.points[first].crank
+        area = arm.offset(self.points[point].place)
+        self.folds.append(planar.Limit(area, planar.GRAZE * self.distance(first, point)
+                                       * self.distance(second, point)))
         place = planar.mirror(arm, self.points[point].place)
         bars = [place - self.points[end].place for end in (first, second)]
         self._pair(name, first, second, planar.Dyad(*bars, ()),
@@ -154,6 +161,7 @@ class Sketch:
         link = self._hang(right, corner, found.left.second, short)
         self._place(corner, right, found.left.second, link, short)
         self.points[corner].place = self.points[pole].place + found.inverse
+        self.corners[corner] = pole, pin, (long - short) * (long + short)
         self._pair(left, pole, pin, found.left, long, short)
         link = self._hang(left, corner, found.right.second, short)
         self._bar(left, corner, found.right.second, short, link)
@@ -165,6 +173,7 @@ class Sketch:
         self.limits.append(found.limit)
         lever = self._hang(pivot, tip, found.along, length, True, self._numbered('lever'))
         self._place(tip, pivot, found.along * length, lever, length)
+        self.transmissions[tip] = arctangent(abs(found.slide), offset)
         self._slide('slide', lever, pivot, pin, found.slide, Complex(0.0, offset))
 
     def slider(self, name: str, pin: str, rod: Real, origin: str, direction: Real, side: float):
@@ -176,7 +185,10 @@ class Sketch:
         self.limits.append(found.limit)
         link = self._hang(pin, name, found.rod, rod)
         self._place(name, pin, found.rod, link, rod)
-        self._slide('block', GROUND, origin, name, found.place, Complex(0.0, 0.0), direction)
+        self.transmissions[name] = arctangent(abs(found.reach), found.height)
+        block = self._slide('block', GROUND, origin, name, found.place, Complex(0.0, 0.0),
+                            direction)
+        self.lines[block] = along
 
     def _on_ground(self, name):
         if self.points[name].home != GROUND:
@@ -202,11 +214,12 @@ class Sketch:
         return f'{word}{taken + 1}' if taken else word
 
     def _slide(self, word, parent, joint, tip, place, local, direction=0.0):
-        """Add a link that slides along its parent."""
+        """Add a link that slides along its parent, and return its name."""
         name = self._numbered(word)
         self.links.append(Link(name, parent, joint, 'prismatic', real(direction), tip))
         self.joint_values[name] = place
         self.frames[name] = {tip: local}
+        return name
 
     def arm(self, first: str, second: str) -> planar.Arm:
         """Return the arm from one joint to another."""
@@ -229,10 +242,13 @@ class Sketch:
         self._place(name, first, found.first, link, to_first)
         link = self._hang(second, name, found.second, to_second)
         self._bar(second, name, found.second, to_second, link)
+        self.transmissions[name] = planar.transmission(found)
 
     def _hang(self, joint, tip, bar, length, upright=False, name=None):
         """Add a link that turns about a joint of its parent, and return its name."""
         name = name or ('' if len(joint + tip) == 2 else '_').join((joint, tip))
+        if name in self.joint_values:
+            raise SketchError(f'its link {name} would have the name of another')
         parent = self.points[joint].home
         zero = Complex(0.0, 1.0) if upright else Complex(1.0, 0.0)
         relative = bar * self.directions.get(parent, zero).conjugate()
