@@ -70,6 +70,20 @@ class Equations:
                 left.append((x - u) * (q - v) - (y - v) * (p - u))
         return left
 
+    def slopes(self, unknowns, pin):
+        """
+        Return the Jacobian of the residuals, by complex steps: exact, as these are polynomials.
+
+        Left to themselves the solvers take differences over a share of each unknown, which is all
+        rounding where a coordinate is close to zero.
+        """
+        slopes = []
+        for index in range(len(unknowns)):
+            moved = [complex(part) for part in unknowns]
+            moved[index] += 1e-30j
+            slopes.append([1e30 * left.imag for left in self.residuals(moved, pin)])
+        return np.array(slopes).T
+
     def pin(self, theta):
         """Return the crank pin at a crank angle."""
         return self._assembly.pin(math.cos(theta), math.sin(theta))
@@ -96,7 +110,7 @@ class Scipy(Follower):
     def solve_one(self, theta):
         """Return {point: (x, y)}."""
         pin = self._equations.pin(theta)
-        found = self._solver(self._equations.residuals, self._before, pin)
+        found = self._solver(self._equations, self._before, pin)
         self._before = found.tolist()
         return self._equations.places(self._before, pin)
 
@@ -108,8 +122,9 @@ class Scipy(Follower):
 
 def _fsolve(tolerance):
     def solve(equations, guess, pin):
-        found, info, flag, message = fsolve(equations, guess, (pin,), xtol=tolerance,
-                                            full_output=True)
+        found, info, flag, message = fsolve(
+            equations.residuals, guess, (pin,), fprime=equations.slopes, xtol=tolerance,
+            full_output=True)
         # Where there is no further progress, the last digits may well have been reached.
         size = np.abs(found).max()
         if flag != 1 and np.abs(info['fvec']).max() > CLOSED * size * size:
@@ -120,8 +135,8 @@ def _fsolve(tolerance):
 
 def _least_squares(tolerance):
     def solve(equations, guess, pin):
-        found = least_squares(equations, guess, args=(pin,), xtol=tolerance, ftol=tolerance,
-                              gtol=tolerance)
+        found = least_squares(equations.residuals, guess, equations.slopes, args=(pin,),
+                              xtol=tolerance, ftol=tolerance, gtol=tolerance)
         if not found.success:
             raise ArithmeticError(found.message)
         return found.x
