@@ -1,0 +1,276 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Robot models, read and moved by libraries that know nothing of this package. No ROS."""
+
+from dataclasses import replace
+from io import BytesIO
+import math
+import re
+from xml.etree import ElementTree
+
+from linkage_ros import mechanisms, scene, urdf
+from linkage_ros.assembly import Assembly
+from linkage_ros.travel import crank_reach
+import numpy as np
+import pytest
+
+TOLERANCE = 1e-12
+SLIDES = {'slide', 'block', 'left0_block', 'left1_block', 'right0_block', 'right1_block'}
+POSE = [0.3, -0.2, 0.92, math.pi / 2.0, 0.4, -1.1]
+GRIPPER = ['O ground 0 0', 'Q ground 0.08 0', 'A crank O 0.03', 'B dyad A Q 0.07 0.05 left',
+           'P rigid A B 0.04 0.06 right', 'T rigid B Q 0.07 0.09 left']
+ENGINE = ['O ground 0 0', 'G ground 0 -20', 'A crank O 40', 'B slider A 120 G 0.5 out',
+          'P rigid A B 50 90 left']
+FIVE_BAR = ['O ground 0 0', 'Q ground 0.118 0', 'A crank O 0.09', 'C crank Q 0.08 up',
+            'P dyad A C 0.1 0.09 left', 'G ground 0 0.2', 'S slider P 0.3 G 0.2 out']
+HALF_TURN = ['O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'B dyad A Q 1.4 1.1 left']
+
+
+def machine(type_, joints=None, **given):
+    """Return a mechanism `m` of a scene in a pose askew."""
+    values = {'mechanisms': ['m'], 'm.type': type_, 'm.pose': POSE, 'm.scale': 0.01,
+              **({'m.joints': joints} if joints else {}),
+              **{f'm.{name.replace("__", ".")}': value for name, value in given.items()}}
+    return scene.read(values).machines['m']
+
+
+def of_two_cranks():
+    linkage = mechanisms.create('custom', joints=FIVE_BAR)
+    return replace(machine('jansen', scale=1.0), linkage=linkage, points=linkage.points)
+
+
+MACHINES = {
+    **{name: lambda name=name: machine(name) for name in mechanisms.TYPES if name != 'five_bar'},
+    'slotted_lever with offset': lambda: machine('slotted_lever', dimensions__e=20.0),
+    'walker of 3 pairs': lambda: machine('jansen', leg_pairs=3),
+    'one-sided walker': lambda: machine('klann', leg_pairs=2, mirrored=False),
+    'gripper': lambda: machine('custom', GRIPPER, scale=1.0),
+    'engine': lambda: machine('custom', ENGINE),
+    'boxer engine': lambda: machine('custom', ENGINE, leg_pairs=2),
+    'five-bar': of_two_cranks,
+}
+CUTS = {'water_drop': 1, 'jansen': 3, 'peaucellier': 3, 'slotted_lever': 1,
+        'walker of 3 pairs': 18, 'gripper': 1, 'engine': 1, 'boxer engine': 4, 'five-bar': 2}
+
+
+def drives(one):
+    """Yield crank angles all through the reach, as `solve` takes them."""
+    if len(one.linkage.cranks) > 1:
+        yield from np.random.default_rng(0).uniform((-0.5, -1.5), (0.5, 0.0), (40, 2))
+    for low, high in one.reach if len(one.linkage.cranks) == 1 else ():
+        yield from np.linspace(low, high, 41)
+
+
+def posed(one, theta):
+    """Return joint positions as they are published, and where each joint is [m], by name."""
+    linkage, assembly = one.linkage, one.assembly()
+    if len(linkage.cranks) > 1:
+        units = {name: one.scale if name in SLIDES else 1.0 for name in linkage.joints}
+        return ({f'm_{name}': units[name] * value
+                 for name, value in linkage.joint_angles(theta).items()},
+                {f'm_{name}': one.scale * xy for name, xy in linkage.solve(theta).items()})
+    angles = assembly.angles(theta)
+    positions = {f'm_{leg.prefix}{joint}': value for leg, row in zip(
+        assembly.legs, assembly.joint_angles(angles))
+        for joint, value in zip(assembly.joints, row)}
+    places = {f'm_{leg.prefix}{point}': xy for leg, row in zip(
+        assembly.legs, assembly.points(angles, linkage.points))
+        for point, xy in zip(linkage.points, row)}
+    return {'m_crank': theta, **positions}, places
+
+
+def in_space(pose, place):
+    """Return a place in the plane [m] turned by roll, pitch and yaw in turn, and shifted."""
+    x, y, z = *place, 0.0
+    for angle, (i, j) in zip(pose[3:], ((1, 2), (2, 0), (0, 1))):
+        turned = [x, y, z]
+        turned[i] = math.cos(angle) * [x, y, z][i] - math.sin(angle) * [x, y, z][j]
+        turned[j] = math.sin(angle) * [x, y, z][i] + math.cos(angle) * [x, y, z][j]
+        x, y, z = turned
+    return np.array([x, y, z]) + pose[:3]
+
+
+class Yourdfpy:
+    """A robot of yourdfpy, in Python."""
+
+    def __init__(self, text):
+        library = pytest.importorskip('yourdfpy')
+        self.robot = library.URDF.load(BytesIO(text.encode()), load_meshes=False)
+        self.joints = self.robot.actuated_joint_names
+
+    def places(self, positions, names):
+        """Return where frames are [m], by name, at joint positions."""
+        self.robot.update_cfg({name: float(value) for name, value in positions.items()})
+        return {name: self.robot.get_transform(name)[:3, 3] for name in names}
+
+
+class Pinocchio:
+    """A robot of Pinocchio, in C++, read by the parser of ROS."""
+
+    def __init__(self, text):
+        self._library = pytest.importorskip('pinocchio')
+        self._model = self._library.buildModelFromXML(text)
+        self._data = self._model.createData()
+        self.joints = list(self._model.names)[1:]
+
+    def places(self, positions, names):
+        """Return where frames are [m], by name, at joint positions."""
+        q = self._library.neutral(self._model)
+        for name, value in positions.items():
+            joint = self._model.joints[self._model.getJointId(name)]
+            ends = [value] if joint.nq == 1 else [math.cos(value), math.sin(value)]
+            q[joint.idx_q:joint.idx_q + joint.nq] = ends
+        self._library.framesForwardKinematics(self._model, self._data, q)
+        return {name: self._data.oMf[self._model.getFrameId(name)].translation.copy()
+                for name in names}
+
+
+def description(one):
+    return urdf.describe([one], 'world')
+
+
+def links(text):
+    return [link.get('name') for link in ElementTree.fromstring(text).iter('link')]
+
+
+def limits(one):
+    """Return the ends of each joint by the link's name, None where it has none."""
+    moving = [joint for joint in ElementTree.fromstring(description(one)).iter('joint')
+              if joint.get('type') != 'fixed']
+    ends = {joint.get('name')[2:]: joint.find('limit') for joint in moving}
+    return {name: end if end is None else (float(end.get('lower')), float(end.get('upper')))
+            for name, end in ends.items()}
+
+
+@pytest.mark.parametrize('library', [Yourdfpy, Pinocchio])
+@pytest.mark.parametrize('name', MACHINES)
+def test_every_joint_is_met_and_every_loop_is_closed(name, library):
+    one = MACHINES[name]()
+    text = description(one)
+    robot = library(text)
+    frames = [link for link in links(text) if not re.search('_link$|^world$', link)]
+    near = TOLERANCE * one.scale * one.linkage.longest
+    for theta in drives(one):
+        positions, places = posed(one, theta)
+        assert sorted(robot.joints) == sorted(positions)
+        assert {re.sub(r'_cut\d*$', '', frame) for frame in frames} == set(places)
+        for frame, found in robot.places(positions, frames).items():
+            wanted = in_space(one.pose, places[re.sub(r'_cut\d*$', '', frame)])
+            assert np.abs(found - wanted).max() < near, (frame, theta)
+
+
+@pytest.mark.parametrize('name', CUTS)
+def test_there_is_one_cut_for_each_loop(name):
+    cuts = [link for link in links(description(MACHINES[name]())) if '_cut' in link]
+    assert len(cuts) == CUTS[name]
+
+
+@pytest.mark.parametrize('name', ['jansen', 'walker of 3 pairs', 'boxer engine', 'peaucellier'])
+def test_every_bar_is_a_rod_from_joint_to_joint(name):
+    one = MACHINES[name]()
+    robot = Yourdfpy(description(one))
+    theta = one.reach[0][0] + 0.7
+    positions, places = posed(one, theta)
+    robot.places(positions, [])
+    rods = [(robot.robot.get_transform(link.name) @ visual.origin @ np.array(
+        [[0.0, 0.0, end * visual.geometry.cylinder.length, 1.0] for end in (-0.5, 0.5)]).T)[:3].T
+        for link in robot.robot.robot.links for visual in link.visuals if visual.geometry.cylinder]
+    bars = [[in_space(one.pose, places[f'm_{leg.prefix}{end}']) for end in bar]
+            for leg in one.assembly().legs for bar in one.linkage.bars]
+    near = TOLERANCE * one.scale * one.linkage.longest
+    assert len(rods) == len(bars)
+    assert all(any(np.abs(rod - bar).max() < near for rod in rods) for bar in bars)
+
+
+@pytest.mark.parametrize('name', [name for name in MACHINES if name != 'five-bar'])
+def test_limits_hold_every_position_and_hardly_more(name):
+    one = MACHINES[name]()
+    at = [posed(one, theta)[0] for arc in one.reach for theta in np.linspace(*arc, 721)]
+    for joint, ends in limits(one).items():
+        values = np.array([positions[f'm_{joint}'] for positions in at])
+        if ends:
+            more = 1e-4 * (one.scale * one.linkage.longest if joint in SLIDES else 1.0)
+            assert ends[0] <= values.min() <= ends[0] + more
+            assert ends[1] >= values.max() >= ends[1] - more
+        elif joint != 'crank':
+            assert np.ptp(values) > math.tau - 0.1
+
+
+def test_only_slides_have_limits_where_there_are_two_cranks():
+    one = of_two_cranks()
+    (low, high), = [ends for ends in limits(one).values() if ends]
+    assert limits(one)['block'] == (low, high)
+    assert all(low < posed(one, theta)[0]['m_block'] < high for theta in drives(one))
+
+
+def test_limits_are_what_textbooks_give():
+    lever = limits(machine('slotted_lever'))
+    swing = math.asin(80.0 / 150.0)
+    assert lever['crank'] is None
+    assert lever['lever'] == pytest.approx((-swing, swing), abs=2e-6)
+    assert lever['slide'] == pytest.approx((0.7, 2.3), abs=2e-6 * 2.7)
+    engine = limits(machine('slider_crank'))
+    stroke = [0.01 * math.sqrt(end ** 2 - 20.0 ** 2) for end in (80.0, 160.0)]
+    assert engine['AB'] is None
+    assert engine['block'] == pytest.approx(stroke, abs=2e-6 * 1.2)
+    kite = limits(machine('water_drop'))
+    assert kite['CB'] == pytest.approx((math.pi / 6.0, math.pi * 5.0 / 6.0), abs=2e-6)
+
+
+def test_a_crank_that_cannot_turn_ends_with_its_reach():
+    end = 2.0 * math.acos(5.0 / 6.0)
+    assert limits(machine('peaucellier'))['crank'] == pytest.approx((-end, end), abs=1e-15)
+    later = limits(machine('peaucellier', crank__sweep=[math.tau - 1.0, math.tau + 1.0]))
+    assert later['crank'] == pytest.approx((math.tau - end, math.tau + end), abs=4e-15)
+
+
+def test_a_crank_of_mirrored_legs_reaches_as_far_as_both_do():
+    end = math.acos(-0.3125)
+    legs = Assembly(mechanisms.create('custom', joints=HALF_TURN), mirrored=True)
+    assert np.array(legs.reach) == pytest.approx(np.array([(-end, end)]))
+    assert np.array(crank_reach(legs)) == pytest.approx(
+        np.array([(-end, end - math.pi), (math.pi - end, end)]))
+
+
+def test_a_crank_that_no_pose_of_all_legs_allows_has_no_ends():
+    assert limits(machine('peaucellier', mirrored=True))['crank'] is None
+
+
+@pytest.mark.parametrize('library', [Yourdfpy, Pinocchio])
+def test_several_mechanisms_make_one_robot(library):
+    machines = scene.read({'frame_id': 'base', 'jansen.leg_pairs': 2}).machines
+    text = urdf.describe(machines.values(), 'base')
+    assert ElementTree.fromstring(text).get('name') == 'linkages'
+    assert links(text)[0] == 'base'
+    assert set(links(text)) == {link for one in machines.values()
+                                for link in links(urdf.describe([one], 'base'))}
+    assert len(library(text).joints) == sum(len(limits(one)) for one in machines.values())
+
+
+def test_the_model_is_valid_and_says_nothing_of_masses():
+    text = description(machine('jansen', leg_pairs=3))
+    assert Yourdfpy(text).robot.validate()
+    assert 'inertial' not in text and 'collision' not in text
+
+
+def test_the_points_that_are_drawn_as_markers_make_no_difference():
+    assert description(machine('jansen', points=['G'])) == description(machine('jansen'))
+
+
+def test_names_that_meet_are_refused():
+    machines = scene.read({'mechanisms': ['leg', 'leg_left0'], 'leg.type': 'jansen',
+                           'leg.leg_pairs': 2, 'leg_left0.type': 'jansen'}).machines
+    with pytest.raises(scene.SceneError, match='two joints leg_left0_O_fixed'):
+        urdf.describe(machines.values(), 'world')
