@@ -140,7 +140,13 @@ class Assembly:
         return np.stack([solved[name] for name in names], axis=1) * self._sizes
 
     def locus(self, name: str) -> np.ndarray:
-        """Return the curve of a joint of the first leg, over its widest reach [m]: (n, 2)."""
+        """
+        Return the curve of a joint of the first leg, over its widest reach [m]: (n, 2).
+
+        Several cranks draw no one curve: there it is empty.
+        """
+        if len(self.linkage.cranks) > 1:
+            return np.empty((0, 2))
         low, high = max(self.reach, key=lambda arc: arc[1] - arc[0])
         places = self.linkage.solve(np.linspace(low, high, LOCUS_POINTS), (name,))[name]
         return places[np.isfinite(places).all(axis=1)] * self._sizes[0]

@@ -42,8 +42,10 @@ class CrankDriver(node.SceneNode):
     def follow(self, new):
         """Let every crank go on as the scene says: from where it is, or from a new start."""
         now = 0 if self._now is None else max(self._now, self._time().nanoseconds)
-        for name, machine in new.machines.items():
-            old, crank = self._cranks.get(name), machine.crank
+        cranks = {f'{name}_{link}': crank for name, machine in new.machines.items()
+                  for link, crank in machine.cranks.items()}
+        for name, crank in cranks.items():
+            old = self._cranks.get(name)
             if old is None or old.start != crank.start:
                 self._motions[name] = Motion(crank.speed, crank.sweep, crank.start, now)
             elif old != crank:
@@ -67,8 +69,8 @@ class CrankDriver(node.SceneNode):
         self._now = now
         if self._publisher.get_subscription_count():
             angles, speeds = zip(*(motion.at(now) for motion in self._motions.values()))
-            names = [f'{name}_crank' for name in self._motions]
-            self._publisher.publish(self._messages.message(time.to_msg(), names, angles, speeds))
+            self._publisher.publish(
+                self._messages.message(time.to_msg(), list(self._motions), angles, speeds))
 
     def _wake(self):
         if self._now is not None and self._time().nanoseconds < self._now:

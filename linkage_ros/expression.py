@@ -333,6 +333,8 @@ def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
 
 def rated(x: Real, rule: Callable) -> Real:
     """Give an expression its rate, a function of the derivative of expressions."""
+    if x.op == 'negative':
+        rated(x.args[0], lambda d: -rule(d))
     if x.varies:
         x.rule = rule
     return x

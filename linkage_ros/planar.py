@@ -350,11 +350,7 @@ def slot(arm: Arm, offset: Real, half: float) -> Slot:
     """
     limit = arm.beyond(offset, abs(offset))
     slide = limit.root() * half
-    skew = arm.vector * Complex(slide, -offset) / arm.square
-    central = abs(offset) <= 0.0
-    along = Complex(where(central, arm.vector.x / slide, skew.x),
-                    where(central, arm.vector.y / slide, skew.y))
-    return Slot(along, slide, limit)
+    return Slot((arm.vector * Complex(slide, -offset)).direction(), slide, limit)
 
 
 class Slider(NamedTuple):

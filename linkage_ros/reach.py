@@ -118,9 +118,10 @@ def _turning_points(margin: Callable, theta: np.ndarray) -> np.ndarray:
     bumps = (inner < 0.0) & (inner >= before) & (inner >= after)
     found = np.flatnonzero(dips | bumps) + 1
     lo, hi = theta[found - 1], theta[found + 1]
+    down = np.where(dips[found - 1], 1.0, -1.0)
     for _ in range(60 if len(found) else 0):
         third = (hi - lo) / 3.0
-        left, right = np.abs(margin(lo + third)), np.abs(margin(hi - third))
+        left, right = down * margin(lo + third), down * margin(hi - third)
         lo, hi = np.where(left > right, lo + third, lo), np.where(left > right, hi, hi - third)
     return 0.5 * (lo + hi)
 

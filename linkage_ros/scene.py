@@ -30,7 +30,7 @@ from typing import Any, Mapping, Optional, Tuple
 
 from . import mechanisms
 from .assembly import Assembly, is_full_turn
-from .mechanism import Design, Mechanism
+from .mechanism import Mechanism
 from .parameters import Field, Parameter, plain, SceneError, Values
 
 __all__ = ['Crank', 'Machine', 'Scene', 'SceneError', 'in_words', 'load', 'plain', 'read']
@@ -40,19 +40,14 @@ DRIVER, KINEMATICS, INVERSE = ALL = 'crank_driver', 'kinematics', 'servo_inverse
 # What a crank that swings by default leaves of its reach at each end, as a part of its width.
 MARGIN = 0.01
 NARROWEST_SWEEP = 1e-6
+FULL_TURN = ((-math.pi, math.pi),)
 
 # What the client library declares for itself.
 _ROS = re.compile(r'(use_sim_time|start_type_description_service|qos_overrides\..*)$')
 _NAME = re.compile(r'[A-Za-z](_?[A-Za-z0-9])*$')
 
 
-def has_one_crank(design: Design) -> bool:
-    """Return whether a linkage can be in a scene: one crank moves all of it."""
-    return sum(line.word == 'crank' for line in design.lines) == 1
-
-
-TYPES = (*(name for name in mechanisms.TYPES if has_one_crank(mechanisms.design(name))),
-         mechanisms.CUSTOM)
+TYPES = (*mechanisms.TYPES, mechanisms.CUSTOM)
 
 MECHANISMS = Field(
     'string_array', 'Names of the mechanisms in the scene.', readers=ALL, read_only=True,
@@ -96,7 +91,7 @@ class Crank:
 
 @dataclass(frozen=True)
 class Machine:
-    """A mechanism in a scene: one leg, its reach and scale, its legs, its look and its crank."""
+    """A mechanism in a scene: one leg, its reach and scale, its legs, its look and its cranks."""
 
     name: str
     linkage: Mechanism
@@ -106,7 +101,12 @@ class Machine:
     mirrored: bool
     points: Tuple[str, ...]
     pose: Tuple[float, ...]
-    crank: Crank
+    cranks: Mapping[str, Crank]
+
+    @property
+    def crank(self) -> Crank:
+        """The first crank, for most linkages the only one."""
+        return self.cranks['crank']
 
     def assembly(self) -> Assembly:
         """Return its legs on their crank."""
@@ -185,7 +185,7 @@ def _machine(name: str, values: Values) -> Machine:
     scale = values.take(f'{name}.scale', SCALE, 1.0)
     return Machine(name, linkage, reach, scale, *_legs(name, linkage, values),
                    _points(name, linkage, values), _pose(name, values),
-                   _crank(name, reach, values))
+                   {crank: _crank(f'{name}.{crank}', reach, values) for crank in linkage.cranks})
 
 
 def _linkage(name, type_, values):
@@ -211,12 +211,9 @@ def _design(name, type_, values):
     start = f'{name}.dimensions.'
     dimensions = [key[len(start):] for key in values.left(start)]
     try:
-        design = mechanisms.design(type_, joints, tracer or None, dimensions)
+        return mechanisms.design(type_, joints, tracer or None, dimensions)
     except ValueError as error:
         raise SceneError(f'{name}.joints: {error}') from None
-    if not has_one_crank(design):
-        raise SceneError(f'{name}.joints must have one crank line, not several')
-    return design
 
 
 def _dimensions(name, design, values):
@@ -250,19 +247,20 @@ def _built(design, dimensions, branches):
     own = {} if design.name in mechanisms.TYPES else {
         'joints': design.joints, 'tracer': design.tracer}
     linkage = mechanisms.create(design.name, branches=dict(branches), **own, **dict(dimensions))
-    return linkage, tuple(linkage.reach())
+    # How far one of several cranks reaches depends on the others: only a pose tells.
+    return linkage, tuple(linkage.reach()) if len(linkage.cranks) == 1 else FULL_TURN
 
 
 def _legs(name, linkage, values):
     pairs = values.take(f'{name}.leg_pairs', LEG_PAIRS, 1)
     mirrored = values.take(f'{name}.mirrored', MIRRORED, pairs > 1)
     if pairs > 1 or mirrored:
-        crank = next(link for link in linkage.links if link.name == 'crank')
-        centre = linkage.solve(0.0, (crank.joint,))[crank.joint]
-        if centre[0] or crank.zero:
+        crank = linkage.links[0]
+        centre = linkage.solve([0.0] * len(linkage.cranks), (crank.joint,))[crank.joint].ravel()
+        if centre[0] or crank.zero or len(linkage.cranks) > 1:
             what, allowed = ('leg_pairs', '1') if pairs > 1 else ('mirrored', 'false')
-            raise SceneError(f'{name}.{what} must be {allowed}: only a linkage whose crank turns '
-                             'about x = 0, its angle counted from +x, can have more legs')
+            raise SceneError(f'{name}.{what} must be {allowed}: only a linkage whose one crank '
+                             'turns about x = 0, its angle counted from +x, can have more legs')
     return pairs, mirrored
 
 
@@ -282,18 +280,18 @@ def _pose(name, values):
 
 
 def _crank(name, reach, values) -> Crank:
-    speed = values.take(f'{name}.crank.speed', SPEED, 1.0)
-    chosen = values.left(f'{name}.crank.start')
-    start = values.take(f'{name}.crank.start', START, 0.0)
-    sweep = values.take(f'{name}.crank.sweep', SWEEP, ())
+    speed = values.take(f'{name}.speed', SPEED, 1.0)
+    chosen = values.left(f'{name}.start')
+    start = values.take(f'{name}.start', START, 0.0)
+    sweep = values.take(f'{name}.sweep', SWEEP, ())
     if sweep:
-        _check_sweep(f'{name}.crank.sweep', sweep, reach)
+        _check_sweep(f'{name}.sweep', sweep, reach)
     elif is_full_turn(reach):
         return Crank(speed, start, None)
     arcs = [sweep] if sweep else reach
     home = [arc for arc in arcs if _inside(start, start, arc)]
     if chosen and not home:
-        raise SceneError(f'{name}.crank.start must be inside the {"sweep" if sweep else "reach"} '
+        raise SceneError(f'{name}.start must be inside the {"sweep" if sweep else "reach"} '
                          f'{in_words(arcs)} rad, not {start}')
     low, high = (home or arcs)[0]
     trimmed = 0.0 if sweep else MARGIN * (high - low)

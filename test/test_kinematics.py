@@ -22,7 +22,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from linkage_ros import scene  # noqa: E402
+from linkage_ros import mechanisms  # noqa: E402
 from linkage_ros.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.kinematics import Kinematics  # noqa: E402
 from rcl_interfaces.msg import Log  # noqa: E402
@@ -184,7 +184,8 @@ def walk(links, frames, angles, turn, side, ground):
     return found
 
 
-@pytest.mark.parametrize('name', [*scene.TYPES[:-1], 'walker'])
+@pytest.mark.parametrize('name', [*(name for name in mechanisms.TYPES if len(
+    mechanisms.create(name).cranks) == 1), 'walker'])
 def test_joint_angles_along_the_tree_lead_to_the_joints(graph, name):
     bench = Bench(graph, name, WALKER if name == 'walker' else {'mechanisms': [name]})
     machine = bench.node.scene.machines[name]
@@ -428,6 +429,31 @@ def test_legs_are_added_while_the_node_runs(graph):
     assert len(bench.joints_at(0.3).name) == 1 + 4 * 6
     assert bench.set(jansen__mirrored=False).successful
     assert len(bench.legs_at(0.3)) == 2
+
+
+def test_a_linkage_with_two_cranks_follows_both(graph):
+    graph.start(CrankDriver, {'mechanisms': ['five_bar'], 'five_bar.crank.speed': 0.4,
+                              'five_bar.crank2.speed': -0.3, 'five_bar.crank2.start': 1.0})
+    graph.start(Kinematics, {'mechanisms': ['five_bar']})
+    states = graph.listen(JointState, 'five_bar/joint_states')
+    drawn = graph.listen(MarkerArray, 'five_bar/markers')
+    pairs = graph.until(lambda: [(s, m) for s in states for m in drawn
+                                 if s.header.stamp == m.markers[0].header.stamp][:20])
+    linkage = mechanisms.create('five_bar')
+    for state, message in pairs:
+        angles = dict(zip(state.name, state.position))
+        speeds = dict(zip(state.name, state.velocity))
+        thetas = angles['five_bar_crank'], angles['five_bar_crank2']
+        turning = speeds['five_bar_crank'], speeds['five_bar_crank2']
+        assert turning == (0.4, -0.3)
+        placed = linkage.solve(thetas)
+        assert places(message.markers[-1]) == pytest.approx(np.array([*placed.values()]))
+        step = 1e-6
+        before, after = (linkage.joint_angles([t + sign * step * w for t, w in zip(
+            thetas, turning)]) for sign in (-1.0, 1.0))
+        for joint in linkage.joints:
+            assert speeds[f'five_bar_{joint}'] == pytest.approx(
+                (after[joint] - before[joint]) / (2.0 * step), abs=1e-7)
 
 
 def test_driver_and_kinematics_go_together_in_a_namespace(graph):

@@ -138,13 +138,15 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'mechanisms': ['custom']}, 'custom.joints: joints must be a list of lines'),
     ({**OWN, 'own.joints': ['A crunk O 1']}, 'own.joints: joint line "A crunk O 1": expected'),
     ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O r']}, 'own.joints: .* dimension r'),
-    ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O 1', 'B crank O 1']},
-     'own.joints must have one crank line'),
+    ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O 1', 'B crank O 1'], 'own.mirrored': True},
+     'own.mirrored must be false: only a linkage whose one crank'),
+    ({'five_bar.crank3.speed': 1.0, 'mechanisms': ['five_bar']},
+     'five_bar.crank3.speed is not a parameter'),
     ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O r'], 'own.dimensions.r': 0.0},
      'own.dimensions.r must be .* above 0'),
     ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O 1'], 'own.dimensions.r': 1.0},
      'own.dimensions.r is not a parameter'),
-    ({'mechanisms': ['five_bar']}, "five_bar.type must be one of .*, not 'five_bar'"),
+    ({'mechanisms': ['six_bar']}, "six_bar.type must be one of .*, not 'six_bar'"),
     ({'jansen.joints': ['O ground 0 0']}, 'jansen.joints is not a parameter'),
 ])
 def test_a_wrong_parameter_is_named_with_what_is_allowed(given, named):

@@ -21,7 +21,7 @@ as far as the pin gets if that is more. Closure: a e^(i theta) + b = e^(i phi) (
 lever angle phi and the pin's place t along the slot; branch L, +1 or -1, is the half of the slot.
 
 Sources: Norton, "Design of Machinery", sec. 4.8 (inverted slider-crank); the inverse closes the
-same triangle: theta = phi + atan2(e + b sin phi, W), W = +-sqrt(a^2 - (e + b sin phi)^2).
+same triangle: a e^(i theta) = e^(i phi) (W + i (e + b sin phi)), W^2 = a^2 - (e + b sin phi)^2.
 """
 
 from functools import lru_cache
@@ -67,9 +67,10 @@ def _inverse() -> Program:
                   exact_sum(a, e) + b * sin)
     grazed = GRAZE * (a + b + abs(e))
     height = root(upper, grazed) * root(lower, grazed)
-    outputs = []
+    across, outputs = e + b * sin, []
     for along in (height, -height):
-        outputs += [phi + arctangent(e + b * sin, along), b * cos + along]
+        theta = arctangent(sin * along + cos * across, cos * along - sin * across)
+        outputs += [theta, b * cos + along]
     return Program(outputs)
 
 
@@ -91,8 +92,9 @@ class Mechanism(mechanism.Mechanism):
         Returns
         -------
         float or array
-            Crank angle [rad] in the shape of the arguments broadcast; NaN where the lever cannot
-            get there on this half of the slot.
+            Crank angle [rad] in the shape of the arguments broadcast, in (-pi, pi] or, with
+            near, within half a turn of it; NaN where the lever cannot get there on this half of
+            the slot.
 
         """
         outputs = self._servo().over(lever_angle)
