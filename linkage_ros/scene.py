@@ -64,7 +64,7 @@ DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [m].', posit
                   readers=ALL)
 BRANCH = Field('integer', 'Assembly sign {0} of the {1}.', -1, 1, rule='except 0', readers=ALL)
 SCALE = Field('double', 'Factor of every length.', 0.0, 1000.0, positive=True,
-              readers=(KINEMATICS,))
+              readers=(KINEMATICS, INVERSE))
 LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.', 1, 50,
                   readers=(KINEMATICS,))
 MIRRORED = Field('bool', 'Whether each leg has a mirror image on the other side; '

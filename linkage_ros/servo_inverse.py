@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Node that answers which servo angle puts a slotted lever where it is wanted."""
+"""Node that answers which servo angle puts a lever, or any other output, where it is wanted."""
 
 import sys
 
@@ -28,10 +28,11 @@ except ImportError as error:
         '"colcon build" at the root of linkage_ros and source install/setup.bash') from error
 
 MOST_NAMED = 5
+SAMPLES = 721
 
 
 class ServoInverse(node.SceneNode):
-    """Serves `servo_inverse` for the slotted levers of a scene."""
+    """Serves `servo_inverse` for the mechanisms of a scene."""
 
     def __init__(self, **kwargs):
         super().__init__(scene.INVERSE, **kwargs)
@@ -53,7 +54,7 @@ class ServoInverse(node.SceneNode):
 
 def solve(scene_: scene.Scene, request, response):
     """
-    Answer a request for lever angles [rad].
+    Answer a request for lever angles [rad], or for values of another output.
 
     Raises
     ------
@@ -61,23 +62,92 @@ def solve(scene_: scene.Scene, request, response):
         If the request as a whole cannot be answered.
 
     """
-    lever = _lever(scene_, request.mechanism)
+    asked = (Output(_machine(scene_, request.mechanism), request.output) if request.output
+             else Lever(_lever(scene_, request.mechanism)))
     wanted = np.array(request.lever_angle, float)
     near = np.array(request.servo_near, float)
     if not wanted.size:
-        raise ValueError('lever_angle is empty; give at least one angle')
+        raise ValueError('lever_angle is empty; give at least one value')
     if near.size not in (0, wanted.size):
         raise ValueError(f'servo_near must be empty or have one angle for each of the '
                          f'{wanted.size} in lever_angle, not {near.size}')
     if not np.isfinite(near).all():
         raise ValueError('servo_near must be finite')
-    servo = np.asarray(lever.servo_angle(wanted, near if near.size else None))
+    servo = np.asarray(asked.servo(wanted, near if near.size else None))
     reachable = np.isfinite(servo)
     response.servo_angle = servo.tolist()
-    response.reduction = np.asarray(lever.reduction(servo)).tolist()
+    response.reduction = np.asarray(asked.slope(servo)).tolist()
     response.reachable = reachable.tolist()
     response.success = bool(reachable.all())
-    response.message = '' if response.success else _complaint(lever, wanted[~reachable])
+    response.message = '' if response.success else _complaint(asked, wanted[~reachable])
+
+
+class Lever:
+    """The lever of a slotted lever, in closed form."""
+
+    what = 'lever angles'
+
+    def __init__(self, linkage):
+        self.servo, self.slope = linkage.servo_angle, linkage.reduction
+        self._linkage = linkage
+
+    def reach(self) -> str:
+        """Return in words where the lever gets."""
+        return f'the lever reaches {scene.in_words(self._linkage.lever_reach())} rad'
+
+
+class Output:
+    """
+    Any output of a linkage with one crank: a link's joint angle or slide, a joint's coordinate.
+
+    Raises
+    ------
+    ValueError
+        If there is no such output.
+
+    """
+
+    def __init__(self, machine: scene.Machine, name: str):
+        self.what = f'values of {name}'
+        self._linkage, self._name = machine.linkage, name
+        self._joint, _, self._axis = name.partition('.')
+        slides = [link.name for link in machine.linkage.links if link.kind == 'prismatic']
+        self._unit = machine.scale if self._axis or name in slides else 1.0
+        if len(machine.linkage.cranks) > 1:
+            raise ValueError(f'{machine.name} has several cranks; only a linkage with one can be '
+                             'solved for an output')
+
+    def servo(self, wanted, near):
+        """Return the crank angle [rad] for each value wanted."""
+        found = self._linkage.crank_angle(self._name, wanted / self._unit, near)
+        return found[..., 0] if near is None else found
+
+    def slope(self, servo):
+        """Return d output / d crank angle."""
+        if not self._axis:
+            return self._linkage.joint_rates(servo, (self._name,))[self._name] * self._unit
+        moving = self._linkage.velocity(servo, (self._joint,))[self._joint]
+        return moving[..., 'xy'.index(self._axis)] * self._unit
+
+    def reach(self) -> str:
+        """Return in words where the output gets."""
+        theta = np.concatenate([np.linspace(*arc, SAMPLES) for arc in self._linkage.reach()])
+        found = (self._linkage.solve(theta, (self._joint,))[self._joint][
+            ..., 'xy'.index(self._axis)] if self._axis
+            else self._linkage.joint_angles(theta, (self._name,))[self._name])
+        span = np.nanmin(found) * self._unit, np.nanmax(found) * self._unit
+        return f'{self._name} lies within about {scene.in_words([span])}'
+
+
+def _machine(scene_, name):
+    allowed = ', '.join(scene_.machines)
+    if name in scene_.machines:
+        return scene_.machines[name]
+    if name:
+        raise ValueError(f'there is no mechanism {name!r}; allowed: {allowed}')
+    if len(scene_.machines) != 1:
+        raise ValueError(f'mechanism may be empty only where there is one; allowed: {allowed}')
+    return next(iter(scene_.machines.values()))
 
 
 def _lever(scene_, name):
@@ -88,7 +158,7 @@ def _lever(scene_, name):
         return levers[name]
     if name in scene_.machines:
         raise ValueError(f'{name} is a {scene_.machines[name].linkage.type}, not a slotted lever; '
-                         f'allowed: {allowed}')
+                         f'name an output, or take one of: {allowed}')
     if name:
         raise ValueError(f'there is no mechanism {name!r}; allowed: {allowed}')
     if len(levers) != 1:
@@ -97,11 +167,10 @@ def _lever(scene_, name):
     return next(iter(levers.values()))
 
 
-def _complaint(lever, missed):
-    named = ', '.join(f'{angle:.6g}' for angle in missed[:MOST_NAMED])
+def _complaint(asked, missed):
+    named = ', '.join(f'{value:.6g}' for value in missed[:MOST_NAMED])
     more = f' and {missed.size - MOST_NAMED} more' if missed.size > MOST_NAMED else ''
-    return (f'lever angles {named}{more} rad cannot be reached; the lever reaches '
-            f'{scene.in_words(lever.lever_reach())} rad')
+    return f'{asked.what} {named}{more} cannot be reached; {asked.reach()}'
 
 
 def main(args=None):

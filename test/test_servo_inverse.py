@@ -25,6 +25,7 @@ pytest.importorskip('rclpy')
 pytest.importorskip('linkage_interfaces')
 
 from linkage_interfaces.srv import ServoInverse as Service  # noqa: E402
+from linkage_ros import mechanisms  # noqa: E402
 from linkage_ros.servo_inverse import ServoInverse  # noqa: E402
 
 TWO = {'mechanisms': ['left', 'right', 'drop'], 'left.type': 'slotted_lever',
@@ -88,7 +89,7 @@ def test_one_angle_out_of_reach_does_not_spoil_the_others(call):
     assert list(np.isnan(response.servo_angle)) == [False, True, False, True, True]
     assert list(np.isnan(response.reduction)) == [False, True, False, True, True]
     assert lever_of(response.servo_angle[2]) == pytest.approx(0.2)
-    assert 'lever angles 0.6, nan, -inf rad cannot be reached' in response.message
+    assert 'lever angles 0.6, nan, -inf cannot be reached' in response.message
     assert '[-0.562536, 0.562536] rad' in response.message
 
 
@@ -104,7 +105,7 @@ def test_many_angles_out_of_reach_are_not_all_named(call):
     (None, {'lever_angle': [0.1], 'mechanism': 'arm'},
      "no mechanism 'arm'; allowed: slotted_lever"),
     (None, {'lever_angle': [0.1], 'mechanism': 'jansen'},
-     'jansen is a jansen, not a slotted lever; allowed: slotted_lever'),
+     'jansen is a jansen, not a slotted lever; name an output, or take one of: slotted_lever'),
     (TWO, {'lever_angle': [0.1]}, 'may be empty only .* allowed: left, right'),
     ({'mechanisms': ['jansen']}, {'lever_angle': [0.1]}, 'no slotted_lever'),
 ])
@@ -114,9 +115,41 @@ def test_a_request_that_cannot_be_answered_gets_the_reason(call, parameters, req
     assert not response.servo_angle and not response.reduction and not response.reachable
 
 
+def test_any_output_of_any_mechanism_is_put_where_it_is_wanted(call):
+    cell = {'mechanisms': ['cell'], 'cell.type': 'peaucellier', 'cell.scale': 0.1}
+    response = call(cell, output='C.y', lever_angle=[0.2, -0.5, 5.0])
+    assert response.reachable == [True, True, False] and not response.success
+    for y, servo, slope in zip([0.2, -0.5], response.servo_angle, response.reduction):
+        assert 0.1 * 65.0 / 6.0 * math.tan(servo / 2.0) == pytest.approx(y, abs=1e-15)
+        assert slope == pytest.approx(0.1 * 65.0 / 12.0 / math.cos(servo / 2.0) ** 2)
+    assert 'values of C.y 5 cannot be reached; C.y lies within about [-0.7' in response.message
+
+
+def test_a_link_is_turned_to_an_angle_by_the_answer_nearest_to_a_servo(call):
+    response = call(mechanism='jansen', output='BE', lever_angle=[-2.2, -2.2],
+                    servo_near=[0.0, 3.0])
+    assert response.success and response.servo_angle[0] != response.servo_angle[1]
+    for servo in response.servo_angle:
+        angle = mechanisms.create('jansen').joint_angles(servo)['BE']
+        assert angle == pytest.approx(-2.2, abs=1e-14)
+
+
+@pytest.mark.parametrize('parameters, request_, message', [
+    (None, {'output': 'C.y', 'lever_angle': [0.1]}, 'may be empty only where there is one;'),
+    (None, {'mechanism': 'arm', 'output': 'C.y', 'lever_angle': [0.1]}, "no mechanism 'arm'"),
+    (None, {'mechanism': 'jansen', 'output': 'Z.y', 'lever_angle': [0.1]}, 'Z'),
+    (None, {'mechanism': 'jansen', 'output': 'O.x', 'lever_angle': [0.1]}, 'O.x'),
+    ({'mechanisms': ['five_bar']}, {'output': 'P.y', 'lever_angle': [0.1]}, 'several cranks'),
+])
+def test_an_output_that_cannot_be_asked_for_gets_the_reason(
+        call, parameters, request_, message):
+    response = call(parameters, **request_)
+    assert not response.success and message in response.message
+
+
 def test_dimensions_change_while_the_node_runs(graph):
     node = graph.start(ServoInverse)
-    request = SimpleNamespace(mechanism='', lever_angle=[0.8], servo_near=[])
+    request = SimpleNamespace(mechanism='', lever_angle=[0.8], servo_near=[], output='')
     assert not node.answer(request, Service.Response()).success
     assert graph.set(node, slotted_lever__dimensions__a=140.0).successful
     response = node.answer(request, Service.Response())
