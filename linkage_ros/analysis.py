@@ -24,7 +24,7 @@ from typing import Callable, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .inverse import ClosedForm, EXTREMES, in_order, nearest, Pieces, wrapped
+from .inverse import ClosedForm, distinct, EXTREMES, in_order, nearest, Pieces, wrapped
 from .planar import GRAZE
 from .reach import sign_changes
 
@@ -159,9 +159,8 @@ class Analysis:
             reach, found = self.reach(*others), []
             for tolerance, curve in self._closures(others):
                 pieces = Pieces(curve, reach, (), False, 2.0 * tolerance)
-                found += pieces.answers(np.zeros(1)).ravel().tolist()
-            ordered = in_order(np.array(found, float).reshape(-1, 1)).ravel()
-            self._poses[key] = ordered[np.isfinite(ordered)].tolist()
+                found += in_order(pieces.answers(np.zeros(1))).ravel().tolist()
+            self._poses[key] = distinct(theta for theta in found if theta == theta)
         return self._poses[key]
 
     def _closures(self, others):

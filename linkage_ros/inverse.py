@@ -24,7 +24,7 @@ inside a bracket, to the last digit: `Pieces`.
 from __future__ import annotations
 
 import math
-from typing import Callable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Callable, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -74,11 +74,11 @@ def nearest(answers: np.ndarray, near) -> np.ndarray:
     return np.take_along_axis(np.broadcast_to(theta, away.shape), best, -1)[..., 0][()]
 
 
-def distinct(theta: Sequence[float]) -> List[float]:
+def distinct(theta: Iterable[float]) -> List[float]:
     """Return angles [rad] in [-pi, pi), in order, without those next to another."""
     kept: List[float] = []
-    for each in sorted(wrapped(np.array(theta, float)).tolist()):
-        if not kept or each - kept[-1] > CLOSE:
+    for each in sorted(wrapped(np.array(list(theta), float)).tolist()):
+        if not kept or each - kept[-1] > CLOSE and each - kept[0] < TURN - CLOSE:
             kept.append(each)
     return kept
 
@@ -210,7 +210,8 @@ class Pieces:
             good = (lo < guess) & (guess < hi) & (np.abs(guess - theta) < 0.5 * step)
             following = np.where(good, guess, 0.5 * (lo + hi))
             theta, step = following, np.abs(following - theta)
-        return best
+        best = np.where(target >= piece.value[-1], piece.theta[-1], best)
+        return np.where(target <= piece.value[0], piece.theta[0], best)
 
 
 class Backward(NamedTuple):
@@ -341,8 +342,8 @@ class _Reversed:
         start, along = ((Complex(self._value, 0.0), Complex(0.0, 1.0)) if axis == 'x' else
                         (Complex(0.0, self._value), Complex(1.0, 0.0)))
         centre = self._sketch.points[link.joint]
-        found = [planar.slider(centre.place, local.length(), start, along, side, centre.span)
-                 for side in (1.0, -1.0)]
+        rail = planar.Rail(centre.place, start, along, centre.span)
+        found = [planar.slider(rail, local.length(), side) for side in (1.0, -1.0)]
         return [each.rod * local.conjugate() / local.squared() for each in found]
 
     def _through_link(self, link: Link, bars: List[Complex]):
@@ -351,10 +352,10 @@ class _Reversed:
         for slide in self._links.values():
             if slide.parent == link.name and slide.kind == 'prismatic' and slide.tip == self._pin:
                 offset = self._sketch.frames[slide.name][self._pin].y
-                return self._cranks([
-                    planar.slider(self._crank.centre, self._crank.length,
-                                  centre + bar.turned() * offset, bar, side, self._span()).rod
-                    for bar in bars for side in (1.0, -1.0)], link.tip)
+                rails = [planar.Rail(self._crank.centre, centre + bar.turned() * offset, bar,
+                                     self._span()) for bar in bars]
+                return self._cranks([planar.slider(rail, self._crank.length, side).rod
+                                     for rail in rails for side in (1.0, -1.0)], link.tip)
         for tip, local in self._sketch.frames[link.name].items():
             radius = self._rod(tip)
             if radius is None or tip == link.joint:

@@ -21,6 +21,7 @@ Linkages written down: one line a joint, in the order they are placed.
     P rigid A B d e right     corner of a rigid triangle on bar AB, d from A, e from B
     P line A B d              on the line of bar AB, d from A; negative: on the other side of A
     B mirror O A C            mirror image of O in the line AC: the far corner of a kite
+    C parallelogram B A D     corner opposite B of a parallelogram on the bars BA and BD
     B C D inversor P A a b    Peaucellier cell from pole P to pin A: long bars a, rhombus b
     L slot Q A e out d        tip, d from Q, of a lever about Q; A in its slot, e to its left
     S slider A r G p out      block on a line through G in direction p [rad], on a rod r from A
@@ -35,7 +36,10 @@ A dyad keeps to its side of first -> second for as long as it can be assembled. 
 hung between a ground joint and a crank pin, and stretches or folds just as the crank passes the
 ground line (a change point: the longest and shortest of the four bars together as long as the
 other two), it goes on smoothly, which changes sides: a parallelogram stays a parallelogram. The
-side written is then the one at a crank angle of a quarter turn.
+side written is then the one at a crank angle of a quarter turn. So does the block of a slider hung
+on a crank pin where the rod stands upright on the line; `out` and `in` are then as they are where
+the pin is farthest along it. With one change point in a turn the linkage is the same again only
+after two turns: its crank angle counts beyond a turn.
 """
 
 from __future__ import annotations
@@ -51,7 +55,7 @@ from .planar import LEFT, RIGHT
 from .sketch import Sketch, SketchError
 
 _WORDS = {'left': LEFT, 'right': RIGHT, 'out': 1.0, 'in': -1.0, 'up': True}
-_JOINTS = ('CENTRE', 'FIRST', 'SECOND', 'POINT', 'POLE', 'PIN', 'PIVOT', 'ORIGIN')
+_JOINTS = ('CENTRE', 'FIRST', 'SECOND', 'POINT', 'CORNER', 'POLE', 'PIN', 'PIVOT', 'ORIGIN')
 _NUMBERS = ('X', 'Y', 'LENGTH', 'DISTANCE', 'OFFSET', 'ANGLE')
 
 # What follows each word, in the order its construction takes it.
@@ -60,6 +64,7 @@ _FORMS = {
     'dyad': 'dyad FIRST SECOND LENGTH LENGTH left|right',
     'rigid': 'rigid FIRST SECOND LENGTH LENGTH left|right',
     'line': 'line FIRST SECOND DISTANCE', 'mirror': 'mirror POINT FIRST SECOND',
+    'parallelogram': 'parallelogram CORNER FIRST SECOND',
     'inversor': 'inversor POLE PIN LENGTH LENGTH',
     'slot': 'slot PIVOT PIN OFFSET out|in LENGTH',
     'slider': 'slider PIN LENGTH ORIGIN ANGLE out|in',

@@ -33,6 +33,7 @@ slider-crank); Hartenberg and Denavit, "Kinematic Synthesis of Linkages" (the in
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 from typing import NamedTuple, Optional, Tuple
 
 from .expression import (
@@ -353,28 +354,75 @@ def slot(arm: Arm, offset: Real, half: float) -> Slot:
     return Slot((arm.vector * Complex(slide, -offset)).direction(), slide, limit)
 
 
+class Rail:
+    """A pin as seen from the line that a block slides on: how far along it, and how high above."""
+
+    def __init__(self, pin: Complex, origin: Complex, along: Complex, span: Real):
+        self.along = along
+        self.height, self.foot = cross(along, pin - origin), dot(along, pin - origin)
+        self._span = span
+
+    def limits(self, rod: Real) -> Tuple[Limit, ...]:
+        """Return the margins whose product is rod^2 - height^2."""
+        margin = (rod - self.height) * (rod + self.height)
+        return (Limit(margin, GRAZE * rod * (rod + self._span)),)
+
+
+class CrankRail(Rail):
+    """
+    A crank pin as seen from the line that a block slides on, from half angles.
+
+    With the height h0 of the crank's centre, the crank m and its angle psi from the line, the
+    margins are (rod + h0 - m) + 2 m s^2 and (rod - h0 - m) + 2 m h^2, where s and h are sine and
+    cosine of (psi + pi/2)/2.
+    """
+
+    def __init__(self, crank: Crank, origin: Complex, along: Complex, span: Real):
+        super().__init__(crank.centre + crank.bar(), origin, along, span)
+        self._crank = crank
+        self._centre = cross(along, crank.centre - origin)
+        self._turn = (crank.zero * along.conjugate()).turned()
+
+    def limits(self, rod: Real) -> Tuple[Limit, ...]:
+        """Return the margins whose product is rod^2 - height^2."""
+        m, centre, (s, h) = self._crank.length, self._centre, _half_angle(
+            self._crank.angle, self._turn)
+        low, high = exact_sum(rod, centre, -m), exact_sum(rod, centre, m)
+        near, far = exact_sum(rod, -centre, -m), exact_sum(rod, -centre, m)
+        # Both roots are positive where the pin is farthest along the line.
+        behind = where(self._turn.y < 0.0, where(self._turn.x <= 0.0, -1.0, 1.0), 1.0)
+        return (self._limit(rod, low, high, low, s, behind),
+                self._limit(rod, far, near, near, h, behind))
+
+    def _limit(self, rod, start, end, gap, half, sign):
+        margin = gap + 2.0 * self._crank.length * square(half)
+        tolerance = GRAZE * (rod + self._span)
+        grown = square_root(2.0 * self._crank.length) * sign
+        smooth = where(abs(gap) <= tolerance, grown * half, root(margin, tolerance))
+        return Limit(margin, tolerance, smooth, start, end,
+                     arctangent(self._turn.y, self._turn.x), self._crank.angle.args[0])
+
+
 class Slider(NamedTuple):
     """
-    A block on a fixed line: the rod to it, its place along the line [m], and the limit.
+    A block on a fixed line: the rod to it, its place along the line [m], and the limits.
 
-    Also how far along the line, and how high above it, the pin is seen from the block [m].
+    Also how far along the line the block is ahead of the pin [m].
     """
 
     rod: Complex
     place: Real
-    limit: Limit
+    limits: Tuple[Limit, ...]
     reach: Real
-    height: Real
 
 
-def slider(pin: Complex, rod: Real, origin: Complex, along: Complex, side: float,
-           span: Real) -> Slider:
+def slider(rail: Rail, rod: Real, side: float) -> Slider:
     """
-    Return the RRP dyad: a rod [m] from a pin to a block on the line origin + x along.
+    Return the RRP dyad: a rod [m] from a pin to a block on a line.
 
-    The block is ahead of the pin's foot on the line for side = +1. `along` is a unit vector.
+    The block is ahead of the pin's foot on the line for side = +1; past a change point of a crank
+    it goes on smoothly.
     """
-    height, foot = cross(along, pin - origin), dot(along, pin - origin)
-    limit = Limit((rod - height) * (rod + height), GRAZE * rod * (rod + span))
-    reach = limit.root() * side
-    return Slider(along * Complex(reach, -height), foot + reach, limit, reach, height)
+    limits = rail.limits(rod)
+    reach = reduce(lambda x, y: x * y, (limit.smooth or limit.root() for limit in limits)) * side
+    return Slider(rail.along * Complex(reach, -rail.height), rail.foot + reach, limits, reach)

@@ -26,7 +26,7 @@ from math import pi
 from typing import NamedTuple, Optional, Tuple
 
 from . import planar
-from .expression import angle, arctangent, Complex, cosine, Number, Real, real, sine
+from .expression import angle, arctangent, Complex, cosine, cross, Number, Real, real, sine
 
 GROUND = 'ground'
 
@@ -152,6 +152,14 @@ class Sketch:
         if isinstance(arm, planar.CrankArm) and pin and pin.centre is self.points[point].place:
             self._kites[first, name] = arm
 
+    def parallelogram(self, name: str, corner: str, first: str, second: str):
+        """Join bars to two joints that are parallel to the bars from a corner to them."""
+        to_first, to_second = (self._bar_between(corner, end) for end in (first, second))
+        self.folds.append(planar.Limit(cross(to_first.vector, to_second.vector),
+                                       planar.GRAZE * to_first.length * to_second.length))
+        self._pair(name, first, second, planar.Dyad(to_second.vector, to_first.vector, ()),
+                   to_second.length, to_first.length)
+
     def inversor(self, names: Tuple[str, str, str], pole: str, pin: str, long: Real, short: Real):
         """Add a Peaucellier cell: the joint right of pole -> pin, the corner, the left joint."""
         right, corner, left = names
@@ -180,15 +188,22 @@ class Sketch:
         """Join a rod [m] from a joint to a block on a line through a ground joint."""
         self._on_ground(origin)
         along = Complex(cosine(direction), sine(direction))
-        start, end = self.points[origin], self.points[pin]
-        found = planar.slider(end.place, rod, start.place, along, side, start.span + end.span)
-        self.limits.append(found.limit)
+        rail = self._rail(pin, origin, along)
+        found = planar.slider(rail, rod, side)
+        self.limits += found.limits
         link = self._hang(pin, name, found.rod, rod)
         self._place(name, pin, found.rod, link, rod)
-        self.transmissions[name] = arctangent(abs(found.reach), found.height)
+        self.transmissions[name] = arctangent(abs(found.reach), rail.height)
         block = self._slide('block', GROUND, origin, name, found.place, Complex(0.0, 0.0),
                             direction)
         self.lines[block] = along
+
+    def _rail(self, pin, origin, along):
+        """Return a joint as seen from a line through a ground joint."""
+        start, end = self.points[origin], self.points[pin]
+        if end.crank:
+            return planar.CrankRail(end.crank, start.place, along, start.span + end.span)
+        return planar.Rail(end.place, start.place, along, start.span + end.span)
 
     def _on_ground(self, name):
         if self.points[name].home != GROUND:

@@ -74,6 +74,11 @@ BRANCHES = {
 }
 
 
+def teach(kind, placed, branches, needs):
+    """Add a kind of linkage: a function like those below, its branches, and its `NEEDS`."""
+    _PLACE[kind], BRANCHES[kind], NEEDS[kind] = placed, branches, needs
+
+
 def exact(numbers):
     """Return a mapping of float64 numbers as the same numbers in this precision."""
     return {name: mp.mpf(number) for name, number in numbers.items()}

@@ -31,5 +31,5 @@ DESIGN = Design('pantograph', {'a': 1.0, 'b': 2.5, 'c': 2.5, 'd': 5.0, 'g': 3.0}
     'A crank O a',
     'B dyad F A b c left',
     'D line F B d',
-    'C dyad A D d-b c right',
+    'C parallelogram B A D',
     'T line D C c*d/b'))
