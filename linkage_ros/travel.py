@@ -54,8 +54,8 @@ def ground_frame(linkage: Mechanism) -> Dict[str, Tuple[float, float]]:
     frames = linkage.frames
     carried = {name for link in linkage.links for name in frames[link.name] if name != link.joint}
     names = [name for name in linkage.points if name not in carried]
-    anywhere = 0.0 if len(linkage.cranks) == 1 else [0.0] * len(linkage.cranks)
-    return {name: tuple(place.tolist())
+    anywhere = [0.0] * len(linkage.cranks)
+    return {name: tuple(place.ravel().tolist())
             for name, place in linkage.solve(anywhere, names).items()}
 
 

@@ -168,7 +168,7 @@ class _Model:
 
 def _crank_travel(machine) -> Optional[Travel]:
     """Return the outermost ends of the crank's reach [rad], in the turn that it is driven in."""
-    arcs = crank_reach(machine.assembly()) if len(machine.linkage.cranks) == 1 else ()
+    arcs = crank_reach(machine.assembly())
     if not arcs or is_full_turn(arcs):
         return None
     low, high = min(lo for lo, _ in arcs), max(hi for _, hi in arcs)
