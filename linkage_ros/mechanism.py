@@ -38,6 +38,16 @@ SMALL, LARGE = 1e-30, 1e30
 UNIT = dimension('[m]')
 
 
+def check_bars(linkage: Mechanism):
+    """Raise ValueError, with its line, for a bar that has no length."""
+    for (first, second), length in linkage.bar_lengths.items():
+        size = np.asarray(length)
+        if not np.all((size > 0.0) & np.isfinite(size)):
+            raise linkage.line_of(first, second).error(
+                f'the bar {first}-{second} must be longer than zero, got {length:g}'
+                if not size.ndim else f'the bar {first}-{second} must be longer than zero')
+
+
 @dataclass(frozen=True, eq=False)
 class Design:
     """
@@ -55,6 +65,8 @@ class Design:
         The joint whose curve is the locus.
     signed : frozenset
         Dimensions that may be zero or negative.
+    check : callable
+        From a mechanism of this type; raises ValueError for dimensions that cannot be.
 
     """
 
@@ -63,6 +75,7 @@ class Design:
     joints: Tuple[str, ...]
     tracer: str
     signed: frozenset = frozenset()
+    check: Callable = check_bars
 
     @cached_property
     def lines(self) -> list:
@@ -228,10 +241,13 @@ class Mechanism(Analysis):
         return {(bar.first, bar.second): self._value(in_metres(bar.length))
                 for bar in self._structure.sketch.bars}
 
+    def line_of(self, *joints: str) -> language.Line:
+        """Return the line that places one of some joints, the last that does."""
+        return [line for line in self._design.lines if set(joints) & set(line.names)][-1]
+
     def triangles(self) -> dict:
         """Return for each line of a rigid triangle whether the dimensions allow it."""
-        lines = {line.names[0]: line for line in self._design.lines}
-        return {lines[name]: np.isfinite(self._value(height))
+        return {self.line_of(name): np.isfinite(self._value(height))
                 for name, height in self._structure.sketch.triangles.items()}
 
     @property
@@ -252,9 +268,11 @@ class Mechanism(Analysis):
 
     def with_dimensions(self, **changed) -> Mechanism:
         """Return the same mechanism with other dimensions [m]; raises ValueError like create."""
-        return type(self)(self._design, self._structure,
+        made = type(self)(self._design, self._structure,
                           checked_dimensions(self._design, {**self.dimensions, **changed}),
                           self.branches, self._accelerate)
+        self._design.check(made)
+        return made
 
     def _on_other_branch(self, joint: str) -> Mechanism:
         branches = {**self.branches, joint: -self.branches[joint]}
@@ -368,8 +386,8 @@ class Mechanism(Analysis):
             raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
                              'not for arrays')
         if len(others) != len(self.cranks) - 1:
-            raise ValueError(f'{self.type} has {len(self.cranks)} cranks: the angles of the '
-                             f'{len(self.cranks) - 1} others are needed, got {len(others)}')
+            raise ValueError(f'{self.type} has {len(self.cranks)} cranks: the angle of each but '
+                             f'the first is needed, got {len(others)}')
         return arcs(lambda theta: margins.over(theta, *others),
                     self._structure.sketch.limits, self._value)
 

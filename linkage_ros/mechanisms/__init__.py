@@ -124,6 +124,5 @@ def create(type_: str, /, *, branches=None, joints=None, tracer=None, **dimensio
     structure = _structure(chosen, tuple(signs.items()))
     kind = getattr(TYPES.get(type_), 'Mechanism', Mechanism)
     made = kind(chosen, structure, lengths, signs)
-    if type_ == CUSTOM:
-        custom.check(made)
+    chosen.check(made)
     return made

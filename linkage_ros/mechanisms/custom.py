@@ -20,7 +20,7 @@ from typing import Optional, Sequence, Tuple
 import numpy as np
 
 from .. import language
-from ..mechanism import Design, Mechanism
+from ..mechanism import check_bars, Design, Mechanism
 
 
 @lru_cache(maxsize=64)
@@ -37,23 +37,22 @@ def design(joints: Tuple[str, ...], tracer: Optional[str], given: Tuple[str, ...
     lines = language.parse(joints)
     if not any(line.word == 'crank' for line in lines):
         raise ValueError('a linkage needs at least one crank line')
+    for line in lines:
+        for name in language.lengths([line]):
+            if name not in given:
+                raise line.error(f'dimension {name} has no value; '
+                                 f'given: {", ".join(given) or "none"}')
     used = language.lengths(lines)
-    missing = [name for name in used if name not in given]
-    if missing:
-        raise ValueError(f'no value for dimension {", ".join(missing)}; '
-                         f'given: {", ".join(given) or "none"}')
     names = [name for line in lines for name in line.names]
     if tracer is not None and tracer not in names:
         raise ValueError(f'tracer {tracer!r} is no joint; allowed: {", ".join(names)}')
     signed = frozenset(name for name, length in used.items() if not length)
-    return Design('custom', dict.fromkeys(used, 1.0), joints, tracer or names[-1], signed)
+    return Design('custom', dict.fromkeys(used, 1.0), joints, tracer or names[-1], signed, check)
 
 
 def check(linkage: Mechanism):
-    """Raise ValueError where a bar has no length or a rigid triangle cannot exist."""
-    for (first, second), length in linkage.bar_lengths.items():
-        if not np.all(np.asarray(length) > 0.0):
-            raise ValueError(f'the bar {first}-{second} must be longer than zero, got {length}')
+    """Raise ValueError, with its line, where a bar has no length or a triangle cannot exist."""
+    check_bars(linkage)
     for line, exists in linkage.triangles().items():
         if not np.all(exists):
             raise line.error('no triangle has these sides: each must be shorter than the '
