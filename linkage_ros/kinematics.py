@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Node that publishes joint angles, markers and loci of a scene's mechanisms."""
+"""Node that publishes joint angles, markers, loci and robot models of a scene's mechanisms."""
 
 import math
 import sys
@@ -21,9 +21,10 @@ from typing import NamedTuple, Optional, Sequence
 import numpy as np
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
-from . import messages, node, scene
+from . import messages, node, scene, urdf
 from .wire import Wire
 
 ANY = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -105,12 +106,14 @@ class Outlet:
         self._joint_states = node_.create_publisher(JointState, f'{name}/joint_states', 10)
         self._markers = node_.create_publisher(MarkerArray, f'{name}/markers', 1)
         self._locus = node_.create_publisher(Marker, f'{name}/locus', LATCHED)
+        self._description = node_.create_publisher(String, f'{name}/robot_description', LATCHED)
+        self._described = None
         # A logger of its own: what is throttled is the warnings of this mechanism alone.
         self._logger = node_.get_logger().get_child(name)
         self._made_for = None
 
     def follow(self, machine: scene.Machine, frame_id: str):
-        """Make assembly and messages for a mechanism, if it is another, and send its locus."""
+        """Make what a mechanism needs, if it is another, and send its locus and robot model."""
         if self._made_for == (machine, frame_id):
             return
         self._made_for = machine, frame_id
@@ -131,6 +134,12 @@ class Outlet:
         curve = self._assembly.locus(machine.tracer)
         if len(curve) > 1:
             self._locus.publish(messages.locus(*drawn, curve, size))
+        self._describe(urdf.describe([machine], frame_id))
+
+    def _describe(self, robot):
+        if robot != self._described:
+            self._described = robot
+            self._description.publish(String(data=robot))
 
     def turn(self, stamp, thetas: Sequence[float], speeds: Sequence[float]):
         """Publish what is listened to at crank angles [rad]; speeds [rad/s], or none."""

@@ -87,17 +87,17 @@ class _Model:
     """A mechanism as links and joints of a robot."""
 
     def __init__(self, robot, machine: Machine):
-        self._robot, self._machine = robot, machine
+        self._robot, self._machine, self._assembly = robot, machine, machine.assembly()
         self._links = machine.linkage.links
         self._bars = machine.linkage.bars
         self._frames = {GROUND: ground_frame(machine.linkage), **machine.linkage.frames}
         self._travels = {**travels(machine.linkage, machine.reach),
-                         'crank': _crank_travel(machine)}
+                         'crank': _crank_travel(machine, self._assembly)}
         self._size = machine.scale * float(machine.linkage.longest)
 
     def add_to(self, root: str):
         """Add ground, crank and legs."""
-        legs = self._machine.assembly().legs
+        legs = self._assembly.legs
         self._robot.fix(root, self._link('', GROUND), self._machine.pose)
         if len(legs) > 1:
             self._hang(Leg('', 0.0, 1.0), self._links[0])
@@ -166,9 +166,9 @@ class _Model:
         return (leg.side * x, y) if link == GROUND else (x, leg.side * y)
 
 
-def _crank_travel(machine) -> Optional[Travel]:
+def _crank_travel(machine, assembly) -> Optional[Travel]:
     """Return the outermost ends of the crank's reach [rad], in the turn that it is driven in."""
-    arcs = crank_reach(machine.assembly())
+    arcs = crank_reach(assembly)
     if not arcs or is_full_turn(arcs):
         return None
     low, high = min(lo for lo, _ in arcs), max(hi for _, hi in arcs)

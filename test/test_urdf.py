@@ -14,7 +14,6 @@
 
 """Robot models, read and moved by libraries that know nothing of this package. No ROS."""
 
-from io import BytesIO
 import math
 import re
 from xml.etree import ElementTree
@@ -24,6 +23,7 @@ from linkage_ros.assembly import Assembly
 from linkage_ros.travel import crank_reach
 import numpy as np
 import pytest
+from robots import LIBRARIES, Yourdfpy
 
 TOLERANCE = 1e-12
 SLIDES = {'slide', 'block', 'left0_block', 'left1_block', 'right0_block', 'right1_block'}
@@ -94,41 +94,6 @@ def in_space(pose, place):
     return np.array([x, y, z]) + pose[:3]
 
 
-class Yourdfpy:
-    """A robot of yourdfpy, in Python."""
-
-    def __init__(self, text):
-        library = pytest.importorskip('yourdfpy')
-        self.robot = library.URDF.load(BytesIO(text.encode()), load_meshes=False)
-        self.joints = self.robot.actuated_joint_names
-
-    def places(self, positions, names):
-        """Return where frames are [m], by name, at joint positions."""
-        self.robot.update_cfg({name: float(value) for name, value in positions.items()})
-        return {name: self.robot.get_transform(name)[:3, 3] for name in names}
-
-
-class Pinocchio:
-    """A robot of Pinocchio, in C++, read by the parser of ROS."""
-
-    def __init__(self, text):
-        self._library = pytest.importorskip('pinocchio')
-        self._model = self._library.buildModelFromXML(text)
-        self._data = self._model.createData()
-        self.joints = list(self._model.names)[1:]
-
-    def places(self, positions, names):
-        """Return where frames are [m], by name, at joint positions."""
-        q = self._library.neutral(self._model)
-        for name, value in positions.items():
-            joint = self._model.joints[self._model.getJointId(name)]
-            ends = [value] if joint.nq == 1 else [math.cos(value), math.sin(value)]
-            q[joint.idx_q:joint.idx_q + joint.nq] = ends
-        self._library.framesForwardKinematics(self._model, self._data, q)
-        return {name: self._data.oMf[self._model.getFrameId(name)].translation.copy()
-                for name in names}
-
-
 def description(one):
     return urdf.describe([one], 'world')
 
@@ -146,7 +111,7 @@ def limits(one):
             for name, end in ends.items()}
 
 
-@pytest.mark.parametrize('library', [Yourdfpy, Pinocchio])
+@pytest.mark.parametrize('library', LIBRARIES)
 @pytest.mark.parametrize('name', MACHINES)
 def test_every_joint_is_met_and_every_loop_is_closed(name, library):
     one = MACHINES[name]()
@@ -241,7 +206,7 @@ def test_a_crank_that_no_pose_of_all_legs_allows_has_no_ends():
     assert limits(machine('peaucellier', mirrored=True))['crank'] is None
 
 
-@pytest.mark.parametrize('library', [Yourdfpy, Pinocchio])
+@pytest.mark.parametrize('library', LIBRARIES)
 def test_several_mechanisms_make_one_robot(library):
     machines = scene.read({'frame_id': 'base', 'jansen.leg_pairs': 2}).machines
     text = urdf.describe(machines.values(), 'base')

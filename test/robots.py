@@ -1,0 +1,58 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Robot models as libraries see them that know nothing of this package."""
+
+from io import BytesIO
+import math
+
+import pytest
+
+
+class Yourdfpy:
+    """A robot of yourdfpy, in Python."""
+
+    def __init__(self, text):
+        library = pytest.importorskip('yourdfpy')
+        self.robot = library.URDF.load(BytesIO(text.encode()), load_meshes=False)
+        self.joints = self.robot.actuated_joint_names
+
+    def places(self, positions, names):
+        """Return where frames are [m], by name, at joint positions."""
+        self.robot.update_cfg({name: float(value) for name, value in positions.items()})
+        return {name: self.robot.get_transform(name)[:3, 3] for name in names}
+
+
+class Pinocchio:
+    """A robot of Pinocchio, in C++, read by the parser of ROS."""
+
+    def __init__(self, text):
+        self._library = pytest.importorskip('pinocchio')
+        self._model = self._library.buildModelFromXML(text)
+        self._data = self._model.createData()
+        self.joints = list(self._model.names)[1:]
+
+    def places(self, positions, names):
+        """Return where frames are [m], by name, at joint positions."""
+        q = self._library.neutral(self._model)
+        for name, value in positions.items():
+            joint = self._model.joints[self._model.getJointId(name)]
+            ends = [value] if joint.nq == 1 else [math.cos(value), math.sin(value)]
+            q[joint.idx_q:joint.idx_q + joint.nq] = ends
+        self._library.framesForwardKinematics(self._model, self._data, q)
+        return {name: self._data.oMf[self._model.getFrameId(name)].translation.copy()
+                for name in names}
+
+
+LIBRARIES = [Yourdfpy, Pinocchio]

@@ -1,0 +1,95 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The robot model on its topic: an unchanged robot_state_publisher sees what the markers show."""
+
+import math
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from linkage_ros.kinematics import Kinematics  # noqa: E402
+from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
+from robots import LIBRARIES  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from std_msgs.msg import String  # noqa: E402
+from visualization_msgs.msg import MarkerArray  # noqa: E402
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+POSE = [0.3, -0.2, 0.92, math.pi / 2.0, 0.4, -1.1]
+SCENES = {
+    'water_drop': {}, 'jansen': {}, 'jansen with six legs': {'m.leg_pairs': 3}, 'peaucellier': {},
+    'slotted_lever': {'m.dimensions.e': 20.0}, 'slider_crank': {}}
+
+
+def given(name):
+    """Return the parameters of a scene with a mechanism `m` in a pose askew."""
+    return {'mechanisms': ['m'], 'm.type': name.split()[0], 'm.pose': POSE, 'm.scale': 0.01,
+            **SCENES[name]}
+
+
+def in_frame(pose, point):
+    """Return a marker's point [m] in the marker's frame, turned by the quaternion of its pose."""
+    q, p = pose.orientation, np.array([point.x, point.y, point.z])
+    axis = np.array([q.x, q.y, q.z])
+    turned = p + 2.0 * np.cross(axis, np.cross(axis, p) + q.w * p)
+    return turned + [pose.position.x, pose.position.y, pose.position.z]
+
+
+@pytest.mark.parametrize('library', LIBRARIES)
+@pytest.mark.parametrize('name', SCENES)
+def test_joint_states_put_the_robot_where_the_markers_are(graph, name, library):
+    machine = graph.start(Kinematics, given(name)).scene.machines['m']
+    descriptions = graph.listen(String, 'm/robot_description', LATCHED)
+    joints = graph.listen(JointState, 'm/joint_states')
+    markers = graph.listen(MarkerArray, 'm/markers')
+    turn = graph.crank(['m_crank'])
+    robot = library(graph.until(lambda: descriptions)[0].data)
+    frames = [f'm_{leg.prefix}{point}' for leg in machine.assembly().legs
+              for point in machine.points]
+    for theta in (-1.0, 0.0, 0.3, 1.1):
+        state = turn([theta], joints)
+        _, spheres = turn([theta], markers).markers
+        found = robot.places(dict(zip(state.name, state.position)), frames)
+        for frame, point in zip(frames, spheres.points):
+            wanted = in_frame(spheres.pose, point)
+            assert np.abs(found[frame] - wanted).max() < 1e-12 * 0.01 * machine.linkage.longest
+    assert spheres.header.frame_id == 'world'
+
+
+def test_whoever_comes_late_hears_the_description_once(graph):
+    node = graph.start(Kinematics, {'mechanisms': ['jansen'], 'frame_id': 'base'})
+    heard = graph.listen(String, 'jansen/robot_description', LATCHED)
+    robot = ElementTree.fromstring(graph.until(lambda: heard)[0].data)
+    assert robot.get('name') == 'jansen' and robot.find('link').get('name') == 'base'
+    crank = graph.crank(['jansen_crank'])
+    crank([0.5], graph.listen(JointState, 'jansen/joint_states'))
+    assert graph.set(node, jansen__points=['G']).successful
+    assert graph.set(node, jansen__pose=[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]).successful
+    graph.until(lambda: len(heard) > 1)
+    assert len(heard) == 2 and 'xyz="1.0 0.0 0.0"' in heard[1].data
+
+
+def test_a_new_dimension_makes_a_new_description(graph):
+    node = graph.start(Kinematics, {'mechanisms': ['cell'], 'cell.type': 'peaucellier'})
+    heard = graph.listen(String, 'cell/robot_description', LATCHED)
+    graph.until(lambda: heard)
+    assert graph.set(node, cell__dimensions__r=3.1).successful
+    graph.until(lambda: len(heard) > 1)
+    ends = [float(re.search('upper="([^"]*)"', message.data)[1]) for message in heard]
+    assert ends == pytest.approx([2.0 * math.acos(5.0 / (2.0 * r)) for r in (3.0, 3.1)])
