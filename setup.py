@@ -45,6 +45,6 @@ setup(
         'console_scripts': [
             f'{name} = {package_name}.{name}:main'
             for name in ('crank_driver', 'kinematics', 'servo_inverse', 'viewer')
-        ],
+        ] + [f'urdf = {package_name}.print_urdf:main'],
     },
 )
