@@ -136,11 +136,12 @@ def _stamp(message):
 class Process:
     """An executable of this package as users start it, with a parameter file."""
 
-    def __init__(self, name, parameter_file):
+    def __init__(self, name, parameter_file, *arguments):
         self.domain = next(_domains)
         self._process = subprocess.Popen(
-            [sys.executable, '-m', f'linkage_ros.{name}', '--ros-args', '--params-file',
-             str(parameter_file)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            [sys.executable, '-m', f'linkage_ros.{name}', *arguments, '--ros-args',
+             '--params-file', str(parameter_file)],
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
             env=dict(os.environ, ROS_DOMAIN_ID=str(self.domain)))
 
     def interrupt(self, signal):

@@ -15,6 +15,7 @@
 """The robot model on its topic: an unchanged robot_state_publisher sees what the markers show."""
 
 import math
+from pathlib import Path
 import re
 from xml.etree import ElementTree
 
@@ -23,14 +24,17 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from linkage_ros import scene, urdf  # noqa: E402
 from linkage_ros.kinematics import Kinematics  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from robots import LIBRARIES  # noqa: E402
+from ros_harness import Process  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+CATALOGUE = Path(__file__).parents[1] / 'config' / 'all.yaml'
 POSE = [0.3, -0.2, 0.92, math.pi / 2.0, 0.4, -1.1]
 SCENES = {
     'water_drop': {}, 'jansen': {}, 'jansen with six legs': {'m.leg_pairs': 3}, 'peaucellier': {},
@@ -93,3 +97,29 @@ def test_a_new_dimension_makes_a_new_description(graph):
     graph.until(lambda: len(heard) > 1)
     ends = [float(re.search('upper="([^"]*)"', message.data)[1]) for message in heard]
     assert ends == pytest.approx([2.0 * math.acos(5.0 / (2.0 * r)) for r in (3.0, 3.1)])
+
+
+def test_the_command_prints_the_robot_of_a_scene():
+    code, printed = Process('print_urdf', CATALOGUE).end()
+    found = scene.load(str(CATALOGUE))
+    assert code == 0
+    assert printed == urdf.describe(found.machines.values(), found.frame_id) + '\n'
+
+
+def test_the_command_prints_those_that_are_named():
+    code, printed = Process('print_urdf', CATALOGUE, '--mechanism', 'jansen').end()
+    assert code == 0
+    jansen = scene.load(str(CATALOGUE)).machines['jansen']
+    assert printed == urdf.describe([jansen], 'world') + '\n'
+
+
+@pytest.mark.parametrize('arguments, lines, complaint', [
+    (['--mechanism', 'leg'], 'rate: 50.0', "there is no mechanism 'leg'; allowed: water_drop, "),
+    ([], 'rate: -1.0', 'rate must be a finite number'),
+])
+def test_the_command_says_in_one_line_what_is_wrong(tmp_path, arguments, lines, complaint):
+    file = tmp_path / 'scene.yaml'
+    file.write_text(f'/**:\n  ros__parameters:\n    {lines}\n')
+    code, printed = Process('print_urdf', file, *arguments).end()
+    assert code == 1
+    assert complaint in printed and len(printed.splitlines()) == 1
