@@ -21,7 +21,7 @@ from rcl_interfaces.msg import (
     SetParametersResult,
 )
 import rclpy
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import get_logger
 from rclpy.node import Node
@@ -29,7 +29,15 @@ from rclpy.parameter import Parameter
 
 from . import scene
 
+try:
+    from rclpy.experimental import EventsExecutor as Executor
+except ImportError:
+    Executor = SingleThreadedExecutor
+
 RCLError = rclpy_implementation.RCLError
+
+# Some builds of the EventsExecutor wait well for a while, but busily and deaf to signals for ever.
+LONGEST_WAIT = 1.0
 
 
 class SceneNode(Node):
@@ -118,7 +126,7 @@ def _typed(parameter):
     return Parameter(parameter.name, kind, parameter.value)
 
 
-def run(node_class, name: str, args=None) -> int:
+def run(node_class, name: str, args=None, executor_class=Executor) -> int:
     """Run a node until it is interrupted; return the exit code of the process."""
     try:
         rclpy.init(args=args)
@@ -127,7 +135,7 @@ def run(node_class, name: str, args=None) -> int:
     node = None
     try:
         node = node_class()
-        rclpy.spin(node)
+        _spin(node, executor_class())
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except scene.SceneError as error:
@@ -141,6 +149,15 @@ def run(node_class, name: str, args=None) -> int:
             node.destroy_node()
         rclpy.try_shutdown()
     return 0
+
+
+def _spin(node, executor):
+    executor.add_node(node)
+    try:
+        while rclpy.ok():
+            executor.spin_once(timeout_sec=LONGEST_WAIT)
+    finally:
+        executor.shutdown()
 
 
 def _failed(name: str, error: Exception) -> int:

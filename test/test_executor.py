@@ -1,0 +1,171 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What nodes do on the executor that runs them: timers, simulated time, services, and its end."""
+
+import itertools
+import math
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import textwrap
+from types import SimpleNamespace
+
+import pytest
+
+rclpy = pytest.importorskip('rclpy')
+pytest.importorskip('linkage_interfaces')
+
+from linkage_interfaces.srv import ServoInverse  # noqa: E402
+from linkage_ros import node  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from ros_harness import Graph, Process  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+
+SCENE = """
+    /**:
+      ros__parameters:
+        mechanisms: [slotted_lever, jansen]
+        jansen.crank.speed: 0.5
+    """
+
+
+@pytest.fixture
+def started(tmp_path):
+    """Return a function that starts an executable, with parameters, in a graph with the tester."""
+    processes = []
+
+    def start(name, more=''):
+        path = tmp_path / f'{name}.yaml'
+        path.write_text(textwrap.dedent(SCENE) + more)
+        processes.append(Process(name, path))
+        return processes[-1]
+
+    yield start
+    for process in processes:
+        process.interrupt(signal.SIGINT)
+        assert process.end() == (0, '')
+
+
+def test_the_executor_that_waits_for_events_is_used_where_there_is_one():
+    experimental = pytest.importorskip('rclpy.experimental')
+    assert node.Executor is experimental.EventsExecutor
+
+
+def test_timers_run_on_simulated_time_and_follow_it_back(started):
+    process = started('crank_driver', '    use_sim_time: true\n    rate: 10.0\n')
+    with Graph(process.domain) as graph:
+        heard = graph.listen(JointState, 'crank_states')
+        tick = graph.clock()
+
+        def past(seconds):
+            """Let the time run on from there until a message is of it."""
+            heard.clear()
+            steps = itertools.count()
+
+            def told():
+                tick(round((seconds + 0.01 * next(steps)) * 1e9))
+                return [m for m in heard if seconds <= _seconds(m) < seconds + 10.0]
+            return graph.until(told)[0]
+
+        first, later = past(10.0), past(30.0)
+        passed = _seconds(later) - _seconds(first)
+        assert later.position[1] - first.position[1] == pytest.approx(0.5 * passed % math.tau)
+        back = past(2.0)
+        assert 0.0 <= (back.position[1] - later.position[1]) % math.tau < 0.5 * 10.0
+
+
+def test_a_new_rate_acts_at_once(started):
+    process = started('crank_driver', '    rate: 0.01\n')
+    with Graph(process.domain) as graph:
+        heard = graph.listen(JointState, 'crank_states')
+        graph.until(lambda: graph.node.count_publishers('crank_states'))
+        assert graph.set(named('crank_driver'), rate=50.0).successful
+        graph.until(lambda: len(heard) > 2)
+
+
+def test_a_service_and_a_parameter_are_answered(started):
+    process = started('servo_inverse')
+    with Graph(process.domain) as graph:
+        client = graph.node.create_client(ServoInverse, 'servo_inverse')
+        graph.until(client.service_is_ready)
+        future = client.call_async(ServoInverse.Request(lever_angle=[0.0]))
+        graph.until(future.done)
+        assert future.result().success and future.result().servo_angle[0] == 0.0
+        refused = graph.set(named('servo_inverse'), slotted_lever__dimensions__a=-1.0)
+        assert not refused.successful
+
+
+@pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
+def test_where_there_is_no_such_executor_the_plain_one_is_used_and_ends_as_quietly(stop):
+    done = python("""
+        import sys
+        sys.modules['rclpy.experimental'] = None
+        from linkage_ros import node
+        from rclpy.executors import SingleThreadedExecutor
+        assert node.Executor is SingleThreadedExecutor
+        """ + ENDS_ITSELF.format(stop=int(stop)))
+    assert (done.returncode, done.stderr) == (0, 'turned\n')
+
+
+@pytest.mark.parametrize('executor', [node.Executor, SingleThreadedExecutor])
+def test_a_programming_error_ends_a_node_loudly(executor):
+    done = python(f"""
+        from linkage_ros import node
+        from rclpy import executors, node as rclpy_node
+
+        class Wrong(rclpy_node.Node):
+            def __init__(self):
+                super().__init__('wrong')
+                self.create_timer(0.01, lambda: 1 // 0)
+
+        executor = node.Executor if {executor is node.Executor} else \\
+            executors.SingleThreadedExecutor
+        node.run(Wrong, 'wrong', executor_class=executor)
+        """)
+    assert done.returncode == 1 and 'ZeroDivisionError' in done.stderr
+
+
+ENDS_ITSELF = """
+        import signal
+        from linkage_ros.crank_driver import CrankDriver
+
+        class Ended(CrankDriver):
+            def _tick(self):
+                super()._tick()
+                print('turned', file=sys.stderr)
+                self._timer.cancel()
+                signal.raise_signal({stop})
+
+        sys.exit(node.run(Ended, 'ended', []))
+        """
+
+
+def python(code):
+    """Run code in a Python of its own."""
+    return subprocess.run(
+        [sys.executable, '-c', textwrap.dedent(code)], cwd=Path(__file__).parents[1],
+        capture_output=True, text=True, timeout=60,
+        env=dict(os.environ, ROS_DOMAIN_ID=str(101 + os.getpid() % 100)))
+
+
+def named(name):
+    """Return what stands for a node in another process."""
+    return SimpleNamespace(get_fully_qualified_name=lambda: name)
+
+
+def _seconds(message):
+    return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
