@@ -158,7 +158,7 @@ class Analysis:
         if key not in self._poses:
             reach, found = self.reach(*others), []
             for tolerance, curve in self._closures(others):
-                pieces = Pieces(curve, reach, (), False, 2.0 * tolerance)
+                pieces = Pieces(curve, reach, (), False, 2.0 * tolerance, tolerance)
                 found += in_order(pieces.answers(np.zeros(1))).ravel().tolist()
             self._poses[key] = distinct(theta for theta in found if theta == theta)
         return self._poses[key]

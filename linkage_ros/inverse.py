@@ -107,15 +107,18 @@ class Pieces:
     angular : bool
         Whether the output is an angle, compared modulo a turn.
     tolerance : float
-        How far beyond an extreme a value still counts as reached.
+        How far beyond an extreme a value still counts as the extreme.
+    short : float
+        How far short of an extreme it does.
 
     """
 
     def __init__(self, curve: Callable, reach: Sequence[Arc], marks: Sequence[float],
-                 angular: bool, tolerance: float):
+                 angular: bool, tolerance: float, short: float = 0.0):
         self._curve = curve
         self._angular = angular
         self._tolerance = tolerance
+        self._short = short
         self._marks = distinct(marks)
         self._pieces = [piece for arc in reach for piece in self._cut(*arc)]
 
@@ -210,8 +213,8 @@ class Pieces:
             good = (lo < guess) & (guess < hi) & (np.abs(guess - theta) < 0.5 * step)
             following = np.where(good, guess, 0.5 * (lo + hi))
             theta, step = following, np.abs(following - theta)
-        best = np.where(target >= piece.value[-1], piece.theta[-1], best)
-        return np.where(target <= piece.value[0], piece.theta[0], best)
+        best = np.where(target >= piece.value[-1] - self._short, piece.theta[-1], best)
+        return np.where(target <= piece.value[0] + self._short, piece.theta[0], best)
 
 
 class Backward(NamedTuple):
