@@ -15,6 +15,7 @@ build := build$(suffix)
 install := install$(suffix)
 log := log$(suffix)
 bin := $(CURDIR)/$(venv)/bin
+docs_python := $(CURDIR)/.venv-docs/bin/python
 
 requirements := wheels/$(DISTRO).txt wheels/build.txt wheels/dev.txt
 sources := package.xml setup.py setup.cfg resource/linkage_ros wheels/prefix.cmake \
@@ -44,6 +45,17 @@ help: ## Show what can be made
 demo: build ## Run the nodes, measure what they send, draw it to demo/out/
 	@$(in_ros) python demo/demo.py
 
+.PHONY: pictures
+pictures: .venv-docs/.installed ## Draw what pictures/pictures.txt lists, without ROS
+	@mkdir -p pictures/out
+	@grep -v '^#' pictures/pictures.txt | xargs -t -L 1 $(docs_python) -m linkage_ros.render
+
+.PHONY: docs
+docs: .venv-docs/.installed ## Build the documentation to docs/_build/html/ and check its links
+	@cd docs && $(docs_python) -m sphinx -q -W --keep-going -b html . _build/html
+	@$(docs_python) docs/links.py docs/_build/html
+	@echo 'Documentation: docs/_build/html/index.html'
+
 .PHONY: test
 test: build ## Run the tests
 	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest
@@ -59,7 +71,8 @@ build: $(install)/.built ## Build both packages
 
 .PHONY: clean
 clean: ## Remove everything that was made
-	rm -rf .venv .venv-* build build-* install install-* log log-* demo/out
+	rm -rf .venv .venv-* build build-* install install-* log log-* demo/out \
+	  pictures/out docs/_build docs/mechanisms
 
 $(install)/.built: $(venv)/.installed $(sources)
 	@colcon --log-base $(log) build --build-base $(build) --install-base $(install) --cmake-args \
@@ -78,4 +91,9 @@ $(venv)/.installed: $(requirements)
 	@echo 'Installing ROS 2 $(DISTRO) into $(venv): about a minute, once.'
 	@$(PYTHON) -m venv $(venv)
 	@python -m pip install -qq $(requirements:%=-r %)
+	@touch $@
+
+.venv-docs/.installed: docs/requirements.txt
+	@$(PYTHON) -m venv .venv-docs
+	@$(docs_python) -m pip install -qq -r $<
 	@touch $@

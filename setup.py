@@ -33,6 +33,7 @@ setup(
     install_requires=['setuptools', 'numpy'],
     extras_require={
         'fast': ['numba'],
+        'render': ['matplotlib>=3.6', 'pyyaml', 'tqdm'],
         'test': ['gmpy2', 'hypothesis', 'mpmath', 'pytest', 'pyyaml'],
         'viewer': ['aiohttp>=3.9'],
     },
@@ -44,7 +45,7 @@ setup(
     entry_points={
         'console_scripts': [
             f'{name} = {package_name}.{name}:main'
-            for name in ('crank_driver', 'kinematics', 'servo_inverse', 'viewer')
+            for name in ('crank_driver', 'kinematics', 'render', 'servo_inverse', 'viewer')
         ] + [f'urdf = {package_name}.print_urdf:main'],
     },
 )

@@ -1,0 +1,262 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The command line: what to draw, how, and where to."""
+
+import argparse
+import math
+from pathlib import Path
+import shutil
+import sys
+
+from . import parts
+from .. import scene
+
+STILL, MOVING = ('.png', '.svg'), ('.gif', '.mp4')
+FPS, FASTEST_GIF, FASTEST = 25.0, 50.0, 240.0
+SMALLEST, LARGEST = 64, 8192
+MOST_FRAMES, MOST_COLOURS = 10000, 255
+
+EPILOG = """\
+examples:
+  render config/jansen.yaml --out leg.gif
+  render config/water_drop.yaml --out drop.gif --trace growing --turns 2
+  render config/strandbeest.yaml --out walk.gif --show floor --hide axes,title --size 960x540
+  render config/slotted_lever.yaml --out lever.svg --angle 40 --data joints.csv
+"""
+
+
+class RenderError(Exception):
+    """What is wrong with a request, in one sentence."""
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors are one sentence."""
+
+    def error(self, message):
+        """Raise RenderError."""
+        raise RenderError(message)
+
+
+def main(args=None) -> int:
+    """Draw what the command line asks for; return the exit code."""
+    try:
+        asked = parsed(args)
+        draw(asked, chosen(asked))
+    except (RenderError, scene.SceneError) as error:
+        return failed(error)
+    except ImportError as error:
+        return failed(f'{error.name} is not installed: pip install linkage_ros[render], or '
+                      'apt install python3-matplotlib python3-tqdm python3-yaml')
+    except OSError as error:
+        return failed(f'{error.filename}: {error.strerror}' if error.filename else error)
+    except KeyboardInterrupt:
+        return failed('interrupted')
+    return 0
+
+
+def failed(why) -> int:
+    """Say why there is no picture; return the exit code."""
+    print(f'render: {why}', file=sys.stderr)
+    return 1
+
+
+def parsed(args):
+    """Return what the command line asks for; raise RenderError if it cannot be."""
+    asked = parser().parse_args(args)
+    ending = asked.out.suffix.lower()
+    if ending not in STILL + MOVING:
+        raise RenderError(f'--out must end in {", ".join(STILL + MOVING)}, not {asked.out}')
+    asked.moving = ending in MOVING
+    for option in ('angle',) if asked.moving else ('turns', 'fps', 'frames', 'loop', 'colours'):
+        if getattr(asked, option) is not None:
+            allowed = ' and '.join(STILL if asked.moving else MOVING)
+            raise RenderError(f'--{option} is for {allowed} only, not for {ending}')
+    if ending == '.mp4':
+        check_mp4(asked)
+    if ending == '.gif' and (asked.fps or FPS) > FASTEST_GIF:
+        raise RenderError(f'--fps must be at most {FASTEST_GIF:g} for .gif, not {asked.fps:g}')
+    for file in filter(None, (asked.out, asked.data)):
+        if not file.absolute().parent.is_dir():
+            raise RenderError(f'{file} cannot be written: there is no folder {file.parent}')
+    return asked
+
+
+def check_mp4(asked):
+    """Raise RenderError if there can be no MP4."""
+    for option in ('loop', 'colours'):
+        if getattr(asked, option) is not None:
+            raise RenderError(f'--{option} is for .gif only, not for .mp4')
+    if any(side % 2 for side in asked.size):
+        raise RenderError('--size must be two even numbers for .mp4')
+    if not shutil.which('ffmpeg'):
+        raise RenderError('ffmpeg, which writes .mp4, is not installed: apt install ffmpeg, or '
+                          'choose .gif')
+
+
+def chosen(asked):
+    """Return the machines to draw; raise SceneError or RenderError if there are none such."""
+    try:
+        machines = scene.load(asked.scene).machines
+    except UnicodeDecodeError:
+        raise RenderError(f'{asked.scene} is no text file') from None
+    names = asked.mechanisms or list(machines)
+    for name in names:
+        if name not in machines:
+            raise RenderError(f'{asked.scene} has no mechanism {name}; '
+                              f'allowed: {", ".join(machines)}')
+    return [machines[name] for name in names]
+
+
+def draw(asked, machines):
+    """Write the files."""
+    from matplotlib import style
+
+    from .picture import Picture, PictureError
+
+    usual = parts.USUAL_IN_MOTION if asked.moving else parts.USUAL
+    with style.context('default', after_reset=True):
+        picture = Picture(machines, asked.size, asked.trace, (usual | asked.show) - asked.hide)
+        times = moments(asked, picture)
+        try:
+            picture.arrange(times)
+        except PictureError as error:
+            raise RenderError(error) from None
+        write(asked, picture, times)
+
+
+def write(asked, picture, times):
+    """Write the picture, and the data if they are wanted."""
+    from tqdm import tqdm
+
+    from . import files
+
+    def progress(times):
+        return tqdm(times, asked.out.name, unit='frame', disable=None)
+
+    fps = asked.fps or FPS
+    if asked.out.suffix.lower() == '.gif':
+        colours = asked.colours or MOST_COLOURS
+        files.gif(picture, times, fps, asked.loop or 0, colours, asked.out, progress)
+    elif asked.moving:
+        files.mp4(picture, times, fps, asked.out, progress)
+    else:
+        files.still(picture, times[0], asked.out)
+    if asked.data:
+        files.data(picture, times, asked.data)
+
+
+def moments(asked, picture):
+    """Return when to draw [turns of the first crank]."""
+    first = picture.panels[0]
+    if not asked.moving:
+        crank = first.cycle.first
+        return [0.0 if asked.angle is None else crank.turns_to(math.radians(asked.angle))]
+    if not math.isfinite(picture.period):
+        raise RenderError(f'{first.machine.name}.crank.speed is 0: nothing moves')
+    turns = asked.turns or 1.0
+    frames = asked.frames or max(round(turns * picture.period * (asked.fps or FPS)), 1)
+    if frames > MOST_FRAMES:
+        raise RenderError(f'this takes {frames} frames, more than {MOST_FRAMES}: choose --frames, '
+                          '--turns or --fps')
+    return [turns * k / frames for k in range(frames)]
+
+
+def parser() -> Parser:
+    """Return the parser of the command line."""
+    made = Parser('render', description='Draw a scene: a picture (.png, .svg) or an animation '
+                  '(.gif, .mp4).', epilog=EPILOG,
+                  formatter_class=argparse.RawDescriptionHelpFormatter)
+    made.add_argument('scene', metavar='SCENE', help='parameter file of the scene')
+    made.add_argument('--out', metavar='FILE', type=Path, required=True,
+                      help=f'what to write; ends in {", ".join(STILL + MOVING)}')
+    made.add_argument('--data', metavar='FILE', type=Path,
+                      help='write what is drawn as CSV too: time [s], crank angles [rad] and '
+                      'joints [m], every digit')
+    made.add_argument('--mechanisms', metavar='NAME,...', type=words,
+                      help='draw only these of the scene')
+    made.add_argument('--trace', choices=parts.TRACES, default='whole',
+                      help="the traced joint's curve: whole (default), growing in the first turn, "
+                      'fading after 0.3 turns, a whole one whose stance, where a foot is on the '
+                      'ground, is bold, or none')
+    made.add_argument('--show', metavar='PART,...', type=parts_of_a_picture, default=frozenset(),
+                      help='draw besides: dimensions, floor (what walks on it makes it move), '
+                      "labels (the joints' names, which animations are without)")
+    made.add_argument('--hide', metavar='PART,...', type=parts_of_a_picture, default=frozenset(),
+                      help=f'leave out some of {", ".join(parts.PARTS)}')
+    made.add_argument('--size', metavar='WxH', type=size, default=(720, 720),
+                      help='pixels (default: 720x720)')
+    still = made.add_argument_group('for .png and .svg')
+    still.add_argument('--angle', metavar='DEG', type=number(-math.inf, math.inf),
+                       help="the first mechanism's crank angle (default: where it starts)")
+    moving = made.add_argument_group('for .gif and .mp4')
+    moving.add_argument('--turns', metavar='N', type=number(0.0, 1000.0),
+                        help="turns of the first mechanism's crank, or swings to and fro "
+                        '(default: 1)')
+    moving.add_argument('--fps', metavar='N', type=number(0.0, FASTEST),
+                        help=f'frames a second (default: {FPS:g})')
+    moving.add_argument('--frames', metavar='N', type=whole(1, MOST_FRAMES),
+                        help="frames in all (default: as many as the crank's speed takes)")
+    moving.add_argument('--loop', metavar='N', type=whole(0, 65536),
+                        help='how often a .gif plays (default: 0, again and again)')
+    moving.add_argument('--colours', metavar='N', type=whole(2, MOST_COLOURS),
+                        help=f'colours of a .gif: fewer make it smaller (default: {MOST_COLOURS})')
+    return made
+
+
+def number(low, high):
+    """Return a reader of numbers above low and not above high."""
+    def read(text):
+        value = float(text)
+        if not (low < value <= high and math.isfinite(value)):
+            raise argparse.ArgumentTypeError(f'must be above {low:g} and at most {high:g}, '
+                                             f'not {text}')
+        return value
+    read.__name__ = 'number'
+    return read
+
+
+def whole(low, high):
+    """Return a reader of whole numbers from low to high."""
+    def read(text):
+        value = int(text)
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f'must be from {low} to {high}, not {text}')
+        return value
+    read.__name__ = 'whole number'
+    return read
+
+
+def words(text):
+    """Return the words between commas."""
+    return [word for word in text.split(',') if word]
+
+
+def parts_of_a_picture(text):
+    """Return the parts between commas."""
+    for word in words(text):
+        if word not in parts.PARTS:
+            raise argparse.ArgumentTypeError(f'{word} is no part of a picture; allowed: '
+                                             f'{", ".join(parts.PARTS)}')
+    return frozenset(words(text))
+
+
+def size(text):
+    """Return width and height."""
+    sides = text.lower().split('x')
+    if len(sides) != 2 or not all(side.isdecimal() for side in sides) \
+            or not all(SMALLEST <= int(side) <= LARGEST for side in sides):
+        raise argparse.ArgumentTypeError(f'must be like 720x720, each side from {SMALLEST} to '
+                                         f'{LARGEST}, not {text}')
+    return tuple(map(int, sides))

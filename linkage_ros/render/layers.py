@@ -1,0 +1,391 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What a picture is made of: each layer adds artists to axes, and moves them.
+
+`artists` are those that move, in the order they are drawn.
+"""
+
+import math
+import textwrap
+
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_rgb
+from matplotlib.path import Path
+from matplotlib.patheffects import withStroke
+import numpy as np
+
+from .cycle import SAMPLES
+
+# Colours that colour-blind people tell apart (Okabe and Ito, "Color Universal Design").
+BLUE, ORANGE, GREEN, VERMILLION = '#0072b2', '#e69f00', '#009e73', '#d55e00'
+DARK, GREY = '#222222', '#8a8a8a'
+LINK, CRANK, TRACE, GUIDE = BLUE, ORANGE, VERMILLION, GREEN
+
+FADED = 0.3  # turns after which a fading trace is gone
+STANCE = 0.06  # of a foot curve's height: a foot lower than that is on the ground
+CURVED = 20  # points: a line that has more is a curve
+STRAIGHT = 1e-9  # of a curve's length: how far it may leave a line and still be called one
+WHITENED = 0.7  # how white the last of many pairs of legs is
+
+HALO = [withStroke(linewidth=3, foreground='white')]
+PIVOT_SIZE = 13  # points, from its top to its bottom
+PIVOT = Path([(0.0, 0.0), (-0.6, -1.0), (0.6, -1.0), (0.0, 0.0)], closed=True)
+
+
+def whiter(colour, part: float):
+    """Return a colour so much of the way to white."""
+    return tuple(np.array(to_rgb(colour)) * (1.0 - part) + part)
+
+
+class Trace:
+    """The curve of the tracer: whole, growing, fading, or the part that a foot stands on."""
+
+    def __init__(self, axes, machine, cycle, kind, unit):
+        self._cycle, self._kind = cycle, kind
+        self._tracer = machine.linkage.points.index(machine.tracer)
+        self.artists = []
+        if kind in ('growing', 'fading'):
+            lines = LineCollection([], lw=3 * unit, color=TRACE, zorder=2, animated=True)
+            axes.add_collection(lines, autolim=False)
+            self.artists = [lines]
+        elif kind != 'none':
+            curve = cycle.locus(machine)
+            for side in (1.0, -1.0)[:1 + machine.mirrored]:
+                self._add_still(axes, curve * (side, 1.0), unit)
+
+    def _add_still(self, axes, curve, unit):
+        bold = {'color': TRACE, 'lw': 3 * unit, 'zorder': 2}
+        if self._kind == 'stance':
+            axes.plot(*curve.T, color=whiter(TRACE, 0.65), lw=1.2 * unit, zorder=2)
+            curve = standing(curve)
+        axes.plot(*curve.T, **bold)
+
+    def show(self, pose):
+        """Draw the curve up to the tracer."""
+        if self._kind == 'growing':
+            start, end = 0.0, min(pose.turns, float(self._cycle.turns))
+            curves = self._cycle.curve(self._tracer, start, end)
+            self.artists[0].set_segments(np.moveaxis(curves, 1, 0))
+        elif self._kind == 'fading':
+            curves = self._cycle.curve(self._tracer, pose.turns - FADED, pose.turns)
+            pieces = np.stack([curves[:-1], curves[1:]], axis=2)
+            ages = np.linspace(1.0, 0.0, len(pieces))
+            self.artists[0].set_segments(pieces.reshape(-1, 2, 2))
+            self.artists[0].set_color(np.repeat([whiter(TRACE, age) for age in ages],
+                                                pieces.shape[1], axis=0))
+
+
+def standing(curve):
+    """Return the part of a foot's closed curve that is on the ground, shape (n, 2)."""
+    height = curve[:, 1] - curve[:, 1].min()
+    low = height[:-1] <= STANCE * height.max()
+    start = int(np.argmax(low & ~np.roll(low, 1)))
+    rolled = np.roll(low, -start)
+    length = len(low) if rolled.all() else int(np.argmin(rolled))
+    return np.roll(curve[:-1], -start, axis=0)[:length]
+
+
+def guides(axes, machine, cycle, unit):
+    """Draw the crank circle, a straight line that is traced, and slides on the ground."""
+    linkage = machine.linkage
+    first_leg = cycle.course[:, 0]
+    dashed = {'color': GUIDE, 'lw': 1.6 * unit, 'ls': (0, (6, 4)), 'zorder': 1}
+    around = np.exp(1j * np.linspace(0.0, math.tau, 361))
+    for bar in cranks(linkage):
+        centre, pin = (first_leg[0, linkage.points.index(name)] for name in bar)
+        circle = centre @ (1, 1j) + around * math.dist(centre, pin)
+        axes.plot(circle.real, circle.imag, **dashed)
+    line = straight(cycle.locus(machine))
+    if line is not None:
+        axes.axline(*line, **dashed)
+    for link in linkage.links:
+        if link.kind == 'prismatic' and link.parent == 'ground':
+            track = straight(first_leg[:, linkage.points.index(link.tip)])
+            axes.plot(*np.transpose(track), color='#d0d0d0', lw=14 * unit, zorder=1,
+                      solid_capstyle='round')
+
+
+def cranks(linkage):
+    """Return the bars that are cranks, from the joint they turn about to their pin."""
+    return [(link.joint, link.tip) for link in linkage.links if link.name in linkage.cranks]
+
+
+def straight(curve):
+    """Return two ends of a curve that is a straight line, and None for any other."""
+    first = curve[0]
+    last = curve[np.argmax(np.hypot(*(curve - first).T))]
+    along = last - first
+    length = math.hypot(*along)
+    away = np.abs((curve - first) @ (-along[1], along[0])) / (length or 1.0)
+    return (first, last) if away.max() <= STRAIGHT * length else None
+
+
+class Legs:
+    """The links and joints; of several pairs of legs each is paler than the one before it."""
+
+    def __init__(self, axes, machine, cycle, parts, unit):
+        linkage = machine.linkage
+        index = {name: linkage.points.index(name) for name in machine.points}
+        shown = [bar for bar in linkage.bars if set(bar) <= set(index)]
+        self._bars = np.array([[index[p], index[q]] for p, q in shown], int).reshape(-1, 2)
+        self._plates = [[index[name] for name in frame] for frame in linkage.frames.values()
+                        if len(frame) == 3 and set(frame) <= set(index)]
+        self._joints = np.array(list(index.values()))
+        self._tracer = linkage.points.index(machine.tracer)
+        self._fixed = fixed(cycle.course)[self._joints]
+        self._slots = list(slots(linkage, cycle, index))
+        self._legs = []
+        sides = 1 + machine.mirrored
+        thin = unit * (1.0 if len(cycle.prefixes) == 1 else 0.7)
+        for leg in reversed(range(len(cycle.prefixes))):
+            white = WHITENED * (leg // sides) / machine.leg_pairs
+            colours = [whiter(CRANK if bar in cranks(linkage) else LINK, white) for bar in shown]
+            self._legs.append((leg, self._artists(axes, parts, colours, white, thin)))
+        self.artists = [artist for _, artists in self._legs for artist in artists.values()]
+
+    def _artists(self, axes, parts, colours, white, unit):
+        """Return the artists of one leg, from the back to the front."""
+        zorder = 10 + 10 * (1.0 - white)
+        made = {}
+
+        def lines(name, colour, width, above, **style):
+            made[name] = LineCollection([], colors=colour, lw=width * unit, capstyle='round',
+                                        zorder=zorder + above, animated=True, **style)
+            axes.add_collection(made[name], autolim=False)
+
+        def dots(name, marker, size, above, **style):
+            made[name], = axes.plot([], [], ls='', marker=marker, ms=size * unit,
+                                    zorder=zorder + above, animated=True, **style)
+
+        dark = whiter(DARK, white)
+        if 'links' in parts:
+            made['plates'] = PolyCollection([], facecolors=whiter(LINK, 0.78 + 0.22 * white),
+                                            zorder=zorder, animated=True)
+            axes.add_collection(made['plates'], autolim=False)
+            lines('bars', colours, 5.5, 0.1)
+            lines('slot_rims', dark, 17, 0.2)
+            lines('slots', 'white', 13.5, 0.3)
+            if self._slots:
+                lines('cranks', colours, 5.5, 0.35)
+        if 'joints' in parts:
+            dots('pivots', PIVOT, 2 * PIVOT_SIZE, 0.05, mfc=whiter(GREY, 0.4), mec=GREY)
+            dots('joints', 'o', 9, 0.4, mfc='white', mec=dark, mew=2.2 * unit)
+            dots('tracer', 'o', 11, 0.5, mfc=whiter(TRACE, white), mec=dark, mew=1.6 * unit)
+        return made
+
+    def show(self, pose):
+        """Move the legs."""
+        for leg, artists in self._legs:
+            self._show_leg(artists, pose.places[leg])
+
+    def _show_leg(self, artists, places):
+        bars = places[self._bars]
+        if 'bars' in artists:
+            artists['plates'].set_verts([places[plate] for plate in self._plates])
+            artists['bars'].set_segments(bars)
+            tracks = [from_frame(ends, places[bar]) for bar, ends in self._slots]
+            artists['slot_rims'].set_segments(tracks)
+            artists['slots'].set_segments(tracks)
+        if 'cranks' in artists:
+            artists['cranks'].set_segments(bars[:1])
+        if 'joints' in artists:
+            joints = places[self._joints]
+            artists['pivots'].set_data(*joints[self._fixed].T)
+            artists['joints'].set_data(*joints.T)
+            artists['tracer'].set_data(*places[[self._tracer]].T)
+
+
+def fixed(course):
+    """Return which joints of the first leg never move."""
+    return np.ptp(course[:, 0], axis=0).max(axis=1) == 0.0
+
+
+def slots(linkage, cycle, shown):
+    """Yield for each slot in a moving link the joints of its bar, and its ends seen from there."""
+    links = {link.name: link for link in linkage.links}
+    for link in linkage.links:
+        parent = links.get(link.parent)
+        if link.kind == 'prismatic' and parent \
+                and {parent.joint, parent.tip, link.tip} <= set(shown):
+            bar = [linkage.points.index(name) for name in (parent.joint, parent.tip)]
+            first_leg = cycle.course[:, 0]
+            seen = to_frame(first_leg[:, linkage.points.index(link.tip)], first_leg[:, bar])
+            ends = np.array([np.nanmin(seen.real), np.nanmax(seen.real)])
+            yield bar, ends + 1j * np.nanmean(seen.imag)
+
+
+def to_frame(places, bar):
+    """Return places as complex numbers [m], seen from the start of a bar along it."""
+    start, end = bar[..., 0, :] @ (1, 1j), bar[..., 1, :] @ (1, 1j)
+    return (places @ (1, 1j) - start) * np.conj(end - start) / np.abs(end - start)
+
+
+def from_frame(seen, bar):
+    """Return the places [m] that are so seen along a bar, shape (n, 2)."""
+    start, end = bar @ (1, 1j)
+    there = start + seen * (end - start) / abs(end - start)
+    return np.stack([there.real, there.imag], axis=-1)
+
+
+class Floor:
+    """What the lowest foot walks on: it moves as far as the foot that stands on it."""
+
+    MARKS = 9  # in a turn's way
+    COLOUR = '#b5a27c'
+
+    def __init__(self, axes, machine, cycle, unit):
+        tracer = machine.linkage.points.index(machine.tracer)
+        feet = cycle.course[:, :, tracer]
+        lowest = np.nan_to_num(feet[:-1, :, 1], nan=np.inf).argmin(axis=1)
+        steps = np.diff(feet[:, :, 0], axis=0)[np.arange(len(lowest)), lowest]
+        self._way = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
+        # After a turn the marks are where others were; a lone foot brings them back itself.
+        turn, stride = abs(self._way[-1]), np.ptp(self._way) or 1.0
+        self._spacing = turn / self.MARKS if turn > 0.1 * stride else 0.5 * stride
+        self._tracer = tracer
+        self._axes = axes
+        style = {'color': self.COLOUR, 'zorder': 1, 'animated': True, 'capstyle': 'round'}
+        self._line = LineCollection([], lw=3 * unit, **style)
+        self._marks = LineCollection([], lw=2 * unit, **style)
+        self.artists = [self._line, self._marks]
+        for artist in self.artists:
+            axes.add_collection(artist, autolim=False)
+
+    def show(self, pose):
+        """Move the floor under the lowest foot."""
+        level = np.fmin.reduce(pose.places[:, self._tracer, 1])
+        samples = len(self._way)
+        way = np.interp(pose.turns * SAMPLES % (samples - 1), np.arange(samples), self._way)
+        low, high = self._axes.get_xlim()
+        self._line.set_segments([[(low, level), (high, level)]])
+        first = low + (way - low) % self._spacing - self._spacing
+        marks = np.arange(first, high + self._spacing, self._spacing)
+        depth = 0.22 * self._spacing
+        self._marks.set_segments([[(x, level), (x - depth, level - depth)] for x in marks])
+
+
+class Headline:
+    """Above the axes: the name, the dimensions, the crank angle, and the lever's if it has one."""
+
+    def __init__(self, axes, machine, parts, unit, single):
+        self._linkage = machine.linkage
+        self._short = not single or unit < 0.6
+        size = 5 + 10 * unit if single else 11.5
+        fixed_lines = [] if single else [machine.name.replace('_', ' ')]
+        if 'dimensions' in parts:
+            sizes = self._linkage.dimensions.items()
+            words = ',  '.join(f'{name}\u00a0=\u00a0{value:g}' for name, value in sizes)
+            fixed_lines += textwrap.wrap(words, 60 if single else 28)
+        self.artists = []
+        if 'title' in parts:
+            fixed_lines.append(' ')
+            count = len(readings(self._linkage, (0.0, 0.0), self._short))
+            self.artists = [axes.annotate(
+                '', (k / count, 1.0), (0, 6), 'axes fraction', 'offset points', fontsize=size,
+                va='baseline', animated=True, in_layout=False) for k in range(count)]
+        axes.set_title('\n'.join(fixed_lines), loc='left', fontsize=size)
+
+    def show(self, pose):
+        """Write what holds now."""
+        for text, reading in zip(self.artists, readings(self._linkage, pose.thetas, self._short)):
+            text.set_text(reading)
+
+
+def readings(linkage, thetas, short=False):
+    """Return as texts the angles of the cranks, of a lever that one drives, and their ratios."""
+    if not hasattr(linkage, 'reduction'):
+        names = ['θ', *(f'θ{number}' for number in range(2, len(linkage.cranks) + 1))]
+        return [reading(name, theta) for name, theta in zip(names, thetas)]
+    theta = math.remainder(thetas[0], math.tau)
+    lever = float(linkage.joint_angles(theta)['lever'])
+    angles = [reading('θ', theta), reading('φ', lever)]
+    if short:
+        return angles
+    return angles + [f'φ/θ = {rounded(lever / theta, 3) if theta else "–"}',
+                     f'dφ/dθ = {rounded(float(linkage.reduction(theta)), 3)}']
+
+
+def reading(name, angle):
+    """Return an angle [rad] as text in degrees."""
+    return f'{name} = {rounded(math.degrees(angle), 1)}°'
+
+
+def rounded(number, digits):
+    """Return a number as text, with the sign of what is shown."""
+    return f'{round(number, digits) + 0.0:.{digits}f}'.replace('-', '−')
+
+
+class Names:
+    """The joints' names, each where it is seldom in the way."""
+
+    DIRECTIONS = np.exp(1j * np.linspace(0.0, math.tau, 24, endpoint=False))
+
+    def __init__(self, axes, machine, cycle, unit):
+        linkage = machine.linkage
+        self._axes = axes
+        self._index = [linkage.points.index(name) for name in machine.points]
+        self._bars = np.array([[linkage.points.index(name) for name in bar]
+                               for bar in linkage.bars])
+        self._fixed = np.flatnonzero(fixed(cycle.course))
+        self._pivot = PIVOT_SIZE * unit * axes.figure.dpi / 72
+        in_slots = {link.tip for link in linkage.links if link.kind == 'prismatic'}
+        distance = axes.figure.dpi / 72 * (5 + 8 * unit)
+        self._distances = [distance * (1.4 if name in in_slots else 1.0)
+                           for name in machine.points]
+        self.artists = [axes.annotate(
+            name, (0.0, 0.0), (0.0, 0.0), textcoords='offset points', fontsize=8 + 6 * unit,
+            ha='center', va='center', zorder=100, animated=True, path_effects=HALO,
+            annotation_clip=False, in_layout=False) for name in machine.points]
+
+    def settle(self, poses):
+        """Choose each name's place beside its joint, for poses of shape (n, legs, joints, 2)."""
+        joints = self._pixels(poses[:, 0])
+        obstacles = [joints[:, self._bars[:, 0]], joints[:, self._bars[:, 1]]], [joints, joints], [
+            joints[:, self._fixed], joints[:, self._fixed] - 1j * self._pivot]
+        obstacles = [*obstacles, *self._curves()]
+        for text, index, distance in zip(self.artists, self._index, self._distances):
+            tried = joints[:, [index]] + distance * self.DIRECTIONS
+            room = np.min([clearance(tried, *lines) for lines in obstacles], axis=0)
+            room = np.nan_to_num(np.minimum(room, distance))
+            best = distance * self.DIRECTIONS[room.mean(axis=0).argmax()]
+            text.set_position(np.array([best.real, best.imag]) * 72 / self._axes.figure.dpi)
+            name, half = joints[:, [index]] + best, 0.5 * distance
+            obstacles.append([name - half, name + half])
+
+    def _curves(self):
+        """Yield the lines that stand still, as starts and ends of their pieces in pixels."""
+        for line in self._axes.lines:
+            if len(line.get_xdata()) > CURVED:
+                curve = self._pixels(line.get_xydata())[None, ::5]
+                yield curve[:, :-1], curve[:, 1:]
+
+    def _pixels(self, places):
+        pixels = self._axes.transData.transform(places.reshape(-1, 2)) @ (1, 1j)
+        return pixels.reshape(places.shape[:-1])
+
+    def show(self, pose):
+        """Move the names with their joints."""
+        for text, index in zip(self.artists, self._index):
+            text.xy = tuple(pose.places[0, index])
+
+
+def clearance(points, starts, ends):
+    """Return how far points (n, m) are from the nearest of lines (n or 1, k), all complex."""
+    along = (ends - starts)[:, None]
+    from_start = points[:, :, None] - starts[:, None]
+    squared = np.abs(along) ** 2
+    part = (from_start * np.conj(along)).real / np.where(squared > 0.0, squared, 1.0)
+    return np.abs(from_start - np.clip(part, 0.0, 1.0) * along).min(axis=2)

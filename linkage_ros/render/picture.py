@@ -1,0 +1,209 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Pictures of machines at any time; needs Matplotlib, but neither a screen nor ROS."""
+
+import math
+import warnings
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+import numpy as np
+
+from . import layers
+from .cycle import Cycle
+from .parts import USUAL
+
+DOTS_PER_INCH = 100
+CROWDED = 'the size is too small for what is drawn: choose a larger one, or hide a part'
+PADDING = 0.1  # inches, around everything
+FRAME, GRID = '#b0b0b0', '#e6e6e6'
+READABLE = 24  # poses in which the joints' names keep clear of the links
+
+
+class PictureError(ValueError):
+    """What cannot be drawn, and why."""
+
+
+class Picture:
+    """
+    Machines side by side, each on axes of its own.
+
+    Parameters
+    ----------
+    machines : sequence of Machine
+        What to draw.
+    size : (int, int)
+        Width and height in pixels.
+    trace : str
+        One of parts.TRACES.
+    parts : collection of str
+        What of parts.PARTS to draw.
+
+    """
+
+    def __init__(self, machines, size=(720, 720), trace='whole', parts=USUAL):
+        width, height = size
+        self.figure = Figure((width / DOTS_PER_INCH, height / DOTS_PER_INCH), DOTS_PER_INCH,
+                             layout='constrained', facecolor='white')
+        self.figure.get_layout_engine().set(w_pad=PADDING, h_pad=PADDING)
+        self._canvas = FigureCanvasAgg(self.figure)
+        count = len(machines)
+        columns = min(max(round(math.sqrt(count * width / height)), 1), count)
+        rows = math.ceil(count / columns)
+        unit = min(max(min(width / columns, height / rows) / 720, 0.4), 2.0)
+        axes = self.figure.subplots(rows, columns, squeeze=False).flat
+        self.panels = [Panel(one, machine, trace, parts, unit, count == 1)
+                       for one, machine in zip(axes, machines)]
+        for unused in axes[count:]:
+            unused.remove()
+        self.period = self.panels[0].cycle.first.period
+        self._still = None
+
+    def arrange(self, times):
+        """
+        Place axes and names such that the pictures at these times [turns] are readable.
+
+        Raises
+        ------
+        PictureError
+            If there is too little room.
+
+        """
+        self.show(times[0])
+        with warnings.catch_warnings():
+            warnings.filterwarnings('error', 'constrained_layout not applied')
+            for _ in range(2):  # the axes fit their labels, which follow from their limits
+                try:
+                    self._canvas.draw()
+                except UserWarning:
+                    raise PictureError(CROWDED) from None
+                for panel in self.panels:
+                    panel.fill()
+        self.figure.set_layout_engine('none')
+        chosen = times[::math.ceil(len(times) / READABLE)]
+        for panel in self.panels:
+            panel.settle([self._turns(panel, turns) for turns in chosen])
+
+    def show(self, turns):
+        """Move all to where they are after so many turns of the first mechanism's crank."""
+        for panel in self.panels:
+            panel.show(self._turns(panel, turns))
+
+    def at(self, turns):
+        """Return the picture after so many turns, shape (height, width, 3), 8 bits a colour."""
+        self.show(turns)
+        if self._still is None:
+            self._canvas.draw()
+            self._still = self._canvas.copy_from_bbox(self.figure.bbox)
+        self._canvas.restore_region(self._still)
+        for panel in self.panels:
+            panel.draw()
+        return np.array(self._canvas.buffer_rgba())[..., :3]
+
+    def seconds(self, turns):
+        """Return how long so many turns take [s]; what stands still takes none."""
+        return turns * self.period if math.isfinite(self.period) else 0.0
+
+    def _turns(self, panel, turns):
+        """Return the turns of one mechanism in the time of so many turns of the first."""
+        if panel is self.panels[0] or panel.cycle.first.period == self.period:
+            return turns
+        return self.seconds(turns) / panel.cycle.first.period
+
+
+class Panel:
+    """One mechanism on its axes."""
+
+    def __init__(self, axes, machine, trace, parts, unit, single):
+        self.machine, self.cycle = machine, Cycle(machine)
+        self._axes = axes
+        self._margin = 14 + 30 * unit  # pixels, for pivots, slots and names
+        self._joints = [machine.linkage.points.index(name) for name in machine.points]
+        moving = [layers.Trace(axes, machine, self.cycle, trace, unit)]
+        if 'floor' in parts:
+            moving.append(layers.Floor(axes, machine, self.cycle, unit))
+        if 'guides' in parts:
+            layers.guides(axes, machine, self.cycle, unit)
+        moving.append(layers.Legs(axes, machine, self.cycle, parts, unit))
+        self._names = None
+        if 'labels' in parts and len(self.cycle.prefixes) == 1:
+            self._names = layers.Names(axes, machine, self.cycle, unit)
+            moving.append(self._names)
+        if parts & {'title', 'dimensions'}:
+            moving.append(layers.Headline(axes, machine, parts, unit, single))
+        self._moving = moving
+        self._extent = self._drawn()
+        self._dress('axes' in parts, unit)
+
+    def _drawn(self):
+        """Return the lowest and the highest x and y of what is drawn in a turn [m]."""
+        places = [self.cycle.course[:, :, self._joints].reshape(-1, 2)]
+        places += [line.get_xydata() for line in self._axes.lines if len(line.get_xdata()) > 2]
+        places = np.concatenate(places)
+        return np.nanmin(places, axis=0), np.nanmax(places, axis=0)
+
+    def _dress(self, axes_shown, unit):
+        if not axes_shown:
+            self._axes.set_axis_off()
+            return
+        self._axes.set_xlabel('x [m]', fontsize=10 + 3 * unit)
+        self._axes.set_ylabel('y [m]', fontsize=10 + 3 * unit)
+        self._axes.tick_params(labelsize=9 + 2 * unit, color=FRAME)
+        self._axes.set_axisbelow(True)
+        self._axes.grid(color=GRID)
+        self._axes.spines[:].set_color(FRAME)
+        for axis in (self._axes.xaxis, self._axes.yaxis):
+            axis.set_major_locator(MaxNLocator(min(max(int(8 * unit), 4), 10),
+                                               steps=[1, 2, 2.5, 5, 10]))
+
+    def fill(self):
+        """Set the limits so that all is inside, at one scale; PictureError if there is no room."""
+        low, high = self._extent
+        pixels = np.array(self._axes.get_window_extent().size)
+        if pixels.min() < 3.0 * self._margin:
+            raise PictureError(CROWDED)
+        half = 0.5 * pixels * ((high - low) / (pixels - 2.0 * self._margin)).max()
+        centre = 0.5 * (low + high)
+        self._axes.set(xlim=(centre[0] - half[0], centre[0] + half[0]),
+                       ylim=(centre[1] - half[1], centre[1] + half[1]))
+
+    def settle(self, times):
+        """Place the joints' names for poses at these times [turns]."""
+        if self._names:
+            self._names.settle(np.stack([self.cycle.pose(turns).places for turns in times]))
+
+    def show(self, turns):
+        """Move all to where they are after so many turns of the crank."""
+        self.pose = self.cycle.pose(turns)
+        for layer in self._moving:
+            layer.show(self.pose)
+
+    def draw(self):
+        """Draw what moves onto what stands still."""
+        for layer in self._moving:
+            for artist in layer.artists:
+                self._axes.draw_artist(artist)
+
+    def columns(self):
+        """Return the names of what `values` returns."""
+        name = self.machine.name
+        joints = [f'{leg}{joint}_{axis}' for leg in self.cycle.prefixes
+                  for joint in self.machine.points for axis in 'xy']
+        return [f'{name}_{part}' for part in (*self.machine.cranks, *joints)]
+
+    def values(self):
+        """Return the crank angles [rad] and the joints [m] as they are shown."""
+        return [*self.pose.thetas, *self.pose.places[:, self._joints].ravel().tolist()]

@@ -1,0 +1,387 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Pictures of scenes: what is drawn is what was solved, the same bytes each time, nothing cut."""
+
+import csv
+import itertools
+import math
+from pathlib import Path
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+for module in ('matplotlib', 'tqdm', 'yaml'):
+    pytest.importorskip(module)
+
+from linkage_ros import mechanisms, scene  # noqa: E402
+from linkage_ros.render import layers, main  # noqa: E402
+from linkage_ros.render.cycle import Cycle  # noqa: E402
+from linkage_ros.render.parts import PARTS, TRACES, USUAL  # noqa: E402
+from linkage_ros.render.picture import Picture  # noqa: E402
+from matplotlib.colors import to_rgb  # noqa: E402
+from PIL import Image  # noqa: E402
+
+ROOT = Path(__file__).parents[1]
+CONFIG = ROOT / 'config'
+TABLE = [line.split() for line in (ROOT / 'pictures' / 'pictures.txt').read_text().splitlines()
+         if line and not line.startswith('#')]
+
+
+def machine(type_, **parameters):
+    given = {f'{type_}.{name.replace("__", ".")}': value for name, value in parameters.items()}
+    return scene.read({'mechanisms': [type_], **given}).machines[type_]
+
+
+def picture_of(*machines, times=(0.0,), **kwargs):
+    made = Picture(machines, **kwargs)
+    made.arrange(list(times))
+    return made
+
+
+def rendered(tmp_path, *args, config='jansen', ending='png'):
+    out = tmp_path / f'out.{ending}'
+    assert main([str(CONFIG / f'{config}.yaml'), '--out', str(out), *args]) == 0
+    return out
+
+
+def rows_of(file):
+    with open(file, newline='') as lines:
+        return [{name: float(value) for name, value in row.items()}
+                for row in csv.DictReader(lines)]
+
+
+@pytest.mark.parametrize('row', TABLE, ids=[Path(row[2]).name for row in TABLE])
+def test_every_picture_of_the_table_is_drawn(row, tmp_path, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    scene_file, _, file, *options = row
+    out = tmp_path / Path(file).name
+    few = ['--frames', '3'] if out.suffix == '.gif' else []
+    assert main([scene_file, '--out', str(out), *options, *few]) == 0
+    with Image.open(out) as image:
+        assert getattr(image, 'n_frames', 1) == (3 if few else 1)
+
+
+@pytest.mark.parametrize('ending, args', [
+    ('png', []), ('svg', []), ('gif', ['--frames', '4', '--trace', 'fading'])])
+def test_the_same_request_gives_the_same_bytes(tmp_path, ending, args):
+    once = rendered(tmp_path, *args, config='all', ending=ending).read_bytes()
+    assert rendered(tmp_path, *args, config='all', ending=ending).read_bytes() == once
+
+
+@pytest.mark.skipif(not shutil.which('ffmpeg'), reason='ffmpeg is not installed')
+def test_an_mp4_has_the_same_bytes_each_time(tmp_path):
+    once = rendered(tmp_path, '--frames', '3', ending='mp4').read_bytes()
+    assert rendered(tmp_path, '--frames', '3', ending='mp4').read_bytes() == once
+    assert once[4:8] == b'ftyp'
+
+
+def test_without_ffmpeg_there_is_no_mp4_but_a_reason(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv('PATH', str(tmp_path))
+    assert main([str(CONFIG / 'jansen.yaml'), '--out', str(tmp_path / 'leg.mp4')]) == 1
+    assert 'ffmpeg' in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_gif_has_the_frames_the_rate_the_loops_and_the_size_asked_for(tmp_path):
+    file = rendered(tmp_path, '--frames', '7', '--fps', '30', '--loop', '3', '--size', '320x240',
+                    '--hide', 'axes', ending='gif')
+    with Image.open(file) as image:
+        assert image.size == (320, 240) and image.n_frames == 7
+        assert image.info['loop'] == 2  # repetitions after the first time
+        milliseconds = 0
+        for frame in range(image.n_frames):
+            image.seek(frame)
+            milliseconds += image.info['duration']
+        assert milliseconds == 230  # 7/30 s in hundredths
+
+
+def test_a_turn_is_drawn_in_the_time_it_takes(tmp_path):
+    data = tmp_path / 'joints.csv'
+    rendered(tmp_path, '--fps', '10', '--turns', '2', '--size', '200x200', '--data', str(data),
+             ending='gif')
+    times = [row['time'] for row in rows_of(data)]
+    cranks = [row['jansen_crank'] for row in rows_of(data)]
+    assert len(times) == round(10 * 2 * math.tau / 2.0)  # two turns at 2 rad/s, 10 frames a second
+    assert np.allclose(np.remainder(2.0 * np.array(times), math.tau), cranks, atol=1e-12)
+
+
+def test_the_data_are_the_joints_as_solved_to_the_last_digit(tmp_path):
+    data = tmp_path / 'joints.csv'
+    rendered(tmp_path, '--frames', '25', '--size', '99x99', '--hide', 'axes,title',
+             '--data', str(data), config='strandbeest', ending='gif')
+    leg = mechanisms.create('jansen')
+    rows = rows_of(data)
+    assert len(rows) == 25
+    for row, (pair, side) in itertools.product(rows[::6], itertools.product(range(6), (1, -1))):
+        theta = row['strandbeest_crank'] - math.tau * pair / 6
+        solved = leg.solve(theta if side > 0 else math.pi - theta)
+        name = f'strandbeest_{"left" if side > 0 else "right"}{pair}'
+        for joint, (x, y) in solved.items():
+            assert row[f'{name}_{joint}_x'] == side * 0.01 * x
+            assert row[f'{name}_{joint}_y'] == 0.01 * y
+
+
+def test_the_bars_in_the_data_are_as_long_as_in_the_original_document(tmp_path):
+    data = tmp_path / 'joints.csv'
+    assert main([str(ROOT / 'pictures/jansen.yaml'), '--out', str(tmp_path / 'leg.gif'),
+                 '--frames', '9', '--data', str(data)]) == 0
+    lengths = {'OA': 15.0, 'BC': 41.5, 'AC': 50.0, 'BD': 40.1, 'CD': 55.8, 'BE': 39.3,
+               'AE': 61.9, 'EF': 36.7, 'DF': 39.4, 'EG': 49.0, 'FG': 65.7}
+    for row, ((p, q), length) in itertools.product(rows_of(data), lengths.items()):
+        ends = [[row[f'leg_{joint}_{axis}'] for axis in 'xy'] for joint in (p, q)]
+        assert math.dist(*ends) == pytest.approx(length, rel=1e-13)
+
+
+@pytest.mark.parametrize('type_', [t for t in mechanisms.TYPES])
+def test_both_directions_have_one_scale_and_nothing_is_cut_off(type_):
+    one = machine(type_)
+    picture = picture_of(one, size=(640, 400))
+    axes = picture.panels[0]._axes
+    (x0, y0), (x1, y1) = axes.transData.transform([(0.0, 0.0), (1.0, 1.0)])
+    assert x1 - x0 == pytest.approx(y1 - y0, rel=1e-9)
+    places = Cycle(one).course.reshape(-1, 2)
+    pixels = axes.transData.transform(places[np.isfinite(places).all(axis=1)])
+    box = axes.get_window_extent()
+    assert np.all(pixels > (box.x0 + 15, box.y0 + 15))
+    assert np.all(pixels < (box.x1 - 15, box.y1 - 15))
+
+
+@pytest.mark.parametrize('args', [[], ['--show', 'dimensions'], ['--size', '600x460']])
+@pytest.mark.parametrize('config', ['all', 'slotted_lever', 'peaucellier', 'jansen'])
+def test_nothing_reaches_over_the_edge_of_a_picture(tmp_path, config, args):
+    with Image.open(rendered(tmp_path, *args, config=config)) as image:
+        pixels = np.array(image.convert('RGB'))
+    edges = [pixels[:2], pixels[-2:], pixels[:, :2], pixels[:, -2:]]
+    assert all((edge == 255).all() for edge in edges)
+
+
+def test_an_animation_shows_what_a_still_of_that_time_shows(tmp_path):
+    picture = picture_of(machine('jansen'), times=[0.0, 0.3])
+    moved = picture.at(0.3)
+    again = picture_of(machine('jansen'), times=[0.0, 0.3])
+    assert np.array_equal(moved, again.at(0.3))
+    assert not np.array_equal(moved, again.at(0.6))
+
+
+def test_a_gif_keeps_the_colours_that_colour_blind_people_tell_apart(tmp_path):
+    file = rendered(tmp_path, '--frames', '3', ending='gif')
+    with Image.open(file) as image:
+        seen = {colour for _, colour in image.convert('RGB').getcolors(1 << 16)}
+    wanted = [layers.BLUE, layers.ORANGE, layers.GREEN, layers.VERMILLION, 'white']
+    assert {tuple(round(255 * c) for c in to_rgb(colour)) for colour in wanted} <= seen
+
+
+def test_the_pairs_of_a_walker_pale_from_the_first_to_the_last(tmp_path):
+    made = picture_of(machine('jansen', leg_pairs=3))
+    legs = next(layer for layer in made.panels[0]._moving if isinstance(layer, layers.Legs))
+    brightness = {leg: np.mean(artists['bars'].get_colors()[1][:3]) for leg, artists in legs._legs}
+    assert brightness[0] == brightness[1] < brightness[2] == brightness[3] < brightness[4]
+
+
+def segments_of(picture):
+    trace = next(layer for layer in picture.panels[0]._moving if isinstance(layer, layers.Trace))
+    return [np.asarray(path.vertices) for path in trace.artists[0].get_paths()]
+
+
+def test_a_growing_trace_is_what_the_tracer_went_through_until_now():
+    drop = machine('water_drop')
+    picture = picture_of(drop, trace='growing')
+    for turns in (0.1, 0.55, 1.0, 1.7):
+        picture.show(turns)
+        curve, = segments_of(picture)
+        angles = np.linspace(0.0, math.tau * min(turns, 1.0), 500)
+        way = drop.linkage.solve(angles, ('P',))['P']
+        apart = np.hypot(*np.moveaxis(way[:, None] - curve, -1, 0))
+        assert apart.min(axis=1).max() < 0.05 and apart.min(axis=0).max() < 0.1
+        assert np.allclose(curve[-1], way[-1], atol=1e-12)
+
+
+def test_a_fading_trace_ends_at_the_tracer_and_begins_where_it_was_three_tenths_of_a_turn_ago():
+    drop = machine('water_drop')
+    picture = picture_of(drop, trace='fading')
+    for turns in (0.0, 0.1, 0.8, 1.3):
+        picture.show(turns)
+        pieces = segments_of(picture)
+        first, last = drop.linkage.solve(math.tau * np.array([turns - 0.3, turns]), ('P',))['P']
+        assert np.allclose(pieces[-1][-1], last, atol=1e-12)
+        assert math.dist(pieces[0][0], first) < 0.04
+
+
+def test_a_foot_stands_on_the_lowest_part_of_its_curve():
+    leg = machine('jansen')
+    curve = Cycle(leg).locus(leg)
+    standing = layers.standing(curve)
+    low, high = curve[:, 1].min(), curve[:, 1].max()
+    assert standing[:, 1].min() == low
+    assert standing[:, 1].max() - low < 0.1 * (high - low)
+    assert np.ptp(standing[:, 0]) > 0.7 * np.ptp(curve[:, 0])
+    assert np.hypot(*np.diff(standing, axis=0).T).max() < 2.0  # one piece
+
+
+def test_the_floor_moves_as_the_foot_that_stands_on_it():
+    walker = machine('jansen', leg_pairs=3)
+    picture = picture_of(walker, parts=USUAL | {'floor'})
+    floor = next(la for la in picture.panels[0]._moving if isinstance(la, layers.Floor))
+    foot = walker.linkage.points.index('G')
+
+    def state(turns):
+        picture.show(turns)
+        feet = picture.panels[0].pose.places[:, foot]
+        lowest = int(feet[:, 1].argmin())
+        marks = np.array([path.vertices[0] for path in floor.artists[1].get_paths()])
+        assert marks[:, 1] == pytest.approx(feet[lowest, 1])
+        return lowest, feet[lowest, 0], marks[3, 0]
+
+    moved = 0
+    for k in range(60):
+        (leg, x, mark), (same, further, mark_further) = state(k / 60), state((k + 0.1) / 60)
+        if leg == same:
+            step = (mark_further - mark - (further - x)) / floor._spacing
+            assert abs(step - round(step)) < 0.02
+            moved += 1
+    assert moved > 30
+
+
+def test_a_line_is_drawn_where_the_curve_is_one():
+    straight = [t for t in mechanisms.TYPES if t != 'five_bar'
+                and layers.straight(Cycle(machine(t)).locus(machine(t))) is not None]
+    assert straight == ['peaucellier', 'slider_crank', 'whitworth']
+
+
+@pytest.mark.parametrize('r, a, b', [(3.0, 9.0, 4.0), (4.0, 9.0, 2.0), (2.0, 5.0, 3.0),
+                                     (3.0, 6.0, 3.0)])
+def test_the_line_of_a_cell_is_where_the_original_document_says(r, a, b):
+    cell = machine('peaucellier', dimensions__r=r, dimensions__a=a, dimensions__b=b)
+    ends = np.array(layers.straight(Cycle(cell).locus(cell)))
+    assert ends[:, 0] == pytest.approx((a * a - b * b) / (2 * r) - r, rel=1e-12)
+
+
+def test_the_angle_is_in_the_title():
+    picture = picture_of(machine('water_drop'))
+    picture.show(0.125)
+    assert texts_of(picture) == ['θ = 45.0°']
+
+
+def texts_of(picture):
+    headline = picture.panels[0]._moving[-1]
+    return [text.get_text() for text in headline.artists]
+
+
+def test_angles_and_ratio_of_a_slotted_lever_are_printed():
+    picture = picture_of(machine('slotted_lever'))
+    picture.show(50.0 / 360.0)
+    lever = math.degrees(math.atan2(80 * math.sin(math.radians(50)),
+                                    80 * math.cos(math.radians(50)) + 150))
+    assert texts_of(picture)[:3] == ['θ = 50.0°', f'φ = {lever:.1f}°', f'φ/θ = {lever / 50:.3f}']
+    picture.show(310.0 / 360.0)
+    assert texts_of(picture)[:2] == ['θ = −50.0°', f'φ = −{lever:.1f}°']
+    picture.show(0.0)
+    assert texts_of(picture)[1:] == ['φ = 0.0°', 'φ/θ = –', f'dφ/dθ = {80 / 230:.3f}']
+
+
+@pytest.mark.parametrize('trace', TRACES)
+@pytest.mark.parametrize('type_', ['jansen', 'five_bar'])
+def test_every_trace_and_part_can_be_drawn(type_, trace):
+    picture_of(machine(type_), trace=trace, parts=frozenset(PARTS)).at(0.4)
+
+
+@pytest.mark.parametrize('crank', [
+    {'crank__speed': 2.0}, {'crank__speed': -3.0, 'crank__start': 1.0},
+    {'crank__sweep': [-0.5, 1.0]}, {'crank__sweep': [-0.5, 1.0], 'crank__speed': -1.0}])
+def test_the_crank_is_where_it_was_asked_to_be(crank):
+    wheel = Cycle(machine('four_bar', **crank)).first
+    for angle in np.linspace(-0.49, 0.99, 17):
+        assert math.remainder(wheel.angle(wheel.turns_to(angle)) - angle,
+                              math.tau) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_several_cranks_turn_as_fast_as_they_were_told_to():
+    five_bar = machine('five_bar', crank__speed=1.0, crank2__speed=-1.5, crank2__start=2.0)
+    cycle = Cycle(five_bar)
+    assert cycle.turns == 2
+    for turns in (0.0, 0.3, 1.9):
+        wanted = math.tau * turns, 2.0 - 1.5 * math.tau * turns
+        thetas = cycle.pose(turns).thetas
+        assert [math.remainder(t - w, math.tau) for t, w in zip(thetas, wanted)] == pytest.approx(
+            [0.0, 0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize('args, said', [
+    (['nowhere.yaml', '--out', 'a.png'], 'nowhere.yaml: No such file'),
+    (['jansen.yaml', '--out', 'a.bmp'], '--out must end in .png, .svg, .gif, .mp4, not a.bmp'),
+    (['jansen.yaml'], '--out'),
+    (['jansen.yaml', '--out', 'no/a.png'], 'there is no folder no'),
+    (['jansen.yaml', '--out', 'a.png', '--data', 'no/a.csv'], 'there is no folder no'),
+    (['jansen.yaml', '--out', 'a.png', '--fps', '30'], '--fps is for .gif and .mp4 only'),
+    (['jansen.yaml', '--out', 'a.gif', '--angle', '30'], '--angle is for .png and .svg only'),
+    (['jansen.yaml', '--out', 'a.gif', '--fps', '60'], '--fps must be at most 50'),
+    (['jansen.yaml', '--out', 'a.gif', '--fps', 'x'], 'number'),
+    (['jansen.yaml', '--out', 'a.gif', '--turns', '0'], 'above 0'),
+    (['jansen.yaml', '--out', 'a.gif', '--turns', 'nan'], 'above 0'),
+    (['jansen.yaml', '--out', 'a.gif', '--turns', '999'], 'frames, more than'),
+    (['jansen.yaml', '--out', 'a.gif', '--loop', '-1'], 'from 0'),
+    (['jansen.yaml', '--out', 'a.png', '--size', '7x7'], '64'),
+    (['all.yaml', '--out', 'a.png', '--size', '99x99'], 'size is too small'),
+    (['jansen.yaml', '--out', 'a.png', '--hide', 'legs'], 'legs is no part'),
+    (['jansen.yaml', '--out', 'a.png', '--trace', 'x'], 'growing'),
+    (['jansen.yaml', '--out', 'a.png', '--mechanisms', 'x'], 'allowed: jansen'),
+    (['peaucellier.yaml', '--out', 'a.png', '--angle', '180'], 'swings inside'),
+    (['bad.yaml', '--out', 'a.png'], 'leg.type must be'),
+    (['picture.png', '--out', 'a.png'], 'picture.png'),
+    (['still.yaml', '--out', 'a.gif'], 'nothing moves'),
+])
+def test_what_cannot_be_is_said_in_one_line_and_no_file_is_left(
+        args, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    scene_file = CONFIG / args[0]
+    start = '/**: {ros__parameters: {mechanisms: [leg], leg.type: '
+    (tmp_path / 'bad.yaml').write_text(start + 'unknown}}')
+    (tmp_path / 'still.yaml').write_text(start + 'jansen, leg.crank.speed: 0.0}}')
+    (tmp_path / 'picture.png').write_bytes(b'\x89PNG\r\n\xff')
+    before = set(tmp_path.iterdir())
+    assert main([str(scene_file) if scene_file.exists() else args[0], *args[1:]]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith('render: ') and error.count('\n') == 1 and said in error
+    assert set(tmp_path.iterdir()) == before
+
+
+def test_a_crank_that_stands_still_has_a_picture(tmp_path):
+    file = tmp_path / 'still.yaml'
+    file.write_text('/**: {ros__parameters: {mechanisms: [water_drop, jansen], '
+                    'water_drop.crank.speed: 0.0}}')
+    assert main([str(file), '--out', str(tmp_path / 'a.png'), '--angle', '90']) == 0
+
+
+def test_no_ros_is_needed(tmp_path):
+    code = ('import sys; sys.modules.update(dict.fromkeys(["rclpy", "ament_index_python"])); '
+            'from linkage_ros.render import main; sys.exit(main(sys.argv[1:]))')
+    out = tmp_path / 'leg.svg'
+    subprocess.run([sys.executable, '-c', code, str(CONFIG / 'jansen.yaml'), '--out', str(out)],
+                   cwd=ROOT, check=True, timeout=120)
+    assert out.read_text().lstrip().startswith('<?xml')
+
+
+def test_without_matplotlib_its_package_is_named(tmp_path):
+    code = ('import sys; sys.modules["matplotlib"] = None; '
+            'from linkage_ros.render import main; sys.exit(main(sys.argv[1:]))')
+    ended = subprocess.run(
+        [sys.executable, '-c', code, str(CONFIG / 'jansen.yaml'), '--out', 'leg.svg'],
+        cwd=ROOT, capture_output=True, text=True, timeout=120)
+    assert ended.returncode == 1
+    assert ended.stderr.startswith('render: matplotlib is not installed: ')
+    assert ended.stderr.count('\n') == 1
