@@ -48,9 +48,23 @@ def _grazed(x, tolerance):
 
 
 def _root(x, tolerance):
-    if np.min(x, initial=0.0) < 0.0 or np.any(np.isnan(x)):
-        x = np.where(x >= -tolerance, np.maximum(x, 0.0), np.nan)
-    return np.sqrt(x)
+    if _all_at_least(x, 0.0):
+        return np.sqrt(x)
+    return np.sqrt(_gated(np.maximum(x, 0.0), x, tolerance))
+
+
+def _gated(x, margin, tolerance):
+    """Return x where the margin is not below zero by more than the tolerance, else NaN."""
+    if _all_at_least(margin, -tolerance):
+        return x
+    return np.where(margin >= -tolerance, x, np.nan)
+
+
+def _all_at_least(x, bound) -> bool:
+    """Return whether nothing is below a bound, or no number; for one bound in one quick pass."""
+    if isinstance(bound, float) and np.size(x):
+        return np.minimum.reduce(x, axis=None) >= bound
+    return np.all(x >= bound)
 
 
 @np.vectorize
@@ -81,22 +95,24 @@ class _Dialect:
 
 _FLOAT = _Dialect(
     {**_OPERATORS, 'where': '({1} if {0} else {2})',
-     'root': '(sqrt({0}) if {0} > 0.0 else grazed({0}, {1}))'},
+     'root': '(sqrt({0}) if {0} > 0.0 else grazed({0}, {1}))',
+     'gated': '({0} if {1} >= -{2} else nan)'},
     frozenset({'root'}),
     {'sin': math.sin, 'cos': math.cos, 'sqrt': math.sqrt, 'atan2': math.atan2,
      'grazed': _grazed, 'nan': math.nan}, frees=False)
 
 _ARRAY = _Dialect(
-    {**_OPERATORS, 'where': 'where({}, {}, {})', 'root': 'root({}, {})'},
+    {**_OPERATORS, 'where': 'where({}, {}, {})', 'root': 'root({}, {})',
+     'gated': 'gated({}, {}, {})'},
     frozenset(),
     {'sin': np.sin, 'cos': np.cos, 'sqrt': np.sqrt, 'atan2': np.arctan2, 'where': np.where,
-     'root': _root, 'nan': np.nan}, frees=True)
+     'root': _root, 'gated': _gated, 'nan': np.nan}, frees=True)
 
 _EVALUATED = {
     'add': np.add, 'subtract': np.subtract, 'multiply': np.multiply, 'divide': np.divide,
     'negative': np.negative, 'absolute': np.absolute, 'less': np.less,
     'less_equal': np.less_equal, 'sin': np.sin, 'cos': np.cos, 'sqrt': np.sqrt,
-    'atan2': np.arctan2, 'where': np.where, 'root': _root, 'fsum': _fsum,
+    'atan2': np.arctan2, 'where': np.where, 'root': _root, 'gated': _gated, 'fsum': _fsum,
 }
 
 
@@ -166,6 +182,10 @@ class _Listing:
             uses[number] += 1
         return uses
 
+    def varying(self) -> list:
+        """Return which outputs depend on an angle."""
+        return [j for j, n in enumerate(self.outputs) if self.entries[n][0].varies]
+
     def statements(self, dialect: _Dialect) -> tuple:
         """Return the assignments as (name, code, names used) and the code of each output."""
         text, depth, reads, lines = {}, {}, {}, []
@@ -203,18 +223,28 @@ def _with_releases(lines, kept):
             yield 'del ' + ', '.join(done)
 
 
-def _python(listing: _Listing, dialect: _Dialect, angles: int) -> Callable:
-    """Return a function of the constants that returns the function of the angles."""
+def _python(listing: _Listing, dialect: _Dialect, angles: int, names=()) -> Callable:
+    """
+    Return a function of the constants that returns the function of the angles.
+
+    That returns the outputs as a tuple or, where there are names, in pairs: an array (2,) each.
+    """
     lines, outputs, kept = listing.statements(dialect)
     body = (list(_with_releases(lines, kept)) if dialect.frees
             else [f'{name} = {code}' for name, code, _ in lines])
+    rows = ', '.join(f'{name!r}: pairs[{i}]' for i, name in enumerate(names))
+    # Packing floats as bytes takes a quarter of the time numpy needs to convert them.
+    ending = [
+        f'pairs = empty(({len(names)}, 2))',
+        f'pack(pairs, 0, {", ".join(outputs)})',
+        f'return {{{rows}}}',
+    ] if names else [f'return ({"".join(code + ", " for code in outputs)})']
     source = '\n'.join([
         f'def bind({", ".join(f"k{n}" for n in listing.constants)}):',
         f'    def pose({", ".join(f"x{i}" for i in range(angles))}):',
-        *(f'        {line}' for line in body),
-        f'        return ({"".join(code + ", " for code in outputs)})',
+        *(f'        {line}' for line in [*body, *ending]),
         '    return pose'])
-    scope = dict(dialect.names)
+    scope = {**dialect.names, 'empty': np.empty, 'pack': Struct(f'{len(outputs)}d').pack_into}
     exec(compile(source, '<linkage>', 'exec'), scope)
     return scope['bind']
 
@@ -231,7 +261,7 @@ def _accelerated(listing: _Listing, angles: int) -> Callable:
         '    for i in range(out.shape[1]):',
         *(f'        {x} = angles[{j}, i]' for j, x in enumerate(given)),
         *(f'        {name} = {code}' for name, code, _ in lines),
-        *(f'        out[{j}, i] = {code}' for j, code in enumerate(outputs))])
+        *(f'        out[{j}, i] = {outputs[j]}' for j in listing.varying())])
     scope = {**_FLOAT.names, 'grazed': numba.njit(_grazed)}
     exec(compile(source, '<linkage>', 'exec'), scope)
     return numba.njit(scope['kernel'], error_model='numpy')
@@ -244,10 +274,15 @@ class _Variant:
         self._listing = _Listing(outputs, decided)
         self._angles = angles
         self.outputs = len(outputs)
-        # Packing floats as bytes takes a quarter of the time numpy needs to convert them.
-        self.layout = Struct(f'{len(outputs)}d')
         self.constants = [self._listing.entries[n][0] for n in self._listing.constants]
         self.float = _python(self._listing, _FLOAT, angles)
+        self._placing = {}
+
+    def placing(self, names: tuple) -> Callable:
+        """Return the code for one pose that returns the outputs in pairs, by name."""
+        if names not in self._placing:
+            self._placing[names] = _python(self._listing, _FLOAT, self._angles, names)
+        return self._placing[names]
 
     @cached_property
     def array(self):
@@ -330,9 +365,9 @@ class Pose:
             # What Python raises for, numpy answers with inf or nan.
             return tuple(self._blocks([np.array([a]) for a in angles], 1)[:, 0].tolist())
 
-    def pack(self, out: np.ndarray, *angles: float):
-        """Write the outputs at one pose into an array of as many float64."""
-        self._variant.layout.pack_into(out, 0, *self.at(*angles))
+    def placer(self, names: tuple) -> Callable:
+        """Return the function from one pose, of floats, to an array (2,) for each name."""
+        return self._variant.placing(names)(*self._constants)
 
     def over(self, *angles) -> np.ndarray:
         """Return the outputs over arrays that are broadcast together, shape (outputs, *shape)."""
@@ -352,7 +387,9 @@ class Pose:
         return out.reshape(self._variant.outputs, *shape)
 
     def _by_kernel(self, given):
+        # Only what varies is left to the loop: rows of constants keep it from being vectorised.
         out = np.empty((self._variant.outputs, given.shape[1]))
+        out[:] = np.array(self.at(*[0.0] * len(given)))[:, None]
         self._variant.accelerated(given, *self._constants, out)
         return out
 

@@ -161,9 +161,6 @@ def real(value: Number) -> Real:
     return Real('constant', (float(value),), varies=False, positive=value > 0)
 
 
-NAN = real(float('nan'))
-
-
 def dimension(name: str, positive: bool = True) -> Real:
     """Return the leaf for a named dimension."""
     return Real('dimension', (name,), varies=False, positive=positive)
@@ -204,6 +201,11 @@ def root(x: Real, tolerance: Real) -> Real:
     Zero within the tolerance (a limit that is hit up to rounding counts as reached), NaN below.
     """
     return _node('root', x, real(tolerance))
+
+
+def gated(x: Real, margin: Real, tolerance: Real) -> Real:
+    """Return x where the margin is not below zero by more than the tolerance, else NaN."""
+    return _node('gated', x, margin, real(tolerance))
 
 
 def arctangent(y: Real, x: Real) -> Real:
@@ -376,7 +378,8 @@ _RULES = {
     'absolute': lambda n, _, dx: where(n.args[0] < 0.0, -dx, dx),
     'sqrt': _sqrt_rule,
     'root': _sqrt_rule,
-    'where': lambda n, _, dc, dx, dy: where(n.args[0], dx, NAN if n.args[2] is NAN else dy),
+    'where': lambda n, _, dc, dx, dy: where(n.args[0], dx, dy),
+    'gated': lambda n, _, dx, *__: gated(dx, *n.args[1:]),
     'less': lambda n, *_: real(0.0),
     'less_equal': lambda n, *_: real(0.0),
 }

@@ -227,7 +227,7 @@ class Mechanism(Analysis):
         self._accelerate = accelerate
         self._lengths = _in_own_unit(self.dimensions, design.has_literal_lengths)
         self._evaluated = {}
-        self._poses = {}
+        self._poses, self._single = {}, {}
         self.links = tuple(link._replace(zero=float(self._value(link.zero)))
                            for link in sketch.links)
 
@@ -321,6 +321,12 @@ class Mechanism(Analysis):
             If a joint does not exist.
 
         """
+        if isinstance(theta, float):
+            try:
+                return self._single[points](theta)
+            except (KeyError, TypeError, ArithmeticError, ValueError):
+                # Not asked for before, or not to be had in Python's floats, which raise.
+                pass
         return self._vectors('points', theta, points)
 
     def velocity(self, theta, points: Optional[Sequence[str]] = None, crank: int = 0) -> dict:
@@ -416,10 +422,6 @@ class Mechanism(Analysis):
 
     def _vectors(self, kind, theta, points, *crank):
         names, pose = self._ready(kind, points, *crank)
-        if isinstance(theta, float) and not pose.shape:
-            pairs = np.empty((len(names), 2))
-            pose.pack(pairs, theta)
-            return dict(zip(names, pairs))
         values = pose.over(*self._each_crank(theta))
         pairs = np.moveaxis(values.reshape(-1, 2, *values.shape[1:]), 1, -1)
         return dict(zip(names, pairs))
@@ -438,13 +440,17 @@ class Mechanism(Analysis):
 
     def _ready(self, kind: str, wanted, *crank: int) -> Tuple[Tuple[str, ...], Pose]:
         """Return the names that are wanted and the function that computes them."""
-        if not isinstance(wanted, (tuple, str, type(None))):
-            wanted = tuple(wanted)
-        key = (kind, wanted, *crank)
-        if key not in self._poses:
+        try:
+            return self._poses[(kind, wanted, *crank)]
+        except KeyError:
             names = self._names(kind, wanted)
-            self._poses[key] = names, self._bound(kind, names, *crank)
-        return self._poses[key]
+        except TypeError:
+            return self._ready(kind, tuple(wanted), *crank)
+        pose = self._bound(kind, names, *crank)
+        if kind == 'points' and not pose.shape and len(self.cranks) == 1:
+            self._single[wanted] = pose.placer(names)
+        self._poses[(kind, wanted, *crank)] = names, pose
+        return names, pose
 
     def _bound(self, kind: str, names, *crank: int) -> Pose:
         program = self._structure.program(kind, names, *crank)

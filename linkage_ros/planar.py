@@ -43,7 +43,7 @@ from .expression import (
     cross,
     dot,
     exact_sum,
-    NAN,
+    gated,
     rated,
     Real,
     root,
@@ -330,8 +330,7 @@ def inversor(arm: Arm, long: Real, short: Real) -> Inversor:
 def _where_assembled(vector: Complex, limits) -> Complex:
     x, y = vector.x, vector.y
     for limit in limits:
-        held = -limit.tolerance <= limit.margin
-        x, y = where(held, x, NAN), where(held, y, NAN)
+        x, y = (gated(part, limit.margin, limit.tolerance) for part in (x, y))
     return Complex(x, y)
 
 
@@ -351,7 +350,10 @@ def slot(arm: Arm, offset: Real, half: float) -> Slot:
     """
     limit = arm.beyond(offset, abs(offset))
     slide = limit.root() * half
-    return Slot((arm.vector * Complex(slide, -offset)).direction(), slide, limit)
+    central, aside = abs(offset) <= 0.0, arm.vector * Complex(slide, -offset)
+    along = Complex(where(central, arm.vector.x * half, aside.x),
+                    where(central, arm.vector.y * half, aside.y))
+    return Slot(along.direction(), slide, limit)
 
 
 class Rail:
