@@ -29,7 +29,7 @@ for module in ('matplotlib', 'tqdm', 'yaml'):
     pytest.importorskip(module)
 
 from linkage_ros import mechanisms, scene  # noqa: E402
-from linkage_ros.render import layers, main  # noqa: E402
+from linkage_ros.render import files, layers, main  # noqa: E402
 from linkage_ros.render.cycle import Cycle  # noqa: E402
 from linkage_ros.render.parts import PARTS, TRACES, USUAL  # noqa: E402
 from linkage_ros.render.picture import Picture  # noqa: E402
@@ -170,12 +170,16 @@ def test_nothing_reaches_over_the_edge_of_a_picture(tmp_path, config, args):
     assert all((edge == 255).all() for edge in edges)
 
 
-def test_an_animation_shows_what_a_still_of_that_time_shows(tmp_path):
-    picture = picture_of(machine('jansen'), times=[0.0, 0.3])
-    moved = picture.at(0.3)
-    again = picture_of(machine('jansen'), times=[0.0, 0.3])
-    assert np.array_equal(moved, again.at(0.3))
-    assert not np.array_equal(moved, again.at(0.6))
+@pytest.mark.parametrize('type_, options', [
+    ('slotted_lever', {}), ('jansen', {'leg_pairs': 2}), ('peaucellier', {})])
+def test_an_animation_shows_what_a_still_of_that_time_shows(tmp_path, type_, options):
+    picture = picture_of(machine(type_, **options), times=[0.0, 0.3], trace='fading')
+    frame = picture.at(0.3)
+    files.still(picture, 0.3, tmp_path / 'still.png')
+    with Image.open(tmp_path / 'still.png') as image:
+        still = np.array(image.convert('RGB'))
+    assert np.array_equal(frame, still)
+    assert not np.array_equal(frame, picture.at(0.6))
 
 
 def test_a_gif_keeps_the_colours_that_colour_blind_people_tell_apart(tmp_path):
@@ -189,7 +193,7 @@ def test_a_gif_keeps_the_colours_that_colour_blind_people_tell_apart(tmp_path):
 def test_the_pairs_of_a_walker_pale_from_the_first_to_the_last(tmp_path):
     made = picture_of(machine('jansen', leg_pairs=3))
     legs = next(layer for layer in made.panels[0]._moving if isinstance(layer, layers.Legs))
-    brightness = {leg: np.mean(artists['bars'].get_colors()[1][:3]) for leg, artists in legs._legs}
+    brightness = {leg: np.mean(artists['bars'].get_colors()[0][:3]) for leg, artists in legs._legs}
     assert brightness[0] == brightness[1] < brightness[2] == brightness[3] < brightness[4]
 
 

@@ -140,7 +140,10 @@ class Legs:
         linkage = machine.linkage
         index = {name: linkage.points.index(name) for name in machine.points}
         shown = [bar for bar in linkage.bars if set(bar) <= set(index)]
-        self._bars = np.array([[index[p], index[q]] for p, q in shown], int).reshape(-1, 2)
+        turning = cranks(linkage)
+        self._bars, self._cranks = (
+            np.array([[index[p], index[q]] for p, q in shown if ((p, q) in turning) is driven],
+                     int).reshape(-1, 2) for driven in (False, True))
         self._plates = [[index[name] for name in frame] for frame in linkage.frames.values()
                         if len(frame) == 3 and set(frame) <= set(index)]
         self._joints = np.array(list(index.values()))
@@ -152,12 +155,12 @@ class Legs:
         thin = unit * (1.0 if len(cycle.prefixes) == 1 else 0.7)
         for leg in reversed(range(len(cycle.prefixes))):
             white = WHITENED * (leg // sides) / machine.leg_pairs
-            colours = [whiter(CRANK if bar in cranks(linkage) else LINK, white) for bar in shown]
-            self._legs.append((leg, self._artists(axes, parts, colours, white, thin)))
-        self.artists = [artist for _, artists in self._legs for artist in artists.values()]
+            self._legs.append((leg, self._artists(axes, parts, white, thin)))
+        self.artists = sorted((artist for _, artists in self._legs for artist in artists.values()),
+                              key=lambda artist: artist.get_zorder())
 
-    def _artists(self, axes, parts, colours, white, unit):
-        """Return the artists of one leg, from the back to the front."""
+    def _artists(self, axes, parts, white, unit):
+        """Return the artists of one leg by what they draw."""
         zorder = 10 + 10 * (1.0 - white)
         made = {}
 
@@ -175,11 +178,10 @@ class Legs:
             made['plates'] = PolyCollection([], facecolors=whiter(LINK, 0.78 + 0.22 * white),
                                             zorder=zorder, animated=True)
             axes.add_collection(made['plates'], autolim=False)
-            lines('bars', colours, 5.5, 0.1)
+            lines('bars', whiter(LINK, white), 5.5, 0.1)
             lines('slot_rims', dark, 17, 0.2)
             lines('slots', 'white', 13.5, 0.3)
-            if self._slots:
-                lines('cranks', colours, 5.5, 0.35)
+            lines('cranks', whiter(CRANK, white), 5.5, 0.35)
         if 'joints' in parts:
             dots('pivots', PIVOT, 2 * PIVOT_SIZE, 0.05, mfc=whiter(GREY, 0.4), mec=GREY)
             dots('joints', 'o', 9, 0.4, mfc='white', mec=dark, mew=2.2 * unit)
@@ -192,15 +194,13 @@ class Legs:
             self._show_leg(artists, pose.places[leg])
 
     def _show_leg(self, artists, places):
-        bars = places[self._bars]
         if 'bars' in artists:
             artists['plates'].set_verts([places[plate] for plate in self._plates])
-            artists['bars'].set_segments(bars)
+            artists['bars'].set_segments(places[self._bars])
+            artists['cranks'].set_segments(places[self._cranks])
             tracks = [from_frame(ends, places[bar]) for bar, ends in self._slots]
             artists['slot_rims'].set_segments(tracks)
             artists['slots'].set_segments(tracks)
-        if 'cranks' in artists:
-            artists['cranks'].set_segments(bars[:1])
         if 'joints' in artists:
             joints = places[self._joints]
             artists['pivots'].set_data(*joints[self._fixed].T)
