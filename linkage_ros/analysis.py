@@ -192,7 +192,7 @@ class Analysis:
             return pieces.answers
         twin = backward.joint and self._on_other_branch(backward.joint)
         return ClosedForm(self._curve('backward', output, ()), curve,
-                          twin and twin._curve('output', output, ()), angular).answers
+                          twin and twin._curve('output', output, ()), reach, angular).answers
 
     def _marks(self, others):
         """Return the crank angles at which the linkage is nearest to closing or coming apart."""

@@ -36,6 +36,8 @@ from .sketch import GROUND, Link, Sketch
 TURN = 2.0 * math.pi
 # Samples of an arc in search of extremes, and of a piece in search of a bracket.
 EXTREMES, SAMPLES = 360, 65
+# Rounding of an angle on its way through a closed form [rad].
+ROUNDED = 8 * 2.0 ** -52 * math.pi
 # Marks nearer to each other than this [rad] are one.
 CLOSE = 1e-9
 # Newton's method halves its error more than once a step; bisection needs one step a bit.
@@ -63,6 +65,19 @@ def in_order(answers: np.ndarray) -> np.ndarray:
     most = int(np.isfinite(rows).sum(axis=0).max(initial=0))
     rows = rows[:max(most, 1)] if len(rows) else np.full((1, answers.shape[1]), np.nan)
     return np.moveaxis(rows, 0, -1)
+
+
+def inside(theta: np.ndarray, arcs: Sequence[Arc]) -> np.ndarray:
+    """Return angles [rad] that lie on arcs, at an end those beyond it by rounding; NaN others."""
+    if any(hi - lo >= TURN for lo, hi in arcs):
+        return theta
+    kept = np.full(theta.shape, np.nan)
+    for lo, hi in arcs:
+        past = np.mod(theta - lo, TURN)
+        kept = np.where(past <= hi - lo, theta, kept)
+        kept = np.where((past > hi - lo) & (past - (hi - lo) <= ROUNDED), hi, kept)
+        kept = np.where(past >= TURN - ROUNDED, lo, kept)
+    return kept
 
 
 def nearest(answers: np.ndarray, near) -> np.ndarray:
@@ -262,21 +277,24 @@ class ClosedForm:
     twin : callable, optional
         The same of the linkage on its other branch: a candidate belongs to the branch that
         gives the value back more nearly.
+    reach : sequence of (float, float)
+        The crank angles that can be assembled [rad].
     angular : bool
         Whether the output is an angle, compared modulo a turn.
 
     """
 
     def __init__(self, backward: Callable, curve: Callable, twin: Optional[Callable],
-                 angular: bool):
+                 reach: Sequence[Arc], angular: bool):
         self._backward = backward
+        self._reach = reach
         self._curve = curve
         self._twin = twin
         self._angular = angular
 
     def answers(self, values: np.ndarray) -> np.ndarray:
         """Return the crank angles [rad] for values, shape (n,), as shape (candidates, n)."""
-        theta = self._backward(values)
+        theta = inside(self._backward(values), self._reach)
         miss = self._miss(self._curve, theta, values)
         if self._twin is None:
             return np.where(np.isfinite(miss), theta, np.nan)

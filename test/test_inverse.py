@@ -1,0 +1,412 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Every crank angle that gives an output its value is found, and nothing else is."""
+
+import math
+
+from accuracy import case_of, truth
+from linkage_ros import mechanisms
+from linkage_ros.inverse import Pieces
+from linkage_ros.planar import GRAZE
+import numpy as np
+import pytest
+import reference
+from reference_wider import HELD
+
+KINDS = list(mechanisms.TYPES)
+# Coordinates and slides that never change.
+CONSTANT = {'peaucellier': ['C.x'], 'slider_crank': ['B.y']}
+
+
+def held(linkage):
+    """Return the angle of a second crank, if there is one."""
+    return (HELD,) * (len(linkage.cranks) - 1)
+
+
+def outputs(linkage):
+    """Return the outputs that the first crank moves."""
+    every = (*linkage.joints, *(f'{name}.{axis}' for name in linkage.points for axis in 'xy'))
+    return [output for output in every if linkage._structure.moves(output)
+            and output not in CONSTANT.get(linkage.type, ())]
+
+
+def value_at(linkage, output, theta):
+    """Return an output at crank angles of the first crank."""
+    theta = np.asarray(theta, float)
+    theta = [theta, *(np.full_like(theta, other) for other in held(linkage))]
+    theta = theta if held(linkage) else theta[0]
+    name, _, axis = output.rpartition('.')
+    if name:
+        return linkage.solve(theta, (name,))[name][..., 'xy'.index(axis)]
+    return linkage.joint_angles(theta, (output,))[output]
+
+
+def inside(linkage, rng, count):
+    """Return crank angles inside the reach."""
+    arcs = linkage.reach(*held(linkage))
+    return np.array([rng.uniform(*arcs[rng.integers(len(arcs))]) for _ in range(count)])
+
+
+def turned(linkage, output):
+    """Tell whether an output is an angle."""
+    kinds = {link.name: link.kind for link in linkage.links}
+    return kinds.get(output) == 'revolute'
+
+
+def difference(linkage, output, one, other):
+    """Return the difference of two values of an output, angles modulo a turn."""
+    gap = one - other
+    return gap - 2 * math.pi * np.round(gap / (2 * math.pi)) if turned(linkage, output) else gap
+
+
+@pytest.mark.parametrize('kind', [kind for kind in KINDS if kind != 'five_bar'])
+def test_every_answer_is_right_to_the_last_digits(kind):
+    linkage, rng = mechanisms.create(kind), np.random.default_rng(1)
+    turning = [link for link in linkage.links if link.kind == 'revolute']
+    case = case_of(linkage, [])
+    count = 0
+    for output in outputs(linkage):
+        if output in ('block',):  # the truth knows it as its joint's place
+            continue
+        wanted = value_at(linkage, output, inside(linkage, rng, 2))
+        for value, answers in zip(wanted.tolist(), linkage.crank_angle(output, wanted)):
+            for theta in answers[np.isfinite(answers)].tolist():
+                exact = truth(case, theta, turning)
+                miss, sensitivity = _miss(exact, output, value)
+                assert miss <= 4 * sensitivity + np.spacing(abs(value)), (output, value, theta)
+                count += 1
+    assert count > 10
+
+
+def _miss(exact, output, value):
+    """Return how far a true output is from a value, and what half an ulp of all inputs does."""
+    name, _, axis = output.rpartition('.')
+    half = 0.5 * np.spacing(abs(value))
+    if name:
+        place = exact.values[name]
+        found = place.real if axis == 'x' else place.imag
+        return float(abs(found - value)), float(exact.sensitivity[name]) + half
+    if output == 'slide':
+        return float(abs(exact.values['slide'] - value)), float(exact.sensitivity[output]) + half
+    direction = exact.values[f'angle {output}'] * reference.mp.expj(-reference.mp.mpf(value))
+    return (float(abs(reference.mp.arg(direction))),
+            float(exact.sensitivity[f'angle {output}']) + half)
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_all_answers_are_found(kind):
+    linkage, rng = mechanisms.create(kind), np.random.default_rng(2)
+    arcs = linkage.reach(*held(linkage))
+    for output in outputs(linkage):
+        wanted = value_at(linkage, output, inside(linkage, rng, 12))
+        answers = linkage.crank_angle(output, wanted, others=held(linkage))
+        expected = np.zeros(len(wanted), int)
+        for lo, hi in arcs:
+            theta = np.linspace(lo, hi, 20001)
+            theta = theta[1:-1] if arcs != [(-math.pi, math.pi)] else theta
+            gap = difference(linkage, output, value_at(linkage, output, theta)[:, None], wanted)
+            crossed = (gap[1:] >= 0) != (gap[:-1] >= 0)
+            if turned(linkage, output):  # half a turn away the sign changes as well
+                crossed &= (np.abs(gap[1:]) < 1.5) & (np.abs(gap[:-1]) < 1.5)
+            expected += crossed.sum(0)
+        found = np.isfinite(answers).sum(-1)
+        assert (found >= 1).all()
+        # A sample can step over two answers beside an extreme, never make one up.
+        assert (found >= expected).all() and (found - expected <= 2).all(), (output, found)
+        assert (found == expected).mean() > 0.7, (output, found, expected)
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_answers_ascend_in_one_turn_and_give_the_value_back(kind):
+    linkage, rng = mechanisms.create(kind), np.random.default_rng(3)
+    for output in outputs(linkage):
+        theta = inside(linkage, rng, 20)
+        wanted = value_at(linkage, output, theta)
+        answers = linkage.crank_angle(output, wanted, others=held(linkage))
+        given = np.isfinite(answers)
+        assert (np.diff(given.astype(int)) <= 0).all()  # NaN only at the end
+        assert (np.diff(answers)[given[:, 1:]] > 0).all()
+        assert ((answers >= -math.pi) & (answers < math.pi))[given].all()
+        back = difference(linkage, output, value_at(linkage, output, answers), wanted[:, None])
+        size = math.pi if turned(linkage, output) else linkage.longest
+        assert (np.abs(back[given]) < 1e-11 * size).all(), output
+        nearest = linkage.crank_angle(output, wanted, near=theta + 4 * math.pi,
+                                      others=held(linkage))
+        away = np.abs(nearest - theta - 4 * math.pi)
+        assert (away <= np.nanmin(np.abs(answers - theta[:, None]), axis=1) + 1e-12).all()
+
+
+def four_bar(**changed):
+    """Return Norton's four-bar."""
+    return mechanisms.create('four_bar', **changed)
+
+
+@pytest.mark.parametrize('kind, output', [
+    ('four_bar', 'QB'), ('four_bar', 'A.x'), ('slider_crank', 'block'), ('slider_crank', 'B.x'),
+    ('slotted_lever', 'lever'), ('slotted_lever', 'L.x'), ('peaucellier', 'C.y'),
+    ('jansen', 'BC'), ('jansen', 'D.y'), ('klann', 'BD'), ('pantograph', 'FB'),
+    ('whitworth', 'lever')])
+def test_the_closed_form_and_the_bracketed_search_agree(kind, output):
+    rng = np.random.default_rng(4)
+    for side in (1, -1):
+        linkage = mechanisms.create(kind)
+        linkage = mechanisms.create(kind, branches=dict.fromkeys(linkage.branches, side)) \
+            if kind in ('four_bar', 'slider_crank', 'slotted_lever', 'whitworth') else linkage
+        wanted = value_at(linkage, output, inside(linkage, rng, 40))
+        closed = linkage.crank_angle(output, wanted)
+        assert linkage._structure.backward(output) is not None
+        searched = Pieces(linkage._curve('output', output, ()), linkage.reach(),
+                          linkage._marks(()), turned(linkage, output), GRAZE * linkage.longest)
+        searched = np.sort(searched.answers(wanted), axis=0).T
+        searched = searched[:, :closed.shape[1]]
+        assert (np.isfinite(closed) == np.isfinite(searched)).all()
+        np.testing.assert_allclose(np.sort(np.mod(closed, 2 * math.pi)),
+                                   np.sort(np.mod(searched, 2 * math.pi)), atol=1e-8)
+
+
+def test_the_inversor_s_height_gives_the_crank_by_its_tangent():
+    linkage = mechanisms.create('peaucellier')
+    height = np.linspace(-5.0, 5.0, 11)
+    expected = 2 * np.arctan(2 * 3.0 * height / (9.0 ** 2 - 4.0 ** 2))
+    np.testing.assert_allclose(linkage.crank_angle('C.y', height)[:, 0], expected, rtol=1e-15)
+    assert linkage.crank_angle('C.y', 9.0).tolist() == pytest.approx([math.nan], nan_ok=True)
+
+
+@pytest.mark.parametrize('half', [1, -1])
+def test_the_lever_s_servo_is_one_output_among_others(half):
+    for lengths in ({'a': 80.0, 'b': 150.0, 'e': 20.0}, {'a': 150.0, 'b': 80.0, 'e': -30.0}):
+        lever = mechanisms.create('slotted_lever', branches={'L': half}, **lengths)
+        wanted = np.linspace(-3.0, 3.0, 41)
+        near = np.linspace(-9.0, 9.0, 41)
+        np.testing.assert_allclose(lever.crank_angle('lever', wanted, near),
+                                   lever.servo_angle(wanted, near), atol=2e-14)
+
+
+def test_the_shape_is_that_of_the_values_with_the_answers_last():
+    linkage = four_bar()
+    assert linkage.crank_angle('QB', 1.0).shape == (2,)
+    assert linkage.crank_angle('QB', [1.0]).shape == (1, 2)
+    assert linkage.crank_angle('QB', np.full((3, 2), 1.0)).shape == (3, 2, 2)
+    assert isinstance(linkage.crank_angle('QB', 1.0, near=0.0), float)
+    assert linkage.crank_angle('QB', [1.0, 1.1], near=0.0).shape == (2,)
+    assert linkage.crank_angle('QB', 1.0, near=np.zeros((3, 2))).shape == (3, 2)
+    assert linkage.crank_angle('QB', np.ones((3, 1)), near=np.zeros(2)).shape == (3, 2)
+
+
+@pytest.mark.parametrize('output, value', [
+    ('QB', 3.0), ('B.y', 90.0), ('P.x', -200.0), ('A.x', 40.1), ('QB', math.nan)])
+def test_where_nothing_is_found_there_is_one_nan(output, value):
+    linkage = four_bar()
+    assert np.isnan(linkage.crank_angle(output, value)).tolist() == [True]
+    assert math.isnan(linkage.crank_angle(output, value, near=1.0))
+
+
+@pytest.mark.parametrize('kind, output', [
+    (kind, output) for kind, names in CONSTANT.items() for output in names])
+def test_an_output_that_never_changes_has_no_crank_angle(kind, output):
+    linkage = mechanisms.create(kind)
+    value = value_at(linkage, output, 0.3)
+    assert np.isnan(linkage.crank_angle(output, value)).tolist() == [True]
+
+
+def test_the_extreme_of_an_output_is_one_answer():
+    lever = mechanisms.create('slotted_lever', a=80.0, b=160.0)
+    np.testing.assert_allclose(lever.crank_angle('lever', math.asin(0.5)), 2 * math.pi / 3,
+                               atol=3e-8)
+    crank = mechanisms.create('slider_crank', a=40.0, b=120.0, c=0.0)
+    assert crank.crank_angle('block', 160.0).tolist() == [0.0]
+    assert crank.crank_angle('B.x', 80.0).tolist() == [-math.pi]
+    drop = mechanisms.create('water_drop')
+    assert drop.crank_angle('P.y', 4.0).tolist() == pytest.approx([0.0], abs=1e-15)
+
+
+def test_the_answer_nearest_is_taken_whole_turns_included():
+    linkage = four_bar()
+    low, high = linkage.crank_angle('QB', 1.0)
+    assert linkage.crank_angle('QB', 1.0, near=low + 0.1) == low
+    assert linkage.crank_angle('QB', 1.0, near=high + 20 * math.pi) == pytest.approx(
+        high + 20 * math.pi)
+
+
+def test_angles_are_the_same_a_turn_further():
+    linkage = four_bar()
+    np.testing.assert_allclose(linkage.crank_angle('QB', 1.0 + 2 * math.pi),
+                               linkage.crank_angle('QB', 1.0), atol=1e-14)
+
+
+def test_the_crank_s_own_angle_is_answered_with_itself():
+    for kind in ('jansen', 'peaucellier'):
+        linkage = mechanisms.create(kind)
+        np.testing.assert_allclose(linkage.crank_angle('crank', [0.5, 7.0])[:, 0],
+                                   [0.5, 7.0 - 2 * math.pi], atol=1e-15)
+
+
+def test_a_double_crank_s_follower_has_one_answer_everywhere():
+    linkage = four_bar(a=5.0, b=7.0, c=6.0, d=2.0, p=1.0)
+    follower = np.linspace(-math.pi, math.pi, 41)
+    answers = linkage.crank_angle('QB', follower)
+    assert answers.shape == (41, 1) and np.isfinite(answers).all()
+    coupler = linkage.crank_angle('AB', linkage.joint_angles(follower)['AB'])
+    assert np.isfinite(coupler).all(-1).any()
+
+
+def test_an_answer_beside_a_tight_turn_is_not_missed():
+    # The lever whips round by nearly half a turn while the crank turns by some 1e-6.
+    lever = mechanisms.create('custom', joints=(
+        'O ground 0 0', 'Q ground 0.6 -0.8', 'A crank O a', 'L slot Q A 0 out 1',
+        'T rigid Q L 1 1 left'), a=1.000001)
+    there = math.atan2(-0.8, 0.6)
+    for theta in there + np.array([-3e-6, -5e-7, 4e-7, 2e-6]):
+        wanted = float(lever.solve(theta)['T'][1])
+        answers = lever.crank_angle('T.y', wanted)
+        assert np.nanmin(np.abs(answers - theta)) < 1e-9
+
+
+def test_lengths_of_any_size_have_the_same_answers():
+    for size in (1e-150, 1e150):
+        small, plain = (mechanisms.create(kind, **{
+            name: value * scale for name, value in mechanisms.defaults(kind).items()})
+            for kind in ('four_bar',) for scale in (size, 1.0))
+        for output in ('QB', 'P.y', 'B.x', 'A.y'):
+            scale = 1.0 if output == 'QB' else size
+            np.testing.assert_allclose(small.crank_angle(output, 1.0 * scale),
+                                       plain.crank_angle(output, 1.0), atol=1e-12)
+
+
+def test_a_second_crank_is_held():
+    linkage = mechanisms.create('five_bar')
+    theta = np.array([0.1, 0.9, 1.5])
+    height = linkage.solve([theta, np.full(3, 1.25)])['P'][:, 1]
+    answers = linkage.crank_angle('P.y', height, near=theta, others=(1.25,))
+    np.testing.assert_allclose(answers, theta, atol=1e-13)
+    with pytest.raises(ValueError, match='five_bar has 2 cranks'):
+        linkage.crank_angle('P.y', height)
+
+
+@pytest.mark.parametrize('output, problem', [
+    ('X.x', "four_bar has no output 'X.x'; allowed: crank, AB, QB, O.x, O.y, Q.x"),
+    ('B', "no output 'B'"), ('B.z', "no output 'B.z'"), ('', "no output ''"),
+    (None, 'no output None'), ('Q.x', 'Q.x of four_bar does not move with the first crank')])
+def test_a_wrong_output_is_refused_with_what_is_allowed(output, problem):
+    with pytest.raises(ValueError, match=problem):
+        four_bar().crank_angle(output, 1.0)
+
+
+# --- transmission angles and dead points --------------------------------------------------------
+
+def test_the_transmission_angle_is_that_of_the_law_of_cosines():
+    # Norton, "Design of Machinery", sec. 3.3: extremes where the crank is on the ground line.
+    linkage = four_bar()
+    theta = np.linspace(-math.pi, math.pi, 73)
+    square = 40.0 ** 2 + 100.0 ** 2 - 2 * 40.0 * 100.0 * np.cos(theta)
+    expected = np.arccos((120.0 ** 2 + 80.0 ** 2 - square) / (2 * 120.0 * 80.0))
+    np.testing.assert_allclose(linkage.transmission_angles(theta)['B'], expected, atol=1e-13)
+
+
+def test_the_transmission_angle_of_a_slider_is_its_rod_s_to_the_normal():
+    linkage = mechanisms.create('slider_crank')
+    theta = np.linspace(-math.pi, math.pi, 73)
+    expected = np.arccos((40.0 * np.sin(theta) + 20.0) / 120.0)
+    np.testing.assert_allclose(linkage.transmission_angles(theta)['B'], expected, atol=1e-14)
+
+
+def test_a_slot_through_the_pivot_always_passes_on_the_whole_force():
+    lever = mechanisms.create('slotted_lever')
+    assert (lever.transmission_angles(np.linspace(-3, 3, 7))['L'] == math.pi / 2).all()
+    offset = mechanisms.create('slotted_lever', e=30.0)
+    slide = offset.joint_angles(1.0)['slide']
+    assert offset.transmission_angles(1.0)['L'] == pytest.approx(math.atan2(slide, 30.0))
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_every_joint_that_closes_a_loop_has_a_transmission_angle_between_its_bars(kind):
+    linkage = mechanisms.create(kind)
+    theta = inside(linkage, np.random.default_rng(6), 9)
+    asked = [theta, np.full_like(theta, HELD)] if held(linkage) else theta
+    place, found = linkage.solve(asked), linkage.transmission_angles(asked)
+    assert found
+    for joint, angle in found.items():
+        assert ((angle >= 0) & (angle <= math.pi)).all()
+        line = next(line for line in mechanisms.design(kind).lines if joint in line.names)
+        if line.word in ('dyad', 'mirror', 'parallelogram'):
+            p, q = (place[name] - place[joint] for name in line.args[-2:]
+                    ) if line.word != 'dyad' else (
+                place[name] - place[joint] for name in line.args[:2])
+            lengths = np.linalg.norm(p, axis=1) * np.linalg.norm(q, axis=1)
+            np.testing.assert_allclose(np.cos(angle), (p * q).sum(1) / lengths, atol=1e-13)
+
+
+def test_an_inversor_passes_its_force_on_at_both_arms():
+    found = mechanisms.create('peaucellier').transmission_angles(0.5)
+    assert list(found) == ['B', 'D'] and found['B'] == found['D']
+
+
+def test_transmission_angles_are_asked_for_by_joint():
+    linkage = mechanisms.create('jansen')
+    assert list(linkage.transmission_angles(0.3, ('E',))) == ['E']
+    with pytest.raises(ValueError, match="no transmission angle at 'G'; allowed: C, E, F"):
+        linkage.transmission_angles(0.3, ('G',))
+
+
+def test_the_jansen_leg_s_worst_transmission_angle_is_where_it_was_measured():
+    theta = np.radians(np.linspace(0.0, 360.0, 36001))
+    angle = mechanisms.create('jansen').transmission_angles(theta)['E']
+    assert math.degrees(angle.min()) == pytest.approx(8.65, abs=5e-3)
+    assert math.degrees(theta[angle.argmin()]) == pytest.approx(191.60, abs=5e-3)
+
+
+@pytest.mark.parametrize('kind, expected', [
+    ('water_drop', [-math.pi, 0.0]), ('jansen', []), ('slotted_lever', []), ('four_bar', []),
+    ('slider_crank', []), ('klann', []), ('whitworth', []),
+    ('peaucellier', [-2 * math.acos(5 / 6), 2 * math.acos(5 / 6)])])
+def test_dead_points_are_where_a_dyad_stretches_or_folds(kind, expected):
+    assert mechanisms.create(kind).dead_points() == pytest.approx(expected, abs=1e-15)
+
+
+def test_the_ends_of_the_reach_are_dead_points():
+    for kind in ('watt', 'five_bar'):
+        linkage = mechanisms.create(kind)
+        (lo, hi), = linkage.reach(*held(linkage))
+        assert linkage.dead_points(*held(linkage)) == pytest.approx([lo, hi], abs=1e-15)
+
+
+def test_a_triple_rocker_has_its_textbook_dead_points():
+    # Norton, "Design of Machinery", sec. 4.11: toggle positions of a non-Grashof four-bar.
+    linkage = four_bar(a=2.0, b=9.0, c=5.0, d=4.0, p=1.0)
+    toggle = math.acos((2.0 ** 2 + 4.0 ** 2 - (9.0 - 5.0) ** 2) / (2 * 2.0 * 4.0))
+    assert linkage.dead_points() == pytest.approx([-toggle, toggle], rel=1e-14)
+    for theta in linkage.dead_points():
+        assert linkage.transmission_angles(theta)['B'] == pytest.approx(0.0, abs=1e-7)
+
+
+def test_a_slider_crank_with_a_short_rod_stops_where_the_rod_stands_upright():
+    linkage = mechanisms.create('slider_crank', a=40.0, b=30.0, c=0.0)
+    limit = math.asin(30.0 / 40.0)
+    assert linkage.dead_points() == pytest.approx(
+        [limit - math.pi, -limit, limit, math.pi - limit], rel=1e-14)
+
+
+def test_the_pantograph_is_dead_where_it_lies_flat():
+    linkage = mechanisms.create('pantograph', a=1.0, b=2.0, c=2.0, g=3.0)
+    assert linkage.dead_points() == pytest.approx([0.0], abs=1e-8)
+
+
+def test_the_distance_to_a_dead_point_is_counted_round_the_turn():
+    drop = mechanisms.create('water_drop')
+    theta = np.array([[0.1, -0.2], [3.0, 7.0]])
+    expected = [[0.1, 0.2], [math.pi - 3.0, 7.0 - 2 * math.pi]]
+    np.testing.assert_allclose(drop.distance_to_dead_point(theta), expected, rtol=1e-14)
+    assert isinstance(drop.distance_to_dead_point(0.5), float)
+    assert mechanisms.create('jansen').distance_to_dead_point(0.5) == math.inf
