@@ -98,21 +98,24 @@ class Assembly:
         pose = self.linkage.function(points, joints, rates)
         cranks, posed = len(self.linkage.cranks), 2 * len(points) + len(joints)
         factors = self._factors(len(points), joints, rates * cranks)
-        out = np.empty_like(factors)
-        pack = Struct(f'{out.shape[1]}d').pack_into
-        rows = [(i * out.strides[0], leg.lag, leg.side > 0.0) for i, leg in enumerate(self.legs)]
+        legs, width = factors.shape
+        pack = Struct(f'{width}d').pack_into
+        rows = [(i * factors.strides[0], leg.lag, leg.side > 0.0)
+                for i, leg in enumerate(self.legs)]
 
         def solve(first, *others, speeds=()):
+            solved = np.empty((legs, width))
             for place, lag, left in rows:
                 angle = first - lag
-                pack(out, place, *pose(angle if left else math.pi - angle, *others))
-            solved = out * factors
+                pack(solved, place, *pose(angle if left else math.pi - angle, *others))
+            solved *= factors
             if not rates:
                 return solved
-            turning = solved[:, posed:].reshape(len(rows), cranks, -1)
-            velocities = np.tensordot(turning, speeds, (1, 0)) if cranks > 1 else \
-                turning[:, 0] * speeds[0]
-            return np.hstack([solved[:, :posed], velocities])
+            if cranks == 1:
+                solved[:, posed:] *= speeds[0]
+                return solved
+            turning = solved[:, posed:].reshape(legs, cranks, -1)
+            return np.hstack([solved[:, :posed], np.tensordot(turning, speeds, (1, 0))])
 
         return solve
 

@@ -170,8 +170,8 @@ class Outlet:
         solved = self._solvers[wanted](*drive.thetas, speeds=drive.speeds)
         posed = 2 * len(points) + len(joints)
         held, moving = self._assembly.within_reach(drive.thetas), bool(rates)
-        # One sum tells of all values whether each is finite; it is rarely asked which.
-        if not math.isfinite(solved.sum()):
+        # One sum, of squares, tells whether all values are finite; it is rarely asked which are.
+        if not math.isfinite(np.vdot(solved, solved)):
             held = held & np.isfinite(solved[:, :posed]).all(axis=1)
             moving = moving and bool(np.isfinite(solved[held, posed:]).all())
         self._pose = Pose(np.concatenate([solved.ravel(), drive.thetas, drive.speeds]),

@@ -29,6 +29,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 # The bytes that say how a message is encoded; what follows is aligned from its end.
 HEADER = 4
+LEAD = bytes(8 - HEADER)
 
 _STAMP = struct.Struct('=iI')
 _SENTINEL = Time(sec=0x5EC0_1234, nanosec=0x2A0C_4321)
@@ -61,9 +62,10 @@ class Template:
         message = build(_SENTINEL, values)
         text = serialize_message(message)
         self._length = len(text)
-        self._bytes = bytearray(text + bytes(-(len(text) - HEADER) % 8))
+        # Numbers lie at multiples of 8 after the header; in memory too they are quicker there.
+        self._bytes = bytearray(LEAD + text + bytes(-(len(text) - HEADER) % 8))
         self._stamps = _places(self._bytes, _STAMP.pack(_SENTINEL.sec, _SENTINEL.nanosec))
-        numbers = np.frombuffer(self._bytes, float, offset=HEADER)
+        numbers = np.frombuffer(self._bytes, float, offset=len(LEAD) + HEADER)
         order = np.argsort(values)
         found = order[np.searchsorted(values, numbers, sorter=order) % max(count, 1)]
         self._slots = np.flatnonzero(values[found] == numbers) if count else np.empty(0, int)
@@ -76,7 +78,7 @@ class Template:
         self._numbers[self._slots] = values.take(self._sources)
         for place in self._stamps:
             _STAMP.pack_into(self._bytes, place, stamp.sec, stamp.nanosec)
-        return bytes(memoryview(self._bytes)[:self._length])
+        return bytes(memoryview(self._bytes)[len(LEAD):len(LEAD) + self._length])
 
     def _check(self, build, kind, count):
         stamp, values = Time(sec=12, nanosec=345), np.linspace(-1.5, 7.25, count)
