@@ -1,0 +1,172 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Textbook examples come out to the digits that are printed.
+
+Norton: R. L. Norton, "Design of Machinery" (examples of ch. 4, answers to the tables of problems
+P4-1 to P4-3, table 3-1). Khurmi and Gupta: "Theory of Machines", ch. 5. Mabie and Reinholtz:
+"Mechanisms and Dynamics of Machinery", the table of Geneva wheels.
+"""
+
+import math
+
+from linkage_ros import mechanisms
+import numpy as np
+import pytest
+
+TURN = 2 * math.pi
+
+
+def degrees(vector):
+    """Return the direction of a vector [deg]."""
+    return math.degrees(math.atan2(vector[1], vector[0]))
+
+
+def printed(value, text):
+    """Tell whether a number is what is printed; books round on the way: to one last digit."""
+    return abs(value - float(text)) <= 10.0 ** -len(text.partition('.')[2])
+
+
+@pytest.mark.parametrize('lengths, theta, side, coupler, rocker', [
+    # Example 4-1, open and crossed, and problem 4-6, row a.
+    ({'a': 40.0, 'b': 120.0, 'c': 80.0, 'd': 100.0}, 40.0, 1, '20.298', '57.325'),
+    ({'a': 40.0, 'b': 120.0, 'c': 80.0, 'd': 100.0}, 40.0, -1, '-60.98', '-98.01'),
+    ({'a': 2.0, 'b': 7.0, 'c': 9.0, 'd': 6.0, 'p': 1.0}, 30.0, 1, '88.8', '117.3'),
+    ({'a': 2.0, 'b': 7.0, 'c': 9.0, 'd': 6.0, 'p': 1.0}, 30.0, -1, '-115.2', '-143.6')])
+def test_norton_s_four_bars(lengths, theta, side, coupler, rocker):
+    linkage = mechanisms.create('four_bar', branches={'B': side}, **lengths)
+    place = linkage.solve(math.radians(theta))
+    assert printed(degrees(place['B'] - place['A']), coupler)
+    assert printed(degrees(place['B'] - place['Q']), rocker)
+    assert linkage.grashof() == 'crank-rocker'
+
+
+@pytest.mark.parametrize('lengths, theta, side, rod, slide', [
+    # Example 4-2, and problem 4-9, row a, open and crossed; the rod is seen from its block.
+    ({'a': 40.0, 'b': 120.0, 'c': -20.0}, 60.0, 1, '152.91', '126.84'),
+    ({'a': 1.4, 'b': 4.0, 'c': 1.0}, 45.0, 1, '180.1', '4.99'),
+    ({'a': 1.4, 'b': 4.0, 'c': 1.0}, 45.0, -1, '-0.14', '-3.01')])
+def test_norton_s_slider_cranks(lengths, theta, side, rod, slide):
+    linkage = mechanisms.create('slider_crank', branches={'B': side}, **lengths)
+    place = linkage.solve(math.radians(theta))
+    angle = degrees(place['A'] - place['B'])
+    assert printed(angle % 360.0 if float(rod) > 180.0 else angle, rod)
+    assert printed(linkage.joint_angles(math.radians(theta))['block'], slide)
+    assert linkage.crank_angle('block', place['B'][0], near=1.0) == pytest.approx(
+        math.radians(theta))
+
+
+@pytest.mark.parametrize('half, slot, lever, slide', [
+    ('out', '232.7', '142.7', '1.79'), ('in', '281.0', '-169.0', '-1.79')])
+def test_norton_s_inverted_slider_crank(half, slot, lever, slide):
+    # Problem 4-12, row a: links 6, 2, 4, gamma 90, theta2 30 degrees. The slot is at right angles
+    # to the lever of 4, so its line passes the pivot at that distance, to the right.
+    linkage = mechanisms.create('custom', joints=(
+        'O ground 0 0', 'Q ground 6 0', 'A crank O 2', f'L slot Q A -4 {half} 1'))
+    theta = math.radians(30.0)
+    place = linkage.solve(theta)
+    along = degrees(place['L'] - place['Q']) % 360.0
+    assert printed(along, slot)
+    assert printed((along - 90.0 + 180.0) % 360.0 - 180.0, lever)
+    assert printed(linkage.joint_angles(theta)['slide'], slide)
+
+
+@pytest.mark.parametrize('turn, d, b, length, bend, speed', [
+    (40, '2.950', '3.925', '1.193', '0.00004', '1.717'),
+    (60, '2.900', '3.850', '1.763', '0.00027', '1.702'),
+    (140, '2.500', '3.250', '3.623', '0.023', '1.565'),
+    (160, '2.350', '3.025', '3.933', '0.047', '1.504'),
+    (180, '2.200', '2.800', '4.181', '0.096', '1.436')])
+def test_hoeken_s_straight_lines_are_norton_s_table(turn, d, b, length, bend, speed):
+    linkage = mechanisms.create('hoeken', a=1.0, b=float(b), d=float(d))
+    theta = math.pi + np.radians(np.linspace(-0.5, 0.5, 4001) * turn)
+    place = linkage.solve(theta, ('P',))['P']
+    assert printed(np.ptp(place[:, 0]), length)
+    assert printed(100.0 * np.ptp(place[:, 1]) / np.ptp(place[:, 0]), bend)
+    assert printed(abs(linkage.velocity(math.pi, ('P',))['P'][0]), speed)
+
+
+def test_the_crank_and_slotted_lever_of_khurmi_and_gupta():
+    # Centres 240 mm apart, crank 120 mm, slotted bar 450 mm: the bar leans 30 degrees at the
+    # ends, the time ratio is 2, the stroke 450 mm.
+    lever = mechanisms.create('slotted_lever', a=120.0, b=240.0)
+    (right, left), = lever.lever_reach()
+    assert math.degrees(left) == pytest.approx(30.0)
+    forth = np.ptp([lever.crank_angle('lever', end * (1.0 - 1e-15), near=end)
+                    for end in (right, left)])
+    assert forth / (TURN - forth) == pytest.approx(2.0, abs=1e-6)
+    assert 2.0 * 450.0 * math.sin(left) == pytest.approx(450.0)
+
+
+@pytest.mark.parametrize('a, b, c, ratio, stroke', [
+    (150.0, 100.0, 120.0, '2.735', '240.0'),  # centres 100 mm, crank 150 mm
+    (40.0, 20.0, 75.0, '2.000', '150.0')])  # crank 40 mm, ratio 2 and stroke 150 mm asked for
+def test_whitworth_s_quick_return_of_khurmi_and_gupta(a, b, c, ratio, stroke):
+    linkage = mechanisms.create('whitworth', a=a, b=b, c=c, d=400.0)
+    left, right = (linkage.crank_angle('lever', end, near=0.0)
+                   for end in (0.5 * math.pi, -0.5 * math.pi))
+    back = left - right
+    ends = linkage.solve(np.array([left, right]), ('R',))['R'][:, 0]
+    assert printed((TURN - back) / back if back < math.pi else back / (TURN - back), ratio)
+    assert printed(np.ptp(ends), stroke)
+    everywhere = linkage.solve(np.linspace(-math.pi, math.pi, 3601), ('R',))['R'][:, 0]
+    assert np.ptp(everywhere) == pytest.approx(np.ptp(ends), rel=1e-6)
+
+
+# Slots, and how many times the crank's speed, and its square, the wheel's speed and acceleration
+# are at most; Mabie and Reinholtz.
+@pytest.mark.parametrize('slots, speed, where, acceleration', [
+    (3, '6.46', '4.76', '31.4'), (4, '2.41', '11.4', '5.41'), (5, '1.43', '17.5', '2.30'),
+    (6, '1.00', '22.9', '1.35')])
+def test_a_geneva_wheel_turns_as_in_the_table(slots, speed, where, acceleration):
+    linkage = mechanisms.create('custom', r=1.0, joints=(
+        'O ground 0 0', f'Q ground {1.0 / math.sin(math.pi / slots)}*r 0', 'A crank O r',
+        'L slot Q A 0 out r'))
+    enters = 0.5 * math.pi - math.pi / slots
+    turned = linkage.joint_angles(np.array([-enters, enters]))['lever']
+    assert abs(np.ptp(turned)) == pytest.approx(TURN / slots, rel=1e-14)
+    np.testing.assert_allclose(linkage.joint_rates(np.array([-enters, enters]))['lever'], 0.0,
+                               atol=1e-15)
+    assert printed(-linkage.joint_rates(0.0)['lever'], speed)
+    theta = np.linspace(0.0, enters, 20001)
+    step = theta[1] - theta[0]
+    accelerations = np.diff(linkage.joint_rates(theta)['lever']) / step
+    assert printed(accelerations.max(), acceleration)
+    assert math.degrees(theta[accelerations.argmax()]) == pytest.approx(float(where), abs=0.1)
+
+
+SQUEEZER = (
+    'O ground 0 0', 'A ground -0.06934 -0.00227', 'B ground -0.03635 0.03273',
+    'F crank O 0.007', 'E dyad F B 0.028 0.035 {}', 'G dyad E A 0.02 0.04 {}',
+    'H dyad E A 0.02 0.04 {}')
+
+
+def test_andrews_squeezer_stands_as_published():
+    # Mazzia and Magherini, "Test Set for Initial Value Problem Solvers", problem "Andrews'
+    # squeezing mechanism": the seven angles at the start.
+    beta, theta, gamma = -0.0617138900142764496, 0.0, 0.455279819163070380
+    phi, delta, omega, epsilon = (0.222668390165885885, 0.487364979543842550,
+                                  -0.222668390165885885, 1.23054744454982119)
+    sides = 'left', 'right', 'left'
+    place = mechanisms.create('custom', joints=[
+        *SQUEEZER[:4], *(line.format(side) for line, side in zip(SQUEEZER[4:], sides))
+    ]).solve(beta)
+    at = {name: complex(*where) for name, where in place.items()}
+    found = [np.angle(at['F'] - at['E']) - beta, np.angle((at['B'] - at['E']) / 1j),
+             np.angle((at['G'] - at['E']) / 1j) - np.angle(at['G'] - at['A']),
+             np.angle(at['G'] - at['A']),
+             np.angle(at['E'] - at['H']) - np.angle((at['A'] - at['H']) / 1j),
+             np.angle((at['A'] - at['H']) / 1j)]
+    np.testing.assert_allclose(found, [theta, gamma, phi, delta, omega, epsilon], atol=2e-14)
