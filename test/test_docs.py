@@ -1,0 +1,125 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The pages: what they link to is there, what they say to type works, and nothing is left out."""
+
+from pathlib import Path
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+
+from linkage_ros import mechanisms, scene
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PAGES = sorted([*ROOT.glob('*.md'), *(ROOT / 'docs').glob('*.md')])
+LINK = re.compile(r'!?\[[^]]*\]\(([^)\s]+)\)')
+RENDER = re.compile(r'\$ (?:python -m linkage_ros\.render|ros2 run linkage_ros render) (.*)')
+FENCE = re.compile(r'^```(\w*)\n(.*?)^```', re.MULTILINE | re.DOTALL)
+
+
+@pytest.fixture
+def catalogue(monkeypatch):
+    for module in ('matplotlib', 'tqdm', 'yaml'):
+        pytest.importorskip(module)
+    monkeypatch.syspath_prepend(ROOT / 'docs')
+    import catalogue
+    return catalogue
+
+
+def blocks(page, language):
+    return [text for name, text in FENCE.findall(page.read_text()) if name == language]
+
+
+def anchors(page):
+    headings = re.findall(r'^#+ +(.*)$', FENCE.sub('', page.read_text()), re.MULTILINE)
+    return {re.sub(r'[^\w\- ]', '', text).strip().lower().replace(' ', '-') for text in headings}
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
+def test_every_link_inside_the_repository_leads_somewhere(page):
+    for link in LINK.findall(FENCE.sub('', page.read_text())):
+        if not re.match(r'\w+:', link):
+            path, _, place = link.partition('#')
+            target = (page.parent / path).resolve() if path else page
+            assert target.exists(), link
+            assert not place or target.suffix != '.md' or place in anchors(target), link
+
+
+@pytest.mark.skipif(not shutil.which('git') or not (ROOT / '.git').exists(), reason='no clone')
+def test_no_page_shows_a_picture_that_is_not_kept():
+    kept = set(subprocess.run(['git', 'ls-files', 'docs'], cwd=ROOT, check=True, text=True,
+                              capture_output=True).stdout.split())
+    for page in PAGES:
+        for link in LINK.findall(page.read_text()):
+            if link.endswith(('.png', '.gif', '.svg')) and ':' not in link:
+                assert str((page.parent / link).resolve().relative_to(ROOT)) in kept, link
+
+
+def test_the_pictures_that_are_kept_are_small():
+    assert sum(file.stat().st_size for file in (ROOT / 'docs/images').iterdir()) < 1.5e6
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
+def test_the_pictures_that_a_page_says_to_render_can_be_asked_for(page):
+    for module in ('matplotlib', 'yaml'):
+        pytest.importorskip(module)
+    from linkage_ros.render.command import parsed
+
+    for line in '\n'.join(blocks(page, 'console')).splitlines():
+        command = RENDER.match(line)
+        if command:
+            asked = parsed(shlex.split(command[1]))
+            scene.load(ROOT / asked.scene)
+
+
+def test_the_tour_works_as_written():
+    page = ROOT / 'docs' / 'index.md'
+    for code in blocks(page, 'python'):
+        exec(compile(code, page.name, 'exec'), {})
+    yaml = pytest.importorskip('yaml')
+    for text in blocks(page, 'yaml'):
+        given = yaml.safe_load(text)['/**']['ros__parameters']
+        assert list(scene.read(given).machines) == given['mechanisms']
+
+
+@pytest.mark.parametrize('type_', list(mechanisms.TYPES))
+def test_the_page_of_a_mechanism_has_all_of_it(catalogue, type_):
+    page, linkage = catalogue.page(type_), mechanisms.create(type_)
+    for name, value in linkage.dimensions.items():
+        assert re.search(rf'^\| `{name}` \| {re.escape(f"{value:g}")} \| `', page, re.MULTILINE)
+    for name in (*linkage.joints, *(f'{joint}: {sign:+d}' for joint, sign
+                                    in linkage.branches.items())):
+        assert f'`{name}`' in page
+    for line in mechanisms.design(type_).joints:
+        assert line.split(maxsplit=1)[1].split()[-1] in page
+    exec(compile(re.findall(r'```python\n(.*?)```', page, re.DOTALL)[0], type_, 'exec'), {})
+
+
+def test_text_of_a_docstring_is_taken_for_text(catalogue):
+    assert catalogue.markdown('a*b*c <d> [e] `f*g` sqrt(theta^2) -> |h|') == \
+        r'a\*b\*c \<d\> \[e\] `f*g` √(θ²) → \|h\|'
+
+
+def test_a_broken_link_is_found(tmp_path):
+    (tmp_path / 'a.html').write_text('<p id="x"><a href="b.html#y"><a href="#x"><a href="#z">'
+                                     '<img src="c.png"><a href="https://example.org/d">')
+    (tmp_path / 'b.html').write_text('<p id="y"><a href="a.html#x">')
+    ended = subprocess.run([sys.executable, str(ROOT / 'docs' / 'links.py'), str(tmp_path)],
+                           capture_output=True, text=True, timeout=60)
+    assert ended.returncode == 1
+    said = [line.split(': ')[1].split()[0] for line in ended.stderr.splitlines()]
+    assert said == ['#z', 'c.png']
