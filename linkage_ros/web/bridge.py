@@ -45,7 +45,6 @@ class Bridge:
         self.node = node
         self.loop = None
         self._tasks = SimpleQueue()
-        self._wake = node.create_guard_condition(self._work)
 
     def ask(self, function, *args):
         """
@@ -59,8 +58,16 @@ class Bridge:
         """
         future = self.loop.create_future()
         self._tasks.put((function, args, future))
-        self._wake.trigger()
+        self._wake()
         return future
+
+    def _wake(self):
+        # Unlike a guard condition, a task works with every executor.
+        executor = self.node.executor
+        if executor is not None:
+            executor.create_task(self._work)
+        else:
+            self.loop.call_later(SECONDS_BETWEEN_TRIES, self._wake)
 
     async def call(self, client, request):
         """Return a service's response; raise NoAnswer if there is none in time."""

@@ -133,7 +133,9 @@ class Layout:
             point.x, point.y, point.z = place
         for marker in _markers(message):
             marker.header.stamp = UNUSED_STAMP
-        marked = np.frombuffer(serialize_message(message), np.uint8)
+        marked = serialize_message(message)
+        # On its way a message may have been filled up at its end.
+        marked = np.frombuffer(marked.ljust(len(text), b'\0'), np.uint8)
         numbers = self._numbers(marked)
         self._slots = np.flatnonzero(np.isin(numbers, unused))
         self._found = len(marked) == len(text) and np.array_equal(numbers[self._slots], unused)

@@ -142,7 +142,7 @@ class Server:
 
     async def _visit(self, request):
         socket_ = web.WebSocketResponse(
-            timeout=SECONDS_TO_CLOSE, max_msg_size=MOST_BYTES, heartbeat=20.0)
+            timeout=SECONDS_TO_CLOSE, max_msg_size=MOST_BYTES, heartbeat=20.0, compress=False)
         await socket_.prepare(request)
         visitor = Visitor(self._stage, socket_)
         self._visitors.add(visitor)

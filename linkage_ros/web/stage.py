@@ -42,6 +42,7 @@ MARKERS_TYPE, LOCUS_TYPE = 'visualization_msgs/msg/MarkerArray', 'visualization_
 LIST_TYPE = 'rcl_interfaces/srv/ListParameters'
 LEVER_TYPE = 'linkage_interfaces/srv/ServoInverse'
 SECONDS_BETWEEN_LOOKS = 1.0
+SECONDS_TO_LINGER = 1.0
 
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -95,6 +96,7 @@ class Stage:
         self._seen = None
         self._cast = {}
         self._looking = None
+        self._lowering = None
         # What follows is changed in the executor's thread alone.
         self._nodes = {}
         self._levers = {}
@@ -105,20 +107,27 @@ class Stage:
     def enter(self, visitor):
         """Let somebody look; the first one raises the curtain."""
         self.audience.append(visitor)
-        if len(self.audience) == 1:
+        if self._lowering:
+            self._lowering.cancel()
+        if self._looking is None:
             self._looking = asyncio.ensure_future(self._look())
-        else:
-            visitor.tell('scene', self._scene())
-            for feed in self.feeds():
-                visitor.offer(feed)
+            return
+        visitor.tell('scene', self._scene())
+        for feed in self.feeds():
+            visitor.offer(feed)
 
     def leave(self, visitor):
-        """Let somebody go; the last one lowers the curtain."""
+        """Let somebody go; after the last one the curtain falls, unless it was only a reload."""
         self.audience.remove(visitor)
         if not self.audience:
-            self._looking.cancel()
-            self._seen, self._cast = None, {}
-            self._bridge.ask(self._close)
+            # A node that is still to answer would wait for a client that is gone.
+            self._lowering = self._bridge.loop.call_later(SECONDS_TO_LINGER, self._lower)
+
+    def _lower(self):
+        self._looking.cancel()
+        self._looking = self._lowering = None
+        self._seen, self._cast = None, {}
+        self._bridge.ask(self._close)
 
     def feeds(self):
         """Return the feeds that have something to draw."""

@@ -46,21 +46,24 @@ function element(tag, properties = {}, ...children) {
   return made;
 }
 
-/** Return a function that passes on a value, the newest only, when the one before is through. */
-function newest(pass) {
-  let busy = false;
-  let waiting = null;
-  return async function offer(value) {
-    waiting = { value };
-    if (busy) return;
-    busy = true;
-    while (waiting) {
-      const { value: next } = waiting;
-      waiting = null;
-      await pass(next);
+/** Passes on values one after the other; of those that wait only the newest. */
+class Newest {
+  constructor(pass) {
+    this.pass = pass;
+    this.busy = false;
+  }
+
+  async offer(value) {
+    this.waiting = { value };
+    if (this.busy) return;
+    this.busy = true;
+    while (this.waiting) {
+      const { value: next } = this.waiting;
+      this.waiting = null;
+      await this.pass(next);
     }
-    busy = false;
-  };
+    this.busy = false;
+  }
 }
 
 /** A number with a slider; what is refused springs back, with the reason below. */
@@ -80,7 +83,7 @@ class Slider {
     this.row = element('div', { className: 'row', title },
       element('label', { htmlFor: id, textContent: label }), this.range, this.number,
       element('span', { className: 'unit', textContent: unit }), this.answer, this.reason);
-    this.offer = newest(async wanted => {
+    this.asked = new Newest(async wanted => {
       const answer = await request(wanted);
       this.settle(answer.reason, answer.reason ? this.accepted : wanted, answer);
     });
@@ -99,6 +102,10 @@ class Slider {
     this.render();
   }
 
+  offer(value) {
+    this.asked.offer(value);
+  }
+
   chosen() {
     if (this.kind === 'integer') return Number(this.range.value);
     const value = this.scale.value(this.range.value / STOPS, this.low, this.high);
@@ -111,18 +118,18 @@ class Slider {
     this.reason.hidden = !reason;
     this.row.classList.toggle('refused', !!reason);
     this.told?.(answer);
-    if (!this.held) this.render();
+    if (!this.held && !this.asked.waiting) this.render();
   }
 
   release() {
     this.held = false;
-    this.render();
+    if (!this.asked.busy) this.render();
   }
 
   /** Show a value that somebody else has set. */
   update(value) {
     this.accepted = value;
-    if (!this.held) this.render();
+    if (!this.held && !this.asked.busy) this.render();
   }
 
   render() {

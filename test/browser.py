@@ -1,0 +1,174 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A real browser without a window, driven through its own protocol (Chrome DevTools)."""
+
+import asyncio
+import base64
+import io
+import itertools
+import json
+from pathlib import Path
+import shutil
+import subprocess
+
+import aiohttp
+import numpy as np
+from PIL import Image
+
+NAMES = ('chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable', 'chrome')
+FLAGS = ('--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+         '--disable-background-networking', '--disable-component-update', '--disable-sync',
+         '--window-size=1200,900', '--remote-debugging-port=0')
+DEADLINE = 30.0
+
+
+def found():
+    """Return the path of a browser, or None."""
+    return next(filter(None, map(shutil.which, NAMES)), None)
+
+
+async def until(predicate, what=''):
+    """Wait until something holds; return what the predicate, or what it awaits, returned."""
+    async def held():
+        while True:
+            value = predicate()
+            if asyncio.iscoroutine(value):
+                value = await value
+            if value:
+                return value
+            await asyncio.sleep(0.02)
+
+    try:
+        return await asyncio.wait_for(held(), DEADLINE)
+    except asyncio.TimeoutError:
+        raise AssertionError(f'did not happen in time: {what or predicate}') from None
+
+
+class Browser:
+    """
+    One page of a browser with a fresh profile.
+
+    Attributes
+    ----------
+    complaints : list
+        What the page wrote to the console, exceptions included.
+    requests : list
+        The addresses that the page asked for.
+
+    """
+
+    def __init__(self, profile: Path):
+        self._profile = profile
+        self._numbers = itertools.count(1)
+        self._answers = {}
+        self.complaints = []
+        self.requests = []
+
+    async def __aenter__(self):
+        self._process = subprocess.Popen(
+            [found(), *FLAGS, f'--user-data-dir={self._profile}', 'about:blank'],
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            await self._connect()
+        except BaseException:
+            self._end()
+            raise
+        return self
+
+    async def __aexit__(self, *_):
+        self._reading.cancel()
+        await self._session.close()
+        self._end()
+
+    async def _connect(self):
+        written = self._profile / 'DevToolsActivePort'
+        port = (await until(lambda: written.exists() and written.read_text().split()))[0]
+        self._session = aiohttp.ClientSession()
+        async with self._session.get(f'http://127.0.0.1:{port}/json') as response:
+            page = next(one for one in await response.json() if one['type'] == 'page')
+        self._socket = await self._session.ws_connect(
+            page['webSocketDebuggerUrl'], max_msg_size=0)
+        self._reading = asyncio.ensure_future(self._read())
+        for domain in ('Page', 'Runtime', 'Log', 'Network'):
+            await self._do(f'{domain}.enable')
+
+    def _end(self):
+        self._process.terminate()
+        try:
+            self._process.wait(DEADLINE)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    async def _read(self):
+        async for message in self._socket:
+            said = json.loads(message.data)
+            if 'id' in said:
+                self._answers.pop(said['id']).set_result(said)
+            elif said['method'] in ('Runtime.exceptionThrown', 'Runtime.consoleAPICalled',
+                                    'Log.entryAdded'):
+                self.complaints.append(said['params'])
+            elif said['method'] == 'Network.requestWillBeSent':
+                self.requests.append(said['params']['request']['url'])
+
+    async def _do(self, method, **params):
+        number = next(self._numbers)
+        answer = self._answers[number] = asyncio.get_running_loop().create_future()
+        await self._socket.send_json({'id': number, 'method': method, 'params': params})
+        said = await asyncio.wait_for(answer, DEADLINE)
+        assert 'result' in said, said
+        return said['result']
+
+    async def open(self, url: str):
+        """Go to a page."""
+        await self._do('Page.navigate', url=url)
+        await until(lambda: self.value('document.readyState === "complete"'), url)
+
+    async def value(self, expression: str):
+        """Return the value of an expression in the page; wait for it if it is a promise."""
+        said = await self._do('Runtime.evaluate', expression=expression, awaitPromise=True,
+                              returnByValue=True)
+        assert 'exceptionDetails' not in said, said['exceptionDetails']
+        return said['result'].get('value')
+
+    async def middle(self, expression: str):
+        """Return the middle x, y and the width of an element, as the page's pixels."""
+        return await self.value(
+            f'(() => {{ const {{x, y, width, height}} = ({expression}).getBoundingClientRect();'
+            'return [x + width / 2, y + height / 2, width]; })()')
+
+    async def click(self, expression: str):
+        """Press and release the mouse on an element."""
+        x, y, _ = await self.middle(expression)
+        await self._mouse('mousePressed', x, y)
+        await self._mouse('mouseReleased', x, y)
+
+    async def drag(self, *places):
+        """Press the mouse at the first place, go to the others, release it at the last."""
+        await self._mouse('mousePressed', *places[0])
+        for start, end in zip(places, places[1:]):
+            for part in (0.25, 0.5, 0.75, 1.0):
+                await self._mouse('mouseMoved', *(
+                    a + part * (b - a) for a, b in zip(start, end)))
+        await self._mouse('mouseReleased', *places[-1])
+
+    async def _mouse(self, kind, x, y):
+        await self._do('Input.dispatchMouseEvent', type=kind, x=x, y=y, button='left',
+                       buttons=int(kind != 'mouseReleased'), clickCount=1)
+
+    async def picture(self) -> np.ndarray:
+        """Return what is seen: red, green and blue, shape (height, width, 3)."""
+        data = (await self._do('Page.captureScreenshot', format='png'))['data']
+        return np.asarray(Image.open(io.BytesIO(base64.b64decode(data))).convert('RGB'), int)

@@ -1,0 +1,766 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The viewer: what its page is sent, what its sliders do, and who may look."""
+
+import asyncio
+import itertools
+import json
+import math
+from pathlib import Path
+import re
+import signal
+import socket
+import struct
+import threading
+
+import numpy as np
+import pytest
+
+aiohttp = pytest.importorskip('aiohttp')
+pytest.importorskip('rclpy')
+pytest.importorskip('linkage_interfaces')
+
+import browser  # noqa: E402
+from linkage_ros import mechanisms, messages  # noqa: E402
+from linkage_ros.crank_driver import CrankDriver  # noqa: E402
+from linkage_ros.kinematics import Kinematics  # noqa: E402
+from linkage_ros.servo_inverse import ServoInverse  # noqa: E402
+from linkage_ros.viewer import Viewer  # noqa: E402
+from linkage_ros.web.feed import Feed  # noqa: E402
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor  # noqa: E402
+import rclpy  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
+from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
+from ros_harness import Graph, Process  # noqa: E402
+from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / 'linkage_ros' / 'web' / 'page'
+NODES = (CrankDriver, Kinematics, ServoInverse)
+RATE = {'rate': 100.0}
+LEVER = {**RATE, 'mechanisms': ['lever', 'drop'], 'lever.type': 'slotted_lever',
+         'drop.type': 'water_drop'}
+LEG = {**RATE, 'mechanisms': ['leg'], 'leg.type': 'jansen', 'leg.crank.speed': 0.0,
+       'leg.crank.start': 1.0}
+
+needs_browser = pytest.mark.skipif(
+    not browser.found(), reason=f'none of {", ".join(browser.NAMES)} is installed')
+
+
+def lever_of(servo, a=80.0, b=150.0):
+    """Return the lever angle from the pin's place: the loop closure, written out."""
+    return math.atan2(a * math.sin(servo), b + a * math.cos(servo))
+
+
+class Show:
+    """The nodes of a scene and a viewer, at work in a thread of their own."""
+
+    def __init__(self, graph, parameters, kinds=NODES, **kwargs):
+        self.graph = graph
+        self.viewer = graph.start(Viewer, {'port': 0})
+        self.nodes = [graph.start(kind, parameters, **kwargs) for kind in kinds]
+        self._over = threading.Event()
+        self._thread = threading.Thread(
+            target=graph.until, args=(self._over.is_set, math.inf), daemon=True)
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self._over.set()
+        self._thread.join()
+
+    def values(self, name):
+        """Return the value of a parameter on each node that has it."""
+        return [node.get_parameter(name).value for node in self.nodes if node.has_parameter(name)]
+
+    def entities(self):
+        """Return how many subscriptions and clients the viewer has."""
+        return len(list(self.viewer.subscriptions)), len(list(self.viewer.clients))
+
+
+@pytest.fixture
+def show(graph):
+    """Return a function that starts a scene with a viewer."""
+    shows = []
+
+    def start(parameters, kinds=NODES, before=lambda: None, **kwargs):
+        before()
+        shows.append(Show(graph, parameters, kinds, **kwargs).__enter__())
+        return shows[-1]
+
+    yield start
+    for one in shows:
+        one.__exit__()
+
+
+@pytest.fixture(scope='module')
+def lever():
+    """Yield a show that no test changes."""
+    with Graph() as graph, Show(graph, LEVER) as running:
+        yield running
+
+
+class Page:
+    """What a browser knows, without the browser: the other end of the WebSocket."""
+
+    def __init__(self, url, lazy=False, **kwargs):
+        self._url = url.replace('http', 'ws') + 'socket'
+        self._kwargs = kwargs
+        self._lazy = lazy
+        self._ids = itertools.count(1)
+        self.said, self.looks, self.points, self.pictures = [], {}, {}, 0
+
+    async def __aenter__(self):
+        self._session = aiohttp.ClientSession()
+        try:
+            self.socket = await self._session.ws_connect(self._url, **self._kwargs)
+        except BaseException:
+            await self._session.close()
+            raise
+        self._reading = asyncio.ensure_future(self._read())
+        return self
+
+    async def __aexit__(self, *_):
+        await self.socket.close()
+        await self._reading
+        await self._session.close()
+
+    async def _read(self):
+        async for message in self.socket:
+            if message.type == aiohttp.WSMsgType.TEXT:
+                self._hear(message.json())
+            else:
+                self._draw(message.data)
+                if not self._lazy:
+                    await self.socket.send_json({'op': 'drawn'})
+
+    def _hear(self, said):
+        if said['op'] == 'look':
+            self.looks[said['number']] = said
+        self.said.append(said)
+
+    def _draw(self, data):
+        self.pictures += 1
+        at = 0
+        while at < len(data):
+            number, count = struct.unpack_from('<II', data, at)
+            self.points[number] = np.frombuffer(data, '<f4', 3 * count, at + 8).reshape(-1, 3)
+            at += 8 + 12 * count
+
+    async def heard(self, op, **fields):
+        """Return the first message that says this."""
+        def said():
+            return [m for m in self.said if {**m, 'op': op, **fields} == m]
+
+        return (await browser.until(said, (op, fields)))[0]
+
+    async def cast(self, *keys):
+        """Return the mechanisms by key, when these are all there are, with settings."""
+        def known():
+            for said in reversed(self.said):
+                if said['op'] == 'scene':
+                    cast = {one['key']: one for one in said['mechanisms']}
+                    return cast if set(cast) == set(keys) and all(
+                        one['settings'] for one in cast.values()) else None
+
+        return await browser.until(known, keys)
+
+    async def ask(self, op, mechanism, **fields):
+        """Return the answer to a request."""
+        number = next(self._ids)
+        await self.socket.send_json({'op': op, 'mechanism': mechanism, 'id': number, **fields})
+        return await self.heard('answer', id=number)
+
+    async def set(self, mechanism, **values):
+        """Set parameters, __ for a point; return the reason of a refusal, or nothing."""
+        return (await self.ask('set', mechanism, values={
+            name.replace('__', '.'): value for name, value in values.items()}))['reason']
+
+    def drawn(self, mechanism, kind):
+        """Return the points of a mechanism's marker."""
+        return next((self.points[number] for number, look in self.looks.items()
+                     if (look['mechanism'], look['kind']) == (mechanism, kind)
+                     and number in self.points), np.empty((0, 3)))
+
+
+def test_what_is_drawn_is_where_the_catalogue_says(show):
+    async def look(url):
+        async with Page(url) as page:
+            await browser.until(lambda: len(page.drawn('/leg', 'joints')) and len(
+                page.drawn('/leg', 'strip')))
+            return page
+
+    page = asyncio.run(look(show(LEG).viewer.url))
+    leg = mechanisms.create('jansen')
+    solved = leg.solve(1.0)
+    joints = page.drawn('/leg', 'joints')
+    np.testing.assert_allclose(
+        joints[:, :2], [solved[point] for point in leg.points], rtol=1e-6, atol=1e-5)
+    assert not joints[:, 2].any()
+    ends = page.drawn('/leg', 'lines').reshape(-1, 2, 3)
+    np.testing.assert_allclose(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1),
+                               [leg.bar_lengths[bar] for bar in leg.bars], rtol=1e-6)
+    feet = leg.solve(np.linspace(0.0, math.tau, 721), ('G',))['G']
+    curve = page.drawn('/leg', 'strip')[:, :2]
+    away = np.linalg.norm(curve[:, None] - feet, axis=2).min(axis=1)
+    assert len(curve) > 100 and away.max() < 0.01 * np.ptp(feet[:, 0])
+
+
+def test_every_slider_has_a_value_a_range_and_a_meaning(lever):
+    async def look(url):
+        async with Page(url) as page:
+            return await page.cast('/lever', '/drop')
+
+    cast = asyncio.run(look(lever.viewer.url))
+    assert (cast['/lever']['lever'], cast['/drop']['lever']) == (True, False)
+    settings = {one['name']: one for one in cast['/lever']['settings']}
+    assert {'crank.speed', 'crank.start', 'dimensions.a', 'dimensions.b', 'dimensions.e'} <= set(
+        settings)
+    assert settings['dimensions.a']['value'] == 80.0
+    assert settings['dimensions.a']['low'] == pytest.approx(8.0)
+    assert (settings['crank.speed']['low'], settings['crank.speed']['high']) == (-100.0, 100.0)
+    assert '[rad/s]' in settings['crank.speed']['meaning']
+    assert settings['type'] == {**settings['type'], 'value': 'slotted_lever', 'fixed': True}
+    assert settings['points']['value'] == ['O', 'Q', 'A', 'L']
+
+
+def test_a_slider_sets_every_node_that_has_the_parameter(show):
+    running = show(LEVER)
+
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/lever', '/drop')
+            assert await page.set('/lever', dimensions__b=160) == ''
+            assert await page.set('/lever', crank__speed=-2.5) == ''
+            await page.heard('value', mechanism='/lever', name='dimensions.b', value=160.0)
+            await page.heard('value', mechanism='/lever', name='crank.speed', value=-2.5)
+
+    asyncio.run(use(running.viewer.url))
+    assert running.values('lever.dimensions.b') == [160.0, 160.0, 160.0]
+    assert running.values('lever.crank.speed') == [-2.5]
+
+
+@pytest.mark.parametrize('values, reason', [
+    ({'dimensions__b': 1e6}, r'lever\.dimensions\.b .*15'),
+    ({'dimensions__b': 'long'}, 'lever.dimensions.b must be a finite number'),
+    ({'dimensions__b': True}, 'lever.dimensions.b must be a finite number'),
+    ({'dimensions__q': 1.0}, "lever has no parameter 'dimensions.q'"),
+    ({'type': 'jansen'}, 'lever.type must be'),
+    ({'dimensions__a': 10.0, 'dimensions__e': 700.0}, 'be assembled'),
+    ({'branches__L': 5}, r'lever\.branches\.L'),
+])
+def test_a_refusal_says_why_and_changes_nothing(lever, values, reason):
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/lever', '/drop')
+            return await page.set('/lever', **values)
+
+    assert re.search(reason, asyncio.run(use(lever.viewer.url)))
+    assert lever.values('lever.dimensions.a') == [80.0] * 3
+    assert lever.values('lever.dimensions.b') == [150.0] * 3
+
+
+def test_what_one_node_refuses_no_node_keeps(graph, show):
+    def picky(**kwargs):
+        node = rclpy.create_node('picky', **kwargs)
+        node.declare_parameter('lever.dimensions.b', 150.0, ParameterDescriptor(
+            floating_point_range=[FloatingPointRange(from_value=140.0, to_value=155.0)]))
+        return node
+
+    running = show(LEVER, before=lambda: graph.start(picky))
+
+    async def use(url):
+        async with Page(url) as page:
+            cast = await page.cast('/lever', '/drop')
+            assert 'dimensions.b' in {one['name'] for one in cast['/lever']['settings']}
+            return await page.set('/lever', dimensions__b=160.0), await page.set(
+                '/lever', dimensions__b=152.0)
+
+    refused, granted = asyncio.run(use(running.viewer.url))
+    assert '160' in refused and granted == ''
+    assert running.values('lever.dimensions.b') == [152.0] * 3
+
+
+def test_a_change_that_somebody_else_makes_is_shown(show):
+    running = show(LEVER)
+
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/lever', '/drop')
+            for node in running.nodes:
+                if node.has_parameter('drop.crank.speed'):
+                    node.set_parameters([Parameter('drop.crank.speed', value=3.25)])
+            await page.heard('value', mechanism='/drop', name='crank.speed', value=3.25)
+
+    asyncio.run(use(running.viewer.url))
+
+
+def test_a_dragged_lever_is_where_it_was_dragged_to_and_stays_there(show):
+    running = show(LEVER)
+
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/lever', '/drop')
+            answer = await page.ask('drag', '/lever', angle=0.4)
+
+            def lever():
+                joints = page.drawn('/lever', 'joints')
+                return len(joints) and abs(math.atan2(
+                    joints[1, 0] - joints[3, 0], joints[3, 1] - joints[1, 1]) - 0.4) < 1e-6
+
+            await browser.until(lever)
+            return answer
+
+    answer = asyncio.run(use(running.viewer.url))
+    assert answer['reason'] == ''
+    assert lever_of(answer['servo']) == pytest.approx(0.4, abs=1e-12)
+    slope = (lever_of(answer['servo'] + 1e-6) - lever_of(answer['servo'] - 1e-6)) / 2e-6
+    assert answer['reduction'] == pytest.approx(slope, abs=1e-8)
+    assert running.values('lever.crank.speed') == [0.0]
+    assert running.values('lever.crank.start') == [answer['servo']]
+
+
+@pytest.mark.parametrize('mechanism, angle, reason', [
+    ('/lever', 1.0, r'cannot be reached; the lever reaches \[-0.5625'),
+    ('/drop', 0.1, 'drop has no lever'),
+    ('/gone', 0.1, "no mechanism '/gone'; there are: /drop, /lever"),
+    ('/lever', 'up', 'not understood'),
+])
+def test_a_lever_that_cannot_be_dragged_says_why(lever, mechanism, angle, reason):
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/lever', '/drop')
+            return (await page.ask('drag', mechanism, angle=angle))['reason']
+
+    assert re.search(reason, asyncio.run(use(lever.viewer.url)))
+    assert lever.values('lever.crank.speed') == [1.0]
+
+
+def test_nobody_is_listened_to_while_nobody_looks(show):
+    running = show(LEG)
+    at_rest = running.entities()
+
+    async def use(url):
+        assert running.graph.node.count_subscribers('/leg/markers') == 0
+        async with Page(url) as first:
+            await first.cast('/leg')
+            async with Page(url) as second:
+                await second.cast('/leg')
+                await browser.until(lambda: first.pictures > 2 and second.pictures)
+                assert running.graph.node.count_subscribers('/leg/markers') == 1
+        await browser.until(lambda: running.entities() == at_rest)
+        await browser.until(
+            lambda: running.graph.node.count_subscribers('/leg/markers') == 0)
+        async with Page(url) as again:
+            await browser.until(lambda: again.pictures)
+
+    asyncio.run(use(running.viewer.url))
+
+
+def test_a_browser_that_has_not_drawn_is_sent_no_more(show):
+    running = show({**LEG, 'leg.crank.speed': 1.0})
+    heard = running.graph.listen(MarkerArray, 'leg/markers')
+
+    async def use(url):
+        async with Page(url, lazy=True) as page:
+            await page.cast('/leg')
+            await browser.until(lambda: page.pictures)
+            before = len(heard)
+            await browser.until(lambda: len(heard) > before + 20)
+            assert await page.set('/leg', crank__speed=0.0) == ''
+            assert page.pictures == 1
+            await page.socket.send_json({'op': 'drawn'})
+            await browser.until(lambda: page.pictures == 2)
+
+    asyncio.run(use(running.viewer.url))
+
+
+def test_nodes_that_come_later_or_in_a_namespace_are_found(graph, show):
+    running = show(LEG, kinds=())
+
+    async def use(url):
+        async with Page(url) as page:
+            assert (await page.heard('scene'))['mechanisms'] == []
+            running.nodes.extend(graph.start(kind, LEG, namespace='left')
+                                 for kind in (CrankDriver, Kinematics))
+            await page.cast('/left/leg')
+            await browser.until(lambda: len(page.drawn('/left/leg', 'joints')))
+            await browser.until(lambda: 'crank.speed' in {
+                one['name'] for m in page.said if m['op'] == 'scene'
+                for cast in m['mechanisms'] for one in cast['settings']})
+            assert await page.set('/left/leg', crank__speed=2.0) == ''
+
+    asyncio.run(use(running.viewer.url))
+    assert running.values('leg.crank.speed') == [2.0]
+
+
+def test_nonsense_is_answered_or_ignored(show):
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/leg')
+            for nonsense in ('', '[]', '{"op": 1}', 'null', '{"op": "set"}', '\x00'):
+                await page.socket.send_str(nonsense)
+            await page.socket.send_bytes(b'\xff\xfe')
+            assert 'not understood' in (await page.ask('set', '/leg'))['reason']
+            assert 'not understood' in (await page.ask('set', '/leg', values=3))['reason']
+            assert 'unknown request' in (await page.ask('fly', '/leg'))['reason']
+
+    asyncio.run(use(show(LEG).viewer.url))
+
+
+@pytest.fixture
+def address(lever):
+    """Return the address of the page."""
+    return lever.viewer.url
+
+
+async def status(url, **headers):
+    """Return the status and the headers of an answer."""
+    async with aiohttp.ClientSession() as session:
+        async with session.get(url, headers=headers) as response:
+            return response.status, response.headers
+
+
+@pytest.mark.parametrize('name', ['', *sorted(path.name for path in PAGE.iterdir())])
+def test_the_page_is_served_with_nothing_from_outside(address, name):
+    code, headers = asyncio.run(status(address + name))
+    assert code == 200
+    assert headers['Content-Security-Policy'].startswith("default-src 'self'")
+    assert headers['X-Content-Type-Options'] == 'nosniff'
+    text = (PAGE / (name or 'index.html')).read_text()
+    named = re.findall(r"""(?:src|href|from|url\()\s*=?\s*["']([^"']+)["']""", text)
+    assert all((PAGE / one).is_file() for one in named)
+    addresses = set(re.findall(r'https?://[^\s"\'`]+', text))
+    assert addresses <= {'http://www.apache.org/licenses/LICENSE-2.0', 'http://www.w3.org/2000/svg'}
+
+
+@pytest.mark.parametrize('name', ['%2e%2e%2fserver.py', 'server.py', 'none.html', 'page/main.js'])
+def test_only_the_page_is_served(address, name):
+    assert asyncio.run(status(address + name))[0] == 404
+
+
+@pytest.mark.parametrize('host, own', [
+    ('localhost:{port}', True), ('127.0.0.1:{port}', True), ('[::1]:{port}', True),
+    ('localhost', True), ('evil.example', False), ('evil.example:{port}', False),
+    ('localhost.evil.example', False), ('10.1.2.3:{port}', False), ('[', False), ('', False),
+])
+def test_a_foreign_host_is_refused(address, host, own):
+    host = host.format(port=address.split(':')[2].strip('/'))
+    assert asyncio.run(status(address, Host=host))[0] == (200 if own else 403)
+
+
+@pytest.mark.parametrize('origin', [
+    'http://evil.example', 'https://127.0.0.1', 'http://127.0.0.1:1', 'null', 'file://',
+    'http://localhost:{port}', 'http://127.0.0.1:{port}.evil.example', ''])
+def test_a_foreign_origin_is_refused(address, origin):
+    async def use():
+        port = address.split(':')[2].strip('/')
+        async with Page(address, headers={'Origin': origin.format(port=port)}):
+            pass
+
+    with pytest.raises(aiohttp.WSServerHandshakeError) as refused:
+        asyncio.run(use())
+    assert refused.value.status == 403
+
+
+def test_its_own_origin_is_let_in(address):
+    async def use():
+        async with Page(address, headers={'Origin': address[:-1]}) as page:
+            await page.heard('scene')
+
+    asyncio.run(use())
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(('127.0.0.1', 0))
+        return probe.getsockname()[1]
+
+
+@pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_viewer_while_somebody_looks(tmp_path, stop):
+    port = free_port()
+    scene = tmp_path / 'scene.yaml'
+    scene.write_text(json.dumps({'/**': {'ros__parameters': {'port': port}}}))
+    process = Process('viewer', scene)
+    url = f'http://127.0.0.1:{port}/'
+
+    async def use():
+        async def up():
+            try:
+                return (await status(url))[0] == 200
+            except aiohttp.ClientConnectionError:
+                return False
+
+        await browser.until(up)
+        async with Page(url) as page:
+            await page.heard('scene')
+            process.interrupt(stop)
+            await browser.until(lambda: page.socket.closed)
+
+    asyncio.run(use())
+    code, printed = process.end()
+    assert code == 0 and f'Look at {url}' in printed
+    assert 'Traceback' not in printed and 'rror' not in printed
+
+
+@pytest.mark.parametrize('parameters, named', [
+    ({'port': 'taken'}, 'address already in use'), ({'port': 70000}, 'port'),
+    ({'port': 'eighty'}, 'port'), ({'host': '192.0.2.1'}, '192.0.2.1'),
+])
+def test_a_viewer_that_cannot_listen_ends_in_one_sentence(tmp_path, parameters, named):
+    with socket.socket() as taken:
+        taken.bind(('127.0.0.1', 0))
+        taken.listen()
+        given = {'port': 0, **parameters}
+        if given['port'] == 'taken':
+            given['port'] = taken.getsockname()[1]
+        scene = tmp_path / 'scene.yaml'
+        scene.write_text(json.dumps({'/**': {'ros__parameters': given}}))
+        code, printed = Process('viewer', scene).end()
+    said = [line for line in printed.splitlines() if '[FATAL]' in line]
+    assert code == 1 and 'Traceback' not in printed
+    assert len(said) == 1 and named in said[0]
+
+
+def walker(step, legs=2, frame='world', width=1.0):
+    """Return a message as kinematics sends it."""
+    made = messages.Markers('leg', frame, (0.0, 1.0, 2.0, 0.5, 0.0, 0.0), [(0, 1), (1, 2)], width)
+    places = np.random.default_rng(step).normal(size=(legs, 3, 2))
+    stamp = rclpy.time.Time(nanoseconds=1 + 10 ** 9 * step).to_msg()
+    return serialize_message(made.message(stamp, places))
+
+
+# As the middleware hands it over.
+FILLED = walker(9) + bytes(3)
+
+
+def unpacked(text):
+    """Return the points of a message as they are drawn."""
+    message = deserialize_message(text, MarkerArray)
+    return b''.join(
+        struct.pack('<II', marker.id, len(marker.points)) + np.array(
+            [(p.x, p.y, p.z) for p in marker.points], '<f4').tobytes()
+        for marker in message.markers)
+
+
+def test_what_is_read_without_unpacking_is_what_unpacking_gives():
+    feed = Feed('/leg', MarkerArray, lambda _, id_: id_)
+    looks = []
+    for text in (walker(1), walker(2), walker(3), walker(4, legs=1), walker(5),
+                 walker(6, width=2.0), walker(7, frame='earth'), walker(8), FILLED, FILLED):
+        feed.newest = text
+        look, records = feed.drawn()
+        assert records == unpacked(text)
+        looks.append(look[0]['width'])
+    assert looks[5] == 2.0 * looks[0] == 2.0 * looks[7]
+
+
+def test_markers_that_are_gone_are_drawn_no_more():
+    feed = Feed('/leg', MarkerArray, lambda _, id_: id_)
+    feed.newest = walker(1)
+    assert set(feed.drawn()[0]) == {0, 1}
+    one = deserialize_message(walker(2), MarkerArray)
+    one.markers = [marker for marker in one.markers if marker.type == Marker.SPHERE_LIST]
+    feed.newest = serialize_message(one)
+    assert struct.pack('<II', 0, 0) in feed.drawn()[1]
+
+
+class Seen:
+    """A browser that looks at a show."""
+
+    def __init__(self, page):
+        self.page = page
+
+    def section(self, name):
+        """Return the expression for a mechanism's part of the panel."""
+        return f'document.querySelector(`section[data-key="/{name}"]`)'
+
+    def row(self, name, label):
+        """Return the expression for a slider's row."""
+        return (f'[...{self.section(name)}.querySelectorAll(".row")].find('
+                f'row => row.querySelector("label").textContent === "{label}")')
+
+    async def slide(self, name, label, part):
+        """Drag a slider from where it is to a part of its way."""
+        slider = f'{self.row(name, label)}.querySelector("input")'
+        x, y, width = await self.page.middle(slider)
+        at = await self.page.value(f'(({slider}).value - ({slider}).min) / '
+                                   f'(({slider}).max - ({slider}).min)')
+        left, inner = x - 0.5 * width + 8.0, width - 16.0
+        await self.page.drag((left + at * inner, y), (left + part * inner, y))
+
+    async def reason(self, name, label):
+        """Return the reason that is shown at a slider, or nothing."""
+        return await self.page.value(
+            f'(row => row.hidden ? "" : row.textContent)'
+            f'({self.row(name, label)}.querySelector(".reason"))')
+
+    async def number(self, name, label):
+        """Return the number that a slider shows."""
+        return float(await self.page.value(
+            f'{self.row(name, label)}.querySelector("input[type=number]").value'))
+
+    async def view(self, name):
+        """Show one mechanism."""
+        await self.page.click('[...document.querySelectorAll("#views button")].find('
+                              f'button => button.textContent === "{name}")')
+
+    async def canvas(self):
+        """Return what is seen of the picture."""
+        width = await self.page.value('document.getElementById("picture").clientWidth')
+        top = await self.page.value('document.getElementById("picture").getBoundingClientRect().y')
+        return (await self.page.picture())[int(top):, :int(width)]
+
+
+def coloured(picture, red, green, blue):
+    """Return the rows and columns of the pixels of a colour."""
+    return np.argwhere((abs(picture - (red, green, blue)) < 12).all(axis=2))
+
+
+@pytest.fixture
+def looked_at(tmp_path):
+    """Return a function that looks at a show with a browser and does something there."""
+    def run(running, doing):
+        async def look():
+            async with browser.Browser(tmp_path) as page:
+                await page.open(running.viewer.url)
+                seen = Seen(page)
+                await browser.until(
+                    lambda: page.value('document.querySelectorAll("section").length'))
+                await doing(seen)
+                assert page.complaints == []
+                assert all(url.startswith((running.viewer.url, 'ws://127.0.0.1:', 'data:'))
+                           for url in page.requests)
+
+        asyncio.run(look())
+
+    return run
+
+
+@needs_browser
+def test_the_picture_moves_and_a_click_stops_it(show, looked_at):
+    running = show({**LEVER, 'drop.crank.speed': 0.0, 'lever.crank.speed': 3.0})
+
+    async def doing(seen):
+        await seen.view('lever')
+
+        async def drawn():
+            return len(coloured(await seen.canvas(), 0, 114, 178)) > 1000
+
+        await browser.until(drawn)
+        first = await seen.canvas()
+
+        async def moved():
+            return (await seen.canvas() != first).any(axis=2).sum() > 1000
+
+        await browser.until(moved)
+        await seen.page.click(f'{seen.section("lever")}.querySelector("button")')
+        await browser.until(lambda: running.values('lever.crank.speed') == [0.0])
+
+        async def still():
+            before = await seen.canvas()
+            return (await seen.canvas() == before).all()
+
+        await browser.until(still)
+
+    looked_at(running, doing)
+
+
+@needs_browser
+def test_a_dragged_slider_sets_the_nodes_and_a_refused_one_springs_back(show, looked_at):
+    running = show(LEVER)
+
+    async def doing(seen):
+        await seen.view('lever')
+        await seen.slide('lever', 'b', 0.7)
+        await browser.until(lambda: running.values('lever.dimensions.b')[0] > 200.0)
+
+        async def agreed():
+            return running.values('lever.dimensions.b') == [await seen.number('lever', 'b')] * 3
+
+        await browser.until(agreed)
+        assert await seen.reason('lever', 'b') == ''
+
+        await seen.slide('lever', 'e', 1.0)
+        await browser.until(lambda: seen.reason('lever', 'e'))
+        kept, = set(running.values('lever.dimensions.e'))
+
+        async def sprung():
+            return abs(await seen.number('lever', 'e') - kept) < 1e-5 * abs(kept) + 1e-9
+
+        await browser.until(sprung)
+        assert re.match('Refused: .*lever.dimensions', await seen.reason('lever', 'e'))
+        assert abs(kept) < 1500.0
+
+    looked_at(running, doing)
+
+
+@needs_browser
+def test_the_lever_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
+    running = show({**LEVER, 'lever.crank.speed': 0.0})
+
+    async def doing(seen):
+        await seen.view('lever')
+
+        async def settled():
+            before = await seen.canvas()
+            return len(coloured(before, 89, 193, 163)) > 100 and (
+                await seen.canvas() == before).all()
+
+        await browser.until(lambda: seen.page.value(f'!!({seen.row("lever", "lever")})'))
+        await browser.until(settled)
+        rows, columns = coloured(await seen.canvas(), 230, 159, 0).T
+        top = await seen.page.value('document.getElementById("picture").getBoundingClientRect().y')
+        tip = float(columns[rows < rows.min() + 10].mean()), top + int(rows.min()) + 8
+        pivot = float(columns[rows > rows.max() - 10].mean()), top + int(rows.max()) - 8
+        length = pivot[1] - tip[1]
+
+        def at(phi):
+            return pivot[0] - length * math.sin(phi), pivot[1] - length * math.cos(phi)
+
+        await seen.page.drag(tip, at(0.2), at(0.4))
+        await browser.until(lambda: abs(
+            lever_of(running.values('lever.crank.start')[0]) - 0.4) < 0.02)
+
+        async def shown():
+            servo, = running.values('lever.crank.start')
+            return abs(await seen.number('lever', 'lever') - lever_of(servo)) < 0.01
+
+        await browser.until(shown)
+        assert await seen.reason('lever', 'lever') == ''
+        await seen.page.drag(at(0.4), at(0.5), at(1.2))
+        await browser.until(lambda: seen.reason('lever', 'lever'))
+        assert 'the lever reaches' in await seen.reason('lever', 'lever')
+        await browser.until(shown)
+
+    looked_at(running, doing)
+
+
+@needs_browser
+def test_a_foreign_page_is_not_let_in(address, tmp_path):
+    async def look():
+        async with browser.Browser(tmp_path) as page:
+            await page.open('about:blank')
+            return await page.value(
+                'new Promise(done => {'
+                f'  const socket = new WebSocket("{address.replace("http", "ws")}socket");'
+                '  socket.onopen = () => done("open");'
+                '  socket.onerror = () => done("refused");'
+                '})')
+
+    assert asyncio.run(look()) == 'refused'
