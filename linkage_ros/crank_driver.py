@@ -59,6 +59,7 @@ class CrankDriver(node.SceneNode):
     def _time(self):
         return self.get_clock().now()
 
+    @node.until_the_end
     def _tick(self):
         time = self._time()
         now = time.nanoseconds

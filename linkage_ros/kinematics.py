@@ -48,6 +48,7 @@ class Kinematics(node.SceneNode):
         for name, machine in new.machines.items():
             self._outlets[name].follow(machine, new.frame_id)
 
+    @node.until_the_end
     def _turn(self, cranks):
         if cranks.name != self._names:
             self._names = list(cranks.name)

@@ -14,6 +14,9 @@
 
 """What the three nodes share: a scene as parameters that can be changed, and `main`."""
 
+from functools import wraps
+import signal
+
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
@@ -38,6 +41,19 @@ RCLError = rclpy_implementation.RCLError
 
 # Some builds of the EventsExecutor wait well for a while, but busily and deaf to signals for ever.
 LONGEST_WAIT = 1.0
+
+
+def until_the_end(callback):
+    """Let a callback of a node fail in silence where it fails because its context has ended."""
+    @wraps(callback)
+    def guarded(self, *args):
+        try:
+            callback(self, *args)
+        except RCLError:
+            # A signal ends the context at any time, even while a message is being published.
+            if self.context.ok():
+                raise
+    return guarded
 
 
 class SceneNode(Node):
@@ -128,6 +144,8 @@ def _typed(parameter):
 
 def run(node_class, name: str, args=None, executor_class=Executor) -> int:
     """Run a node until it is interrupted; return the exit code of the process."""
+    # An interrupt is to end the context, as it does, but not to raise amid a callback.
+    signal.signal(signal.SIGINT, lambda *_: None)
     try:
         rclpy.init(args=args)
     except RCLError as error:
@@ -136,12 +154,11 @@ def run(node_class, name: str, args=None, executor_class=Executor) -> int:
     try:
         node = node_class()
         _spin(node, executor_class())
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except ExternalShutdownException:
         pass
     except scene.SceneError as error:
         return _failed(name, error)
     except RCLError:
-        # A signal ends the context at any time, even while a message is being published.
         if rclpy.ok():
             raise
     finally:

@@ -121,6 +121,35 @@ def test_where_there_is_no_such_executor_the_plain_one_is_used_and_ends_as_quiet
     assert (done.returncode, done.stderr) == (0, 'turned\n')
 
 
+@pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('plain', [False, True])
+def test_a_signal_amid_a_callback_ends_a_node_quietly(stop, plain):
+    done = python(f"""
+        import signal, sys
+        from linkage_ros import node
+        from linkage_ros.crank_driver import CrankDriver
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+        from sensor_msgs.msg import JointState
+
+        class Ended(CrankDriver):
+            def __init__(self):
+                super().__init__()
+                self.create_subscription(JointState, 'crank_states', print, 1)
+
+            def _time(self):
+                if self._publisher.get_subscription_count():
+                    signal.raise_signal({int(stop)})
+                    while rclpy.ok():
+                        pass
+                return super()._time()
+
+        executor = SingleThreadedExecutor if {plain} else node.Executor
+        sys.exit(node.run(Ended, 'ended', [], executor))
+        """)
+    assert (done.returncode, done.stdout, done.stderr) == (0, '', '')
+
+
 @pytest.mark.parametrize('executor', [node.Executor, SingleThreadedExecutor])
 def test_a_programming_error_ends_a_node_loudly(executor):
     done = python(f"""
