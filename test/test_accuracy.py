@@ -74,13 +74,13 @@ def check(rows):
 @pytest.mark.parametrize('kind, dimensions, branches', CATALOGUE)
 def test_the_catalogue_is_right_to_the_last_digits(kind, dimensions, branches):
     mechanism = mechanisms.create(kind, branches=branches, **dimensions)
-    check(measure(mechanism, awkward(mechanism, np.random.default_rng(1), 6)))
+    check(measure(mechanism, awkward(mechanism, np.random.default_rng(1), 3)))
 
 
 @pytest.mark.parametrize('kind', KINDS)
 def test_random_and_degenerate_dimensions_are_right_too(kind):
     rows = []
-    for mechanism, rng in some(kind, seed=2, count=80):
+    for mechanism, rng in some(kind, seed=2, count=24):
         rows += measure(mechanism, stress.angles(rng, 3, ends(mechanism)))
     check(rows)
 
@@ -88,7 +88,7 @@ def test_random_and_degenerate_dimensions_are_right_too(kind):
 @pytest.mark.parametrize('kind', KINDS)
 def test_velocities_and_joint_rates_are_right(kind):
     rows = []
-    for mechanism, rng in some(kind, seed=3, count=15):
+    for mechanism, rng in some(kind, seed=3, count=4):
         rows += measure(mechanism, stress.angles(rng, 2, ends(mechanism)), rates=True)
     check(rows)
 
@@ -97,13 +97,13 @@ def test_velocities_and_joint_rates_are_right(kind):
     case for case in CATALOGUE if case[1] is stress.CATALOGUE[case[0]][0]])
 def test_velocities_and_joint_rates_of_the_catalogue_are_right(kind, dimensions, branches):
     mechanism = mechanisms.create(kind, branches=branches, **dimensions)
-    check(measure(mechanism, awkward(mechanism, np.random.default_rng(4), 6)[::4], rates=True))
+    check(measure(mechanism, awkward(mechanism, np.random.default_rng(4), 6)[::8], rates=True))
 
 
 @pytest.mark.parametrize('half', [1, -1])
 def test_the_inverse_of_the_lever_is_right_on_both_branches(half):
     rows = []
-    for mechanism, rng in some('slotted_lever', seed=5, count=40):
+    for mechanism, rng in some('slotted_lever', seed=5, count=12):
         lever = mechanisms.create('slotted_lever', branches={'L': half}, **mechanism.dimensions)
         limits = [end for arc in lever.lever_reach() for end in arc]
         rows += measure_servo(lever, stress.angles(rng, 4, limits, turns=1.0))
@@ -116,14 +116,14 @@ def test_the_inverse_of_the_lever_is_right_on_both_branches(half):
 
 @given(theta=st.floats(-1e10, 1e10), a=st.floats(0.01, 100.0), b=st.floats(0.01, 100.0),
        e=st.floats(-100.0, 100.0).filter(lambda e: e == 0.0 or abs(e) > 1e-6))
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None, derandomize=True)
 def test_any_lever_at_any_angle_is_right(theta, a, b, e):
     check(measure(mechanisms.create('slotted_lever', a=a, b=b, e=e), [theta]))
 
 
 @given(theta=st.floats(-4.0, 4.0), r=st.floats(0.1, 10.0), a=st.floats(0.1, 10.0),
        b=st.floats(0.1, 10.0))
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None, derandomize=True)
 def test_any_inversor_at_any_angle_is_right(theta, r, a, b):
     check(measure(mechanisms.create('peaucellier', r=r, a=a, b=b), [theta]))
 
@@ -132,7 +132,7 @@ def test_any_inversor_at_any_angle_is_right(theta, r, a, b):
 @pytest.mark.parametrize('size', [1e-150, 1e150])
 def test_lengths_of_any_size_are_right(kind, size):
     rows = []
-    for mechanism, rng in some(kind, seed=6, count=8):
+    for mechanism, rng in some(kind, seed=6, count=4):
         grown = {name: value * size for name, value in mechanism.dimensions.items()}
         grown = mechanisms.create(kind, branches=mechanism.branches, **grown)
         rows += measure(grown, stress.angles(rng, 2, ends(grown)), rates=True)
@@ -143,7 +143,7 @@ def test_lengths_of_any_size_are_right(kind, size):
 @pytest.mark.parametrize('power', [-500, 500])
 def test_lengths_times_a_power_of_two_give_the_same_bits(kind, power):
     scale = 2.0 ** power
-    for mechanism, rng in some(kind, seed=7, count=10):
+    for mechanism, rng in some(kind, seed=7, count=5):
         grown = {name: value * scale for name, value in mechanism.dimensions.items()}
         grown = mechanisms.create(kind, branches=mechanism.branches, **grown)
         theta = stress.angles(rng, 10, ends(mechanism))
