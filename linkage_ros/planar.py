@@ -105,7 +105,6 @@ class Arm:
         self.foot = foot
         self.vector = end - foot
         self.square = self.vector.squared()
-        self._length = square_root(self.square)
         self._span = span
 
     def offset(self, point: Complex) -> Real:
@@ -114,12 +113,12 @@ class Arm:
 
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
-        margin = (radius - self._length) * (radius + self._length)
+        margin = square(radius) - self.square
         return self._limit(radius, size, 1.0, margin)
 
     def beyond(self, radius: Real, size: Real) -> Limit:
         """Return the margin square - radius^2; the radius is made from lengths up to size."""
-        margin = (self._length - radius) * (self._length + radius)
+        margin = self.square - square(radius)
         return self._limit(radius, size, -1.0, margin)
 
     def _rate(self, margin, sign):
