@@ -108,7 +108,15 @@ def truth(case, theta, links, rates=False):
     """Return the `Truth` of a case at a crank angle, for the links as a mechanism lists them."""
     def evaluate(length, angle):
         return _evaluate(case, length, angle, links, rates)
-    return _truth(evaluate, case.dimensions, float(theta))
+    return _truth(evaluate, case.dimensions, float(theta), _bars(case))
+
+
+def _bars(case):
+    """Return the lengths of bars that are no dimension but follow from them: rounded as well."""
+    if case.kind != 'slotted_lever':
+        return {}
+    a, b = (mp.mpf(case.dimensions[name]) for name in 'ab')
+    return {'tip': max(9 * b / 5, a + b)}
 
 
 def servo_truth(dimensions, half, lever_angle, cut):
@@ -120,13 +128,13 @@ def servo_truth(dimensions, half, lever_angle, cut):
     return _truth(evaluate, dimensions, float(lever_angle))
 
 
-def _truth(evaluate, dimensions, angle):
+def _truth(evaluate, dimensions, angle, bars=()):
     length = reference.exact(dimensions)
     values, gaps = evaluate(length, mp.mpf(angle))
     spread, slack = dict.fromkeys(values, mp.zero), dict.fromkeys(gaps, mp.zero)
     for side in (1, -1):
         one_side, one_slack = dict.fromkeys(values, mp.zero), dict.fromkeys(gaps, mp.zero)
-        for moved in _moves(length, dimensions, angle, side):
+        for moved in _moves(length, dimensions, angle, dict(bars), side):
             new_values, new_gaps = evaluate(*moved)
             for name in values:
                 one_side[name] += _distance(name, values[name], new_values[name])
@@ -140,13 +148,15 @@ def _truth(evaluate, dimensions, angle):
     return Truth(values, spread, closures)
 
 
-def _moves(length, dimensions, angle, side):
+def _moves(length, dimensions, angle, bars, side):
     """Yield the inputs with one of them moved by half an ulp; what is zero is exact."""
     if angle:
         yield length, mp.mpf(angle) + side * _half_ulp(min(abs(angle), math.pi))
     for name, number in dimensions.items():
         if number:
             yield {**length, name: length[name] + side * _half_ulp(number)}, mp.mpf(angle)
+    for name, number in bars.items():
+        yield {**length, name: number + side * _half_ulp(float(number))}, mp.mpf(angle)
 
 
 def _half_ulp(number):

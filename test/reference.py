@@ -185,7 +185,7 @@ def _other_corner(A, B, D, b):
     return circles(B, b, D, b, side)[0]
 
 
-def _slotted_lever(theta, sides, a, b, e):
+def _slotted_lever(theta, sides, a, b, e, tip=None):
     """Lay the slot from the pin as a tangent, at the foot, to the circle of its offset about Q."""
     A = I * a * mp.expj(theta)
     Q = mp.mpc(0, -b)
@@ -193,8 +193,8 @@ def _slotted_lever(theta, sides, a, b, e):
     slide = sides['L'] * mp.sqrt(gap if gap > 0 else mp.zero)
     foot, _ = circles(Q, abs(e), A, abs(slide), LEFT if slide * e > 0 else RIGHT)
     lever = (A - foot) / slide if abs(slide) > abs(e) else (foot - Q) / (I * e)
-    tip = Q + lever * max(9 * b / 5, a + b)
-    return Pose({'O': mp.mpc(0), 'Q': Q, 'A': A, 'L': tip}, {'L': gap}, slide)
+    end = Q + lever * (tip or max(9 * b / 5, a + b))
+    return Pose({'O': mp.mpc(0), 'Q': Q, 'A': A, 'L': end}, {'L': gap}, slide)
 
 
 _PLACE = {
