@@ -154,7 +154,7 @@ class Sketch:
 
     def parallelogram(self, name: str, corner: str, first: str, second: str):
         """Join bars to two joints that are parallel to the bars from a corner to them."""
-        to_first, to_second = (self._bar_between(corner, end) for end in (first, second))
+        to_first, to_second = (self._side(corner, end) for end in (first, second))
         self.folds.append(planar.Limit(cross(to_first.vector, to_second.vector),
                                        planar.GRAZE * to_first.length * to_second.length))
         self._pair(name, first, second, planar.Dyad(to_second.vector, to_first.vector, ()),
@@ -218,6 +218,14 @@ class Sketch:
             self._vectors[first, second] = _Vector(vector, length, link)
         return self._vectors[first, second]
 
+    def _side(self, first, second):
+        """Return the vector between two joints of one link or of the ground."""
+        ends = self.points[first], self.points[second]
+        if ends[0].home == ends[1].home == GROUND:
+            vector = ends[1].place - ends[0].place
+            return _Vector(vector, vector.length(), GROUND)
+        return self._bar_between(first, second)
+
     def _link_of(self, first, second):
         for link, frame in self.frames.items():
             if first in frame and second in frame:
@@ -246,10 +254,7 @@ class Sketch:
 
     def distance(self, first: str, second: str) -> Real:
         """Return the constant distance [m] of two joints of one link or of the ground."""
-        ends = self.points[first], self.points[second]
-        if ends[0].home == ends[1].home == GROUND:
-            return (ends[1].place - ends[0].place).length()
-        return self._bar_between(first, second).length
+        return self._side(first, second).length
 
     def _pair(self, name, first, second, found, to_first, to_second):
         """Join the two bars of a dyad: the joint belongs to the first, the second is cut there."""

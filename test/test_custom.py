@@ -91,6 +91,18 @@ def test_a_parallelogram_stays_one(m, g):
     assert linkage.dead_points() == pytest.approx([-math.pi, 0.0], abs=1e-15)
 
 
+def test_a_parallelogram_is_a_line_of_its_own():
+    linkage = mechanisms.create('custom', g=0.3, m=0.1, joints=(
+        'O ground 0 0', 'Q ground 0 g', 'A crank O m', 'B parallelogram O A Q'))
+    theta = np.linspace(-9.0, 9.0, 181)
+    place = linkage.solve(theta)
+    np.testing.assert_allclose(place['B'] - place['A'], np.full((181, 2), (0.0, 0.3)), atol=1e-16)
+    np.testing.assert_allclose(linkage.joint_angles(theta)['QB'],
+                               np.arctan2(np.sin(theta), np.cos(theta)), atol=2e-15)
+    assert linkage.bar_lengths == {('O', 'A'): 0.1, ('A', 'B'): 0.3, ('Q', 'B'): 0.1}
+    assert linkage.dead_points() == pytest.approx([-math.pi / 2, math.pi / 2])
+
+
 def test_an_antiparallelogram_stays_one():
     linkage = four_bar(1.0, 3.0, 1.0, 3.0, side=-1)
     theta = np.linspace(-3.0, 3.0, 61)

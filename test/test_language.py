@@ -46,7 +46,7 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P line A B 0', 'the bar A-P must be longer than zero, got 0'),
     ('P line A B b-b', 'the bar A-P must be longer than zero, got 0'),
     ('P mirror B O Q', 'O and B are not joints of one moving link'),
-    ('P parallelogram O A Q', 'O and Q are not joints of one moving link'),
+    ('P parallelogram O B Q', 'O and B are not joints of one moving link'),
     ('P slot A B 0 out 1', 'joint A must be on the ground'),
     ('P slider B 3 A 0 out', 'joint A must be on the ground'),
     ('P slider B 3 O 0 up', "'up' must be out or in"),
