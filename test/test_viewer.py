@@ -316,6 +316,7 @@ def test_a_dragged_lever_is_where_it_was_dragged_to_and_stays_there(show):
         async with Page(url) as page:
             await page.cast('/lever', '/drop')
             answer = await page.ask('drag', '/lever', angle=0.4)
+            assert answer['reason'] == ''
 
             def lever():
                 joints = page.drawn('/lever', 'joints')
@@ -326,7 +327,6 @@ def test_a_dragged_lever_is_where_it_was_dragged_to_and_stays_there(show):
             return answer
 
     answer = asyncio.run(use(running.viewer.url))
-    assert answer['reason'] == ''
     assert lever_of(answer['servo']) == pytest.approx(0.4, abs=1e-12)
     slope = (lever_of(answer['servo'] + 1e-6) - lever_of(answer['servo'] - 1e-6)) / 2e-6
     assert answer['reduction'] == pytest.approx(slope, abs=1e-8)

@@ -17,6 +17,7 @@
 const MARGIN = 44;
 const SLACK = 0.06;
 const GRAB = 18;
+const LINE = 18;
 const FONT = "13px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
 const REFUSED = '#d55e00';
 
@@ -286,15 +287,23 @@ export class Picture {
     }
   }
 
-  /** Write the mechanisms' names below them. */
+  /** Write the mechanisms' names below them, none over another. */
   titles() {
     const { context } = this;
     context.font = `600 ${FONT}`;
     context.textAlign = 'center';
     context.textBaseline = 'top';
+    const written = [];
     for (const { key, name } of this.mechanisms) {
       const box = this.boxes.get(key);
-      if (box) this.text(name, ...this.at((box.low[0] + box.high[0]) / 2, box.low[1]));
+      if (!box) continue;
+      const half = context.measureText(name).width / 2 + 4;
+      let [x, y] = this.at((box.low[0] + box.high[0]) / 2, box.low[1]);
+      const over = () => written.find(other =>
+        Math.abs(other.x - x) < other.half + half && Math.abs(other.y - y) < LINE);
+      for (let other = over(); other; other = over()) y = other.y + LINE;
+      written.push({ x, y, half });
+      this.text(name, x, y);
     }
   }
 
@@ -315,22 +324,31 @@ export class Picture {
       mechanism.key, Math.atan2(points[3 * pivot] - points[3 * tip], points[3 * tip + 1] - points[3 * pivot + 1])]);
   }
 
+  /** Return the mechanism whose lever is under the pointer. */
+  under([x, y]) {
+    for (const { mechanism, places, pivot, tip } of this.found()) {
+      const [q, l] = [pivot, tip].map(i => this.at(places[2 * i], places[2 * i + 1]));
+      const along = [l[0] - q[0], l[1] - q[1]];
+      const part = ((x - q[0]) * along[0] + (y - q[1]) * along[1]) / (along[0] ** 2 + along[1] ** 2);
+      const near = Math.min(Math.max(part, 0.2), 1);
+      if (Math.hypot(x - q[0] - near * along[0], y - q[1] - near * along[1]) < GRAB) return mechanism;
+    }
+    return null;
+  }
+
   grab(event) {
     const pointer = [event.offsetX, event.offsetY];
-    for (const lever of this.found()) {
-      const [q, l] = [lever.pivot, lever.tip].map(i => this.at(lever.places[2 * i], lever.places[2 * i + 1]));
-      const along = [l[0] - q[0], l[1] - q[1]];
-      const part = ((pointer[0] - q[0]) * along[0] + (pointer[1] - q[1]) * along[1]) / (along[0] ** 2 + along[1] ** 2);
-      const near = Math.min(Math.max(part, 0.2), 1);
-      if (Math.hypot(pointer[0] - q[0] - near * along[0], pointer[1] - q[1] - near * along[1]) > GRAB) continue;
-      this.grabbed = { key: lever.mechanism.key, pointer };
-      this.canvas.setPointerCapture(event.pointerId);
-      return;
-    }
+    const mechanism = this.under(pointer);
+    if (!mechanism) return;
+    this.grabbed = { key: mechanism.key, pointer };
+    this.canvas.setPointerCapture(event.pointerId);
   }
 
   move(event) {
-    if (!this.grabbed) return;
+    if (!this.grabbed) {
+      this.canvas.classList.toggle('lever', this.under([event.offsetX, event.offsetY]) !== null);
+      return;
+    }
     this.grabbed.pointer = [event.offsetX, event.offsetY];
     const lever = [...this.found()].find(({ mechanism }) => mechanism.key === this.grabbed.key);
     if (!lever) return;
