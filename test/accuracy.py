@@ -113,10 +113,12 @@ def truth(case, theta, links, rates=False):
 
 def _bars(case):
     """Return the lengths of bars that are no dimension but follow from them: rounded as well."""
-    if case.kind != 'slotted_lever':
-        return {}
-    a, b = (mp.mpf(case.dimensions[name]) for name in 'ab')
-    return {'tip': max(9 * b / 5, a + b)}
+    length = reference.exact(case.dimensions)
+    if case.kind == 'water_drop':
+        return {'rocker': 2 * length['a'], 'tail': 3 * length['a']}
+    if case.kind == 'slotted_lever':
+        return {'tip': max(9 * length['b'] / 5, length['a'] + length['b'])}
+    return {}
 
 
 def servo_truth(dimensions, half, lever_angle, cut):

@@ -141,18 +141,19 @@ def servo(length, lever_angle, cut):
     return Servo(mp.arg((foot + slide * lever) / I), slide, gap)
 
 
-def _water_drop(theta, sides, a):
+def _water_drop(theta, sides, a, rocker=None, tail=None):
     """Turn CO by twice the angle OCA, which has the sign of the crank's sine."""
     sine = mp.sin(theta)
     with mp.extraprec(-2 * min(0, mp.mag(sine)) if sine else 0):
+        c = rocker or 2 * a
         A = I * a * mp.expj(theta)
-        C = mp.mpc(0, -2 * a)
+        C = mp.mpc(0, -c)
         reach = mp.sqrt(squared(A - C))
-        cosine = (reach * reach + 4 * a * a - a * a) / (4 * a * reach)
+        cosine = (reach * reach + c * c - a * a) / (2 * c * reach)
         height = mp.sqrt(max(mp.zero, 1 - cosine * cosine))
         half = mp.mpc(cosine, height if sine > 0 else -height)
-        B = C + 2 * a * I * half * half
-        P = A + 3 * (A - B)
+        B = C + c * I * half * half
+        P = A + (tail or 3 * a) / a * (A - B)
     return Pose({'O': mp.mpc(0), 'C': C, 'A': A, 'B': B, 'P': P}, {})
 
 
