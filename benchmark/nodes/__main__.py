@@ -1,0 +1,102 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What the nodes cost, next to what any node costs, in the same run.
+
+    python -m benchmark.nodes             everything but what is below, in some ten minutes
+    python -m benchmark.nodes --quick     a look, within a minute or two
+    python -m benchmark.nodes --soak      memory over a million messages
+    python -m benchmark.nodes --hold      a minute at 1000 Hz
+
+Results go to benchmark/results/nodes.json, each mode into its own part, with a table beside it.
+"""
+
+import argparse
+import json
+import os
+from pathlib import Path
+import sys
+import tempfile
+import time
+from types import SimpleNamespace
+
+from . import report
+
+ROS = [SimpleNamespace(package=name) for name in ('ros-rclpy', 'ros-rmw-fastrtps-cpp')]
+RESULTS = Path(__file__).parents[1] / 'results' / 'nodes.json'
+
+
+def main():
+    """Run, write and print."""
+    # The processes find each other here and nobody else.
+    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
+    os.environ['PYTHONPATH'] = os.pathsep.join(
+        [str(Path(__file__).parents[2]), os.environ.get('PYTHONPATH', '')])
+    options = arguments()
+    result = json.loads(options.output.read_text()) if options.output.exists() else {}
+    result.update(run(options))
+    options.output.parent.mkdir(parents=True, exist_ok=True)
+    options.output.write_text(json.dumps(result, indent=1) + '\n')
+    options.output.with_suffix('.md').write_text(report.document(result))
+    print(report.document(result))
+
+
+def arguments():
+    """Return what the command line asks for."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
+    mode = parser.add_mutually_exclusive_group()
+    mode.add_argument('--quick', action='store_true', help='one rate and fewer rounds')
+    mode.add_argument('--soak', type=int, nargs='?', const=10 ** 6, metavar='MESSAGES')
+    mode.add_argument('--hold', type=float, nargs='?', const=60.0, metavar='SECONDS')
+    parser.add_argument('--rounds', type=int, help='bursts of each subject')
+    parser.add_argument('--output', type=Path, default=RESULTS, metavar='JSON')
+    return parser.parse_args()
+
+
+def run(options):
+    """Return the parts of the result that were asked for."""
+    from benchmark.machine import machine
+
+    from . import campaign, driving, long, scenes
+
+    started = time.time()
+    driver = driving.Driver()
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            bench = campaign.Bench(
+                driver, Path(folder), options.rounds or (2 if options.quick else 7))
+            if options.soak:
+                return {'soak': long.soak(bench, options.soak)}
+            if options.hold:
+                return {'hold': long.hold(bench, 1000.0, options.hold)}
+            rates = (1000.0,) if options.quick else campaign.RATES
+            rows, parts = [], []
+            for scene in scenes.SCENES:
+                rows += bench.cost(scene, rates)
+                for rate in rates:
+                    parts += bench.parts(scene, rate)
+                print(f'{scene}: {time.time() - started:.0f} s', file=sys.stderr)
+            return {'rows': rows, 'parts': parts, 'starts': bench.starts(),
+                    'services': bench.services(40 if options.quick else 200),
+                    'machine': machine(ROS), 'cores': os.cpu_count(),
+                    'load': os.getloadavg()[2],
+                    'seconds': round(time.time() - started)}
+    finally:
+        driver.end()
+
+
+if __name__ == '__main__':
+    main()

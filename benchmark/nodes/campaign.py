@@ -1,0 +1,181 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Short bursts, each subject in turn, round after round."""
+
+from contextlib import contextmanager
+import json
+import statistics
+import time
+
+from linkage_interfaces.srv import ServoInverse
+import numpy as np
+from std_srvs.srv import Trigger
+
+from . import scenes
+from .driving import Process
+
+SUBJECT = ('-m', 'benchmark.nodes.subject')
+NODE = ('-m', 'linkage_ros.kinematics')
+RATES = (50.0, 200.0, 1000.0)
+# How long a burst takes [s], by rate.
+SECONDS = {50.0: 1.2, 200.0: 1.0, 1000.0: 0.6}
+WARM_UP = 60
+
+
+class Bench:
+    """A driver, a folder for what processes are given and give back, and how many rounds."""
+
+    def __init__(self, driver, folder, rounds):
+        self.driver, self.folder, self.rounds = driver, folder, rounds
+
+    @contextmanager
+    def subjects(self, scene, wanted):
+        """Start processes, {name: (arguments, topics that are heard)}; yield their lines."""
+        parameters = scenes.write(scene, self.folder)
+        started = {}
+        try:
+            for name, (arguments, _) in wanted.items():
+                started[name] = Process(name, *arguments, parameters=parameters)
+            yield {name: self.driver.line(started[name], scene, topics)
+                   for name, (_, topics) in wanted.items()}
+        finally:
+            for process in started.values():
+                process.end()
+
+    def ready(self, scene):
+        """Return the file with what `kinematics` answers on each topic."""
+        path = self.folder / f'{scene.replace(" ", "_")}.ready'
+        if not path.exists():
+            process = Process('model', *NODE, parameters=scenes.write(scene, self.folder))
+            try:
+                self.driver.capture(process, scene, path)
+            finally:
+                process.end()
+        return path
+
+    def cost(self, scene, rates=RATES):
+        """Return rows of CPU time a message and latency, for every subject and rate."""
+        heard = scenes.topics(scene)
+        floor = (*SUBJECT, 'floor', '--ready', str(self.ready(scene)))
+        wanted = {
+            'kinematics': (NODE, heard), 'floor': (floor, heard),
+            'fresh': ((*SUBJECT, 'fresh'), heard),
+            'unheard': (NODE, ()), 'deaf': ((*SUBJECT, 'deaf'), ()),
+            'raw': ((*SUBJECT, 'raw'), ())}
+        if scene == 'one leg':
+            wanted['relay'] = (*SUBJECT, 'relay'), heard[:1]
+        if scene == '12 legs':
+            wanted['kinematics_plain'] = (*SUBJECT, 'kinematics', '--single'), heard
+            wanted['floor_plain'] = (*floor, '--single'), heard
+        with self.subjects(scene, wanted) as lines:
+            for line in lines.values():
+                line.burst(200.0, WARM_UP)
+            return [row for rate in rates for row in self._rows(scene, rate, lines)]
+
+    def _rows(self, scene, rate, lines):
+        bursts = {name: [] for name in lines}
+        for _ in range(self.rounds):
+            for name, line in lines.items():
+                bursts[name].append(line.burst(rate, round(rate * SECONDS[rate])))
+        return [{'scene': scene, 'rate': rate, 'subject': name, **_summary(found)}
+                for name, found in bursts.items()]
+
+    def parts(self, scene, rate):
+        """Return the parts of a tick of each subject [us]."""
+        heard = scenes.topics(scene)
+        wanted = {
+            'kinematics': ('kinematics', heard), 'fresh': ('fresh', heard),
+            'floor': ('floor', heard)}
+        if scene == 'one leg':
+            wanted['relay'] = 'relay', heard[:1]
+        files = {name: self.folder / f'{name}.times' for name in wanted}
+        with self.subjects(scene, {
+                name: ((*SUBJECT, kind, '--times', str(files[name]),
+                        *(('--ready', str(self.ready(scene))) if kind == 'floor' else ())), topics)
+                for name, (kind, topics) in wanted.items()}) as lines:
+            for _ in range(self.rounds):
+                for line in lines.values():
+                    line.burst(rate, round(rate * SECONDS[rate]))
+        return [{'scene': scene, 'rate': rate, 'subject': name, **json.loads(path.read_text())}
+                for name, path in files.items()]
+
+    def starts(self, scene='12 legs'):
+        """Return seconds from the start of a process to its first joint states."""
+        heard = scenes.topics(scene)[:1]
+        floor = (*SUBJECT, 'floor', '--ready', str(self.ready(scene)))
+        found = {'kinematics': [], 'floor': []}
+        for _ in range(self.rounds):
+            for name, arguments in (('kinematics', NODE), ('floor', floor)):
+                begin = time.perf_counter()
+                with self.subjects(scene, {name: (arguments, heard)}):
+                    found[name].append(time.perf_counter() - begin)
+        return {name: statistics.median(times) for name, times in found.items()}
+
+    def services(self, calls):
+        """Return rows of round trips [us] and CPU time a call [us]."""
+        servo = Process('servo', '-m', 'linkage_ros.servo_inverse')
+        trigger = Process('plain', *SUBJECT, 'trigger')
+        echo = Process('echo', *SUBJECT, 'echo')
+        try:
+            node = self.driver.node
+            asks = node.create_client(ServoInverse, '/servo/servo_inverse')
+            pulls = node.create_client(Trigger, '/plain/trigger')
+            shouts = node.create_client(ServoInverse, '/echo/servo_inverse')
+            clients = asks, pulls, shouts
+            assert self.driver.until(lambda: all(c.service_is_ready() for c in clients))
+            wanted = {
+                'trigger': (trigger, pulls, Trigger.Request(), calls),
+                'echo 1': (echo, shouts, _request(1), calls),
+                'servo 1': (servo, asks, _request(1), calls),
+                'echo 1000': (echo, shouts, _request(1000), calls // 4),
+                'servo 1000': (servo, asks, _request(1000), calls // 4)}
+            bursts = {name: [] for name in wanted}
+            for _ in range(self.rounds + 1):
+                for name, call in wanted.items():
+                    bursts[name].append(self._calls(*call))
+        finally:
+            for process in (servo, trigger, echo):
+                process.end()
+        return [{'subject': name,
+                 'round_trips': [statistics.median(times) for times, _ in found[1:]],
+                 'p50': statistics.median(statistics.median(times) for times, _ in found[1:]),
+                 'p99': float(np.percentile(np.concatenate([t for t, _ in found[1:]]), 99)),
+                 'cpu': statistics.median(cpu for _, cpu in found[1:])}
+                for name, found in bursts.items()]
+
+    def _calls(self, process, client, request, count):
+        times, spin, cpu = [], self.driver._executor.spin_once, process.cpu()
+        for _ in range(count):
+            start = time.perf_counter()
+            future = client.call_async(request)
+            while not future.done():
+                spin(timeout_sec=1.0)
+            times.append(1e6 * (time.perf_counter() - start))
+        return times, 1e6 * (process.cpu() - cpu) / count
+
+
+def _request(count):
+    angles = np.linspace(-0.5, 0.5, count) if count > 1 else np.array([0.1])
+    return ServoInverse.Request(lever_angle=angles.tolist())
+
+
+def _summary(bursts):
+    latencies = np.concatenate([b.latencies for b in bursts])
+    heard = bool(len(latencies))
+    return {'cpus': [b.cpu for b in bursts],
+            'cpu': statistics.median(b.cpu for b in bursts),
+            'p50': float(np.percentile(latencies, 50)) if heard else None,
+            'p99': float(np.percentile(latencies, 99)) if heard else None,
+            'lost': sum(b.lost for b in bursts)}

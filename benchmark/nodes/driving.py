@@ -1,0 +1,198 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Processes that are measured, and the one that drives them and hears them."""
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time
+
+from linkage_ros import node
+import rclpy
+from sensor_msgs.msg import JointState
+from visualization_msgs.msg import MarkerArray
+
+from . import scenes
+
+DEADLINE = 30.0
+# After the last message of a burst, answers are waited for this long [s].
+PATIENCE = 0.5
+
+
+class Process:
+    """A node in a process and a namespace of its own."""
+
+    def __init__(self, name, *arguments, parameters=None):
+        self.name = name
+        given = ['--params-file', str(parameters)] if parameters else []
+        self._process = subprocess.Popen(
+            [sys.executable, *arguments, '--ros-args', '-r', f'__ns:=/{name}', *given])
+        # The number of a process's CPU clock is made from its id, as clock_getcpuclockid does.
+        self._clock = (~self._process.pid << 3) | 2
+
+    def cpu(self) -> float:
+        """Return the CPU time of all its threads [s]."""
+        return time.clock_gettime(self._clock)
+
+    def resident(self) -> int:
+        """Return its resident set size [bytes]."""
+        with open(f'/proc/{self._process.pid}/statm') as text:
+            return int(text.read().split()[1]) * os.sysconf('SC_PAGE_SIZE')
+
+    def running(self) -> bool:
+        """Return whether it has not ended."""
+        return self._process.poll() is None
+
+    def end(self):
+        """End it as a user does."""
+        self._process.send_signal(signal.SIGINT)
+        try:
+            self._process.wait(DEADLINE)
+        finally:
+            self._process.kill()
+
+
+class Burst:
+    """What came of a number of crank messages at a rate."""
+
+    def __init__(self, sent, heard, cpu):
+        self.cpu = 1e6 * cpu / len(sent)
+        self.lost = max((len(sent) - len(times) for times in heard), default=0)
+        # Answers come in order: where none is missing, the nth is to the nth message.
+        self.latencies = [] if self.lost or not heard else [
+            1e6 * (max(answers) - asked) for asked, *answers in zip(sent, *heard)]
+
+
+class Driver:
+    """The node that sends crank messages and hears joint states."""
+
+    def __init__(self):
+        rclpy.init()
+        self.node = rclpy.create_node('driver')
+        # Nobody takes what arrives for this one: what a drawing program does is not measured.
+        self._idle = rclpy.create_node('viewer')
+        self._executor = node.Executor()
+        self._executor.add_node(self.node)
+
+    def end(self):
+        """End it."""
+        self._executor.shutdown()
+        self.node.destroy_node()
+        self._idle.destroy_node()
+        rclpy.try_shutdown()
+
+    def wait(self, seconds):
+        """Let what arrives be heard for a while."""
+        until = time.perf_counter() + seconds
+        while (left := until - time.perf_counter()) > 0.0:
+            self._executor.spin_once(timeout_sec=left)
+
+    def until(self, predicate, seconds=DEADLINE):
+        """Let what arrives be heard until something holds; return whether it did."""
+        deadline = time.perf_counter() + seconds
+        while not (held := predicate()) and time.perf_counter() < deadline:
+            self._executor.spin_once(timeout_sec=0.02)
+        return held
+
+    def line(self, process, scene, topics):
+        """Return what drives a process that answers on some topics, when both are connected."""
+        line = Line(self, process, scene, topics)
+        if not self.until(line.connected):
+            raise RuntimeError(f'{process.name} did not answer in {DEADLINE} s')
+        return line
+
+    def capture(self, process, scene, path):
+        """Write down what a process answers, once."""
+        line = self.line(process, scene, scenes.topics(scene))
+        heard = {}
+        subscriptions = [
+            self.node.create_subscription(
+                JointState if topic.joints else MarkerArray, f'/{process.name}/{topic.name}',
+                lambda text, topic=topic: heard.update({topic: bytes(text)}), 10, raw=True)
+            for topic in scenes.topics(scene)]
+
+        def complete():
+            line.send()
+            return len(heard) == len(subscriptions)
+
+        assert self.until(complete)
+        for subscription in subscriptions:
+            self.node.destroy_subscription(subscription)
+        path.write_bytes(pickle.dumps(heard))
+        self.wait(PATIENCE)
+        return line
+
+
+class Line:
+    """From the driver to one process and back."""
+
+    def __init__(self, driver, process, scene, topics):
+        self.process = process
+        self._driver = driver
+        self._cranks = scenes.Cranks(scene)
+        self._publisher = driver.node.create_publisher(
+            JointState, f'/{process.name}/crank_states', 10)
+        self._heard = []
+        for topic in topics:
+            path = f'/{process.name}/{topic.name}'
+            if topic.joints:
+                self._hear(path)
+            else:
+                driver._idle.create_subscription(MarkerArray, path, self._ignore, 1, raw=True)
+
+    def _hear(self, path):
+        times = []
+        self._heard.append(times)
+        self._driver.node.create_subscription(
+            JointState, path, lambda _: times.append(time.perf_counter()), 1000, raw=True)
+
+    def _ignore(self, _):
+        pass
+
+    def send(self):
+        """Send the next crank message."""
+        self._publisher.publish(next(self._cranks))
+
+    def connected(self):
+        """Return whether both ends know each other; sends a message."""
+        if not self._publisher.get_subscription_count():
+            return False
+        self.send()
+        return all(self._heard)
+
+    def burst(self, rate, count):
+        """Send crank messages at a rate [Hz]; return what came of it."""
+        self._driver.wait(0.05)
+        for times in self._heard:
+            times.clear()
+        spin, sent, cpu = self._driver._executor.spin_once, [], self.process.cpu()
+        start = time.perf_counter()
+        while len(sent) < count:
+            left = start + len(sent) / rate - time.perf_counter()
+            if left > 0.0:
+                spin(timeout_sec=left)
+            else:
+                message = next(self._cranks)
+                sent.append(time.perf_counter())
+                self._publisher.publish(message)
+        deadline = time.perf_counter() + PATIENCE
+        while (any(len(times) < count for times in self._heard)
+               and time.perf_counter() < deadline):
+            spin(timeout_sec=0.01)
+        if not self._heard:
+            self._driver.wait(0.05)
+        return Burst(sent, self._heard, self.process.cpu() - cpu)

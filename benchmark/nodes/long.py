@@ -1,0 +1,80 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What takes long: a million messages, and a minute at 1000 Hz."""
+
+import os
+import time
+
+from linkage_ros.kinematics import Kinematics
+import numpy as np
+from rclpy.parameter import Parameter
+
+from . import scenes
+from .campaign import NODE, SUBJECT
+from .driving import Process
+
+MIB = 2 ** 20
+
+
+def soak(bench, count):
+    """Return the growth of a node that turns 12 legs again and again, heard by a process [MiB]."""
+    scene = '12 legs'
+    ready = bench.ready(scene)
+    node = Kinematics(namespace='/soak', parameter_overrides=[
+        Parameter(name, value=value) for name, value in scenes.SCENES[scene].items()])
+    turn = next(s for s in node.subscriptions if s.topic_name.endswith('crank_states')).callback
+    ear = Process('soak', *SUBJECT, 'ear', '--ready', str(ready))
+    try:
+        assert bench.driver.until(lambda: all(
+            node.count_subscribers(topic.name) for topic in scenes.topics(scene)))
+        cranks, sizes = scenes.Cranks(scene), []
+        for done in range(1, count + 1):
+            turn(next(cranks))
+            if done % (count // 100) == 0:
+                sizes.append(_resident())
+                assert ear.running()
+    finally:
+        ear.end()
+        node.destroy_node()
+    # A tenth is left out: buffers and caches fill.
+    settled = sizes[9:]
+    return {'messages': count, 'growth_mib': (settled[-1] - settled[0]) / MIB,
+            'span_mib': (max(settled) - min(settled)) / MIB,
+            'resident_mib': settled[-1] / MIB}
+
+
+def _resident():
+    with open('/proc/self/statm') as text:
+        return int(text.read().split()[1]) * os.sysconf('SC_PAGE_SIZE')
+
+
+def hold(bench, rate, seconds):
+    """Return what came of turning 12 legs at a rate [Hz] for some seconds."""
+    scene = '12 legs'
+    process = Process('held', *NODE, parameters=scenes.write(scene, bench.folder))
+    try:
+        line = bench.driver.line(process, scene, scenes.topics(scene))
+        line.burst(200.0, 200)
+        size, began = process.resident(), time.perf_counter()
+        burst = line.burst(rate, round(rate * seconds))
+        took = time.perf_counter() - began
+        grown = process.resident() - size
+    finally:
+        process.end()
+    found = burst.latencies or [float('nan')]
+    return {'rate': rate, 'seconds': seconds, 'took': took, 'lost': burst.lost, 'cpu': burst.cpu,
+            'p50': float(np.percentile(found, 50)), 'p99': float(np.percentile(found, 99)),
+            'max': float(max(found)), 'growth_mib': grown / MIB,
+            'load': os.getloadavg()[0]}

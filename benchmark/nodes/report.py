@@ -1,0 +1,193 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Tables from the results."""
+
+import statistics
+
+WALKER = '12 legs'
+NAMES = {
+    'kinematics': 'kinematics', 'floor': 'floor (a): as many ready bytes',
+    'fresh': 'ordinary messages (b)', 'relay': 'numerical relay (c), one leg, joint states',
+    'unheard': 'kinematics, no subscriber (d)', 'deaf': 'subscriber that does nothing',
+    'raw': 'the same, message left as bytes', 'kinematics_plain': 'kinematics',
+    'floor_plain': 'floor (a)'}
+LAYERS = ('ask who listens', 'solve', 'patch', 'publish')
+
+
+def document(result):
+    """Return all tables as Markdown."""
+    parts = []
+    if 'rows' in result:
+        machine = result['machine']
+        packages = ', '.join(f'{name} {number}' for name, number in machine['packages'].items())
+        parts += [
+            f'{machine["date"]}, {machine["cpu"]}, {result["cores"]} cores, load '
+            f'{result["load"]:.1f}; Python {machine["python"]}, {packages}; commit '
+            f'{machine["commit"]}. The run took {result["seconds"]} s.',
+            '### Targets', targets(result), '### CPU time and latency', costs(result['rows']),
+            '### Executors', executors(result['rows']),
+            '### Where the time goes', layers(result),
+            '### Body of the tick', bodies(result['parts']),
+            '### Service', services(result['services'])]
+    if 'soak' in result or 'hold' in result:
+        parts += ['### At length', long(result)]
+    return '\n\n'.join(parts) + '\n'
+
+
+def table(head, rows):
+    """Return a table."""
+    lines = [head, ['---'] + ['---:'] * (len(head) - 1), *rows]
+    return '\n'.join('| ' + ' | '.join(map(str, line)) + ' |' for line in lines)
+
+
+def ratio(rows, scene, rate, subject, other):
+    """Return the median over the rounds of the ratio of two subjects' CPU times."""
+    found = {row['subject']: row['cpus'] for row in rows
+             if (row['scene'], row['rate']) == (scene, rate)}
+    return statistics.median(a / b for a, b in zip(found[subject], found[other]))
+
+
+def rates(rows):
+    """Return the rates that were measured."""
+    return sorted({row['rate'] for row in rows})
+
+
+def targets(result):
+    """Return what was aimed at and what came of it."""
+    rows, parts = result['rows'], result['parts']
+    lines = []
+    for rate in rates(rows):
+        tick = {(p['scene'], p['subject']): p['tick'] for p in parts if p['rate'] == rate}
+        body, a_leg = tick[WALKER, 'kinematics'], tick['one leg', 'relay']
+        found = [
+            ('CPU a message / floor (a)', '<= 1.3',
+             ratio(rows, WALKER, rate, 'kinematics', 'floor'), 1.3, '{:.2f}'),
+            ('body of the tick', '<= 80 us', body, 80.0, '{:.0f} us'),
+            ('body of (b) / body', '>= 10', tick[WALKER, 'fresh'] / body, -10.0, '{:.1f}'),
+            ('tick of (c) / tick a leg', '>= 20', a_leg / (body / 12), -20.0, '{:.0f}'),
+            ('no subscriber (d) / does nothing', '<= 1.1',
+             ratio(rows, WALKER, rate, 'unheard', 'deaf'), 1.1, '{:.2f}')]
+        lines += [[f'{what}, {rate:.0f} Hz', aim, form.format(value), met(value, limit)]
+                  for what, aim, value, limit, form in found]
+    pulls = {row['subject']: row['round_trips'] for row in result['services']}
+    trip = statistics.median(a / b for a, b in zip(pulls['servo 1'], pulls['trigger']))
+    lines += [['service, 1 angle / Trigger', '<= 1.2', f'{trip:.2f}', met(trip, 1.2)]]
+    start = result['starts']['kinematics']
+    lines += [['start to first joint states', '< 1.5 s', f'{start:.2f} s', met(start, 1.5)]]
+    for soak in [result['soak']] if 'soak' in result else []:
+        lines += [[f'growth over {soak["messages"]:,} messages', '<= 2 MiB',
+                   f'{soak["span_mib"]:.2f} MiB', met(soak['span_mib'], 2.0)]]
+    for hold in [result['hold']] if 'hold' in result else []:
+        lines += [[f'{hold["rate"]:.0f} Hz for {hold["seconds"]:.0f} s, messages lost', '0',
+                   hold['lost'], met(hold['lost'], 0)]]
+    return table(['12 legs, all topics subscribed', 'target', 'measured', 'met'], lines)
+
+
+def met(value, limit):
+    """Return whether a value is below its limit, or above one that is given as negative."""
+    return 'yes' if (value >= -limit if limit < 0.0 else value <= limit) else '**no**'
+
+
+def costs(rows):
+    """Return CPU time a message and latencies of every subject."""
+    lines = []
+    for row in rows:
+        if row['subject'].endswith('_plain'):
+            continue
+        base = 'deaf' if row['subject'] in ('unheard', 'raw', 'deaf') else 'floor'
+        times = ratio(rows, row['scene'], row['rate'], row['subject'], base)
+        lines.append([
+            row['scene'], f'{row["rate"]:.0f}', NAMES[row['subject']], f'{row["cpu"]:.0f}',
+            f'{times:.2f}', *_latency(row), row['lost']])
+    return ('CPU time of the whole process [us a message], as a ratio to the floor (for those '
+            'that do not publish: to the subscriber that does nothing), and the time from sending '
+            'a crank message to having its last joint states [us].\n\n' + table(
+                ['scene', 'Hz', 'node', 'CPU', 'ratio', 'p50', 'p99', 'lost'], lines))
+
+
+def _latency(row):
+    return [f'{row[p]:.0f}' if row[p] is not None else '' for p in ('p50', 'p99')]
+
+
+def executors(rows):
+    """Return what the plain executor costs next to the one that waits for events."""
+    lines = []
+    for rate in rates(rows):
+        found = {r['subject']: r for r in rows if (r['scene'], r['rate']) == (WALKER, rate)}
+        for subject in ('kinematics', 'floor'):
+            events, plain = found[subject], found[f'{subject}_plain']
+            lines.append([f'{NAMES[f"{subject}_plain"]}, {rate:.0f} Hz',
+                          f'{events["cpu"]:.0f}', f'{plain["cpu"]:.0f}',
+                          f'{ratio(rows, WALKER, rate, f"{subject}_plain", subject):.2f}',
+                          *_latency(events), *_latency(plain)])
+    return table(['12 legs', 'Events CPU', 'Single CPU', 'ratio', 'Events p50', 'p99',
+                  'Single p50', 'p99'], lines)
+
+
+def layers(result):
+    """Return a message's way through the node of 12 legs, layer by layer."""
+    rows, lines = result['rows'], []
+    columns = rates(rows)
+    for rate in columns:
+        cpu = {r['subject']: r['cpu'] for r in rows if (r['scene'], r['rate']) == (WALKER, rate)}
+        part = next(p for p in result['parts'] if (p['scene'], p['rate'], p['subject'])
+                    == (WALKER, rate, 'kinematics'))
+        rest = part['tick'] - sum(part[layer] for layer in LAYERS)
+        lines.append([
+            cpu['raw'], cpu['deaf'] - cpu['raw'], *(part[layer] for layer in LAYERS), rest,
+            cpu['kinematics'] - cpu['deaf'] - part['tick'], cpu['kinematics']])
+    names = ('middleware, wake-up and taking the bytes', 'reading the crank message',
+             *(f'tick: {layer}' for layer in LAYERS), 'tick: the rest',
+             'middleware after publishing, cold caches', 'all')
+    return table(['CPU [us a message]', *(f'{rate:.0f} Hz' for rate in columns)],
+                 [[name, *(f'{v:.0f}' for v in values)]
+                  for name, values in zip(names, zip(*lines))])
+
+
+def bodies(parts):
+    """Return what the callbacks take."""
+    return "CPU time of the callback's thread, medians [us].\n\n" + table(
+        ['scene', 'Hz', 'node', 'tick', *LAYERS],
+        [[p['scene'], f'{p["rate"]:.0f}', NAMES[p['subject']],
+          *(f'{p[layer]:.0f}' for layer in ('tick', *LAYERS))] for p in parts])
+
+
+def services(rows):
+    """Return round trips."""
+    names = {'trigger': 'std_srvs/Trigger', 'echo 1': 'ServoInverse, 1 angle, echoed',
+             'servo 1': 'servo_inverse, 1 angle', 'echo 1000': 'ServoInverse, 1000, echoed',
+             'servo 1000': 'servo_inverse, 1000 angles'}
+    base = next(row['round_trips'] for row in rows if row['subject'] == 'trigger')
+    return table(['service', 'p50 [us]', 'p99 [us]', 'x Trigger', 'CPU of the server [us]'], [
+        [names[row['subject']], f'{row["p50"]:.0f}', f'{row["p99"]:.0f}',
+         f'{statistics.median(a / b for a, b in zip(row["round_trips"], base)):.2f}',
+         f'{row["cpu"]:.0f}'] for row in rows])
+
+
+def long(result):
+    """Return the long runs."""
+    lines = []
+    if 'soak' in result:
+        soak = result['soak']
+        lines.append(['soak', f'{soak["messages"]:,} messages: {soak["resident_mib"]:.0f} MiB, '
+                      f'first to last {soak["growth_mib"]:+.2f} MiB, '
+                      f'span {soak["span_mib"]:.2f} MiB'])
+    if 'hold' in result:
+        hold = result['hold']
+        lines.append(['hold', f'{hold["rate"]:.0f} Hz for {hold["seconds"]:.0f} s (took '
+                      f'{hold["took"]:.1f} s): {hold["lost"]} lost, CPU {hold["cpu"]:.0f} us a '
+                      f'message, latency p50 {hold["p50"]:.0f}, p99 {hold["p99"]:.0f}, longest '
+                      f'{hold["max"]:.0f} us; load {hold["load"]:.1f}'])
+    return table(['run', 'result'], lines)

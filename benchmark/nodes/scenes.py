@@ -1,0 +1,71 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The scenes that are measured, and the crank messages that turn them."""
+
+from pathlib import Path
+from typing import NamedTuple, Tuple
+
+from linkage_ros import scene
+from linkage_ros.motion import Motion
+from sensor_msgs.msg import JointState
+import yaml
+
+SCENES = {
+    'one leg': {'mechanisms': ['leg'], 'leg.type': 'jansen', 'leg.scale': 0.01},
+    '12 legs': {'mechanisms': ['walker'], 'walker.type': 'jansen', 'walker.scale': 0.01,
+                'walker.leg_pairs': 6},
+    'four mechanisms': {'mechanisms': ['water_drop', 'jansen', 'peaucellier', 'slotted_lever']},
+}
+# Of the motion, between two messages [ns]: a hundredth of a second or so, but never the same.
+STEP = 10_000_019
+
+
+class Topic(NamedTuple):
+    """A topic that `kinematics` answers on."""
+
+    name: str
+    joints: bool
+
+
+def topics(name: str) -> Tuple[Topic, ...]:
+    """Return the topics of a scene."""
+    return tuple(Topic(f'{mechanism}/{what}', what == 'joint_states')
+                 for mechanism in SCENES[name]['mechanisms']
+                 for what in ('joint_states', 'markers'))
+
+
+def write(name: str, folder: Path) -> Path:
+    """Write the parameter file of a scene."""
+    path = folder / f'{name.replace(" ", "_")}.yaml'
+    path.write_text(yaml.safe_dump({'/**': {'ros__parameters': SCENES[name]}}))
+    return path
+
+
+class Cranks:
+    """One crank message after the other."""
+
+    def __init__(self, name: str):
+        machines = scene.read(SCENES[name]).machines
+        cranks = [machine.crank for machine in machines.values()]
+        self._motions = [Motion(c.speed, c.sweep, c.start) for c in cranks]
+        self._message = JointState(name=[f'{machine}_crank' for machine in machines])
+        self._count = 0
+
+    def __next__(self) -> JointState:
+        self._count += 1
+        angles, speeds = zip(*(m.at(self._count * STEP) for m in self._motions))
+        self._message.position, self._message.velocity = angles, speeds
+        self._message.header.stamp.nanosec = self._count % 10 ** 9
+        return self._message

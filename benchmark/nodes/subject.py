@@ -1,0 +1,227 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A node that is measured, as a process of its own.
+
+    python -m benchmark.nodes.subject KIND [options] --ros-args ...
+
+KIND is one of KINDS below. With --times FILE it says at its end how long its parts took.
+"""
+
+import argparse
+import json
+from pathlib import Path
+import pickle
+import statistics
+import sys
+import time
+
+from linkage_interfaces.srv import ServoInverse
+from linkage_ros import kinematics, messages, node, scene, wire
+from linkage_ros.kinematics import ANY, Kinematics, Outlet
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.utilities import remove_ros_args
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from visualization_msgs.msg import MarkerArray
+
+from .relay import Loops
+
+
+class Floor(Node):
+    """Publishes ready bytes at each crank message."""
+
+    ready = {}
+
+    def __init__(self):
+        super().__init__('floor')
+        self._out = [(self.create_publisher(type_, topic, depth), text)
+                     for topic, (type_, depth, text) in self.ready.items()]
+        self.create_subscription(JointState, 'crank_states', self._turn, ANY)
+
+    def _turn(self, _):
+        for publisher, text in self._out:
+            publisher.publish(text)
+
+
+class Deaf(Node):
+    """Does nothing at each crank message."""
+
+    raw = False
+
+    def __init__(self):
+        super().__init__('deaf')
+        self.create_subscription(JointState, 'crank_states', self._turn, ANY, raw=self.raw)
+
+    def _turn(self, _):
+        pass
+
+
+class Raw(Deaf):
+    """Does nothing, and does not even look at what the message says."""
+
+    raw = True
+
+
+class FreshOutlet(Outlet):
+    """Builds ordinary messages, as one writes it: new ones each time."""
+
+    def follow(self, machine, frame_id):
+        """Remember how to make markers."""
+        super().follow(machine, frame_id)
+        place = {point: i for i, point in enumerate(machine.points)}
+        self._drawn = (self._name, frame_id, machine.pose,
+                       [(place[p], place[q]) for p, q in machine.linkage.bars],
+                       machine.scale * float(machine.linkage.longest))
+
+    def _send(self, what, publisher, build, stamp):
+        self._joint_state = messages.JointStates()
+        self._marker_array = messages.Markers(*self._drawn)
+        publisher.publish(build(self._pose, stamp))
+
+
+class Relay(Node):
+    """Finds the joint angles of one leg numerically."""
+
+    def __init__(self):
+        super().__init__('relay')
+        machine = scene.read({'mechanisms': ['leg'], 'leg.type': 'jansen'}).machines['leg']
+        self._loops = Loops(machine.linkage)
+        self._names = [f'leg_{link.name}' for link in machine.linkage.links]
+        self._publisher = self.create_publisher(JointState, 'leg/joint_states', 10)
+        self.create_subscription(JointState, 'crank_states', self._turn, ANY)
+
+    def _turn(self, cranks):
+        angles = self._loops.joint_angles(cranks.position[0])
+        message = JointState(name=self._names, position=angles.tolist())
+        message.header.stamp = cranks.header.stamp
+        self._publisher.publish(message)
+
+
+class Triggered(Node):
+    """Answers a service without a question."""
+
+    def __init__(self):
+        super().__init__('triggered')
+        self.create_service(Trigger, 'trigger', self.answer)
+
+    def answer(self, _, response):
+        """Answer."""
+        response.success = True
+        return response
+
+
+class Echoed(Node):
+    """Answers the type of `servo_inverse` with what it was asked."""
+
+    def __init__(self):
+        super().__init__('echoed')
+        self.create_service(ServoInverse, 'servo_inverse', self.answer)
+
+    def answer(self, request, response):
+        """Answer."""
+        response.success = True
+        response.servo_angle = response.reduction = request.lever_angle
+        response.reachable = [True] * len(request.lever_angle)
+        return response
+
+
+class Ear(Node):
+    """Hears every topic of a scene, and does nothing about it."""
+
+    ready = {}
+
+    def __init__(self):
+        super().__init__('ear')
+        for topic, (type_, depth, _) in self.ready.items():
+            self.create_subscription(type_, topic, self._hear, depth, raw=True)
+
+    def _hear(self, _):
+        pass
+
+
+KINDS = {'kinematics': Kinematics, 'fresh': Kinematics, 'floor': Floor, 'relay': Relay,
+         'deaf': Deaf, 'raw': Raw, 'trigger': Triggered, 'echo': Echoed, 'ear': Ear}
+# The parts of the work of a tick.
+PARTS = {'tick': [(Kinematics, '_turn'), (Floor, '_turn'), (Relay, '_turn')],
+         'solve': [(Outlet, '_solve')], 'patch': [(wire.Template, 'patched')],
+         'publish': [(Publisher, 'publish')],
+         'ask who listens': [(Publisher, 'get_subscription_count')]}
+
+
+class Times:
+    """What the parts of a tick take: CPU time of their thread [us], per tick."""
+
+    def __init__(self):
+        self._taken = dict.fromkeys(PARTS, 0)
+        self._ticks = {part: [] for part in PARTS}
+        for part, methods in PARTS.items():
+            for class_, method in methods:
+                setattr(class_, method, self._timed(part, getattr(class_, method)))
+
+    def _timed(self, part, function):
+        taken, whole = self._taken, part == 'tick'
+
+        def timed(*args):
+            start = time.thread_time_ns()
+            try:
+                return function(*args)
+            finally:
+                taken[part] += time.thread_time_ns() - start
+                if whole:
+                    self._end()
+        return timed
+
+    def _end(self):
+        for part, times in self._ticks.items():
+            times.append(1e-3 * self._taken[part])
+            self._taken[part] = 0
+
+    def medians(self):
+        """Return the median of each part."""
+        return {part: statistics.median(times[len(times) // 10:] or [0.0])
+                for part, times in self._ticks.items()}
+
+
+def ready(topics):
+    """Return {topic: (type, depth, bytes)} of topics and the bytes that were heard on them."""
+    return {topic.name: (JointState if topic.joints else MarkerArray, 10 if topic.joints else 1,
+                         text) for topic, text in topics.items()}
+
+
+def main():
+    """Run the node; return the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('kind', choices=KINDS)
+    parser.add_argument('--single', action='store_true', help='on the SingleThreadedExecutor')
+    parser.add_argument('--ready', type=Path, help='what was heard on the topics')
+    parser.add_argument('--times', type=Path, help='where to write how long its parts took')
+    options = parser.parse_args(remove_ros_args()[1:])
+    if options.ready:
+        Floor.ready = Ear.ready = ready(pickle.loads(options.ready.read_bytes()))
+    if options.kind == 'fresh':
+        kinematics.Outlet = FreshOutlet
+    times = Times() if options.times else None
+    executor = SingleThreadedExecutor if options.single else node.Executor
+    code = node.run(KINDS[options.kind], options.kind, executor_class=executor)
+    if times:
+        options.times.write_text(json.dumps(times.medians()))
+    return code
+
+
+if __name__ == '__main__':
+    sys.exit(main())
