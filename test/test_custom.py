@@ -14,16 +14,20 @@
 
 """Linkages of the user's own: the catalogue written out, change points, two cranks, sweeps."""
 
+import doctest
 import math
+from pathlib import Path
+import re
 
 from accuracy import broken, case_of, judge, summary
-from linkage_ros import mechanisms
+from linkage_ros import mechanisms, scene
 import numpy as np
 import pytest
 from reference_wider import MOVING
 import stress
 
 TURN = [(-math.pi, math.pi)]
+PAGE = Path(__file__).parents[1] / 'docs' / 'write-your-own.md'
 LENGTHS = {'a': 1.0, 'b': 3.0, 'c': 2.5, 'd': 3.2, 'e': 1.5, 'f': 2.0, 'g': 3.5, 'h': 4.0}
 FOUR_BAR = ('O ground 0 0', 'Q ground g 0', 'A crank O m', 'B dyad A Q b c left')
 
@@ -284,3 +288,18 @@ def test_arrays_of_dimensions_are_checked_too():
     with pytest.raises(ValueError, match='line "P line A B b-c": the bar A-P must be longer'):
         mechanisms.create('custom', joints=(*FOUR_BAR, 'P line A B b-c'), m=1.0, g=4.0, c=2.5,
                           b=np.array([3.0, 2.5]))
+
+
+def test_the_page_on_writing_a_linkage_says_what_happens():
+    failed, tried = doctest.testfile(str(PAGE), module_relative=False)
+    assert tried > 10 and not failed
+
+
+def test_the_scene_on_that_page_is_the_linkage_on_that_page(tmp_path):
+    text = PAGE.read_text()
+    path = tmp_path / 'gripper.yaml'
+    path.write_text(re.search('```yaml\n(.*?)```', text, re.DOTALL).group(1))
+    gripper = scene.load(str(path)).machines['gripper'].linkage
+    assert gripper.tracer == 'T'
+    assert gripper.solve(0.8)['T'].round(4).tolist() == [0.0985, 0.0684]
+    assert '[0.0985, 0.0684]' in text
