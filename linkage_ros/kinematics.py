@@ -24,7 +24,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
-from . import messages, node, scene, urdf
+from . import messages, node, reading, scene, urdf
 from .wire import Wire
 
 ANY = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -38,10 +38,11 @@ class Kinematics(node.SceneNode):
     def __init__(self, **kwargs):
         super().__init__(scene.KINEMATICS, **kwargs)
         self._outlets = {name: Outlet(self, name) for name in self.scene.machines}
-        self._names = []
+        self._names = None
         self._places = {}
+        self._reader = reading.Reader()
         self.follow(self.scene)
-        self.create_subscription(JointState, 'crank_states', self._turn, ANY)
+        self.create_subscription(JointState, 'crank_states', self._turn, ANY, raw=True)
 
     def follow(self, new):
         """Make anew what has changed."""
@@ -49,16 +50,16 @@ class Kinematics(node.SceneNode):
             self._outlets[name].follow(machine, new.frame_id)
 
     @node.until_the_end
-    def _turn(self, cranks):
-        if cranks.name != self._names:
-            self._names = list(cranks.name)
-            self._places = {name: i for i, name in enumerate(self._names)}
-        positions, speeds = cranks.position, cranks.velocity
-        known = len(speeds) == len(cranks.name)
+    def _turn(self, text):
+        stamp, names, positions, speeds = self._reader.read(text)
+        if names is not self._names:
+            self._names = names
+            self._places = {name: i for i, name in enumerate(names)}
+        known = len(speeds) == len(names)
         for outlet in self._outlets.values():
             places = [self._places.get(name, len(positions)) for name in outlet.cranks]
             if max(places) < len(positions):
-                outlet.turn(cranks.header.stamp, [positions[i] for i in places],
+                outlet.turn(stamp, [positions[i] for i in places],
                             [speeds[i] for i in places] if known else [])
 
 

@@ -31,8 +31,8 @@ from rclpy.serialization import deserialize_message, serialize_message
 HEADER = 4
 LEAD = bytes(8 - HEADER)
 
-_STAMP = struct.Struct('=iI')
-_SENTINEL = Time(sec=0x5EC0_1234, nanosec=0x2A0C_4321)
+STAMP = struct.Struct('=iI')
+SENTINEL = Time(sec=0x5EC0_1234, nanosec=0x2A0C_4321)
 
 
 class NoTemplate(Exception):
@@ -58,13 +58,13 @@ class Template:
     """
 
     def __init__(self, build: Callable, count: int):
-        values = _distinct(count)
-        message = build(_SENTINEL, values)
+        values = distinct(count)
+        message = build(SENTINEL, values)
         text = serialize_message(message)
         self._length = len(text)
         # Numbers lie at multiples of 8 after the header; in memory too they are quicker there.
         self._bytes = bytearray(LEAD + text + bytes(-(len(text) - HEADER) % 8))
-        self._stamps = _places(self._bytes, _STAMP.pack(_SENTINEL.sec, _SENTINEL.nanosec))
+        self._stamps = places(self._bytes, STAMP.pack(SENTINEL.sec, SENTINEL.nanosec))
         numbers = np.frombuffer(self._bytes, float, offset=len(LEAD) + HEADER)
         order = np.argsort(values)
         found = order[np.searchsorted(values, numbers, sorter=order) % max(count, 1)]
@@ -77,7 +77,7 @@ class Template:
         """Return the message with this stamp and these values, serialised."""
         self._numbers[self._slots] = values.take(self._sources)
         for place in self._stamps:
-            _STAMP.pack_into(self._bytes, place, stamp.sec, stamp.nanosec)
+            STAMP.pack_into(self._bytes, place, stamp.sec, stamp.nanosec)
         return bytes(memoryview(self._bytes)[len(LEAD):len(LEAD) + self._length])
 
     def _check(self, build, kind, count):
@@ -121,12 +121,12 @@ class Wire:
             self._publisher.publish(self._build(stamp, values))
 
 
-def _distinct(count: int) -> np.ndarray:
+def distinct(count: int) -> np.ndarray:
     """Return numbers of which no other bytes of a message are made."""
     return -1.2345678901234567e+201 * (1.0 + np.arange(count) / (count + 1.0))
 
 
-def _places(text: bytearray, wanted: bytes) -> list:
+def places(text: bytearray, wanted: bytes) -> list:
     """Return where some bytes stand."""
     found, place = [], text.find(wanted)
     while place >= 0:

@@ -20,6 +20,7 @@ import time
 from linkage_ros.kinematics import Kinematics
 import numpy as np
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 
 from . import scenes
 from .campaign import NODE, SUBJECT
@@ -41,7 +42,7 @@ def soak(bench, count):
             node.count_subscribers(topic.name) for topic in scenes.topics(scene)))
         cranks, sizes = scenes.Cranks(scene), []
         for done in range(1, count + 1):
-            turn(next(cranks))
+            turn(serialize_message(next(cranks)))
             if done % (count // 100) == 0:
                 sizes.append(_resident())
                 assert ear.running()
