@@ -68,6 +68,9 @@ class Analysis:
         pin or of such a link, and the corner of an inversor with its pole on the crank circle
         are closed forms; any other is bracketed and refined to the last digit.
 
+        A linkage with one change point in a turn is the same only after two turns: for it the
+        answers are those of the turn [-pi, pi), and `near` should lie there.
+
         """
         value = np.asarray(value, float)
         solver = self._inverse(output, tuple(map(float, others)))
