@@ -57,8 +57,12 @@ docs: .venv-docs/.installed ## Build the documentation to docs/_build/html/ and 
 	@echo 'Documentation: docs/_build/html/index.html'
 
 .PHONY: test
-test: build ## Run the tests
-	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest
+test: build ## Run the tests, but for the long ones
+	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 -m 'not long'
+
+.PHONY: long
+long: build ## Run the long tests
+	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 -m long
 
 .PHONY: lint
 lint: $(venv)/.installed ## Check the style

@@ -135,9 +135,10 @@ def load(path: str) -> Scene:
     try:
         with open(path) as file:
             given = dict(_flattened(yaml.safe_load(file)['/**']['ros__parameters']))
-    except (yaml.YAMLError, KeyError, TypeError, AttributeError) as error:
+    except (yaml.YAMLError, KeyError, TypeError, AttributeError, UnicodeDecodeError) as error:
+        reason = ' '.join(str(error).split())
         raise SceneError(f"{path} must be YAML with '/**:' and below it 'ros__parameters:' "
-                         f'({error!r})') from None
+                         f'({reason})') from None
     return read(given)
 
 

@@ -121,6 +121,7 @@ def test_where_there_is_no_such_executor_the_plain_one_is_used_and_ends_as_quiet
     assert (done.returncode, done.stderr) == (0, 'turned\n')
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize('plain', [False, True])
 def test_a_signal_amid_a_callback_ends_a_node_quietly(stop, plain):

@@ -69,6 +69,7 @@ def test_a_pose_exists_exactly_inside_the_reach(kind, count):
         assert (placed == held).all(), told(mechanism, theta[placed != held])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('kind, count', [
     ('jansen', 25), ('peaucellier', 60), ('slotted_lever', 100)])
 def test_every_end_of_the_reach_is_a_limit_to_the_last_digits(kind, count):

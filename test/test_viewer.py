@@ -389,6 +389,7 @@ def test_a_browser_that_has_not_drawn_is_sent_no_more(show):
     asyncio.run(use(running.viewer.url))
 
 
+@pytest.mark.long
 def test_nodes_that_come_later_or_in_a_namespace_are_found(graph, show):
     running = show(LEG, kinds=())
 
@@ -491,6 +492,7 @@ def free_port():
         return probe.getsockname()[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_the_viewer_while_somebody_looks(tmp_path, stop):
     port = free_port()
@@ -518,6 +520,7 @@ def test_a_signal_ends_the_viewer_while_somebody_looks(tmp_path, stop):
     assert 'Traceback' not in printed and 'rror' not in printed
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('parameters, named', [
     ({'port': 'taken'}, 'address already in use'), ({'port': 70000}, 'port'),
     ({'port': 'eighty'}, 'port'), ({'host': '192.0.2.1'}, '192.0.2.1'),
