@@ -45,6 +45,12 @@ help: ## Show what can be made
 demo: build ## Run the nodes, measure what they send, draw it to demo/out/
 	@$(in_ros) python demo/demo.py
 
+.PHONY: bench
+bench: build .venv-bench/.installed ## Measure run time against error, stability, and the nodes
+	@.venv-bench/bin/python benchmark/run.py
+	@.venv-bench/bin/python benchmark/stability.py
+	@$(in_ros) python -m benchmark.nodes --quick
+
 .PHONY: pictures
 pictures: .venv-docs/.installed ## Draw what pictures/pictures.txt lists, without ROS
 	@mkdir -p pictures/out
@@ -95,6 +101,15 @@ $(venv)/.installed: $(requirements)
 	@echo 'Installing ROS 2 $(DISTRO) into $(venv): about a minute, once.'
 	@$(PYTHON) -m venv $(venv)
 	@python -m pip install -qq $(requirements:%=-r %)
+	@touch $@
+
+# What there is to compare with is large: some 2 GB. planegcs has no wheel, and is left out where it
+# does not build.
+.venv-bench/.installed: benchmark/requirements.txt
+	@$(PYTHON) -m venv .venv-bench
+	@.venv-bench/bin/python -m pip install -qq -r $<
+	@CMAKE_PREFIX_PATH=$$(echo .venv-bench/lib/python*/site-packages/cmeel.prefix) \
+	  .venv-bench/bin/python -m pip install -qq planegcs==0.1.1 || true
 	@touch $@
 
 .venv-docs/.installed: docs/requirements.txt
