@@ -225,9 +225,10 @@ def _with_releases(lines, kept):
 
 def _python(listing: _Listing, dialect: _Dialect, angles: int, names=()) -> Callable:
     """
-    Return a function of the constants that returns the function of the angles.
+    Return a function of the constants, and of what to do instead, to the function of the angles.
 
     That returns the outputs as a tuple or, where there are names, in pairs: an array (2,) each.
+    What Python's floats raise for is left to `instead`.
     """
     lines, outputs, kept = listing.statements(dialect)
     body = (list(_with_releases(lines, kept)) if dialect.frees
@@ -239,10 +240,14 @@ def _python(listing: _Listing, dialect: _Dialect, angles: int, names=()) -> Call
         f'pack(pairs, 0, {", ".join(outputs)})',
         f'return {{{rows}}}',
     ] if names else [f'return ({"".join(code + ", " for code in outputs)})']
+    given = ', '.join(f'x{i}' for i in range(angles))
     source = '\n'.join([
-        f'def bind({", ".join(f"k{n}" for n in listing.constants)}):',
-        f'    def pose({", ".join(f"x{i}" for i in range(angles))}):',
-        *(f'        {line}' for line in [*body, *ending]),
+        f'def bind({"".join(f"k{n}, " for n in listing.constants)}instead=None):',
+        f'    def pose({given}):',
+        '        try:',
+        *(f'            {line}' for line in [*body, *ending]),
+        '        except (ArithmeticError, ValueError):',
+        f'            return instead({given})',
         '    return pose'])
     scope = {**dialect.names, 'empty': np.empty, 'pack': Struct(f'{len(outputs)}d').pack_into}
     exec(compile(source, '<linkage>', 'exec'), scope)
@@ -355,19 +360,18 @@ class Pose:
         self._accelerate = accelerate
         self.shape = shape
         if not shape:
-            self._float = variant.float(*constants)
+            self.at = variant.float(*constants, self._by_arrays)
 
-    def at(self, *angles: float) -> tuple:
-        """Return the outputs at one pose, from floats."""
-        try:
-            return self._float(*angles)
-        except (ArithmeticError, ValueError):
-            # What Python raises for, numpy answers with inf or nan.
-            return tuple(self._blocks([np.array([a]) for a in angles], 1)[:, 0].tolist())
+    def _by_arrays(self, *angles: float) -> tuple:
+        """Return the outputs at one pose with inf or nan where Python's floats raise."""
+        return tuple(self._blocks([np.array([a]) for a in angles], 1)[:, 0].tolist())
 
     def placer(self, names: tuple) -> Callable:
-        """Return the function from one pose, of floats, to an array (2,) for each name."""
-        return self._variant.placing(names)(*self._constants)
+        """Return the function from one angle, a float, to an array (2,) for each name."""
+        def by_arrays(theta):
+            return dict(zip(names, np.reshape(self._by_arrays(theta), (-1, 2))))
+
+        return self._variant.placing(names)(*self._constants, by_arrays)
 
     def over(self, *angles) -> np.ndarray:
         """Return the outputs over arrays that are broadcast together, shape (outputs, *shape)."""

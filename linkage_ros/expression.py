@@ -290,10 +290,12 @@ class Complex:
         return square_root(self.squared())
 
     def direction(self) -> Complex:
-        """Return the unit vector along this one, along x if it has no length."""
+        """Return the unit vector along this one; along x where dimensions leave it no length."""
         if self.y.value == 0.0 and self.x.op == 'negative' and self.x.args[0].positive:
             return Complex(-1.0, 0.0)
         length = self.length()
+        if length.positive or length.varies:
+            return self / length
         none = length <= 0.0
         return Complex(where(none, 1.0, self.x / length), where(none, 0.0, self.y / length))
 

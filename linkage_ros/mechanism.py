@@ -324,8 +324,8 @@ class Mechanism(Analysis):
         if isinstance(theta, float):
             try:
                 return self._single[points](theta)
-            except (KeyError, TypeError, ArithmeticError, ValueError):
-                # Not asked for before, or not to be had in Python's floats, which raise.
+            except (KeyError, TypeError):
+                # Not asked for before, or as a list.
                 pass
         return self._vectors('points', theta, points)
 
