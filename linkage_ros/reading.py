@@ -21,7 +21,6 @@ taken from the bytes. A message that differs in anything else is deserialised.
 """
 
 from array import array
-from operator import itemgetter
 import struct
 from typing import NamedTuple, Optional, Sequence, Tuple
 
@@ -48,68 +47,84 @@ class Reader:
     """Reads serialised joint states; the names of one source are the same object each time."""
 
     def __init__(self):
-        self._layouts = []
+        self._layouts = {}
         self._learning = True
 
     def read(self, text: bytes) -> Turned:
         """Return what a message says."""
-        for layout in self._layouts:
+        for layout in self._layouts.values():
             if turned := layout.take(text):
                 return turned
         message = deserialize_message(text, JointState)
         turned = Turned(message.header.stamp, list(message.name), tuple(message.position),
                         tuple(message.velocity))
         if self._learning:
-            layout = Layout(turned.names, message)
-            self._layouts = [layout, *self._layouts[:SOURCES - 1]]
-            # What comes from afar may be encoded otherwise than here.
-            self._learning = layout.take(text) is not None
+            self._learn(text, message, turned)
         return turned
+
+    def _learn(self, text, message, turned):
+        source = (message.header.frame_id, *turned.names, len(turned.positions),
+                  len(turned.velocities), len(message.effort))
+        layout = self._layouts.get(source) or Layout(turned.names, message, len(text))
+        # What comes from afar may be encoded otherwise than here.
+        self._learning = layout.admit(text, turned)
+        if self._learning:
+            self._layouts[source] = layout
+        if len(self._layouts) > SOURCES:
+            del self._layouts[next(iter(self._layouts))]
 
 
 class Layout:
-    """Where the numbers are in a message with some names; that message's own are overwritten."""
+    """
+    Where the numbers are in a message with some names; that message's own are overwritten.
 
-    def __init__(self, names: Sequence[str], message: JointState):
+    What comes over the wire ends at `size`; what is serialised here may have a tail.
+    """
+
+    def __init__(self, names: Sequence[str], message: JointState, size: int):
         counts = [len(part) for part in (message.position, message.velocity, message.effort)]
         values = distinct(sum(counts)).tolist()
-        first, last = counts[0], counts[0] + counts[1]
-        message.position = array('d', values[:first])
-        message.velocity = array('d', values[first:last])
-        message.effort = array('d', values[last:])
+        self._first, self._last = counts[0], counts[0] + counts[1]
+        message.position = array('d', values[:self._first])
+        message.velocity = array('d', values[self._first:self._last])
+        message.effort = array('d', values[self._last:])
         message.header.stamp = SENTINEL
-        text = serialize_message(message)
-        self._struct = _fields(text, values)
-        fields = self._struct.unpack(text)
-        self._fixed = itemgetter(*(i for i, x in enumerate(fields) if isinstance(x, bytes)))
-        self._same = self._fixed(fields)
+        text = serialize_message(message)[:size]
         self._names = names
         self._stamp = Time()
-        self._time = fields.index(SENTINEL.sec)
-        self._positions, self._velocities = (
-            slice(start, start + count) for start, count in (
-                (fields.index(values[0]) if counts[0] else 0, counts[0]),
-                (fields.index(values[first]) if counts[1] else 0, counts[1])))
+        self._struct, fixed = _fields(text, values)
+        self._mask = int.from_bytes(fixed, 'little')
+        self._same = int.from_bytes(text, 'little') & self._mask
 
     def take(self, text: bytes) -> Optional[Turned]:
         """Return what a message says, None where it differs in more than numbers."""
-        if len(text) != self._struct.size:
-            return None
-        fields = self._struct.unpack(text)
-        if self._fixed(fields) != self._same:
-            return None
-        self._stamp.sec, self._stamp.nanosec = fields[self._time:self._time + 2]
-        return Turned(self._stamp, self._names, fields[self._positions],
-                      fields[self._velocities])
+        if (len(text) == self._struct.size
+                and int.from_bytes(text, 'little') & self._mask == self._same):
+            return self._taken(text)
+        return None
+
+    def admit(self, text: bytes, turned: Turned) -> bool:
+        """Ignore what is padding, as it differs in a message that says the same with numbers."""
+        if len(text) != self._struct.size or repr(self._taken(text)) != repr(turned):
+            return False
+        self._mask &= ~(int.from_bytes(text, 'little') ^ self._same)
+        self._same &= self._mask
+        return True
+
+    def _taken(self, text):
+        self._stamp.sec, self._stamp.nanosec, *numbers = self._struct.unpack(text)
+        return Turned(self._stamp, self._names, tuple(numbers[:self._first]),
+                      tuple(numbers[self._first:self._last]))
 
 
-def _fields(text: bytes, values: Sequence[float]) -> struct.Struct:
-    """Return a message as the stamp, the numbers, and the bytes between them."""
+def _fields(text: bytes, values: Sequence[float]) -> Tuple[struct.Struct, bytes]:
+    """Return a message as stamp and numbers, and a mask of the bytes between them."""
     codes = dict.fromkeys(places(text, STAMP.pack(SENTINEL.sec, SENTINEL.nanosec)), 'iI')
     for value in values:
         codes.update(dict.fromkeys(places(text, struct.pack('=d', value)), 'd'))
-    spelt, end = ['='], 0
+    spelt, fixed, end = ['='], bytearray(b'\xff' * len(text)), 0
     for place, code in sorted(codes.items()):
-        spelt += [f'{place - end}s', code] if place > end else [code]
+        spelt += [f'{place - end}x', code]
         end = place + 8
-    return struct.Struct(''.join(spelt) + f'{len(text) - end}s')
+        fixed[place:end] = bytes(8)
+    return struct.Struct(''.join(spelt) + f'{len(text) - end}x'), bytes(fixed)

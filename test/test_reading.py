@@ -22,6 +22,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from linkage_ros import reading  # noqa: E402
+from linkage_ros.kinematics import Kinematics  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 
@@ -52,9 +53,25 @@ def reader(monkeypatch):
     return made
 
 
-def check(reader, sent):
-    """Read a message and compare."""
-    turned = reader.read(serialize_message(sent))
+@pytest.fixture
+def check(graph, reader):
+    """Return a function that sends a message, reads what arrives, and compares."""
+    publisher = graph.node.create_publisher(JointState, 'sent', 10)
+    arrived = []
+    graph.node.create_subscription(JointState, 'sent', arrived.append, 10, raw=True)
+    graph.until(publisher.get_subscription_count)
+
+    def check(sent):
+        arrived.clear()
+        publisher.publish(sent)
+        graph.until(lambda: arrived)
+        return compare(reader, arrived[0], sent)
+    return check
+
+
+def compare(reader, text, sent):
+    """Read what arrived and compare it with what was sent."""
+    turned = reader.read(text)
     assert turned.stamp == sent.header.stamp and turned.names == sent.name
     assert turned.positions == tuple(sent.position)
     assert turned.velocities == tuple(sent.velocity)
@@ -64,33 +81,41 @@ def check(reader, sent):
 @pytest.mark.parametrize('names', [[], ['a'], ['a', 'bc'], ['leg_crank'] * 7])
 @pytest.mark.parametrize('velocities', [True, False])
 @pytest.mark.parametrize('effort', [True, False])
-def test_a_source_is_deserialised_once(reader, names, velocities, effort):
-    for seed in range(5):
-        check(reader, message(names, velocities, effort, seed=seed))
-    assert reader.looked == 1
+def test_a_source_is_hardly_ever_deserialised(reader, check, names, velocities, effort):
+    for seed in range(30):
+        check(message(names, velocities, effort, seed=seed))
+    # What pads its strings is left as it was in memory, and may take a few looks to tell.
+    assert reader.looked <= 5
 
 
-def test_what_differs_in_more_than_numbers_is_deserialised(reader):
-    first = check(reader, message(['a', 'b']))
-    assert check(reader, message(['a', 'c'])).names is not first.names
-    check(reader, message(['a', 'b'], frame='x'))
-    check(reader, message(['a', 'b'], velocities=False))
-    check(reader, message(['a', 'b', 'c']))
+def test_what_differs_in_more_than_numbers_is_deserialised(reader, check):
+    first = check(message(['a', 'b']))
+    assert check(message(['a', 'c'])).names is not first.names
+    check(message(['a', 'b'], frame='x'))
+    check(message(['a', 'b'], velocities=False))
+    check(message(['a', 'b', 'c']))
     assert reader.looked == 5
 
 
-def test_sources_that_take_turns_are_each_deserialised_once(reader):
-    for seed in range(5):
+def test_sources_that_take_turns_are_hardly_ever_deserialised(reader, check):
+    for seed in range(20):
         for name in ('a', 'b', 'c'):
-            check(reader, message([name], seed=seed))
-    assert reader.looked == 3
+            check(message([name], seed=seed))
+    assert reader.looked <= 15
+
+
+def test_bytes_of_another_order_are_deserialised(reader):
+    sent = message(['a', 'b'])
+    text = bytearray(serialize_message(sent))
+    read = reading.Layout(['a', 'b'], message(['a', 'b']), len(text))
+    assert not read.admit(bytes(text), reading.Turned(
+        sent.header.stamp, sent.name, tuple(-x for x in sent.position), tuple(sent.velocity)))
 
 
 def test_numbers_that_are_none_are_handed_on(reader):
     for _ in range(2):
         turned = reader.read(serialize_message(JointState(name=['a'], position=[math.nan])))
         assert math.isnan(turned.positions[0])
-    assert reader.looked == 1
 
 
 def test_more_names_than_positions_are_read_as_they_are(reader):
@@ -101,7 +126,16 @@ def test_more_names_than_positions_are_read_as_they_are(reader):
 
 def test_what_is_encoded_otherwise_is_always_deserialised(reader):
     sent = message(['a', 'b'])
-    padded = serialize_message(sent) + bytes(4)
+    longer = serialize_message(sent) + bytes(8)
     for count in (1, 2, 3):
-        assert reader.read(padded).positions == tuple(sent.position)
+        assert reader.read(longer).positions == tuple(sent.position)
         assert reader.looked == count
+
+
+def test_the_node_hardly_ever_deserialises_a_message_of_a_source(graph, reader):
+    graph.start(Kinematics)
+    turn = graph.crank(['jansen_crank'])
+    heard = graph.listen(JointState, 'jansen/joint_states')
+    for theta in range(20):
+        assert turn([float(theta)], heard, [1.0]).position[0] == theta
+    assert reader.looked <= 5
