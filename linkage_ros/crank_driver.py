@@ -34,7 +34,7 @@ class CrankDriver(node.SceneNode):
         self._now = None
         self._messages = JointStates()
         self._publisher = self.create_publisher(JointState, 'crank_states', 10)
-        self._timer = self.create_timer(1.0 / self.scene.rate, self._tick)
+        self._timer = self.create_timer(1.0, self._tick)
         # On system time a timer sleeps until an old time comes round again, if that is set back.
         self.create_timer(1.0, self._wake, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.follow(self.scene)
@@ -51,8 +51,14 @@ class CrankDriver(node.SceneNode):
             elif old != crank:
                 self._motions[name] = self._motions[name].changed(crank.speed, crank.sweep, now)
             self._cranks[name] = crank
-        period = round(1e9 / new.rate)
-        if self._timer.timer_period_ns != period:
+        self._pace(new.rate)
+
+    def _pace(self, rate):
+        if not rate:
+            self._timer.cancel()
+            return
+        period = round(1e9 / rate)
+        if self._timer.timer_period_ns != period or self._timer.is_canceled():
             self._timer.timer_period_ns = period
             self._timer.reset()
 
@@ -74,7 +80,8 @@ class CrankDriver(node.SceneNode):
                 self._messages.message(time.to_msg(), list(self._motions), angles, speeds))
 
     def _wake(self):
-        if self._now is not None and self._time().nanoseconds < self._now:
+        set_back = self._now is not None and self._time().nanoseconds < self._now
+        if set_back and self.scene.rate:
             self._timer.reset()
 
 

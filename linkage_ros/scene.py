@@ -53,8 +53,7 @@ MECHANISMS = Field(
     'string_array', 'Names of the mechanisms in the scene.', readers=ALL, read_only=True,
     rule='at least one, each once, of letters, digits and single underscores, a letter first')
 FRAME_ID = Field('string', 'Frame that the poses are in.', readers=(KINEMATICS,))
-RATE = Field('double', 'Crank messages in a second [Hz].', 0.0, 1000.0, positive=True,
-             readers=(DRIVER,))
+RATE = Field('double', 'Crank messages in a second [Hz]; 0: none.', 0.0, 1000.0, readers=(DRIVER,))
 TYPE = Field('string', 'Type of the mechanism.', readers=ALL, read_only=True,
              rule=f'one of {", ".join(TYPES)}')
 JOINTS = Field('string_array', 'The linkage, one line a joint.', readers=ALL, read_only=True)
@@ -62,9 +61,8 @@ TRACER = Field('string', 'Joint whose curve is the locus; empty: the last.', rea
                read_only=True)
 DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [m].', positive=True,
                   readers=ALL)
-BRANCH = Field('integer', 'Assembly sign {0} of the {1}.', -1, 1, rule='except 0', readers=ALL)
-SCALE = Field('double', 'Factor of every length.', 0.0, 1000.0, positive=True,
-              readers=(KINEMATICS, INVERSE))
+BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the usual one.', -1, 1, readers=ALL)
+SCALE = Field('double', 'Factor of every length.', positive=True, readers=(KINEMATICS, INVERSE))
 LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.', 1, 50,
                   readers=(KINEMATICS,))
 MIRRORED = Field('bool', 'Whether each leg has a mirror image on the other side; '
@@ -232,9 +230,7 @@ def _branches(name, design, values):
     taken = {}
     for key, sign in design.branches.items():
         field = _about(BRANCH, key, design.name)
-        taken[key] = values.take(f'{name}.branches.{key}', field, sign)
-        if not taken[key]:
-            raise field.error(f'{name}.branches.{key}', 0)
+        taken[key] = values.take(f'{name}.branches.{key}', field, sign) or sign
     return taken
 
 
@@ -253,16 +249,23 @@ def _built(design, dimensions, branches):
 
 
 def _legs(name, linkage, values):
-    pairs = values.take(f'{name}.leg_pairs', LEG_PAIRS, 1)
-    mirrored = values.take(f'{name}.mirrored', MIRRORED, pairs > 1)
-    if pairs > 1 or mirrored:
-        crank = linkage.links[0]
-        centre = linkage.solve([0.0] * len(linkage.cranks), (crank.joint,))[crank.joint].ravel()
-        if centre[0] or crank.zero or len(linkage.cranks) > 1:
-            what, allowed = ('leg_pairs', '1') if pairs > 1 else ('mirrored', 'false')
-            raise SceneError(f'{name}.{what} must be {allowed}: only a linkage whose one crank '
-                             'turns about x = 0, its angle counted from +x, can have more legs')
+    able = _can_have_more_legs(linkage)
+    # A slider for what cannot be changed would only be refused.
+    pairs, mirrored = (replace(field, read_only=not able) for field in (LEG_PAIRS, MIRRORED))
+    pairs = values.take(f'{name}.leg_pairs', pairs, 1)
+    mirrored = values.take(f'{name}.mirrored', mirrored, pairs > 1)
+    if (pairs > 1 or mirrored) and not able:
+        what, allowed = ('leg_pairs', '1') if pairs > 1 else ('mirrored', 'false')
+        raise SceneError(f'{name}.{what} must be {allowed}: only a linkage whose one crank '
+                         'turns about x = 0, its angle counted from +x, can have more legs')
     return pairs, mirrored
+
+
+def _can_have_more_legs(linkage) -> bool:
+    crank, *others = (link for link in linkage.links if link.name in linkage.cranks)
+    if others or crank.zero:
+        return False
+    return linkage.solve(0.0, (crank.joint,))[crank.joint][0] == 0.0
 
 
 def _points(name, linkage, values):

@@ -157,7 +157,7 @@ def test_a_new_dimension_keeps_the_crank_in_its_new_reach(graph):
     ('drop.crank.speed', 'fast', 'drop.crank.speed must be'),
     ('drop.crank.sweep', [2.0, 1.0], 'drop.crank.sweep must be .* lower end'),
     ('drop.dimensions.a', -1.0, 'drop.dimensions.a .*0.1'),
-    ('rate', 0.0, 'rate must be .* above 0 up to 1000'),
+    ('rate', -1.0, 'rate .*1000'),
     ('rate', 1e9, 'rate .*1000'),
     ('mechanisms', ['water_drop'], 'mechanisms'),
     ('drop.type', 'jansen', 'drop.type'),
@@ -190,6 +190,17 @@ def test_a_new_rate_takes_effect_at_once(graph):
     driver = Driver(graph, {**DROP, 'rate': 0.001})
     assert driver.set(rate=100.0).successful
     assert driver.at(SECOND) == (0.0, 1.0)
+
+
+def test_a_rate_of_0_sends_nothing_until_it_is_changed(graph):
+    driver = Driver(graph, {**DROP, 'rate': 0.0})
+    timer = next(timer for timer in driver.node.timers if timer.clock == driver.node.get_clock())
+    assert timer.is_canceled()
+    assert driver.set(rate=100.0).successful
+    assert driver.at(SECOND) == (0.0, 1.0)
+    assert driver.set(rate=0.0).successful and timer.is_canceled()
+    assert driver.set(rate=100.0).successful
+    assert driver.at(3 * SECOND) == (2.0, 1.0)
 
 
 def test_time_that_goes_back_makes_no_jump(graph):

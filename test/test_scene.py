@@ -78,6 +78,11 @@ def test_a_branch_is_the_assembly_sign_of_the_linkage():
     assert scene.read(given).machines['jansen'].linkage.branches['F'] == -1
 
 
+def test_the_sign_0_is_the_usual_one():
+    given = {'mechanisms': ['jansen'], 'jansen.branches.E': 0, 'jansen.branches.F': 0}
+    assert scene.read(given).machines['jansen'].linkage.branches == {'C': 1, 'E': -1, 'F': 1}
+
+
 def test_only_more_than_one_pair_is_mirrored_by_default():
     def mirrored(**given):
         given = {f'jansen.{key}': value for key, value in given.items()}
@@ -109,7 +114,7 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'jansen.dimension.a': 1.0}, 'jansen.dimension.a is not a parameter .* jansen.dimensions.a'),
     ({'jansen': None}, 'jansen is not a parameter .* jansen.type'),
     ({'leg.type': 'jansen'}, r'leg.type is not a parameter .* mechanisms, .* jansen\.\*'),
-    ({'jansen.branches.C': 0}, 'jansen.branches.C must be .* -1 to 1, except 0, not 0'),
+    ({'jansen.branches.C': 2}, 'jansen.branches.C must be .* -1 to 1, not 2'),
     ({'jansen.branches.C': 1.0}, 'jansen.branches.C must be a whole number'),
     ({'jansen.scale': 0.0}, 'jansen.scale must be .* above 0'),
     ({'jansen.leg_pairs': 0}, 'jansen.leg_pairs must be a whole number from 1'),
@@ -132,7 +137,7 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'peaucellier.crank.sweep': [-1.2, 1.0]},
      r'peaucellier.crank.sweep must be inside the reach \[-1.17137, 1.17137\] rad'),
     ({'peaucellier.crank.start': 2.0}, r'peaucellier.crank.start must be inside the reach \[-1.1'),
-    ({'rate': 0.0}, 'rate must be .* above 0 up to 1000'),
+    ({'rate': -1.0}, 'rate must be .* from 0 to 1000'),
     ({'rate': 50}, 'rate must be .* decimal point'),
     ({'frame_id': 3}, 'frame_id must be a text'),
     ({'mechanisms': ['custom']}, 'custom.joints: joints must be a list of lines'),
@@ -219,8 +224,10 @@ def test_every_parameter_says_what_it_means_and_who_reads_it():
     for parameter in scene.read({}).parameters:
         field = parameter.field
         assert field.meaning.endswith('.') and field.allowed and field.readers
-        assert field.read_only == (parameter.name == 'mechanisms'
-                                   or parameter.name.endswith('.type'))
+        name, _, what = parameter.name.partition('.')
+        assert field.read_only == (parameter.name == 'mechanisms' or what == 'type'
+                                   or what in ('leg_pairs', 'mirrored')
+                                   and name in ('water_drop', 'slotted_lever'))
 
 
 def test_a_year_of_turning_loses_nothing():

@@ -1,0 +1,106 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The parameters in rqt_reconfigure: each number has a slider, and no stop of it is a trap.
+
+Its slider for floats has 100 steps between the ends of the range, counted from zero, so that an
+end that is no whole step is not met. What may refuse a stop is the linkage alone, never the range.
+"""
+
+import re
+
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('linkage_interfaces')
+
+from linkage_ros.crank_driver import CrankDriver  # noqa: E402
+from linkage_ros.kinematics import Kinematics  # noqa: E402
+from linkage_ros.servo_inverse import ServoInverse  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
+
+NUMBERS = (Parameter.Type.INTEGER, Parameter.Type.DOUBLE)
+SCENES = [
+    {},
+    {'mechanisms': ['walker', 'lever'], 'walker.type': 'jansen', 'walker.leg_pairs': 6,
+     'walker.scale': 0.01, 'walker.dimensions.m': 12.34, 'lever.type': 'slotted_lever',
+     'lever.dimensions.a': 0.37, 'lever.dimensions.b': 0.7, 'lever.dimensions.e': -0.01},
+]
+CANNOT_BE = re.compile(r'dimensions must let the \w+ be assembled|crank\.start must be inside the')
+
+
+def stops(low, high, whole):
+    """Return the values that the slider can send (rqt_reconfigure, param_editors.py)."""
+    if whole:
+        return list(range(low, high + 1))
+    scale = 100 / (high - low)
+    return [place / scale for place in range(round(low * scale), round(high * scale) + 1)]
+
+
+def some(values):
+    """Return the ends and every tenth between: to build a linkage anew takes its time."""
+    return sorted({*values[:2], *values[::10], *values[-2:]})
+
+
+def numbers(node):
+    """Return parameter, descriptor and range of every number, None where it has no range."""
+    for parameter in node.get_parameters_by_prefix('').values():
+        if parameter.type_ in NUMBERS:
+            about = node.describe_parameter(parameter.name)
+            ranges = [*about.floating_point_range, *about.integer_range]
+            yield parameter, about, ranges[0] if len(ranges) == 1 else None
+
+
+@pytest.fixture(params=[(kind, i) for kind in (CrankDriver, Kinematics, ServoInverse)
+                        for i in range(len(SCENES))],
+                ids=lambda param: f'{param[0].__name__}-{param[1]}')
+def node(request, graph):
+    """Start each node with each scene."""
+    kind, scene = request.param
+    return graph.start(kind, SCENES[scene])
+
+
+def test_every_number_has_a_meaning_a_unit_and_a_range(node):
+    assert len(list(numbers(node))) > 20
+    for parameter, about, range_ in numbers(node):
+        name = parameter.name
+        assert range_ is not None and range_.from_value <= parameter.value <= range_.to_value, name
+        assert about.description.endswith('.') and about.additional_constraints, name
+        unit = re.search(r'\[(m|rad|rad/s|Hz)\]', about.description)
+        assert unit or parameter.type_ == Parameter.Type.INTEGER or name.endswith('.scale'), name
+        assert range_.step == (1 if parameter.type_ == Parameter.Type.INTEGER else 0.0), name
+
+
+def test_both_ends_of_every_slider_are_whole_stops(node):
+    for parameter, about, range_ in numbers(node):
+        values = stops(range_.from_value, range_.to_value,
+                       parameter.type_ == Parameter.Type.INTEGER)
+        assert values[0] == pytest.approx(range_.from_value, rel=1e-9), about.name
+        assert values[-1] == pytest.approx(range_.to_value, rel=1e-9), about.name
+
+
+def test_every_stop_is_accepted_or_the_linkage_forbids_it(node):
+    accepted = 0
+    for parameter, about, range_ in numbers(node):
+        if about.read_only:
+            continue
+        values = stops(range_.from_value, range_.to_value,
+                       parameter.type_ == Parameter.Type.INTEGER)
+        for value in values if '.crank.' in about.name else some(values):
+            result, = node.set_parameters([Parameter(about.name, parameter.type_, value)])
+            assert result.successful or CANNOT_BE.search(result.reason), (value, result.reason)
+            accepted += result.successful
+        assert node.set_parameters([parameter])[0].successful
+    assert accepted > 100
