@@ -1,0 +1,191 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""RViz's configuration and the launch file: they name what there is."""
+
+import ast
+from importlib.util import find_spec
+from pathlib import Path
+import re
+import runpy
+
+from linkage_ros import rviz, scene
+import pytest
+
+yaml = pytest.importorskip('yaml')
+
+ROOT = Path(__file__).parents[1]
+CONFIG = ROOT / 'config'
+LAUNCH = ROOT / 'launch' / 'scene.launch.py'
+MESSAGES = {
+    'rviz_default_plugins/MarkerArray': 'visualization_msgs/msg/MarkerArray',
+    'rviz_default_plugins/Marker': 'visualization_msgs/msg/Marker',
+    'rviz_default_plugins/RobotModel': 'std_msgs/msg/String',
+}
+DURABLE = {'TRANSIENT_LOCAL': 'Transient Local', 'VOLATILE': 'Volatile'}
+
+
+@pytest.fixture
+def shown():
+    """Return RViz's configuration."""
+    return yaml.safe_load((CONFIG / 'linkage.rviz').read_text())
+
+
+def displays(config):
+    """Return all displays, those in groups too, but not the groups."""
+    found, left = [], list(config['Visualization Manager']['Displays'])
+    while left:
+        display = left.pop(0)
+        left += display.get('Displays', ())
+        if display['Class'] != rviz.GROUP:
+            found.append(display)
+    return found
+
+
+def topics(config):
+    """Return topic, display class and durability of what is subscribed to."""
+    return {(topic['Value'], display['Class'], topic['Durability Policy'])
+            for display in displays(config)
+            for topic in (display.get('Topic'), display.get('Description Topic')) if topic}
+
+
+def test_rviz_shows_what_the_nodes_of_the_scene_publish(graph, shown):
+    from linkage_ros.kinematics import Kinematics
+
+    given = scene.load(str(CONFIG / 'all.yaml'))
+    node = graph.start(Kinematics, {p.name: p.value for p in given.parameters
+                                    if p.value != ()})
+    published = set()
+    for name, types in node.get_publisher_names_and_types_by_node('kinematics', '/'):
+        for class_, type_ in MESSAGES.items():
+            if type_ in types:
+                info, = node.get_publishers_info_by_topic(name)
+                published.add((name, class_, DURABLE[info.qos_profile.durability.name]))
+    assert len(published) == 3 * len(given.machines)
+    assert topics(shown) == published
+
+
+def test_rviz_looks_from_where_the_linkages_are_seen(shown):
+    given = scene.load(str(CONFIG / 'all.yaml'))
+    manager = shown['Visualization Manager']
+    assert manager['Global Options']['Fixed Frame'] == given.frame_id
+    groups = [d['Name'] for d in manager['Displays'] if d['Class'] == rviz.GROUP]
+    assert groups == list(given.machines)
+    enabled = {d['Class'] for d in displays(shown) if d['Enabled']}
+    assert enabled == {'rviz_default_plugins/Grid', 'rviz_default_plugins/MarkerArray',
+                       'rviz_default_plugins/Marker'}
+    # Along +y, on the plane x-z that they stand in.
+    assert manager['Views']['Current']['Yaw'] == pytest.approx(4.712389)
+    assert all(machine.pose[3:] == pytest.approx((1.5707963, 0.0, 0.0))
+               for machine in given.machines.values())
+
+
+def test_rviz_shows_any_other_scene_too(shown):
+    given = scene.load(str(CONFIG / 'all.yaml'))
+    assert rviz.adapted(shown, given.machines, given.frame_id) == shown
+    other = rviz.adapted(shown, ['walker', 'jansen'], 'earth', 'left/side', robot_model=True)
+    assert {name for name, *_ in topics(other)} == {
+        f'/left/side/{name}/{topic}' for name in ('walker', 'jansen')
+        for topic in ('markers', 'locus', 'robot_description')}
+    assert other['Visualization Manager']['Global Options']['Fixed Frame'] == 'earth'
+    assert all(d['Enabled'] and d['Value'] for d in displays(other))
+    assert rviz.adapted(other, given.machines, given.frame_id)['Panels'] == shown['Panels']
+
+
+@pytest.fixture
+def constants():
+    """Return the launch file's constants, without importing what it imports."""
+    found = {}
+
+    class Filled(ast.NodeTransformer):
+        def visit_Name(self, node):
+            return ast.Constant(found[node.id])
+
+    for line in ast.parse(LAUNCH.read_text()).body:
+        if isinstance(line, ast.Assign):
+            found[line.targets[0].id] = ast.literal_eval(Filled().visit(line.value))
+    return found
+
+
+def test_the_launch_file_starts_executables_that_there_are(constants, monkeypatch):
+    import setuptools
+
+    handed = {}
+    monkeypatch.chdir(ROOT)
+    monkeypatch.setattr(setuptools, 'setup', handed.update)
+    runpy.run_path('setup.py')
+    installed = [line.split(' = ')[0] for line in handed['entry_points']['console_scripts']]
+    assert constants['PACKAGE'] == handed['name']
+    assert {*constants['NODES'], constants['VIEWER']} <= set(installed)
+    files = {name for folder, names in handed['data_files'] for name in names}
+    assert {f'config/{constants["RVIZ_CONFIG"]}', 'launch/scene.launch.py'} <= files
+    assert {str(path.relative_to(ROOT)) for path in CONFIG.glob('*.yaml')} <= files
+
+
+def test_every_argument_of_the_launch_file_is_described(constants):
+    arguments = {name: (default, choices, about)
+                 for name, default, choices, about in constants['ARGUMENTS']}
+    assert {'scene', 'rviz', 'robot_model', 'viewer', 'namespace'} <= set(arguments)
+    for default, choices, about in arguments.values():
+        assert about[0].isupper() and about.endswith('.')
+        assert choices is None or default in choices
+    assert (CONFIG / f'{arguments["scene"][0]}.yaml').is_file()
+    documented = (ROOT / 'docs' / 'viewer.md').read_text()
+    assert all(f'`{name}`' in documented for name in arguments)
+    viewer = (ROOT / 'linkage_ros' / 'viewer.py').read_text()
+    assert re.search(rf'^PORT = {arguments["port"][0]}$', viewer, re.MULTILINE)
+
+
+@pytest.mark.parametrize('path', sorted(CONFIG.glob('*.yaml')), ids=lambda path: path.stem)
+def test_every_scene_that_can_be_launched_can_be_read(path):
+    assert scene.load(str(path)).machines
+
+
+needs_launch = pytest.mark.skipif(
+    not find_spec('launch_ros'), reason='launch and launch_ros are not installed')
+
+
+def started(**arguments):
+    """Return the nodes that the launch file starts."""
+    from launch import LaunchContext
+    from launch.actions import DeclareLaunchArgument, OpaqueFunction
+
+    context = LaunchContext()
+    context.launch_configurations.update(arguments)
+    nodes = []
+    for entity in runpy.run_path(str(LAUNCH))['generate_launch_description']().entities:
+        if isinstance(entity, DeclareLaunchArgument):
+            entity.execute(context)
+        elif isinstance(entity, OpaqueFunction):
+            nodes += entity.execute(context)
+    return [node.node_executable for node in nodes]
+
+
+@needs_launch
+@pytest.mark.parametrize('arguments, besides', [
+    ({}, ['viewer']),
+    ({'viewer': 'false', 'scene': 'strandbeest'}, []),
+    ({'scene': str(CONFIG / 'all.yaml'), 'robot_model': 'true'},
+     ['viewer'] + 4 * ['robot_state_publisher']),
+    ({'rviz': 'true', 'namespace': 'left'}, ['viewer', 'rviz2']),
+])
+def test_the_launch_file_starts_the_nodes_of_a_scene(arguments, besides, monkeypatch, tmp_path):
+    monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path))
+    assert started(**arguments) == ['crank_driver', 'kinematics', 'servo_inverse', *besides]
+
+
+@needs_launch
+def test_a_scene_that_there_is_not_is_refused_with_those_there_are():
+    with pytest.raises(RuntimeError, match='must be one of all, jansen, .*, not walker'):
+        started(scene='walker')
