@@ -419,7 +419,7 @@ class _Reversed:
         return start + along * slide
 
     def _arm(self, place) -> planar.Arm:
-        return planar.Arm(self._crank.centre, place, self._span())
+        return planar.Arm(self._crank.centre, place - self._crank.centre, self._span())
 
     def _span(self) -> Real:
         return self._sketch.points[self._links['crank'].joint].span

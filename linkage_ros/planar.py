@@ -99,11 +99,11 @@ class Limit(NamedTuple):
 
 
 class Arm:
-    """The arm between two points that both move, from their coordinates."""
+    """The arm between two points that both move."""
 
-    def __init__(self, foot: Complex, end: Complex, span: Real):
+    def __init__(self, foot: Complex, vector: Complex, span: Real):
         self.foot = foot
-        self.vector = end - foot
+        self.vector = vector
         self.square = self.vector.squared()
         self._span = span
 

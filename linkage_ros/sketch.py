@@ -250,7 +250,15 @@ class Sketch:
         for (foot, pin), reverse in ((ends, False), (ends[::-1], True)):
             if pin.crank and foot.home == GROUND and foot.place is not pin.crank.centre:
                 return planar.CrankArm(foot.place, pin.crank, reverse)
-        return planar.Arm(ends[0].place, ends[1].place, ends[0].span + ends[1].span)
+        return planar.Arm(ends[0].place, self._between(first, second),
+                          ends[0].span + ends[1].span)
+
+    def _between(self, first, second):
+        """Return the vector between two joints; bars from one joint to both keep more digits."""
+        for name in self.points:
+            if (name, first) in self._vectors and (name, second) in self._vectors:
+                return self._vectors[name, second].vector - self._vectors[name, first].vector
+        return self.points[second].place - self.points[first].place
 
     def distance(self, first: str, second: str) -> Real:
         """Return the constant distance [m] of two joints of one link or of the ground."""
