@@ -147,7 +147,7 @@ const wire = new Wire({
     setting.value = value;
     panel.update(mechanism, name, value);
     if (setting.kind.endsWith('array') || setting.kind === 'bool') show(shown);
-    if (!name.startsWith('crank.')) picture.refit(mechanism);
+    if (!/\.(speed|start)$/.test(name)) picture.refit(mechanism);
   },
 
   frame(buffer) {

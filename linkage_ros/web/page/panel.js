@@ -17,6 +17,7 @@
 const STOPS = 1000;
 const STILL = 2000;
 const RIGHT_ANGLE = Math.PI / 2;
+const CRANK = /\.(speed|start)$/;
 
 /** How a slider's place in [0, 1] becomes a value, and back. */
 const LINEAR = {
@@ -32,8 +33,14 @@ const FINE_ABOUT_ZERO = {
   place: (value, low, high) => (Math.cbrt(value / high) + 1) / 2,
 };
 
+/** A parameter's name without what its place in the panel says. */
+function labelled(name) {
+  return name.replace(/^dimensions\./, '').replace(/^branches\./, 'branch ')
+    .replace(/^crank(\d*)\.(.*)/, '$2 $1').trim();
+}
+
 function law({ name, kind, low, high }) {
-  if (kind === 'integer' || name === 'crank.start') return LINEAR;
+  if (kind === 'integer' || name.endsWith('.start')) return LINEAR;
   if (low > 0) return BY_FACTOR;
   return low === -high ? FINE_ABOUT_ZERO : LINEAR;
 }
@@ -181,7 +188,7 @@ class Section {
       const control = this.control(setting);
       if (!control) continue;
       this.controls.set(setting.name, control);
-      const group = setting.name.split('.')[0];
+      const group = CRANK.test(setting.name) ? 'crank' : setting.name.split('.')[0];
       (groups[group] ?? groups.more).push(control.row);
     }
     if (lever) groups.lever.push(this.leverSlider().row);
@@ -196,29 +203,36 @@ class Section {
     const type = settings.get('type')?.value ?? '';
     const heading = element('header', {}, element('h2', { textContent: name }),
       element('span', { className: 'about', textContent: type === name ? '' : type }));
-    if (settings.has('crank.speed')) {
-      this.button = element('button');
-      this.speed = settings.get('crank.speed').value || 1;
-      this.button.onclick = () => {
-        const now = this.mechanism.value('crank.speed');
-        this.controls.get('crank.speed').offer(now ? 0 : this.speed);
-      };
+    this.speeds = new Map([...settings].filter(([name]) => name.endsWith('.speed'))
+      .map(([name, { value }]) => [name, value || 1]));
+    if (this.speeds.size) {
+      this.button = element('button', { onclick: () => this.stopOrTurn() });
       heading.append(this.button);
       this.renderButton();
     }
     return heading;
   }
 
+  get turns() {
+    return [...this.speeds.keys()].some(name => this.mechanism.value(name));
+  }
+
+  stopOrTurn() {
+    const stop = this.turns;
+    for (const [name, speed] of this.speeds) this.controls.get(name).offer(stop ? 0 : speed);
+  }
+
   renderButton() {
-    const speed = this.mechanism.value('crank.speed');
-    if (speed) this.speed = speed;
-    this.button.textContent = speed ? 'Stop' : 'Turn';
+    for (const name of this.speeds.keys()) {
+      this.speeds.set(name, this.mechanism.value(name) || this.speeds.get(name));
+    }
+    this.button.textContent = this.turns ? 'Stop' : 'Turn';
   }
 
   control(setting) {
     const { name, kind, meaning, allowed, fixed, low, high } = setting;
     const described = {
-      ...setting, label: name.replace(/^(crank|dimensions)\./, '').replace(/^branches\./, 'branch '),
+      ...setting, label: labelled(name),
       title: `${meaning}\nMay be: ${allowed}.`, unit: /\[([^\]]+)\]/.exec(meaning)?.[1] ?? '',
       scale: law(setting),
     };
@@ -247,7 +261,7 @@ class Section {
 
   update(name, value) {
     this.controls.get(name)?.update(value);
-    if (name === 'crank.speed' && this.button) this.renderButton();
+    if (this.speeds.has(name)) this.renderButton();
   }
 }
 
