@@ -20,7 +20,8 @@ What the nodes cost, next to what any node costs, in the same run.
     python -m benchmark.nodes --soak      memory over a million messages
     python -m benchmark.nodes --hold      a minute at 1000 Hz
 
-Results go to benchmark/results/nodes.json, each mode into its own part, with a table beside it.
+Results go to benchmark/results/nodes.json, each mode into its own part; the tables are printed,
+and written into docs/performance.md where --document is given.
 """
 
 import argparse
@@ -35,6 +36,8 @@ from types import SimpleNamespace
 from . import report
 
 ROS = [SimpleNamespace(package=name) for name in ('ros-rclpy', 'ros-rmw-fastrtps-cpp')]
+DOCUMENT = Path(__file__).parents[2] / 'docs' / 'performance.md'
+BEGIN, END = '<!-- measured -->', '<!-- end of what is measured -->'
 RESULTS = Path(__file__).parents[1] / 'results' / 'nodes.json'
 
 
@@ -47,11 +50,15 @@ def main():
         [str(Path(__file__).parents[2]), os.environ.get('PYTHONPATH', '')])
     options = arguments()
     result = json.loads(options.output.read_text()) if options.output.exists() else {}
-    result.update(run(options))
+    if not options.tables:
+        result.update(run(options))
     options.output.parent.mkdir(parents=True, exist_ok=True)
     options.output.write_text(json.dumps(result, indent=1) + '\n')
-    options.output.with_suffix('.md').write_text(report.document(result))
-    print(report.document(result))
+    tables = report.document(result)
+    if options.document:
+        before, _, rest = DOCUMENT.read_text().partition(BEGIN)
+        DOCUMENT.write_text(f'{before}{BEGIN}\n\n{tables}\n{END}{rest.partition(END)[2]}')
+    print(tables)
 
 
 def arguments():
@@ -61,6 +68,8 @@ def arguments():
     mode.add_argument('--quick', action='store_true', help='one rate and fewer rounds')
     mode.add_argument('--soak', type=int, nargs='?', const=10 ** 6, metavar='MESSAGES')
     mode.add_argument('--hold', type=float, nargs='?', const=60.0, metavar='SECONDS')
+    mode.add_argument('--tables', action='store_true', help='run nothing, show the last results')
+    parser.add_argument('--document', action='store_true', help='write the tables to docs/')
     parser.add_argument('--rounds', type=int, help='bursts of each subject')
     parser.add_argument('--output', type=Path, default=RESULTS, metavar='JSON')
     return parser.parse_args()

@@ -17,6 +17,8 @@
 from contextlib import contextmanager
 import json
 import statistics
+import subprocess
+import sys
 import time
 
 from linkage_interfaces.srv import ServoInverse
@@ -32,6 +34,7 @@ RATES = (50.0, 200.0, 1000.0)
 # How long a burst takes [s], by rate.
 SECONDS = {50.0: 1.2, 200.0: 1.0, 1000.0: 0.6}
 WARM_UP = 60
+MAKE = 'import linkage_ros.kinematics, rclpy; rclpy.init(); linkage_ros.kinematics.Kinematics()'
 
 
 class Bench:
@@ -44,13 +47,16 @@ class Bench:
     def subjects(self, scene, wanted):
         """Start processes, {name: (arguments, topics that are heard)}; yield their lines."""
         parameters = scenes.write(scene, self.folder)
-        started = {}
+        started, lines = {}, {}
         try:
             for name, (arguments, _) in wanted.items():
                 started[name] = Process(name, *arguments, parameters=parameters)
-            yield {name: self.driver.line(started[name], scene, topics)
-                   for name, (_, topics) in wanted.items()}
+            for name, (_, topics) in wanted.items():
+                lines[name] = self.driver.line(started[name], scene, topics)
+            yield lines
         finally:
+            for line in lines.values():
+                line.close()
             for process in started.values():
                 process.end()
 
@@ -112,16 +118,19 @@ class Bench:
                 for name, path in files.items()]
 
     def starts(self, scene='12 legs'):
-        """Return seconds from the start of a process to its first joint states."""
+        """Return the seconds from the start of a process to its first joint states, or its end."""
         heard = scenes.topics(scene)[:1]
         floor = (*SUBJECT, 'floor', '--ready', str(self.ready(scene)))
-        found = {'kinematics': [], 'floor': []}
-        for _ in range(self.rounds):
+        found = {'kinematics': [], 'floor': [], 'made': []}
+        for _ in range(2 * self.rounds):
+            begin = time.perf_counter()
+            subprocess.run([sys.executable, '-c', MAKE], check=True)
+            found['made'].append(time.perf_counter() - begin)
             for name, arguments in (('kinematics', NODE), ('floor', floor)):
                 begin = time.perf_counter()
                 with self.subjects(scene, {name: (arguments, heard)}):
                     found[name].append(time.perf_counter() - begin)
-        return {name: statistics.median(times) for name, times in found.items()}
+        return found
 
     def services(self, calls):
         """Return rows of round trips [us] and CPU time a call [us]."""

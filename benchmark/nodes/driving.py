@@ -116,7 +116,7 @@ class Driver:
         return line
 
     def capture(self, process, scene, path):
-        """Write down what a process answers, once."""
+        """Write down what a process answers."""
         line = self.line(process, scene, scenes.topics(scene))
         heard = {}
         subscriptions = [
@@ -133,8 +133,7 @@ class Driver:
         for subscription in subscriptions:
             self.node.destroy_subscription(subscription)
         path.write_bytes(pickle.dumps(heard))
-        self.wait(PATIENCE)
-        return line
+        line.close()
 
 
 class Line:
@@ -147,21 +146,28 @@ class Line:
         self._publisher = driver.node.create_publisher(
             JointState, f'/{process.name}/crank_states', 10)
         self._heard = []
-        for topic in topics:
-            path = f'/{process.name}/{topic.name}'
-            if topic.joints:
-                self._hear(path)
-            else:
-                driver._idle.create_subscription(MarkerArray, path, self._ignore, 1, raw=True)
+        self._subscriptions = [
+            self._hear(f'/{process.name}/{topic.name}') if topic.joints
+            else driver._idle.create_subscription(
+                MarkerArray, f'/{process.name}/{topic.name}', self._ignore, 1, raw=True)
+            for topic in topics]
 
     def _hear(self, path):
         times = []
         self._heard.append(times)
-        self._driver.node.create_subscription(
+        return self._driver.node.create_subscription(
             JointState, path, lambda _: times.append(time.perf_counter()), 1000, raw=True)
 
     def _ignore(self, _):
         pass
+
+    def close(self):
+        """Hear no more."""
+        self._driver.node.destroy_publisher(self._publisher)
+        for subscription in self._subscriptions:
+            self._driver.node.destroy_subscription(subscription)
+            self._driver._idle.destroy_subscription(subscription)
+        self._driver.wait(0.1)
 
     def send(self):
         """Send the next crank message."""

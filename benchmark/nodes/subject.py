@@ -53,6 +53,7 @@ class Floor(Node):
                      for topic, (type_, depth, text) in self.ready.items()]
         self.create_subscription(JointState, 'crank_states', self._turn, ANY)
 
+    @node.until_the_end
     def _turn(self, _):
         for publisher, text in self._out:
             publisher.publish(text)
@@ -105,6 +106,7 @@ class Relay(Node):
         self._publisher = self.create_publisher(JointState, 'leg/joint_states', 10)
         self.create_subscription(JointState, 'crank_states', self._turn, ANY)
 
+    @node.until_the_end
     def _turn(self, cranks):
         angles = self._loops.joint_angles(cranks.position[0])
         message = JointState(name=self._names, position=angles.tolist())
