@@ -17,7 +17,8 @@ log := log$(suffix)
 bin := $(CURDIR)/$(venv)/bin
 docs_python := $(CURDIR)/.venv-docs/bin/python
 
-requirements := wheels/$(DISTRO).txt wheels/build.txt wheels/dev.txt
+requirements := wheels/$(DISTRO).txt wheels/build.txt wheels/demo.txt
+tools := wheels/dev.txt $(wildcard wheels/dev-$(DISTRO).txt)
 sources := package.xml setup.py setup.cfg resource/linkage_ros wheels/prefix.cmake \
   $(shell find linkage_ros config launch linkage_interfaces -type f ! -name '*.pyc' 2>/dev/null)
 
@@ -46,7 +47,7 @@ demo: build ## Run the nodes, measure what they send, draw it to demo/out/
 	@$(in_ros) python demo/demo.py
 
 .PHONY: bench
-bench: build .venv-bench/.installed ## Measure run time against error, stability, and the nodes
+bench: build $(venv)/.tools .venv-bench/.installed ## Measure run time against error, stability, and the nodes
 	@.venv-bench/bin/python benchmark/run.py
 	@.venv-bench/bin/python benchmark/stability.py
 	@$(in_ros) python -m benchmark.nodes --quick
@@ -63,15 +64,15 @@ docs: .venv-docs/.installed ## Build the documentation to docs/_build/html/ and 
 	@echo 'Documentation: docs/_build/html/index.html'
 
 .PHONY: test
-test: build ## Run the tests, but for the long ones
+test: build $(venv)/.tools ## Run the tests, but for the long ones
 	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 -m 'not long'
 
 .PHONY: long
-long: build ## Run the long tests
+long: build $(venv)/.tools ## Run the long tests
 	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 -m long
 
 .PHONY: lint
-lint: $(venv)/.installed ## Check the style
+lint: $(venv)/.tools ## Check the style
 	@ruff check .
 	@python -c 'import sys; from xml.dom.minidom import parse; [parse(f) for f in sys.argv[1:]]' \
 	  package.xml linkage_interfaces/package.xml
@@ -101,6 +102,11 @@ $(venv)/.installed: $(requirements)
 	@echo 'Installing ROS 2 $(DISTRO) into $(venv): about a minute, once.'
 	@$(PYTHON) -m venv $(venv)
 	@python -m pip install -qq $(requirements:%=-r %)
+	@touch $@
+
+$(venv)/.tools: $(venv)/.installed $(tools)
+	@echo 'Installing what the tests need.'
+	@python -m pip install -qq $(requirements:%=-r %) $(tools:%=-r %)
 	@touch $@
 
 # What there is to compare with is large: some 2 GB. planegcs has no wheel, and is left out where it
