@@ -67,11 +67,8 @@ def _started(context):
     shown = scene.load(str(path))
     common = {'namespace': chosen['namespace'], 'output': 'screen'}
     time = {'use_sim_time': 'use_sim_time' in wanted}
-    nodes = [Node(package=PACKAGE, executable=name, parameters=[str(path), time], **common)
-             for name in NODES]
-    if 'viewer' in wanted:
-        nodes.append(Node(package=PACKAGE, executable=VIEWER,
-                          parameters=[{'port': int(chosen['port'])}], **common))
+    # First what may not be installed: then nothing is left running.
+    nodes = []
     if 'robot_model' in wanted:
         nodes += [_robot(machine, shown.frame_id, chosen['namespace'], time)
                   for machine in shown.machines.values()]
@@ -84,7 +81,11 @@ def _started(context):
         adapted.write_text(yaml.safe_dump(config))
         nodes.append(Node(package='rviz2', executable='rviz2', arguments=['-d', str(adapted)],
                           parameters=[time], **common))
-    return nodes
+    if 'viewer' in wanted:
+        nodes.append(Node(package=PACKAGE, executable=VIEWER,
+                          parameters=[{'port': int(chosen['port'])}], **common))
+    return nodes + [Node(package=PACKAGE, executable=name, parameters=[str(path), time], **common)
+                    for name in NODES]
 
 
 def _scene_path(share, name):

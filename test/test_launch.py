@@ -177,12 +177,12 @@ def started(**arguments):
     ({}, ['viewer']),
     ({'viewer': 'false', 'scene': 'strandbeest'}, []),
     ({'scene': str(CONFIG / 'all.yaml'), 'robot_model': 'true'},
-     ['viewer'] + 4 * ['robot_state_publisher']),
-    ({'rviz': 'true', 'namespace': 'left'}, ['viewer', 'rviz2']),
+     4 * ['robot_state_publisher'] + ['viewer']),
+    ({'rviz': 'true', 'namespace': 'left'}, ['rviz2', 'viewer']),
 ])
 def test_the_launch_file_starts_the_nodes_of_a_scene(arguments, besides, monkeypatch, tmp_path):
     monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path))
-    assert started(**arguments) == ['crank_driver', 'kinematics', 'servo_inverse', *besides]
+    assert started(**arguments) == [*besides, 'crank_driver', 'kinematics', 'servo_inverse']
 
 
 @needs_launch
