@@ -27,7 +27,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 from . import messages, node, reading, scene, urdf
 from .wire import Wire
 
-ANY = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+# Any source will do; what comes while the node is kept waiting, 50 ms at 1000 Hz, is not lost.
+ANY = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 SECONDS_BETWEEN_WARNINGS = 5.0
 

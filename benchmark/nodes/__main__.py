@@ -92,13 +92,14 @@ def run(options):
             if options.hold:
                 return {'hold': long.hold(bench, 1000.0, options.hold)}
             rates = (1000.0,) if options.quick else campaign.RATES
-            rows, parts = [], []
+            rows, bodies = [], []
             for scene in scenes.SCENES:
                 rows += bench.cost(scene, rates)
-                for rate in rates:
-                    parts += bench.parts(scene, rate)
+                bodies += bench.bodies(scene)
                 print(f'{scene}: {time.time() - started:.0f} s', file=sys.stderr)
-            return {'rows': rows, 'parts': parts, 'starts': bench.starts(),
+            parts = [part for rate in rates for part in bench.parts('12 legs', rate)]
+            return {'rows': rows, 'parts': parts, 'bodies': bodies,
+                    'starts': bench.starts(),
                     'services': bench.services(40 if options.quick else 200),
                     'machine': machine(ROS), 'cores': os.cpu_count(),
                     'load': os.getloadavg()[2],

@@ -16,6 +16,7 @@
 
 from contextlib import contextmanager
 import json
+import pickle
 import statistics
 import subprocess
 import sys
@@ -23,9 +24,11 @@ import time
 
 from linkage_interfaces.srv import ServoInverse
 import numpy as np
+from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 from std_srvs.srv import Trigger
 
-from . import scenes
+from . import scenes, subject
 from .driving import Process
 
 SUBJECT = ('-m', 'benchmark.nodes.subject')
@@ -34,6 +37,7 @@ RATES = (50.0, 200.0, 1000.0)
 # How long a burst takes [s], by rate.
 SECONDS = {50.0: 1.2, 200.0: 1.0, 1000.0: 0.6}
 WARM_UP = 60
+TICKS = 300
 MAKE = 'import linkage_ros.kinematics, rclpy; rclpy.init(); linkage_ros.kinematics.Kinematics()'
 
 
@@ -99,23 +103,44 @@ class Bench:
                 for name, found in bursts.items()]
 
     def parts(self, scene, rate):
-        """Return the parts of a tick of each subject [us]."""
+        """Return the parts of a tick [us] in a process that is driven at a rate [Hz]."""
         heard = scenes.topics(scene)
-        wanted = {
-            'kinematics': ('kinematics', heard), 'fresh': ('fresh', heard),
-            'floor': ('floor', heard)}
-        if scene == 'one leg':
-            wanted['relay'] = 'relay', heard[:1]
-        files = {name: self.folder / f'{name}.times' for name in wanted}
-        with self.subjects(scene, {
-                name: ((*SUBJECT, kind, '--times', str(files[name]),
-                        *(('--ready', str(self.ready(scene))) if kind == 'floor' else ())), topics)
-                for name, (kind, topics) in wanted.items()}) as lines:
+        wanted = {}
+        for kind in ('kinematics', 'fresh', 'floor'):
+            given = ('--ready', str(self.ready(scene))) if kind == 'floor' else ()
+            wanted[kind] = (*SUBJECT, kind, '--times', str(self.folder / kind), *given), heard
+        with self.subjects(scene, wanted) as lines:
             for _ in range(self.rounds):
                 for line in lines.values():
                     line.burst(rate, round(rate * SECONDS[rate]))
-        return [{'scene': scene, 'rate': rate, 'subject': name, **json.loads(path.read_text())}
-                for name, path in files.items()]
+        return [{'scene': scene, 'rate': rate, 'subject': kind,
+                 **json.loads((self.folder / kind).read_text())} for kind in wanted]
+
+    def bodies(self, scene):
+        """Return what a tick takes [us], one after the other without a pause, in this process."""
+        ready = self.ready(scene)
+        subject.Floor.ready = subject.ready(pickle.loads(ready.read_bytes()))
+        kinds = ['kinematics', 'fresh', 'floor', *(['relay'] if scene == 'one leg' else [])]
+        given = [Parameter(name, value=value) for name, value in scenes.SCENES[scene].items()]
+        nodes = {kind: subject.KINDS[kind](
+            namespace=f'/{kind}', parameter_overrides=given) for kind in kinds}
+        ears = [Process(kind, *SUBJECT, 'ear', '--ready', str(ready)) for kind in kinds]
+        try:
+            assert self.driver.until(lambda: all(
+                node.count_subscribers(topic.name)
+                for node in nodes.values() for topic in scenes.topics(scene)))
+            cranks = scenes.Cranks(scene)
+            ticks = {kind: [] for kind in kinds}
+            for _ in range(self.rounds):
+                for kind, node in nodes.items():
+                    ticks[kind] += _ticks(node, cranks)
+        finally:
+            for ear in ears:
+                ear.end()
+            for node in nodes.values():
+                node.destroy_node()
+        return [{'scene': scene, 'subject': kind, 'tick': statistics.median(times)}
+                for kind, times in ticks.items()]
 
     def starts(self, scene='12 legs'):
         """Return the seconds from the start of a process to its first joint states, or its end."""
@@ -173,6 +198,19 @@ class Bench:
                 spin(timeout_sec=1.0)
             times.append(1e6 * (time.perf_counter() - start))
         return times, 1e6 * (process.cpu() - cpu) / count
+
+
+def _ticks(node, cranks):
+    """Return the CPU time of this thread in each of some ticks, after a few others."""
+    heard = next(s for s in node.subscriptions if s.topic_name.endswith('crank_states'))
+    times = []
+    for _ in range(TICKS):
+        message = next(cranks)
+        given = serialize_message(message) if heard.raw else message
+        start = time.thread_time_ns()
+        heard.callback(given)
+        times.append(1e-3 * (time.thread_time_ns() - start))
+    return times[TICKS // 10:]
 
 
 def _request(count):

@@ -70,8 +70,8 @@ class Burst:
     """What came of a number of crank messages at a rate."""
 
     def __init__(self, sent, heard, cpu):
-        self.cpu = 1e6 * cpu / len(sent)
         self.lost = max((len(sent) - len(times) for times in heard), default=0)
+        self.cpu = 1e6 * cpu / (len(sent) - self.lost)
         # Answers come in order: where none is missing, the nth is to the nth message.
         self.latencies = [] if self.lost or not heard else [
             1e6 * (max(answers) - asked) for asked, *answers in zip(sent, *heard)]

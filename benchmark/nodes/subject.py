@@ -29,7 +29,7 @@ import sys
 import time
 
 from linkage_interfaces.srv import ServoInverse
-from linkage_ros import kinematics, messages, node, scene, wire
+from linkage_ros import kinematics, messages, node, reading, scene, wire
 from linkage_ros.kinematics import ANY, Kinematics, Outlet
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -47,8 +47,8 @@ class Floor(Node):
 
     ready = {}
 
-    def __init__(self):
-        super().__init__('floor')
+    def __init__(self, **kwargs):
+        super().__init__('floor', **kwargs)
         self._out = [(self.create_publisher(type_, topic, depth), text)
                      for topic, (type_, depth, text) in self.ready.items()]
         self.create_subscription(JointState, 'crank_states', self._turn, ANY)
@@ -98,8 +98,8 @@ class FreshOutlet(Outlet):
 class Relay(Node):
     """Finds the joint angles of one leg numerically."""
 
-    def __init__(self):
-        super().__init__('relay')
+    def __init__(self, **kwargs):
+        super().__init__('relay', **kwargs)
         machine = scene.read({'mechanisms': ['leg'], 'leg.type': 'jansen'}).machines['leg']
         self._loops = Loops(machine.linkage)
         self._names = [f'leg_{link.name}' for link in machine.linkage.links]
@@ -143,23 +143,37 @@ class Echoed(Node):
 
 
 class Ear(Node):
-    """Hears every topic of a scene, and does nothing about it."""
+    """Subscribes to every topic of a scene, and never takes what arrives."""
 
     ready = {}
 
     def __init__(self):
         super().__init__('ear')
+        # No executor knows of this one.
+        self._idle = Node('idle')
         for topic, (type_, depth, _) in self.ready.items():
-            self.create_subscription(type_, topic, self._hear, depth, raw=True)
+            self._idle.create_subscription(type_, topic, self._hear, depth, raw=True)
 
     def _hear(self, _):
         pass
 
 
-KINDS = {'kinematics': Kinematics, 'fresh': Kinematics, 'floor': Floor, 'relay': Relay,
+class Fresh(Kinematics):
+    """The same node with ordinary messages."""
+
+    def __init__(self, **kwargs):
+        usual, kinematics.Outlet = kinematics.Outlet, FreshOutlet
+        try:
+            super().__init__(**kwargs)
+        finally:
+            kinematics.Outlet = usual
+
+
+KINDS = {'kinematics': Kinematics, 'fresh': Fresh, 'floor': Floor, 'relay': Relay,
          'deaf': Deaf, 'raw': Raw, 'trigger': Triggered, 'echo': Echoed, 'ear': Ear}
 # The parts of the work of a tick.
 PARTS = {'tick': [(Kinematics, '_turn'), (Floor, '_turn'), (Relay, '_turn')],
+         'read': [(reading.Reader, 'read')],
          'solve': [(Outlet, '_solve')], 'patch': [(wire.Template, 'patched')],
          'publish': [(Publisher, 'publish')],
          'ask who listens': [(Publisher, 'get_subscription_count')]}
@@ -215,8 +229,6 @@ def main():
     options = parser.parse_args(remove_ros_args()[1:])
     if options.ready:
         Floor.ready = Ear.ready = ready(pickle.loads(options.ready.read_bytes()))
-    if options.kind == 'fresh':
-        kinematics.Outlet = FreshOutlet
     times = Times() if options.times else None
     executor = SingleThreadedExecutor if options.single else node.Executor
     code = node.run(KINDS[options.kind], options.kind, executor_class=executor)
