@@ -35,6 +35,8 @@ from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from ros_harness import Graph, Process  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 
+pytestmark = pytest.mark.long
+
 SCENE = """
     /**:
       ros__parameters:
@@ -121,7 +123,6 @@ def test_where_there_is_no_such_executor_the_plain_one_is_used_and_ends_as_quiet
     assert (done.returncode, done.stderr) == (0, 'turned\n')
 
 
-@pytest.mark.long
 @pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize('plain', [False, True])
 def test_a_signal_amid_a_callback_ends_a_node_quietly(stop, plain):

@@ -25,6 +25,8 @@ import pytest
 import reference
 from reference_wider import HELD
 
+pytestmark = pytest.mark.long
+
 KINDS = list(mechanisms.TYPES)
 # Coordinates and slides that never change.
 CONSTANT = {'peaucellier': ['C.x'], 'slider_crank': ['B.y']}
@@ -71,7 +73,6 @@ def difference(linkage, output, one, other):
     return gap - 2 * math.pi * np.round(gap / (2 * math.pi)) if turned(linkage, output) else gap
 
 
-@pytest.mark.long
 @pytest.mark.parametrize('kind', [kind for kind in KINDS if kind != 'five_bar'])
 def test_every_answer_is_right_to_the_last_digits(kind):
     linkage, rng = mechanisms.create(kind), np.random.default_rng(1)
@@ -106,7 +107,6 @@ def _miss(exact, output, value):
             float(exact.sensitivity[f'angle {output}']) + half)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize('kind', KINDS)
 def test_all_answers_are_found(kind):
     linkage, rng = mechanisms.create(kind), np.random.default_rng(2)
@@ -130,7 +130,6 @@ def test_all_answers_are_found(kind):
         assert (found == expected).mean() > 0.7, (output, found, expected)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize('kind', KINDS)
 def test_answers_ascend_in_one_turn_and_give_the_value_back(kind):
     linkage, rng = mechanisms.create(kind), np.random.default_rng(3)

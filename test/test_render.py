@@ -36,6 +36,8 @@ from linkage_ros.render.picture import Picture  # noqa: E402
 from matplotlib.colors import to_rgb  # noqa: E402
 from PIL import Image  # noqa: E402
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / 'config'
 TABLE = [line.split() for line in (ROOT / 'pictures' / 'pictures.txt').read_text().splitlines()
@@ -65,7 +67,6 @@ def rows_of(file):
                 for row in csv.DictReader(lines)]
 
 
-@pytest.mark.long
 @pytest.mark.parametrize('row', TABLE, ids=[Path(row[2]).name for row in TABLE])
 def test_every_picture_of_the_table_is_drawn(row, tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
@@ -77,7 +78,6 @@ def test_every_picture_of_the_table_is_drawn(row, tmp_path, monkeypatch):
         assert getattr(image, 'n_frames', 1) == (3 if few else 1)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize('ending, args', [
     ('png', []), ('svg', []), ('gif', ['--frames', '4', '--trace', 'fading'])])
 def test_the_same_request_gives_the_same_bytes(tmp_path, ending, args):
@@ -149,7 +149,6 @@ def test_the_bars_in_the_data_are_as_long_as_in_the_original_document(tmp_path):
         assert math.dist(*ends) == pytest.approx(length, rel=1e-13)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize('type_', [t for t in mechanisms.TYPES])
 def test_both_directions_have_one_scale_and_nothing_is_cut_off(type_):
     one = machine(type_)
@@ -164,7 +163,6 @@ def test_both_directions_have_one_scale_and_nothing_is_cut_off(type_):
     assert np.all(pixels < (box.x1 - 15, box.y1 - 15))
 
 
-@pytest.mark.long
 @pytest.mark.parametrize('args', [[], ['--show', 'dimensions'], ['--size', '600x460']])
 @pytest.mark.parametrize('config', ['all', 'slotted_lever', 'peaucellier', 'jansen'])
 def test_nothing_reaches_over_the_edge_of_a_picture(tmp_path, config, args):
@@ -174,7 +172,6 @@ def test_nothing_reaches_over_the_edge_of_a_picture(tmp_path, config, args):
     assert all((edge == 255).all() for edge in edges)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize('type_, options', [
     ('slotted_lever', {}), ('jansen', {'leg_pairs': 2}), ('peaucellier', {})])
 def test_an_animation_shows_what_a_still_of_that_time_shows(tmp_path, type_, options):
@@ -303,7 +300,6 @@ def test_angles_and_ratio_of_a_slotted_lever_are_printed():
     assert texts_of(picture)[1:] == ['φ = 0.0°', 'φ/θ = –', f'dφ/dθ = {80 / 230:.3f}']
 
 
-@pytest.mark.long
 @pytest.mark.parametrize('trace', TRACES)
 @pytest.mark.parametrize('type_', ['jansen', 'five_bar'])
 def test_every_trace_and_part_can_be_drawn(type_, trace):
