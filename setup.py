@@ -32,7 +32,7 @@ setup(
     python_requires='>=3.10',
     install_requires=['setuptools', 'numpy'],
     extras_require={
-        'fast': ['numba'],
+        'fast': ['llvmlite>=0.44'],
         'render': ['matplotlib>=3.6', 'pyyaml', 'tqdm'],
         'test': ['gmpy2', 'hypothesis', 'mpmath', 'pytest', 'pyyaml'],
         'viewer': ['aiohttp>=3.9'],

@@ -150,7 +150,7 @@ def targets(result):
 
 
 OURS = ('linkage_ros', 'numpy')
-FAST = ('linkage_ros', 'numba')
+FAST = ('linkage_ros', 'machine code')
 FLOATS = ('linkage_ros', 'function()')
 # Right: all but one in a hundred poses, and these to the last three digits, whatever the angle.
 ACCURATE = 1e3
@@ -159,7 +159,7 @@ RARE = 0.01
 
 def _against_peers(result):
     """Compare with the fastest peer, and with the fastest that is right at every angle."""
-    yield ('| us a pose | function() | numpy | numba | fastest peer that is right '
+    yield ('| us a pose | function() | numpy | machine code | fastest peer that is right '
            '| fastest peer of all |')
     yield '|---|--:|--:|--:|---|---|'
     for kind, title in TITLES.items():

@@ -31,7 +31,7 @@ import sys
 import time
 
 # One core for every method: the numbers are per core.
-for library in ('OMP', 'OPENBLAS', 'MKL', 'NUMBA', 'NUMEXPR'):
+for library in ('OMP', 'OPENBLAS', 'MKL', 'NUMEXPR'):
     os.environ.setdefault(f'{library}_NUM_THREADS', '1')
 sys.path.insert(0, str(Path(__file__).parents[1]))
 

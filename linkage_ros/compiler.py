@@ -16,19 +16,21 @@
 Expressions turned into code.
 
 One list of operations serves every use: plain Python on floats for a single pose, numpy for
-arrays, and numba where it is asked for. Only what the outputs depend on is in the list, each
-value once; what depends on dimensions alone is worked out when they are set, and so is every
+arrays, and machine code where it is asked for. Only what the outputs depend on is in the list,
+each value once; what depends on dimensions alone is worked out when they are set, and so is every
 condition on dimensions: the code for a pose has no branch for it.
 """
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
 import math
 from struct import Struct
 from typing import Callable, Mapping, Sequence
+import warnings
 
 import numpy as np
 
@@ -40,6 +42,8 @@ BLOCK = 4096
 FEW = 32
 # Python's parser bounds how deep parentheses may nest.
 DEEPEST = 16
+
+_compiling = ThreadPoolExecutor(1, 'linkage_ros_compiler')
 
 
 def _grazed(x, tolerance):
@@ -95,18 +99,20 @@ class _Dialect:
 
 _FLOAT = _Dialect(
     {**_OPERATORS, 'where': '({1} if {0} else {2})',
+     'rint': 'round({})',
      'root': '(sqrt({0}) if {0} > 0.0 else grazed({0}, {1}))',
      'gated': '({0} if {1} >= -{2} else nan)'},
     frozenset({'root'}),
     {'sin': math.sin, 'cos': math.cos, 'sqrt': math.sqrt, 'atan2': math.atan2,
-     'grazed': _grazed, 'nan': math.nan}, frees=False)
+     'grazed': _grazed, 'nan': math.nan, 'inf': math.inf}, frees=False)
 
 _ARRAY = _Dialect(
     {**_OPERATORS, 'where': 'where({}, {}, {})', 'root': 'root({}, {})',
-     'gated': 'gated({}, {}, {})'},
+     'gated': 'gated({}, {}, {})', 'rint': 'rint({})'},
     frozenset(),
     {'sin': np.sin, 'cos': np.cos, 'sqrt': np.sqrt, 'atan2': np.arctan2, 'where': np.where,
-     'root': _root, 'gated': _gated, 'nan': np.nan}, frees=True)
+     'root': _root, 'gated': _gated, 'rint': np.rint, 'nan': np.nan,
+     'inf': np.inf}, frees=True)
 
 _EVALUATED = {
     'add': np.add, 'subtract': np.subtract, 'multiply': np.multiply, 'divide': np.divide,
@@ -182,9 +188,12 @@ class _Listing:
             uses[number] += 1
         return uses
 
-    def varying(self) -> list:
-        """Return which outputs depend on an angle."""
-        return [j for j, n in enumerate(self.outputs) if self.entries[n][0].varies]
+    def operations(self) -> tuple:
+        """Return the operations as (number, name, operands), the constants and the outputs."""
+        needed = [(number, *self.entries[number])
+                  for number in self._uses if number not in self.constants]
+        return [(number, node.op, (float(node.value),) if node.op == 'constant' else args)
+                for number, node, args in needed], self.constants, self.outputs
 
     def statements(self, dialect: _Dialect) -> tuple:
         """Return the assignments as (name, code, names used) and the code of each output."""
@@ -254,31 +263,12 @@ def _python(listing: _Listing, dialect: _Dialect, angles: int, names=()) -> Call
     return scope['bind']
 
 
-def _accelerated(listing: _Listing, angles: int) -> Callable:
-    """Return a numba kernel (angles, constants, out); the dimensions may change without it."""
-    import numba
-
-    lines, outputs, _ = listing.statements(_FLOAT)
-    given = [f'x{i}' for i in range(angles)]
-    constants = [f'k{n}' for n in listing.constants]
-    source = '\n'.join([
-        f'def kernel(angles, {"".join(k + ", " for k in constants)}out):',
-        '    for i in range(out.shape[1]):',
-        *(f'        {x} = angles[{j}, i]' for j, x in enumerate(given)),
-        *(f'        {name} = {code}' for name, code, _ in lines),
-        *(f'        out[{j}, i] = {outputs[j]}' for j in listing.varying())])
-    scope = {**_FLOAT.names, 'grazed': numba.njit(_grazed)}
-    exec(compile(source, '<linkage>', 'exec'), scope)
-    return numba.njit(scope['kernel'], error_model='numpy')
-
-
 class _Variant:
     """The code for one outcome of the conditions on dimensions."""
 
     def __init__(self, outputs, decided, angles):
         self._listing = _Listing(outputs, decided)
-        self._angles = angles
-        self.outputs = len(outputs)
+        self.angles, self.outputs = angles, len(outputs)
         self.constants = [self._listing.entries[n][0] for n in self._listing.constants]
         self.float = _python(self._listing, _FLOAT, angles)
         self._placing = {}
@@ -286,16 +276,22 @@ class _Variant:
     def placing(self, names: tuple) -> Callable:
         """Return the code for one pose that returns the outputs in pairs, by name."""
         if names not in self._placing:
-            self._placing[names] = _python(self._listing, _FLOAT, self._angles, names)
+            self._placing[names] = _python(self._listing, _FLOAT, self.angles, names)
         return self._placing[names]
 
     @cached_property
     def array(self):
-        return _python(self._listing, _ARRAY, self._angles)
+        return _python(self._listing, _ARRAY, self.angles)
 
     @cached_property
-    def accelerated(self):
-        return _accelerated(self._listing, self._angles)
+    def loop(self):
+        """The code for many poses as machine code, once the compiler has made it."""
+        return _compiling.submit(self._loop)
+
+    def _loop(self):
+        from .native import Loop
+
+        return Loop(*self._listing.operations())
 
 
 class Program:
@@ -361,6 +357,7 @@ class Pose:
         self.shape = shape
         if not shape:
             self.at = variant.float(*constants, self._by_arrays)
+            self._given = np.array(constants)
 
     def _by_arrays(self, *angles: float) -> tuple:
         """Return the outputs at one pose with inf or nan where Python's floats raise."""
@@ -373,6 +370,12 @@ class Pose:
 
         return self._variant.placing(names)(*self._constants, by_arrays)
 
+    def __call__(self, *angles):
+        """Return the outputs at floats, as floats, or over arrays that are broadcast together."""
+        if not self.shape and all(isinstance(angle, float) for angle in angles):
+            return self.at(*angles)
+        return self.over(*angles)
+
     def over(self, *angles) -> np.ndarray:
         """Return the outputs over arrays that are broadcast together, shape (outputs, *shape)."""
         angles = [np.asarray(a, float) for a in angles]
@@ -383,19 +386,20 @@ class Pose:
         shape, size = angles[0].shape, angles[0].size
         flat = [a.ravel() for a in angles]
         if self._accelerate:
-            out = self._by_kernel(np.array(flat))
-        elif size < FEW:
-            out = self._one_by_one(flat, size)
+            out = np.empty((self._variant.outputs, size))
+            loop, given = self._variant.loop.result(), np.array(flat)
+            loop.run(*loop.arguments(given, self._given, out))
         else:
-            out = self._blocks(flat, size)
+            out = self._plainly(flat, size)
         return out.reshape(self._variant.outputs, *shape)
 
-    def _by_kernel(self, given):
-        # Only what varies is left to the loop: rows of constants keep it from being vectorised.
-        out = np.empty((self._variant.outputs, given.shape[1]))
-        out[:] = np.array(self.at(*[0.0] * len(given)))[:, None]
-        self._variant.accelerated(given, *self._constants, out)
-        return out
+    def batch(self, rows: np.ndarray) -> Batch:
+        """Return poses to be solved again and again, into rows (poses, outputs)."""
+        return Batch(self._plainly, self._variant.loop if self._accelerate else None,
+                     self._given, self._variant.angles, rows)
+
+    def _plainly(self, given, size):
+        return self._one_by_one(given, size) if size < FEW else self._blocks(given, size)
 
     def _one_by_one(self, given, size):
         poses = map(self.at, *(a.tolist() for a in given))
@@ -418,3 +422,41 @@ class Pose:
         with np.errstate(all='ignore'):
             rows = self._variant.array(*self._constants)(*angles)
         return np.array([np.broadcast_to(row, shape) for row in rows], float)
+
+
+class Batch:
+    """
+    Poses that are solved again and again, in arrays that stay where they are.
+
+    Attributes
+    ----------
+    given : float array (angles, poses)
+        Where the angles are put.
+    rows : float array (poses, outputs)
+        What `solve` makes of them.
+
+    """
+
+    def __init__(self, plainly: Callable, loop, constants, angles: int, rows: np.ndarray):
+        self.given, self.rows = np.zeros((angles, len(rows))), rows
+        self._plainly = plainly
+        self._loop, self._constants = loop, constants
+        self._run = None
+
+    def solve(self):
+        """Fill the rows: plainly until there is machine code, for which nobody waits."""
+        if self._loop and self._loop.done():
+            self._take(self._loop)
+        if self._run:
+            self._run(*self._arguments)
+        else:
+            self.rows[:] = self._plainly(self.given, len(self.rows)).T
+
+    def _take(self, loop):
+        self._loop = None
+        if error := loop.exception():
+            warnings.warn(f'no machine code, so plain Python goes on: {error}', stacklevel=3)
+            return
+        self._code = loop.result()
+        self._arguments = self._code.arguments(self.given, self._constants, self.rows.T)
+        self._run = self._code.run

@@ -213,6 +213,11 @@ def arctangent(y: Real, x: Real) -> Real:
     return _node('atan2', y, x)
 
 
+def nearest_integer(x: Real) -> Real:
+    """Return x rounded to an integer, halves to the even one."""
+    return _node('rint', x)
+
+
 def exact_sum(*terms: Number) -> Real:
     """Return the exactly rounded sum of dimensions and sums of them, however much cancels."""
     kept = [t for term in terms for t in _summands(real(term)) if t.value != 0.0]

@@ -25,6 +25,7 @@ from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from . import messages, node, reading, scene, urdf
+from .solution import Layout
 from .wire import Wire
 
 # Any source will do; what comes while the node is kept waiting, 50 ms at 1000 Hz, is not lost.
@@ -39,8 +40,7 @@ class Kinematics(node.SceneNode):
     def __init__(self, **kwargs):
         super().__init__(scene.KINEMATICS, **kwargs)
         self._outlets = {name: Outlet(self, name) for name in self.scene.machines}
-        self._names = None
-        self._places = {}
+        self._names, self._routes = None, ()
         self._reader = reading.Reader()
         self.follow(self.scene)
         self.create_subscription(JointState, 'crank_states', self._turn, ANY, raw=True)
@@ -54,14 +54,17 @@ class Kinematics(node.SceneNode):
     def _turn(self, text):
         stamp, names, positions, speeds = self._reader.read(text)
         if names is not self._names:
-            self._names = names
-            self._places = {name: i for i, name in enumerate(names)}
+            self._names, self._routes = names, self._routed(names, len(positions))
         known = len(speeds) == len(names)
-        for outlet in self._outlets.values():
-            places = [self._places.get(name, len(positions)) for name in outlet.cranks]
-            if max(places) < len(positions):
-                outlet.turn(stamp, [positions[i] for i in places],
-                            [speeds[i] for i in places] if known else [])
+        for outlet, places in self._routes:
+            outlet.turn(stamp, [positions[i] for i in places],
+                        [speeds[i] for i in places] if known else [])
+
+    def _routed(self, names, positions):
+        """Return the mechanisms that a message turns, and where it says how far."""
+        places = {name: i for i, name in enumerate(names[:positions])}
+        return [(outlet, [places[crank] for crank in outlet.cranks])
+                for outlet in self._outlets.values() if places.keys() >= set(outlet.cranks)]
 
 
 class Drive(NamedTuple):
@@ -75,30 +78,21 @@ class Drive(NamedTuple):
 
 class Pose(NamedTuple):
     """
-    A mechanism at one drive, as numbers: `legs` rows, the crank angles, the crank speeds.
+    What is shown of a mechanism.
 
-    A row holds points up to `points`, joint angles up to `posed`, then joint velocities; `held`
-    tells which legs can be assembled, None that all can; `moving` whether velocities are known.
+    `held` tells which legs can be assembled, None that all can; `moving` whether all velocities
+    are known.
     """
 
+    layout: Layout
     values: np.ndarray
-    legs: int
-    cranks: int
-    points: int
-    posed: int
-    row: int
     held: Optional[np.ndarray]
     moving: bool
 
     def rows(self) -> np.ndarray:
         """Return the rows of the legs that can be assembled."""
-        rows = self.values[:self.legs * self.row].reshape(self.legs, self.row)
+        rows = self.layout.rows(self.values)
         return rows if self.held is None else rows[self.held]
-
-    def drives(self) -> Sequence[np.ndarray]:
-        """Return crank angles and speeds."""
-        rest = self.values[self.legs * self.row:]
-        return rest[:self.cranks], rest[self.cranks:]
 
 
 class Outlet:
@@ -133,7 +127,7 @@ class Outlet:
         size = machine.scale * float(machine.linkage.longest)
         self._marker_array = messages.Markers(*drawn, bars, size)
         self._joint_state = messages.JointStates()
-        self._drive, self._solvers, self._wires = None, {}, {}
+        self._drive, self._solutions, self._wires = None, {}, {}
         curve = self._assembly.locus(machine.tracer)
         if len(curve) > 1:
             self._locus.publish(messages.locus(*drawn, curve, size))
@@ -164,22 +158,28 @@ class Outlet:
 
     def _solve(self, drive):
         """Solve the legs, once for each drive, for those who listen."""
-        points = self._points if drive.markers else ()
-        joints = self._assembly.joints if drive.joints else ()
-        rates = joints if drive.speeds else ()
-        wanted = points, joints, rates
-        if wanted not in self._solvers:
-            self._solvers[wanted] = self._assembly.solver(*wanted)
-        solved = self._solvers[wanted](*drive.thetas, speeds=drive.speeds)
-        posed = 2 * len(points) + len(joints)
-        held, moving = self._assembly.within_reach(drive.thetas), bool(rates)
+        wanted = drive.joints, drive.markers, len(drive.speeds)
+        if wanted not in self._solutions:
+            self._solutions[wanted] = self._solution(*wanted)
+        solution = self._solutions[wanted]
+        solution.solve(drive.thetas, drive.speeds)
+        layout, values = solution.layout, solution.values
+        held, moving = None, layout.velocities > 0
+        if self._assembly.is_limited:
+            held = self._assembly.within_reach(drive.thetas[0])
         # One sum, of squares, tells whether all values are finite; it is rarely asked which are.
-        if not math.isfinite(np.vdot(solved, solved)):
-            held = held & np.isfinite(solved[:, :posed]).all(axis=1)
-            moving = moving and bool(np.isfinite(solved[held, posed:]).all())
-        self._pose = Pose(np.concatenate([solved.ravel(), drive.thetas, drive.speeds]),
-                          len(solved), len(drive.thetas), 2 * len(points), posed,
-                          solved.shape[1], None if held.all() else held, moving)
+        if not math.isfinite(np.vdot(values, values)):
+            finite = np.isfinite(solution.rows[:, :layout.posed]).all(axis=1)
+            held = finite if held is None else held & finite
+            moving = moving and bool(np.isfinite(solution.rows[held, layout.posed:]).all())
+        if held is not None and held.all():
+            held = None
+        self._pose = Pose(layout, values, held, moving)
+
+    def _solution(self, joints, markers, moving):
+        names = self._assembly.joints if joints else ()
+        return self._assembly.solution(
+            self._points if markers else (), names, names if moving else ())
 
     def _warn(self, thetas, held):
         legs = [f'{self._name}_{leg.prefix}'.rstrip('_')
@@ -196,23 +196,24 @@ class Outlet:
         if pose.held is not None:
             publisher.publish(build(pose, stamp))
             return
-        kind = what, pose.moving, pose.values.size
+        kind = what, pose.moving, pose.layout
         if kind not in self._wires:
             self._wires[kind] = Wire(
                 publisher, lambda stamp, values: build(pose._replace(values=values), stamp),
-                pose.values.size, self._logger)
+                pose.layout.size, self._logger)
         self._wires[kind].send(stamp, pose.values)
 
     def _joint_message(self, pose, stamp):
         legs = slice(None) if pose.held is None else pose.held
         names = [*self.cranks, *self._joint_names[legs].ravel().tolist()]
-        rows, (thetas, speeds) = pose.rows(), pose.drives()
+        layout, rows, drive = pose.layout, pose.rows(), pose.layout.drive(pose.values)
+        thetas, speeds = drive[:layout.cranks], drive[layout.cranks:]
         return self._joint_state.message(
-            stamp, names, [*thetas, *rows[:, pose.points:pose.posed].flat],
-            [*speeds, *rows[:, pose.posed:].flat] if pose.moving else ())
+            stamp, names, [*thetas, *rows[:, layout.coordinates:layout.posed].flat],
+            [*speeds, *rows[:, layout.posed:].flat] if pose.moving else ())
 
     def _marker_message(self, pose, stamp):
-        places = pose.rows()[:, :pose.points]
+        places = pose.rows()[:, :pose.layout.coordinates]
         return self._marker_array.message(stamp, places.reshape(len(places), -1, 2))
 
 

@@ -18,14 +18,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
+from importlib.util import find_spec
+from itertools import chain, cycle
 from typing import Callable, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
 from . import inverse, language
 from .analysis import Analysis
-from .compiler import evaluate, Pose, Program
+from .compiler import Batch, evaluate, Pose, Program
 from .expression import angle, derivative, dimension, Real, real, spin, where
 from .reach import arcs
 from .sketch import Sketch
@@ -108,7 +109,8 @@ class Structure:
         key = (kind, names, *crank)
         if key not in self._programs:
             outputs = getattr(self, f'_{kind}')(names, *crank)
-            self._programs[key] = Program(outputs, len(self.sketch.cranks))
+            cranks = len(self.sketch.cranks)
+            self._programs[key] = Program(outputs, 2 * cranks + 3 if kind == 'legs' else cranks)
         return self._programs[key]
 
     def _points(self, names):
@@ -127,6 +129,21 @@ class Structure:
         points, joints, rates = wanted
         turning = [self._rates(rates, crank) for crank in range(len(self.sketch.cranks))]
         return [*self._points(points), *self._angles(joints), *chain.from_iterable(turning)]
+
+    def _legs(self, wanted):
+        points, joints, moving = wanted
+        cranks = range(len(self.sketch.cranks))
+        speeds = [angle(len(cranks) + crank) for crank in cranks]
+        across, side, size = (angle(2 * len(cranks) + i) for i in range(3))
+        turning = [sum((rate * speed for rate, speed in zip(rates, speeds)), real(0.0))
+                   for rates in zip(*(self._rates(moving, crank) for crank in cranks))]
+        # A mirrored leg's own crank turns backwards, which mirrors its rates once more.
+        return [*(part * factor for part, factor in zip(self._points(points),
+                                                        cycle((across, size)))),
+                *(value * (across if self._slides(name) else side)
+                  for name, value in zip(joints, self._angles(joints))),
+                *(value * size if self._slides(name) else value
+                  for name, value in zip(moving, turning))]
 
     def _slides(self, name):
         return any(x.name == name and x.kind == 'prismatic' for x in self.sketch.links)
@@ -283,19 +300,16 @@ class Mechanism(Analysis):
         """
         Return the same mechanism with arrays solved by compiled code.
 
-        The first call for a set of points compiles for a second or two.
+        The first call for a set of points compiles for about a tenth of a second.
 
         Raises
         ------
         ImportError
-            If numba is not installed (`pip install linkage_ros[fast]`).
+            If llvmlite is not installed (`pip install linkage_ros[fast]`).
 
         """
-        try:
-            import numba  # noqa: F401
-        except ImportError as error:
-            raise ImportError('accelerated() needs numba: pip install linkage_ros[fast]') \
-                from error
+        if not find_spec('llvmlite'):
+            raise ImportError('accelerated() needs llvmlite: pip install linkage_ros[fast]')
         return type(self)(self._design, self._structure, self.dimensions, self.branches, True)
 
     def solve(self, theta, points: Optional[Sequence[str]] = None) -> dict:
@@ -419,6 +433,30 @@ class Mechanism(Analysis):
                        for kind, names in (('points', points), ('angles', joints),
                                            ('rates', rates)))
         return self._bound('parts', wanted).at
+
+    def legs(self, points: Tuple[str, ...], joints: Tuple[str, ...], moving: Tuple[str, ...],
+             rows: np.ndarray) -> Batch:
+        """
+        Return legs like this one on the same cranks, to be solved again and again.
+
+        An accelerated mechanism's are solved by machine code as soon as that is there, without
+        waiting for it; the numbers are the same.
+
+        Parameters
+        ----------
+        points, joints, moving : tuple of str
+            The joints whose places, angles and velocities are wanted.
+        rows : float array (legs, n)
+            Where they go: x, y [m] of each point, joint angles [rad; a slide: m], velocities.
+
+        Returns
+        -------
+        compiler.Batch
+            For each leg is given: the angle of each crank [rad] as that leg counts it, the speed
+            of each crank [rad/s], its size times its side, its side, 1 or -1, and its size.
+
+        """
+        return self._bound('legs', (points, joints, moving)).batch(rows)
 
     def _vectors(self, kind, theta, points, *crank):
         names, pose = self._ready(kind, points, *crank)

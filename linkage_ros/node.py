@@ -15,6 +15,7 @@
 """What the three nodes share: a scene as parameters that can be changed, and `main`."""
 
 from functools import wraps
+import gc
 import signal
 
 from rcl_interfaces.msg import (
@@ -153,6 +154,8 @@ def run(node_class, name: str, args=None, executor_class=Executor) -> int:
     node = None
     try:
         node = node_class()
+        # What has been made so far stays: the collector need not look through it again and again.
+        gc.freeze()
         _spin(node, executor_class())
     except ExternalShutdownException:
         pass

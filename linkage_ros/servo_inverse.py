@@ -14,6 +14,8 @@
 
 """Node that answers which servo angle puts a lever, or any other output, where it is wanted."""
 
+import math
+from operator import itemgetter
 import sys
 
 import numpy as np
@@ -64,22 +66,26 @@ def solve(scene_: scene.Scene, request, response):
     """
     asked = (Output(_machine(scene_, request.mechanism), request.output) if request.output
              else Lever(_lever(scene_, request.mechanism)))
-    wanted = np.array(request.lever_angle, float)
-    near = np.array(request.servo_near, float)
-    if not wanted.size:
+    wanted, near = request.lever_angle, request.servo_near
+    if not wanted:
         raise ValueError('lever_angle is empty; give at least one value')
-    if near.size not in (0, wanted.size):
+    if near and len(near) != len(wanted):
         raise ValueError(f'servo_near must be empty or have one angle for each of the '
-                         f'{wanted.size} in lever_angle, not {near.size}')
-    if not np.isfinite(near).all():
+                         f'{len(wanted)} in lever_angle, not {len(near)}')
+    if not all(map(math.isfinite, near)):
         raise ValueError('servo_near must be finite')
-    servo = np.asarray(asked.servo(wanted, near if near.size else None))
-    reachable = np.isfinite(servo)
-    response.servo_angle = servo.tolist()
-    response.reduction = np.asarray(asked.slope(servo)).tolist()
-    response.reachable = reachable.tolist()
-    response.success = bool(reachable.all())
-    response.message = '' if response.success else _complaint(asked, wanted[~reachable])
+    # One angle is the usual question, and floats answer it sooner than arrays.
+    given = np.array if len(wanted) > 1 else itemgetter(0)
+    found = asked.servo(given(wanted), given(near) if near else None)
+    response.servo_angle, response.reduction = map(_listed, found)
+    response.reachable = list(map(math.isfinite, response.servo_angle))
+    response.success = all(response.reachable)
+    response.message = '' if response.success else _complaint(asked, [
+        value for value, reached in zip(wanted, response.reachable) if not reached])
+
+
+def _listed(found):
+    return np.ravel(found).tolist() if isinstance(found, np.ndarray) else [float(found)]
 
 
 class Lever:
@@ -88,7 +94,7 @@ class Lever:
     what = 'lever angles'
 
     def __init__(self, linkage):
-        self.servo, self.slope = linkage.servo_angle, linkage.reduction
+        self.servo = linkage.servo
         self._linkage = linkage
 
     def reach(self) -> str:
@@ -118,16 +124,16 @@ class Output:
                              'solved for an output')
 
     def servo(self, wanted, near):
-        """Return the crank angle [rad] for each value wanted."""
+        """Return for each value the crank angle [rad] and d output / d crank angle there."""
         found = self._linkage.crank_angle(self._name, wanted / self._unit, near)
-        return found[..., 0] if near is None else found
+        theta = found[..., 0] if near is None else found
+        return theta, self._slope(theta) * self._unit
 
-    def slope(self, servo):
-        """Return d output / d crank angle."""
+    def _slope(self, theta):
         if not self._axis:
-            return self._linkage.joint_rates(servo, (self._name,))[self._name] * self._unit
-        moving = self._linkage.velocity(servo, (self._joint,))[self._joint]
-        return moving[..., 'xy'.index(self._axis)] * self._unit
+            return self._linkage.joint_rates(theta, (self._name,))[self._name]
+        moving = self._linkage.velocity(theta, (self._joint,))[self._joint]
+        return moving[..., 'xy'.index(self._axis)]
 
     def reach(self) -> str:
         """Return in words where the output gets."""
@@ -140,36 +146,37 @@ class Output:
 
 
 def _machine(scene_, name):
-    allowed = ', '.join(scene_.machines)
-    if name in scene_.machines:
-        return scene_.machines[name]
+    machines = scene_.machines
+    if name in machines:
+        return machines[name]
     if name:
-        raise ValueError(f'there is no mechanism {name!r}; allowed: {allowed}')
-    if len(scene_.machines) != 1:
-        raise ValueError(f'mechanism may be empty only where there is one; allowed: {allowed}')
-    return next(iter(scene_.machines.values()))
+        raise ValueError(f'there is no mechanism {name!r}; allowed: {", ".join(machines)}')
+    if len(machines) != 1:
+        raise ValueError('mechanism may be empty only where there is one; '
+                         f'allowed: {", ".join(machines)}')
+    return next(iter(machines.values()))
 
 
 def _lever(scene_, name):
     levers = {key: machine.linkage for key, machine in scene_.machines.items()
-              if hasattr(machine.linkage, 'servo_angle')}
-    allowed = ', '.join(levers) or 'none: the scene has no slotted_lever'
+              if hasattr(machine.linkage, 'servo')}
     if name in levers:
         return levers[name]
+    if not name and len(levers) == 1:
+        return next(iter(levers.values()))
+    allowed = ', '.join(levers) or 'none: the scene has no slotted_lever'
     if name in scene_.machines:
         raise ValueError(f'{name} is a {scene_.machines[name].linkage.type}, not a slotted lever; '
                          f'name an output, or take one of: {allowed}')
     if name:
         raise ValueError(f'there is no mechanism {name!r}; allowed: {allowed}')
-    if len(levers) != 1:
-        raise ValueError(f'mechanism may be empty only where there is one slotted lever; '
-                         f'allowed: {allowed}')
-    return next(iter(levers.values()))
+    raise ValueError(f'mechanism may be empty only where there is one slotted lever; '
+                     f'allowed: {allowed}')
 
 
 def _complaint(asked, missed):
     named = ', '.join(f'{value:.6g}' for value in missed[:MOST_NAMED])
-    more = f' and {missed.size - MOST_NAMED} more' if missed.size > MOST_NAMED else ''
+    more = f' and {len(missed) - MOST_NAMED} more' if len(missed) > MOST_NAMED else ''
     return f'{asked.what} {named}{more} cannot be reached; {asked.reach()}'
 
 

@@ -46,7 +46,7 @@ def crank_reach(assembly: Assembly) -> Sequence[Arc]:
         return assembly.reach
     ends = [leg.lag + (end if leg.side > 0.0 else math.pi - end)
             for leg in assembly.legs for arc in assembly.reach for end in arc]
-    return reachable_arcs(ends, lambda theta: bool(assembly.within_reach([theta]).all()))
+    return reachable_arcs(ends, lambda theta: bool(assembly.within_reach(theta).all()))
 
 
 def ground_frame(linkage: Mechanism) -> Dict[str, Tuple[float, float]]:

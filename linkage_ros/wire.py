@@ -61,24 +61,27 @@ class Template:
         values = distinct(count)
         message = build(SENTINEL, values)
         text = serialize_message(message)
-        self._length = len(text)
         # Numbers lie at multiples of 8 after the header; in memory too they are quicker there.
         self._bytes = bytearray(LEAD + text + bytes(-(len(text) - HEADER) % 8))
         self._stamps = places(self._bytes, STAMP.pack(SENTINEL.sec, SENTINEL.nanosec))
-        numbers = np.frombuffer(self._bytes, float, offset=len(LEAD) + HEADER)
-        order = np.argsort(values)
-        found = order[np.searchsorted(values, numbers, sorter=order) % max(count, 1)]
-        self._slots = np.flatnonzero(values[found] == numbers) if count else np.empty(0, int)
-        self._sources = found[self._slots] if count else self._slots
-        self._numbers = numbers
+        self._message = memoryview(self._bytes)[len(LEAD):len(LEAD) + len(text)]
+        self._numbers = np.frombuffer(self._bytes, float, offset=len(LEAD) + HEADER)
+        # Every number comes from one table: the values, then what the message has said so far.
+        self._table = np.concatenate([values, self._numbers])
+        self._values = self._table[:count]
+        found = {value: i for i, value in enumerate(values.tolist())}
+        self._sources = np.array([found.get(number, count + slot)
+                                  for slot, number in enumerate(self._numbers.tolist())], int)
         self._check(build, type(message), count)
 
     def patched(self, stamp, values: np.ndarray) -> bytes:
         """Return the message with this stamp and these values, serialised."""
-        self._numbers[self._slots] = values.take(self._sources)
+        self._values[:] = values
+        self._table.take(self._sources, out=self._numbers, mode='clip')
+        sec, nanosec = stamp.sec, stamp.nanosec
         for place in self._stamps:
-            STAMP.pack_into(self._bytes, place, stamp.sec, stamp.nanosec)
-        return bytes(memoryview(self._bytes)[len(LEAD):len(LEAD) + self._length])
+            STAMP.pack_into(self._bytes, place, sec, nanosec)
+        return bytes(self._message)
 
     def _check(self, build, kind, count):
         stamp, values = Time(sec=12, nanosec=345), np.linspace(-1.5, 7.25, count)

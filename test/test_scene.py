@@ -30,11 +30,23 @@ OWN = {'mechanisms': ['own'], 'own.type': 'custom'}
 YEAR = 365 * 86400 * 10 ** 9
 
 
+def solved(assembly, theta, points=(), joints=(), rates=()):
+    """Return the rows of all legs at a crank angle, at a crank speed of 1 rad/s."""
+    solution = assembly.solution(points, joints, rates)
+    solution.solve([theta], [1.0])
+    return solution.rows
+
+
+def places(assembly, theta, points):
+    """Return where the joints of all legs are, shape (legs, points, 2)."""
+    return solved(assembly, theta, points).reshape(len(assembly.legs), -1, 2)
+
+
 def whole_motion(machine):
     """Return all joints at angles all along the motion, shape (..., 2), moved by the pose."""
     assembly = machine.assembly()
     low, high = machine.crank.sweep or (0.0, math.tau)
-    return np.array([assembly.points(assembly.angles(theta), machine.points)
+    return np.array([places(assembly, theta, machine.points)
                      for theta in np.linspace(low, high, 361)]) + machine.pose[0:3:2]
 
 
@@ -51,13 +63,12 @@ def test_without_parameters_the_scene_is_the_catalogue():
 def test_scale_multiplies_every_length():
     lever = mechanisms.create('slotted_lever')
     small, large = (Assembly(lever, scale=scale) for scale in (0.001, 1.0))
-    angles = large.angles(0.4)
-    assert small.points(angles, lever.points) == pytest.approx(
-        0.001 * large.points(angles, lever.points))
+    assert places(small, 0.4, lever.points) == pytest.approx(
+        0.001 * places(large, 0.4, lever.points))
     assert small.joints == ('lever', 'slide')
-    for solved in ('joint_angles', 'joint_rates'):
-        (turn, slide), = getattr(large, solved)(angles)
-        assert getattr(small, solved)(angles)[0] == pytest.approx([turn, 0.001 * slide])
+    (turn, slide, turning, sliding), = solved(large, 0.4, (), large.joints, large.joints)
+    assert solved(small, 0.4, (), small.joints, small.joints)[0] == pytest.approx(
+        [turn, 0.001 * slide, turning, 0.001 * sliding])
 
 
 def test_a_linkage_of_ones_own_is_written_joint_by_joint():
@@ -289,7 +300,7 @@ def test_a_change_of_sweep_goes_on_the_same_way():
 def test_right_legs_share_their_pin_with_left_legs():
     assembly = Assembly(mechanisms.create('jansen'), 3, True)
     for theta in np.linspace(-7.0, 7.0, 57):
-        pins = assembly.points(assembly.angles(theta), ('A',))[:, 0]
+        pins = places(assembly, theta, ('A',))[:, 0]
         assert pins[0::2] == pytest.approx(pins[1::2], abs=1e-12)
         for j, pin in enumerate(pins[0::2]):
             angle = theta - math.tau * j / 3
@@ -298,14 +309,15 @@ def test_right_legs_share_their_pin_with_left_legs():
 
 def test_a_walker_of_one_pair_is_its_own_mirror_image():
     assembly = Assembly(mechanisms.create('jansen'), 1, True)
-    here = assembly.points(assembly.angles(0.4), assembly.linkage.points)
-    there = assembly.points(assembly.angles(math.pi - 0.4), assembly.linkage.points)
+    here, there = (places(assembly, theta, assembly.linkage.points)
+                   for theta in (0.4, math.pi - 0.4))
     assert here[1] == pytest.approx(there[0] * [-1.0, 1.0], abs=1e-12)
 
 
 def test_joint_rates_are_the_slopes_of_joint_angles():
     assembly = Assembly(mechanisms.create('jansen'), 3, True)
-    step = 1e-6
-    slopes = (assembly.joint_angles(assembly.angles(0.7 + step))
-              - assembly.joint_angles(assembly.angles(0.7 - step))) / (2.0 * step)
-    assert assembly.joint_rates(assembly.angles(0.7)) == pytest.approx(slopes, abs=1e-7)
+    step, joints = 1e-6, assembly.joints
+    slopes = (solved(assembly, 0.7 + step, (), joints)
+              - solved(assembly, 0.7 - step, (), joints)) / (2.0 * step)
+    rates = solved(assembly, 0.7, (), joints, joints)[:, len(joints):]
+    assert rates == pytest.approx(slopes, abs=1e-7)

@@ -72,10 +72,11 @@ def drives(one):
 def posed(one, thetas):
     """Return joint positions as they are published, and where each joint is [m], by name."""
     assembly, points = one.assembly(), one.linkage.points
-    rows = assembly.solver(points, assembly.joints)(*thetas.tolist())
+    solution = assembly.solution(points, assembly.joints)
+    solution.solve(thetas.tolist())
     positions = {f'm_{crank}': theta for crank, theta in zip(one.linkage.cranks, thetas)}
     places = {}
-    for leg, row in zip(assembly.legs, rows):
+    for leg, row in zip(assembly.legs, solution.rows):
         start = f'm_{leg.prefix}'
         places.update(zip([start + point for point in points],
                           row[:2 * len(points)].reshape(-1, 2)))

@@ -35,17 +35,20 @@ WALKER = {'mechanisms': ['walker'], 'walker.type': 'jansen', 'walker.leg_pairs':
 def work(monkeypatch):
     """Count solutions by mechanism and by how many points, joints and rates were wanted."""
     done = Counter()
-    make = Assembly.solver
+    make = Assembly.solution
 
     def counted(assembly, *wanted):
-        solve = make(assembly, *wanted)
+        solution = make(assembly, *wanted)
+        solve = solution.solve
 
-        def run(*thetas, **speeds):
+        def run(*drive):
             done[(assembly.linkage.type, *map(len, wanted))] += 1
-            return solve(*thetas, **speeds)
-        return run
+            solve(*drive)
 
-    monkeypatch.setattr(Assembly, 'solver', counted)
+        solution.solve = run
+        return solution
+
+    monkeypatch.setattr(Assembly, 'solution', counted)
     return done
 
 

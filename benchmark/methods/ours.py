@@ -45,10 +45,10 @@ class Ours(Method):
 
 
 class Accelerated(Ours):
-    """The same formulas through numba."""
+    """The same formulas as machine code."""
 
-    knob = 'numba'
-    package = 'numba'
+    knob = 'machine code'
+    package = 'llvmlite'
 
     def prepare(self, kind, dimensions):
         """Create the mechanism; judging its errors has it compiled before the clock starts."""

@@ -19,6 +19,7 @@ The pin A = i a e^(i theta) turns about O, the lever turns about Q = (0, -b), bo
 The slot is parallel to the lever at distance e on its left, L is the lever's tip, 1.8 b from Q or
 as far as the pin gets if that is more. Closure: a e^(i theta) + b = e^(i phi) (t + i e) with the
 lever angle phi and the pin's place t along the slot; branch L, +1 or -1, is the half of the slot.
+Differentiated, it gives d phi / d theta = a cos(theta - phi) / t.
 
 Sources: Norton, "Design of Machinery", sec. 4.8 (inverted slider-crank); the inverse closes the
 same triangle: a e^(i theta) = e^(i phi) (W + i (e + b sin phi)), W^2 = a^2 - (e + b sin phi)^2.
@@ -26,8 +27,7 @@ same triangle: a e^(i theta) = e^(i phi) (W + i (e + b sin phi)), W^2 = a^2 - (e
 
 from functools import lru_cache
 import math
-
-import numpy as np
+from typing import Sequence
 
 from .. import mechanism
 from ..compiler import Program
@@ -37,6 +37,9 @@ from ..expression import (
     cosine,
     dimension,
     exact_sum,
+    gated,
+    nearest_integer,
+    real,
     root,
     sine,
     square,
@@ -54,9 +57,17 @@ DESIGN = Design('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 0.0}, tracer='L',
     'L slot Q A e out max(1.8*b,a+b)'))
 
 
+TURN = 2.0 * math.pi
+
+
 @lru_cache(maxsize=None)
-def _inverse() -> Program:
-    """Return the code for both servo angles, each with its slide, from the lever angle."""
+def _inverse(half: int, follows: bool) -> Program:
+    """
+    Return the code for the servo angle and the reduction on a half of the slot.
+
+    From the lever angle it takes the working branch or, if it follows, what is nearest to a
+    second angle.
+    """
     a, b, e = dimension('a'), dimension('b'), dimension('e', positive=False)
     phi = angle(0)
     sin, cos = sine(phi), cosine(phi)
@@ -67,11 +78,20 @@ def _inverse() -> Program:
                   exact_sum(a, e) + b * sin)
     grazed = GRAZE * (a + b + abs(e))
     height = root(upper, grazed) * root(lower, grazed)
-    across, outputs = e + b * sin, []
-    for along in (height, -height):
+    across, found = e + b * sin, []
+    for rank, along in enumerate((half * height, -half * height)):
         theta = arctangent(sin * along + cos * across, cos * along - sin * across)
-        outputs += [theta, b * cos + along]
-    return Program(outputs)
+        away = real(rank)
+        if follows:
+            theta = theta + TURN * nearest_integer((angle(1) - theta) / TURN)
+            away = abs(theta - angle(1))
+        slide = b * cos + along
+        held = half * slide - GRAZE * (a + b)
+        found.append((where(0.0 < held, away, math.inf),
+                      gated(theta, held, 0.0), gated(along / slide, held, 0.0)))
+    (here, *working), (there, *other) = found
+    return Program([where(there < here, x, y) for x, y in zip(other, working)],
+                   2 if follows else 1)
 
 
 class Mechanism(mechanism.Mechanism):
@@ -97,22 +117,20 @@ class Mechanism(mechanism.Mechanism):
             the slot.
 
         """
-        outputs = self._servo().over(lever_angle)
-        half = self.branches['L']
-        theta, slide = outputs[0::2][::half], outputs[1::2][::half]
-        theta = np.where(half * slide > GRAZE * (self._lengths['a'] + self._lengths['b']),
-                         theta, np.nan)
-        if near is None:
-            return np.where(np.isnan(theta[0]), theta[1], theta[0])[()]
-        near = np.asarray(near, float)
-        turns = 2.0 * math.pi * np.round((near - theta) / (2.0 * math.pi))
-        theta = theta + turns
-        away = np.where(np.isnan(theta), np.inf, np.abs(theta - near))
-        return np.where(away[1] < away[0], theta[1], theta[0])[()]
+        return self.servo(lever_angle, near)[0]
+
+    def servo(self, lever_angle, near=None) -> Sequence:
+        """Return what `servo_angle` does, and d lever / d servo there."""
+        key = 'servo', near is not None
+        if key not in self._poses:
+            program = _inverse(self.branches['L'], near is not None)
+            self._poses[key] = program.bind(self._lengths, self._evaluated)
+        return self._poses[key](*(x for x in (lever_angle, near) if x is not None))
 
     def reduction(self, servo_angle):
         """Return d lever / d servo at a crank angle [rad], in its shape."""
-        return self.joint_rates(servo_angle, ('lever',))['lever'][()]
+        _, pose = self._ready('rates', ('lever',), 0)
+        return pose(servo_angle)[0]
 
     def lever_reach(self) -> list:
         """Return the arcs (lo, hi) [rad] of lever angles that the crank can bring about."""
@@ -123,9 +141,4 @@ class Mechanism(mechanism.Mechanism):
         ends = [end for s in sines if abs(s) <= 1.0
                 for end in (math.asin(s), math.pi - math.asin(s))]
         ends += [-0.5 * math.pi, 0.5 * math.pi]
-        return reachable_arcs(ends, lambda phi: not np.isnan(self.servo_angle(phi)))
-
-    def _servo(self):
-        if 'servo' not in self._poses:
-            self._poses['servo'] = _inverse().bind(self._lengths, self._evaluated)
-        return self._poses['servo']
+        return reachable_arcs(ends, lambda phi: not math.isnan(self.servo_angle(phi)))

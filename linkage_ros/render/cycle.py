@@ -97,7 +97,7 @@ class Cycle:
 
     def __init__(self, machine: Machine):
         assembly = machine.assembly()
-        self._solve = assembly.solver(points=machine.linkage.points)
+        self._solution = assembly.solution(points=machine.linkage.points)
         self._wheels = [Wheel(crank) for crank in machine.cranks.values()]
         self.first = self._wheels[0]
         self._ratios = [1.0, *(at_once(self.first.period, wheel.period)
@@ -113,8 +113,9 @@ class Cycle:
         """Return where everything is; NaN where it cannot be assembled."""
         thetas = tuple(wheel.angle(turns * ratio)
                        for wheel, ratio in zip(self._wheels, self._ratios))
-        places = self._solve(*thetas)
-        return Pose(turns, thetas, places.reshape(len(places), -1, 2))
+        self._solution.solve(thetas)
+        rows = self._solution.rows.copy()
+        return Pose(turns, thetas, rows.reshape(len(rows), -1, 2))
 
     def curve(self, joint: int, start: float, end: float) -> np.ndarray:
         """Return where a joint is between two times [turns], shape (n, legs, 2) [m]."""

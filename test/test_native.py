@@ -1,0 +1,129 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Machine code says what plain Python says, and is done without where there is none."""
+
+from concurrent.futures import Future
+import importlib
+import math
+import sys
+
+from linkage_ros import mechanisms
+from linkage_ros.assembly import Assembly
+import numpy as np
+import pytest
+import stress
+
+native = pytest.importorskip('linkage_ros.native')
+
+TYPES = [kind for kind in mechanisms.TYPES if kind != 'five_bar']
+
+
+def angles(linkage):
+    """Return angles [rad] of every size, dead points and reach limits, and no numbers at all."""
+    ends = [end for arc in linkage.reach() for end in arc] + list(linkage.dead_points())
+    return np.concatenate([stress.angles(np.random.default_rng(3), 200, ends),
+                           [math.inf, -math.inf, math.nan]])
+
+
+def one_by_one(function, thetas):
+    """Return what plain Python finds, a row for each angle."""
+    return np.array([function(theta) for theta in thetas.tolist()])
+
+
+@pytest.mark.parametrize('kind', TYPES)
+def test_every_bit_is_the_same(kind):
+    linkage = mechanisms.create(kind)
+    thetas = angles(linkage)
+    solved = linkage.accelerated().solve(thetas)
+    expected = one_by_one(linkage.function(), thetas)
+    assert np.array_equal(np.hstack(list(solved.values())), expected, equal_nan=True)
+
+
+@pytest.mark.parametrize('kind', ['jansen', 'slotted_lever'])
+def test_so_it_is_for_the_legs_of_a_walker(kind, monkeypatch):
+    linkage = mechanisms.create(kind)
+    assembly = Assembly(linkage, *(6, True) if kind == 'jansen' else (1, False), scale=0.01)
+    wanted = linkage.points, assembly.joints, assembly.joints
+    quick = assembly.solution(*wanted)
+    quick._batch._loop.result()
+    monkeypatch.setattr(type(linkage), 'accelerated', lambda linkage: linkage)
+    plain = assembly.solution(*wanted)
+    for theta in angles(linkage)[:60].tolist():
+        for solution in (quick, plain):
+            solution.solve([theta], [-2.5])
+        assert np.array_equal(quick.values, plain.values, equal_nan=True)
+    assert quick._batch._run and not plain._batch._run
+
+
+def test_a_change_of_dimensions_needs_no_other_code():
+    linkage, thetas = mechanisms.create('peaucellier').accelerated(), np.array([0.2, -0.3])
+    grown = linkage.with_dimensions(**{k: 2.0 * v for k, v in linkage.dimensions.items()})
+    assert np.array_equal(grown.solve(thetas)['C'], 2.0 * linkage.solve(thetas)['C'])
+    loops = [each._ready('points', None)[1]._variant.loop for each in (linkage, grown)]
+    assert loops[0] is loops[1]
+
+
+def batch(rows):
+    """Return water drops, a row each, whose code is still being made, and that code."""
+    linkage = mechanisms.create('water_drop')
+    made = linkage.accelerated()._bound('points', linkage.points)
+    found = made.batch(rows)
+    loop, found._loop = found._loop, Future()
+    return found, loop.result(), one_by_one(linkage.function(), found.given[0])
+
+
+def test_nobody_waits_for_the_compiler():
+    rows = np.zeros((3, 10))
+    found, loop, expected = batch(rows)
+    found.solve()
+    assert np.array_equal(rows, expected) and not found._run
+    found._loop.set_result(loop)
+    rows[:] = 0.0
+    found.solve()
+    assert np.array_equal(rows, expected) and found._run
+
+
+def test_what_cannot_be_compiled_is_done_in_plain_python():
+    rows = np.zeros((3, 10))
+    found, _, expected = batch(rows)
+    found._loop.set_exception(RuntimeError('no such processor'))
+    with pytest.warns(UserWarning, match='no machine code.*no such processor'):
+        found.solve()
+    rows[:] = 0.0
+    found.solve()
+    assert np.array_equal(rows, expected)
+
+
+def test_an_llvmlite_that_is_too_old_is_named(monkeypatch):
+    monkeypatch.delattr('llvmlite.binding.create_pass_builder')
+    monkeypatch.setattr('llvmlite.__version__', '0.41.1')
+    with pytest.raises(ImportError, match='llvmlite 0.44 or newer is needed, this is 0.41.1'):
+        importlib.reload(native)
+
+
+def test_without_llvmlite_only_accelerated_is_missing(monkeypatch):
+    monkeypatch.setitem(sys.modules, 'llvmlite', None)
+    linkage = mechanisms.create('water_drop')
+    with pytest.raises(ImportError, match=r'needs llvmlite: pip install linkage_ros\[fast\]'):
+        linkage.accelerated()
+    solution = Assembly(linkage).solution(('P',))
+    solution.solve([0.3])
+    assert solution.rows[0] == pytest.approx(linkage.solve(0.3)['P'])
+
+
+def test_it_is_compiled_once_for_all_mechanisms_of_a_type():
+    loops = {id(mechanisms.create('hoeken').accelerated()._ready('points', None)[1]._variant.loop)
+             for _ in range(3)}
+    assert len(loops) == 1
