@@ -41,6 +41,8 @@ GRAZE = 32.0
 # A velocity or rate may also err by this many u = 2^-53 of its top speed over a turn; its ratio
 # is counted so that this, too, is RULE.
 SPEED_RULE = 60.0
+# Of a difference quotient in 80 digits.
+STEP = mp.mpf(10) ** -30
 UNIT = 2.0 ** -53
 
 _STEP = mp.mpf(10) ** -30
@@ -125,7 +127,11 @@ def servo_truth(dimensions, half, lever_angle, cut):
     """Return the `Truth` of a lever's inverse on one cut of its slot with the crank circle."""
     def evaluate(length, angle):
         found = reference.servo(length, angle, cut)
-        return ({'angle servo': mp.expj(found.angle)},
+        after, before = (reference.servo(length, angle + step, cut).angle
+                         for step in (STEP, -STEP))
+        turned = mp.arg(mp.expj(after - before))
+        return ({'angle servo': mp.expj(found.angle),
+                 'rate servo': 2 * STEP / turned if turned else mp.zero},
                 {'servo': found.gap, 'slide': half * found.slide})
     return _truth(evaluate, dimensions, float(lever_angle))
 
@@ -373,8 +379,10 @@ def measure_servo(lever, angles, label='') -> List[Row]:
         for exact, state in zip(cuts, due):
             if state == wanted:
                 near = float(mp.arg(exact.values['angle servo']))
-                found = lever.servo_angle(float(angle), near=near)
-                rows.append(_row(case, angle, 'angle servo', found, exact, wanted, {}))
+                found, slope = lever.servo(float(angle), near=near)
+                top = {'rate servo': lever.dimensions['a'] / lever.dimensions['b']}
+                rows += [_row(case, angle, 'angle servo', found, exact, wanted, {}),
+                         _row(case, angle, 'rate servo', slope, exact, wanted, top)]
     return rows
 
 
