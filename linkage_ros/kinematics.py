@@ -26,7 +26,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from . import messages, node, reading, scene, urdf
 from .solution import Layout
-from .wire import Wire
+from .wire import unpack, Wire
 
 # Any source will do; what comes while the node is kept waiting, 50 ms at 1000 Hz, is not lost.
 ANY = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -138,7 +138,7 @@ class Outlet:
             self._described = robot
             self._description.publish(String(data=robot))
 
-    def turn(self, stamp, thetas: Sequence[float], speeds: Sequence[float]):
+    def turn(self, stamp: bytes, thetas: Sequence[float], speeds: Sequence[float]):
         """Publish what is listened to at crank angles [rad]; speeds [rad/s], or none."""
         drive = Drive(thetas, speeds, self._joint_states.get_subscription_count() > 0,
                       self._markers.get_subscription_count() > 0)
@@ -194,7 +194,7 @@ class Outlet:
         """Publish all legs by patching one message; where some are left out, build another."""
         pose = self._pose
         if pose.held is not None:
-            publisher.publish(build(pose, stamp))
+            publisher.publish(build(pose, unpack(stamp)))
             return
         kind = what, pose.moving, pose.layout
         if kind not in self._wires:

@@ -24,11 +24,10 @@ from array import array
 import struct
 from typing import NamedTuple, Optional, Sequence, Tuple
 
-from builtin_interfaces.msg import Time
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
-from .wire import distinct, places, SENTINEL, STAMP
+from .wire import distinct, pack, places, SENTINEL
 
 # Of so many sources the layouts are kept.
 SOURCES = 8
@@ -37,7 +36,7 @@ SOURCES = 8
 class Turned(NamedTuple):
     """Cranks by name, their positions and, where they are known, their velocities."""
 
-    stamp: Time
+    stamp: bytes
     names: Sequence[str]
     positions: Tuple[float, ...]
     velocities: Tuple[float, ...]
@@ -56,7 +55,7 @@ class Reader:
             if turned := layout.take(text):
                 return turned
         message = deserialize_message(text, JointState)
-        turned = Turned(message.header.stamp, list(message.name), tuple(message.position),
+        turned = Turned(pack(message.header.stamp), list(message.name), tuple(message.position),
                         tuple(message.velocity))
         if self._learning:
             self._learn(text, message, turned)
@@ -91,7 +90,6 @@ class Layout:
         message.header.stamp = SENTINEL
         text = serialize_message(message)[:size]
         self._names = names
-        self._stamp = Time()
         self._struct, fixed = _fields(text, values)
         self._mask = int.from_bytes(fixed, 'little')
         self._same = int.from_bytes(text, 'little') & self._mask
@@ -112,14 +110,14 @@ class Layout:
         return True
 
     def _taken(self, text):
-        self._stamp.sec, self._stamp.nanosec, *numbers = self._struct.unpack(text)
-        return Turned(self._stamp, self._names, tuple(numbers[:self._first]),
+        stamp, *numbers = self._struct.unpack(text)
+        return Turned(stamp, self._names, tuple(numbers[:self._first]),
                       tuple(numbers[self._first:self._last]))
 
 
 def _fields(text: bytes, values: Sequence[float]) -> Tuple[struct.Struct, bytes]:
     """Return a message as stamp and numbers, and a mask of the bytes between them."""
-    codes = dict.fromkeys(places(text, STAMP.pack(SENTINEL.sec, SENTINEL.nanosec)), 'iI')
+    codes = dict.fromkeys(places(text, pack(SENTINEL)), '8s')
     for value in values:
         codes.update(dict.fromkeys(places(text, struct.pack('=d', value)), 'd'))
     spelt, fixed, end = ['='], bytearray(b'\xff' * len(text)), 0

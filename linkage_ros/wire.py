@@ -31,8 +31,19 @@ from rclpy.serialization import deserialize_message, serialize_message
 HEADER = 4
 LEAD = bytes(8 - HEADER)
 
-STAMP = struct.Struct('=iI')
+_STAMP = struct.Struct('=iI')
 SENTINEL = Time(sec=0x5EC0_1234, nanosec=0x2A0C_4321)
+
+
+def pack(stamp: Time) -> bytes:
+    """Return a stamp as it is in a message."""
+    return _STAMP.pack(stamp.sec, stamp.nanosec)
+
+
+def unpack(stamp: bytes) -> Time:
+    """Return the stamp that some bytes of a message are."""
+    sec, nanosec = _STAMP.unpack(stamp)
+    return Time(sec=sec, nanosec=nanosec)
 
 
 class NoTemplate(Exception):
@@ -63,7 +74,8 @@ class Template:
         text = serialize_message(message)
         # Numbers lie at multiples of 8 after the header; in memory too they are quicker there.
         self._bytes = bytearray(LEAD + text + bytes(-(len(text) - HEADER) % 8))
-        self._stamps = places(self._bytes, STAMP.pack(SENTINEL.sec, SENTINEL.nanosec))
+        self._stamps = [slice(place, place + _STAMP.size)
+                        for place in places(self._bytes, pack(SENTINEL))]
         self._message = memoryview(self._bytes)[len(LEAD):len(LEAD) + len(text)]
         self._numbers = np.frombuffer(self._bytes, float, offset=len(LEAD) + HEADER)
         # Every number comes from one table: the values, then what the message has said so far.
@@ -74,19 +86,18 @@ class Template:
                                   for slot, number in enumerate(self._numbers.tolist())], int)
         self._check(build, type(message), count)
 
-    def patched(self, stamp, values: np.ndarray) -> bytes:
-        """Return the message with this stamp and these values, serialised."""
+    def patched(self, stamp: bytes, values: np.ndarray) -> bytes:
+        """Return the message with this stamp, packed, and these values, serialised."""
         self._values[:] = values
         self._table.take(self._sources, out=self._numbers, mode='clip')
-        sec, nanosec = stamp.sec, stamp.nanosec
         for place in self._stamps:
-            STAMP.pack_into(self._bytes, place, sec, nanosec)
+            self._bytes[place] = stamp
         return bytes(self._message)
 
     def _check(self, build, kind, count):
         stamp, values = Time(sec=12, nanosec=345), np.linspace(-1.5, 7.25, count)
         built = serialize_message(build(stamp, values))
-        if deserialize_message(self.patched(stamp, values), kind) != deserialize_message(
+        if deserialize_message(self.patched(pack(stamp), values), kind) != deserialize_message(
                 built, kind):
             raise NoTemplate('a patched message does not read back as it was written')
 
@@ -116,12 +127,12 @@ class Wire:
             logger.warning(f'{publisher.topic_name}: {reason}; publishing ordinary messages',
                            once=True)
 
-    def send(self, stamp, values: np.ndarray):
-        """Publish the message with this stamp and these values."""
+    def send(self, stamp: bytes, values: np.ndarray):
+        """Publish the message with this stamp, packed, and these values."""
         if self._template:
             self._publisher.publish(self._template.patched(stamp, values))
         else:
-            self._publisher.publish(self._build(stamp, values))
+            self._publisher.publish(self._build(unpack(stamp), values))
 
 
 def distinct(count: int) -> np.ndarray:

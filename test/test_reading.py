@@ -21,7 +21,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from linkage_ros import reading  # noqa: E402
+from linkage_ros import reading, wire  # noqa: E402
 from linkage_ros.kinematics import Kinematics  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
@@ -72,7 +72,7 @@ def check(graph, reader):
 def compare(reader, text, sent):
     """Read what arrived and compare it with what was sent."""
     turned = reader.read(text)
-    assert turned.stamp == sent.header.stamp and turned.names == sent.name
+    assert wire.unpack(turned.stamp) == sent.header.stamp and turned.names == sent.name
     assert turned.positions == tuple(sent.position)
     assert turned.velocities == tuple(sent.velocity)
     return turned
@@ -109,7 +109,8 @@ def test_bytes_of_another_order_are_deserialised(reader):
     text = bytearray(serialize_message(sent))
     read = reading.Layout(['a', 'b'], message(['a', 'b']), len(text))
     assert not read.admit(bytes(text), reading.Turned(
-        sent.header.stamp, sent.name, tuple(-x for x in sent.position), tuple(sent.velocity)))
+        wire.pack(sent.header.stamp), sent.name, tuple(-x for x in sent.position),
+        tuple(sent.velocity)))
 
 
 def test_numbers_that_are_none_are_handed_on(reader):

@@ -182,7 +182,7 @@ def test_a_patched_message_reads_like_one_that_is_built(count):
         template = wire.Template(build, size)
         for values in (random.normal(size=size), np.zeros(size), -np.arange(size) * 1e300):
             stamp = Time(sec=int(random.integers(2 ** 31)), nanosec=int(random.integers(10 ** 9)))
-            assert deserialize_message(template.patched(stamp, values), kind) == \
+            assert deserialize_message(template.patched(wire.pack(stamp), values), kind) == \
                 deserialize_message(serialize_message(build(stamp, values)), kind)
 
 
@@ -198,6 +198,7 @@ def test_what_cannot_be_patched_is_published_as_an_ordinary_message(graph, monke
     monkeypatch.undo()
     patched = wire.Template(
         lambda stamp, values: JointState(name=plain.name, position=values), len(plain.name))
-    read = deserialize_message(patched.patched(Time(), np.array(plain.position)), JointState)
+    text = patched.patched(wire.pack(Time()), np.array(plain.position))
+    read = deserialize_message(text, JointState)
     assert read.position == plain.position
     assert all(math.isfinite(x) for x in plain.position)

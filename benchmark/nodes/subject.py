@@ -92,7 +92,7 @@ class FreshOutlet(Outlet):
     def _send(self, what, publisher, build, stamp):
         self._joint_state = messages.JointStates()
         self._marker_array = messages.Markers(*self._drawn)
-        publisher.publish(build(self._pose, stamp))
+        publisher.publish(build(self._pose, wire.unpack(stamp)))
 
 
 class Relay(Node):
