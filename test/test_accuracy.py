@@ -100,6 +100,7 @@ def test_velocities_and_joint_rates_of_the_catalogue_are_right(kind, dimensions,
     check(measure(mechanism, awkward(mechanism, np.random.default_rng(4), 6)[::8], rates=True))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('half', [1, -1])
 def test_the_inverse_of_the_lever_is_right_on_both_branches(half):
     rows = []

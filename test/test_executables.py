@@ -67,6 +67,7 @@ def test_a_signal_while_a_message_is_published_is_no_failure(harness):
     assert run(Ended, 'ended', args=[]) == 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('name, text, named', [
     ('kinematics', 'mechanisms: [leg]', 'leg.type must be one of water_drop, '),
     ('kinematics', 'mechanisms: []', 'mechanisms must be'),

@@ -91,6 +91,7 @@ def test_both_ends_of_every_slider_are_whole_stops(node):
         assert values[-1] == pytest.approx(range_.to_value, rel=1e-9), about.name
 
 
+@pytest.mark.long
 def test_every_stop_is_accepted_or_the_linkage_forbids_it(node):
     accepted = 0
     for parameter, about, range_ in numbers(node):

@@ -190,6 +190,7 @@ def test_a_crank_swings_in_the_arc_that_its_start_is_in():
     assert second[0] < crank.sweep[0] < middle < crank.sweep[1] < second[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('path', sorted(glob(os.path.join(CONFIG, '*.yaml'))))
 def test_every_scene_in_config_stands_above_the_floor(path):
     pytest.importorskip('yaml')
@@ -198,6 +199,7 @@ def test_every_scene_in_config_stands_above_the_floor(path):
         assert 0.0 < whole_motion(machine)[..., 1].min() < 0.2
 
 
+@pytest.mark.long
 def test_the_mechanisms_of_the_scene_of_all_stand_apart():
     pytest.importorskip('yaml')
     boxes = []

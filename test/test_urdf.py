@@ -151,6 +151,7 @@ def test_every_bar_is_a_rod_from_joint_to_joint(name):
     assert all(any(np.abs(rod - bar).max() < near for rod in rods) for bar in bars)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('name', [name for name in MACHINES if not re.match('five.bar', name)])
 def test_limits_hold_every_position_and_hardly_more(name):
     one = MACHINES[name]()

@@ -656,6 +656,7 @@ def looked_at(tmp_path):
     return run
 
 
+@pytest.mark.long
 @needs_browser
 def test_the_picture_moves_and_a_click_stops_it(show, looked_at):
     running = show({**LEVER, 'drop.crank.speed': 0.0, 'lever.crank.speed': 3.0})
@@ -685,6 +686,7 @@ def test_the_picture_moves_and_a_click_stops_it(show, looked_at):
     looked_at(running, doing)
 
 
+@pytest.mark.long
 @needs_browser
 def test_a_dragged_slider_sets_the_nodes_and_a_refused_one_springs_back(show, looked_at):
     running = show(LEVER)
@@ -714,6 +716,7 @@ def test_a_dragged_slider_sets_the_nodes_and_a_refused_one_springs_back(show, lo
     looked_at(running, doing)
 
 
+@pytest.mark.long
 @needs_browser
 def test_the_lever_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
     running = show({**LEVER, 'lever.crank.speed': 0.0})
