@@ -73,13 +73,12 @@ class Assembly:
         self.reach = linkage.reach() if reach is None else reach
         # How far one of several cranks reaches depends on the others: only a pose tells.
         self.is_limited = len(linkage.cranks) == 1 and not is_full_turn(self.reach)
-        self._turned = [(-leg.lag if leg.side > 0.0 else math.pi + leg.lag, leg.side)
-                        for leg in legs]
+        self._turned = [(leg.lag, leg.side, 0.0 if leg.side > 0.0 else math.pi) for leg in legs]
         self._scale = scale
 
     def angles(self, theta: float) -> list:
         """Return the crank angle [rad] of each leg, as that leg counts it."""
-        return [start + side * theta for start, side in self._turned]
+        return [start + side * (theta - lag) for lag, side, start in self._turned]
 
     def solution(self, points: Sequence[str] = (), joints: Sequence[str] = (),
                  rates: Sequence[str] = ()) -> Solution:
@@ -87,7 +86,8 @@ class Assembly:
         layout = Layout(len(self.legs), len(self.linkage.cranks), 2 * len(points), len(joints),
                         len(rates))
         values = np.empty(layout.size)
-        batch = _accelerated(self.linkage).legs(points, joints, rates, layout.rows(values))
+        batch = _accelerated(self.linkage).legs(
+            tuple(points), tuple(joints), tuple(rates), layout.rows(values))
         batch.given[-3:].T[:] = [
             (self._scale * leg.side, leg.side, self._scale) for leg in self.legs]
         return Solution(layout, values, batch, self.angles)

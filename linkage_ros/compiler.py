@@ -23,12 +23,13 @@ condition on dimensions: the code for a pose has no branch for it.
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
 import math
 from struct import Struct
+from threading import Thread
 from typing import Callable, Mapping, Sequence
 import warnings
 
@@ -42,8 +43,6 @@ BLOCK = 4096
 FEW = 32
 # Python's parser bounds how deep parentheses may nest.
 DEEPEST = 16
-
-_compiling = ThreadPoolExecutor(1, 'linkage_ros_compiler')
 
 
 def _grazed(x, tolerance):
@@ -284,14 +283,19 @@ class _Variant:
         return _python(self._listing, _ARRAY, self.angles)
 
     @cached_property
-    def loop(self):
-        """The code for many poses as machine code, once the compiler has made it."""
-        return _compiling.submit(self._loop)
+    def loop(self) -> Future:
+        """The code for many poses as machine code, which is made beside what goes on."""
+        made = Future()
+        Thread(target=self._compile, args=(made,), name='linkage_ros compiler').start()
+        return made
 
-    def _loop(self):
-        from .native import Loop
+    def _compile(self, made):
+        try:
+            from .native import Loop
 
-        return Loop(*self._listing.operations())
+            made.set_result(Loop(*self._listing.operations()))
+        except Exception as error:
+            made.set_exception(error)
 
 
 class Program:

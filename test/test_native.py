@@ -67,6 +67,15 @@ def test_so_it_is_for_the_legs_of_a_walker(kind, monkeypatch):
     assert quick._batch._run and not plain._batch._run
 
 
+def test_so_it_is_for_two_cranks():
+    linkage = mechanisms.create('five_bar')
+    thetas = np.random.default_rng(0).uniform(-9.0, 9.0, (2, 100))
+    solved = np.hstack(list(linkage.accelerated().solve(thetas).values()))
+    expected = np.array([linkage.function()(*pair) for pair in thetas.T.tolist()])
+    assert np.isfinite(expected).all(axis=1).any()
+    assert np.array_equal(solved, expected, equal_nan=True)
+
+
 def test_a_change_of_dimensions_needs_no_other_code():
     linkage, thetas = mechanisms.create('peaucellier').accelerated(), np.array([0.2, -0.3])
     grown = linkage.with_dimensions(**{k: 2.0 * v for k, v in linkage.dimensions.items()})
