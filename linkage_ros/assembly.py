@@ -38,6 +38,11 @@ class Leg(NamedTuple):
     lag: float
     side: float
 
+    @property
+    def start(self) -> float:
+        """Its own crank angle [rad] when the crank has turned by its lag."""
+        return 0.0 if self.side > 0.0 else math.pi
+
 
 class Assembly:
     """
@@ -73,12 +78,7 @@ class Assembly:
         self.reach = linkage.reach() if reach is None else reach
         # How far one of several cranks reaches depends on the others: only a pose tells.
         self.is_limited = len(linkage.cranks) == 1 and not is_full_turn(self.reach)
-        self._turned = [(leg.lag, leg.side, 0.0 if leg.side > 0.0 else math.pi) for leg in legs]
         self._scale = scale
-
-    def angles(self, theta: float) -> list:
-        """Return the crank angle [rad] of each leg, as that leg counts it."""
-        return [start + side * (theta - lag) for lag, side, start in self._turned]
 
     def solution(self, points: Sequence[str] = (), joints: Sequence[str] = (),
                  rates: Sequence[str] = ()) -> Solution:
@@ -88,14 +88,15 @@ class Assembly:
         values = np.empty(layout.size)
         batch = _accelerated(self.linkage).legs(
             tuple(points), tuple(joints), tuple(rates), layout.rows(values))
-        batch.given[-3:].T[:] = [
-            (self._scale * leg.side, leg.side, self._scale) for leg in self.legs]
-        return Solution(layout, values, batch, self.angles)
+        batch.given[-5:].T[:] = [
+            (leg.lag, leg.start, self._scale * leg.side, leg.side, self._scale)
+            for leg in self.legs]
+        return Solution(layout, values, batch)
 
     def within_reach(self, theta: float) -> np.ndarray:
         """Return which legs can be assembled at a crank angle [rad], as far as reach tells."""
         with np.errstate(invalid='ignore'):
-            angles = np.array(self.angles(theta))
+            angles = np.array([leg.start + leg.side * (theta - leg.lag) for leg in self.legs])
             return np.any([(angles - lo + WRAPPED) % math.tau <= hi - lo + 2.0 * WRAPPED
                            for lo, hi in self.reach], axis=0)
 

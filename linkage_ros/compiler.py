@@ -30,7 +30,7 @@ from itertools import chain
 import math
 from struct import Struct
 from threading import Thread
-from typing import Callable, Mapping, Sequence
+from typing import Callable, Mapping, Optional, Sequence
 import warnings
 
 import numpy as np
@@ -136,11 +136,14 @@ def evaluate(node: Real, dimensions: Mapping, known: dict):
 class _Listing:
     """The operations behind some outputs, in an order they can be done in, each once."""
 
-    def __init__(self, outputs: Sequence[Real], decided: Mapping[Real, bool]):
+    def __init__(self, outputs: Sequence[Real], decided: Mapping[Real, bool],
+                 replaced: Mapping[Real, Real]):
         self.entries = []
         self._decided = decided
         self._numbers = {}
         self._known = {}
+        for leaf, expression in replaced.items():
+            self._known[leaf] = self._number(expression)
         self.outputs = [self._number(node) for node in outputs]
         self.constants = self._boundary()
         self._uses = self._count_uses()
@@ -265,8 +268,8 @@ def _python(listing: _Listing, dialect: _Dialect, angles: int, names=()) -> Call
 class _Variant:
     """The code for one outcome of the conditions on dimensions."""
 
-    def __init__(self, outputs, decided, angles):
-        self._listing = _Listing(outputs, decided)
+    def __init__(self, outputs, decided, replaced, angles):
+        self._listing = _Listing(outputs, decided, replaced)
         self.angles, self.outputs = angles, len(outputs)
         self.constants = [self._listing.entries[n][0] for n in self._listing.constants]
         self.float = _python(self._listing, _FLOAT, angles)
@@ -308,12 +311,16 @@ class Program:
         What is computed.
     angles : int
         How many angles are given.
+    replaced : mapping, optional
+        What stands for some angles in the outputs.
 
     """
 
-    def __init__(self, outputs: Sequence[Real], angles: int = 1):
+    def __init__(self, outputs: Sequence[Real], angles: int = 1,
+                 replaced: Optional[Mapping[Real, Real]] = None):
         self._outputs = tuple(outputs)
         self._angles = angles
+        self._replaced = replaced or {}
         self._conditions = _conditions(self._outputs)
         self._variants = {}
 
@@ -333,7 +340,8 @@ class Program:
     def _variant(self, decisions: tuple) -> _Variant:
         if decisions not in self._variants:
             decided = dict(zip(self._conditions, decisions))
-            self._variants[decisions] = _Variant(self._outputs, decided, self._angles)
+            self._variants[decisions] = _Variant(
+                self._outputs, decided, self._replaced, self._angles)
         return self._variants[decisions]
 
 

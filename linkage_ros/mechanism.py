@@ -109,8 +109,15 @@ class Structure:
         key = (kind, names, *crank)
         if key not in self._programs:
             outputs = getattr(self, f'_{kind}')(names, *crank)
-            cranks = len(self.sketch.cranks)
-            self._programs[key] = Program(outputs, 2 * cranks + 3 if kind == 'legs' else cranks)
+            self._programs[key] = Program(outputs, len(self.sketch.cranks))
+        return self._programs[key]
+
+    def legs(self, points: Tuple[str, ...], joints: Tuple[str, ...],
+             moving: Tuple[str, ...]) -> Program:
+        """Return the code for a leg of several; see `Mechanism.legs`."""
+        key = points, joints, moving
+        if key not in self._programs:
+            self._programs[key] = self._legs(*key)
         return self._programs[key]
 
     def _points(self, names):
@@ -130,20 +137,21 @@ class Structure:
         turning = [self._rates(rates, crank) for crank in range(len(self.sketch.cranks))]
         return [*self._points(points), *self._angles(joints), *chain.from_iterable(turning)]
 
-    def _legs(self, wanted):
-        points, joints, moving = wanted
-        cranks = range(len(self.sketch.cranks))
-        speeds = [angle(len(cranks) + crank) for crank in cranks]
-        across, side, size = (angle(2 * len(cranks) + i) for i in range(3))
+    def _legs(self, points, joints, moving):
+        cranks = len(self.sketch.cranks)
+        given = [angle(i) for i in range(2 * cranks + 5)]
+        speeds, (lag, start, across, side, size) = given[cranks:2 * cranks], given[2 * cranks:]
         turning = [sum((rate * speed for rate, speed in zip(rates, speeds)), real(0.0))
-                   for rates in zip(*(self._rates(moving, crank) for crank in cranks))]
+                   for rates in zip(*(self._rates(moving, crank) for crank in range(cranks)))]
         # A mirrored leg's own crank turns backwards, which mirrors its rates once more.
-        return [*(part * factor for part, factor in zip(self._points(points),
-                                                        cycle((across, size)))),
-                *(value * (across if self._slides(name) else side)
-                  for name, value in zip(joints, self._angles(joints))),
-                *(value * size if self._slides(name) else value
-                  for name, value in zip(moving, turning))]
+        outputs = [*(part * factor for part, factor in zip(self._points(points),
+                                                           cycle((across, size)))),
+                   *(value * (across if self._slides(name) else side)
+                     for name, value in zip(joints, self._angles(joints))),
+                   *(value * size if self._slides(name) else value
+                     for name, value in zip(moving, turning))]
+        own = self.sketch.joint_values[self.sketch.cranks[0]]
+        return Program(outputs, len(given), {own: start + side * (given[0] - lag)})
 
     def _slides(self, name):
         return any(x.name == name and x.kind == 'prismatic' for x in self.sketch.links)
@@ -452,11 +460,13 @@ class Mechanism(Analysis):
         Returns
         -------
         compiler.Batch
-            For each leg is given: the angle of each crank [rad] as that leg counts it, the speed
-            of each crank [rad/s], its size times its side, its side, 1 or -1, and its size.
+            For each leg is given: the angle of each crank [rad], the speed of each crank
+            [rad/s], its lag and its start [rad], its size times its side, its side, 1 or -1, and
+            its size. It counts the first crank's angle as start + side (angle - lag).
 
         """
-        return self._bound('legs', (points, joints, moving)).batch(rows)
+        program = self._structure.legs(points, joints, moving)
+        return program.bind(self._lengths, self._evaluated, self._accelerate).batch(rows)
 
     def _vectors(self, kind, theta, points, *crank):
         names, pose = self._ready(kind, points, *crank)

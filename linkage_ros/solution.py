@@ -15,7 +15,7 @@
 """All legs of a mechanism at one crank angle, solved again and again."""
 
 from struct import Struct
-from typing import Callable, NamedTuple, Sequence
+from typing import NamedTuple, Sequence
 
 import numpy as np
 
@@ -70,28 +70,25 @@ class Solution:
         Where they go.
     batch : Batch
         Solves the legs into the rows of the values; see `Mechanism.legs`.
-    angles : callable
-        From an angle of the first crank to that of each leg, as it counts it [rad].
 
     """
 
-    def __init__(self, layout: Layout, values: np.ndarray, batch: Batch, angles: Callable):
+    def __init__(self, layout: Layout, values: np.ndarray, batch: Batch):
         self.layout, self.values, self.rows = layout, values, batch.rows
-        self._batch, self._angles = batch, angles
-        # Packing and filling cost less than assigning to arrays.
-        self._first, *self._others = batch.given[:layout.cranks]
-        self._speeds = batch.given[layout.cranks:2 * layout.cranks] if layout.velocities else ()
+        self._batch = batch
+        self._thetas = list(batch.given[:layout.cranks])
+        self._speeds = list(batch.given[layout.cranks:2 * layout.cranks])
         self._drive = layout.drive(values)
-        self._pack_legs = Struct(f'{layout.legs}d').pack_into
-        self._pack_drive = Struct(f'{self._drive.size}d').pack_into
+        self._pack = Struct(f'{self._drive.size}d').pack_into
 
     def solve(self, thetas: Sequence[float], speeds: Sequence[float] = ()):
         """Solve at crank angles [rad] and, if there are velocities, crank speeds [rad/s]."""
-        self._pack_legs(self._first, 0, *self._angles(thetas[0]))
-        # Several cranks are those of a single leg.
-        for row, theta in zip(self._others, thetas[1:]):
+        if not self.layout.velocities:
+            speeds = ()
+        for row, theta in zip(self._thetas, thetas):
             row.fill(theta)
         for row, speed in zip(self._speeds, speeds):
             row.fill(speed)
-        self._pack_drive(self._drive, 0, *thetas, *(speeds if self.layout.velocities else ()))
+        # Packing costs less than assigning to a part of an array.
+        self._pack(self._drive, 0, *thetas, *speeds)
         self._batch.solve()
