@@ -168,7 +168,7 @@ class Outlet:
         if self._assembly.is_limited:
             held = self._assembly.within_reach(drive.thetas[0])
         # One sum, of squares, tells whether all values are finite; it is rarely asked which are.
-        if not math.isfinite(np.vdot(values, values)):
+        if not math.isfinite(values.dot(values)):
             finite = np.isfinite(solution.rows[:, :layout.posed]).all(axis=1)
             held = finite if held is None else held & finite
             moving = moving and bool(np.isfinite(solution.rows[held, layout.posed:]).all())
