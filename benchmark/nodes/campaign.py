@@ -137,14 +137,14 @@ class Bench:
             self.driver.wait(1.0)
             for _ in range(self.rounds):
                 for kind, node in nodes.items():
-                    ticks[kind] += _ticks(node, cranks)
+                    ticks[kind].append(statistics.median(_ticks(node, cranks)))
         finally:
             for ear in ears:
                 ear.end()
             for node in nodes.values():
                 node.destroy_node()
-        return [{'scene': scene, 'subject': kind, 'tick': statistics.median(times)}
-                for kind, times in ticks.items()]
+        return [{'scene': scene, 'subject': kind, 'ticks': times,
+                 'tick': statistics.median(times)} for kind, times in ticks.items()]
 
     def starts(self, scene='12 legs'):
         """Return the seconds from the start of a process to its first joint states, or its end."""
