@@ -384,7 +384,7 @@ class Pose:
 
     def __call__(self, *angles):
         """Return the outputs at floats, as floats, or over arrays that are broadcast together."""
-        if not self.shape and all(isinstance(angle, float) for angle in angles):
+        if not self.shape and set(map(type, angles)) == {float}:
             return self.at(*angles)
         return self.over(*angles)
 

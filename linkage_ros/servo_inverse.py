@@ -38,13 +38,18 @@ class ServoInverse(node.SceneNode):
 
     def __init__(self, **kwargs):
         super().__init__(scene.INVERSE, **kwargs)
+        self._known = {}
         self.create_service(ServoInverseType, 'servo_inverse', self.answer)
+
+    def follow(self, new):
+        """Forget what was asked about."""
+        self._known = {}
 
     def answer(self, request, response):
         """Fill in a response; what cannot be done is said in it, never raised."""
         response.success = False
         try:
-            solve(self.scene, request, response)
+            solve(self._asked(request.mechanism, request.output), request, response)
         except ValueError as problem:
             response.message = str(problem)
         except Exception as problem:
@@ -53,10 +58,17 @@ class ServoInverse(node.SceneNode):
             response.message = f'internal error: {problem!r}'
         return response
 
+    def _asked(self, mechanism, output):
+        if (mechanism, output) not in self._known:
+            self._known[mechanism, output] = (
+                Output(_machine(self.scene, mechanism), output) if output
+                else Lever(_lever(self.scene, mechanism)))
+        return self._known[mechanism, output]
 
-def solve(scene_: scene.Scene, request, response):
+
+def solve(asked, request, response):
     """
-    Answer a request for lever angles [rad], or for values of another output.
+    Answer a request for angles of a Lever [rad], or for values of an Output.
 
     Raises
     ------
@@ -64,8 +76,6 @@ def solve(scene_: scene.Scene, request, response):
         If the request as a whole cannot be answered.
 
     """
-    asked = (Output(_machine(scene_, request.mechanism), request.output) if request.output
-             else Lever(_lever(scene_, request.mechanism)))
     wanted, near = request.lever_angle, request.servo_near
     if not wanted:
         raise ValueError('lever_angle is empty; give at least one value')

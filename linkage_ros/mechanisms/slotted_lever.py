@@ -125,7 +125,8 @@ class Mechanism(mechanism.Mechanism):
         if key not in self._poses:
             program = _inverse(self.branches['L'], near is not None)
             self._poses[key] = program.bind(self._lengths, self._evaluated)
-        return self._poses[key](*(x for x in (lever_angle, near) if x is not None))
+        pose = self._poses[key]
+        return pose(lever_angle) if near is None else pose(lever_angle, near)
 
     def reduction(self, servo_angle):
         """Return d lever / d servo at a crank angle [rad], in its shape."""
