@@ -49,7 +49,10 @@ class ServoInverse(node.SceneNode):
         """Fill in a response; what cannot be done is said in it, never raised."""
         response.success = False
         try:
-            solve(self._asked(request.mechanism, request.output), request, response)
+            key = request.mechanism, request.output
+            asked = self._known.get(key) or self._asked(*key)
+            solve(asked, request, response)
+            self._known[key] = asked
         except ValueError as problem:
             response.message = str(problem)
         except Exception as problem:
@@ -59,11 +62,9 @@ class ServoInverse(node.SceneNode):
         return response
 
     def _asked(self, mechanism, output):
-        if (mechanism, output) not in self._known:
-            self._known[mechanism, output] = (
-                Output(_machine(self.scene, mechanism), output) if output
-                else Lever(_lever(self.scene, mechanism)))
-        return self._known[mechanism, output]
+        if output:
+            return Output(_machine(self.scene, mechanism), output)
+        return Lever(_lever(self.scene, mechanism))
 
 
 def solve(asked, request, response):
