@@ -16,19 +16,13 @@
 
 import struct
 
-from builtin_interfaces.msg import Time
 import numpy as np
 from rclpy.serialization import deserialize_message, serialize_message
 from visualization_msgs.msg import Marker
 
+from .. import wire
+
 KINDS = {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'strip', Marker.SPHERE_LIST: 'joints'}
-
-# The bytes that say how a message is encoded; what follows is aligned from its end.
-HEADER = 4
-
-# A stamp and the first of some numbers that occur nowhere else in a message.
-UNUSED_STAMP = Time(sec=0x5EC0_1235, nanosec=0x2A0C_4323)
-UNUSED = -1.3456789012345678e+211
 
 
 class Feed:
@@ -128,11 +122,11 @@ class Layout:
     def __init__(self, text: bytes, message):
         self._text = np.frombuffer(text, np.uint8)
         points = [point for marker in _markers(message) for point in marker.points]
-        unused = UNUSED * (1.0 + np.arange(3 * len(points)) / (3 * len(points) + 1.0))
+        unused = wire.distinct(3 * len(points))
         for point, place in zip(points, unused.reshape(-1, 3).tolist()):
             point.x, point.y, point.z = place
         for marker in _markers(message):
-            marker.header.stamp = UNUSED_STAMP
+            marker.header.stamp = wire.SENTINEL
         marked = serialize_message(message)
         # On its way a message may have been filled up at its end.
         marked = np.frombuffer(marked.ljust(len(text), b'\0'), np.uint8)
@@ -140,9 +134,10 @@ class Layout:
         self._slots = np.flatnonzero(np.isin(numbers, unused))
         self._found = len(marked) == len(text) and np.array_equal(numbers[self._slots], unused)
         self._fixed = np.ones(len(marked), bool)
-        self._fixed[(HEADER + 8 * self._slots[:, None] + np.arange(8)).ravel()] = False
-        stamp = struct.pack('=iI', UNUSED_STAMP.sec, UNUSED_STAMP.nanosec)
-        self._fixed[_places(marked.tobytes(), stamp)] = False
+        self._fixed[(wire.HEADER + 8 * self._slots[:, None] + np.arange(8)).ravel()] = False
+        stamp = wire.pack(wire.SENTINEL)
+        for place in wire.places(marked.tobytes(), stamp):
+            self._fixed[place:place + len(stamp)] = False
 
     def alike(self, text: bytes) -> bool:
         """Return whether a message can have the same layout."""
@@ -163,16 +158,8 @@ class Layout:
 
     @staticmethod
     def _numbers(text):
-        whole = len(text) - (len(text) - HEADER) % 8
-        return np.frombuffer(text[HEADER:whole].tobytes(), float)
-
-
-def _places(text, wanted):
-    """Return the indices of all bytes of what is wanted, wherever it stands."""
-    found, place = [], -1
-    while (place := text.find(wanted, place + 1)) >= 0:
-        found += range(place, place + len(wanted))
-    return found
+        whole = len(text) - (len(text) - wire.HEADER) % 8
+        return np.frombuffer(text[wire.HEADER:whole].tobytes(), float)
 
 
 def _markers(message):
