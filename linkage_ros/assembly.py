@@ -19,6 +19,7 @@ Pair j of N has its left leg at theta - 2 pi j/N and its right leg, the mirror i
 leg at pi - (theta - 2 pi j/N), on the same crank pin.
 """
 
+from functools import cached_property
 import math
 from typing import NamedTuple, Optional, Sequence
 
@@ -80,13 +81,20 @@ class Assembly:
         self.is_limited = len(linkage.cranks) == 1 and not is_full_turn(self.reach)
         self._scale = scale
 
+    @cached_property
+    def _fastest(self):
+        try:
+            return self.linkage.accelerated()
+        except ImportError:
+            return self.linkage
+
     def solution(self, points: Sequence[str] = (), joints: Sequence[str] = (),
                  rates: Sequence[str] = ()) -> Solution:
         """Return what solves all legs for points, joint angles and rates, and nothing else."""
         layout = Layout(len(self.legs), len(self.linkage.cranks), 2 * len(points), len(joints),
                         len(rates))
         values = np.empty(layout.size)
-        batch = _accelerated(self.linkage).legs(
+        batch = self._fastest.legs(
             tuple(points), tuple(joints), tuple(rates), layout.rows(values))
         batch.given[-5:].T[:] = [
             (leg.lag, leg.start, self._scale * leg.side, leg.side, self._scale)
@@ -116,10 +124,3 @@ class Assembly:
 def is_full_turn(reach) -> bool:
     """Return whether a reach is one arc of a whole turn."""
     return len(reach) == 1 and reach[0][1] - reach[0][0] >= math.tau
-
-
-def _accelerated(linkage):
-    try:
-        return linkage.accelerated()
-    except ImportError:
-        return linkage

@@ -369,7 +369,10 @@ class Pose:
         self.shape = shape
         if not shape:
             self.at = variant.float(*constants, self._by_arrays)
-            self._given = np.array(constants)
+
+    @cached_property
+    def _given(self):
+        return np.array(self._constants)
 
     def _by_arrays(self, *angles: float) -> tuple:
         """Return the outputs at one pose with inf or nan where Python's floats raise."""

@@ -44,7 +44,7 @@ def crank_reach(assembly: Assembly) -> Sequence[Arc]:
     """Return the arcs (lo, hi) [rad] of the crank on which every leg can be assembled."""
     if len(assembly.legs) == 1 or is_full_turn(assembly.reach):
         return assembly.reach
-    ends = [leg.lag + (end if leg.side > 0.0 else math.pi - end)
+    ends = [leg.lag + (leg.start + leg.side * end)
             for leg in assembly.legs for arc in assembly.reach for end in arc]
     return reachable_arcs(ends, lambda theta: bool(assembly.within_reach(theta).all()))
 

@@ -54,15 +54,19 @@ def test_every_bit_is_the_same(kind):
 @pytest.mark.parametrize('kind', ['jansen', 'slotted_lever'])
 def test_so_it_is_for_the_legs_of_a_walker(kind, monkeypatch):
     linkage = mechanisms.create(kind)
-    assembly = Assembly(linkage, *(6, True) if kind == 'jansen' else (1, False), scale=0.01)
-    wanted = linkage.points, assembly.joints, assembly.joints
-    quick = assembly.solution(*wanted)
+    legs = (6, True) if kind == 'jansen' else (1, False)
+
+    def solution():
+        assembly = Assembly(linkage, *legs, scale=0.01)
+        return assembly.solution(linkage.points, assembly.joints, assembly.joints)
+
+    quick = solution()
     quick._batch._loop.result()
     monkeypatch.setattr(type(linkage), 'accelerated', lambda linkage: linkage)
-    plain = assembly.solution(*wanted)
+    plain = solution()
     for theta in angles(linkage)[:60].tolist():
-        for solution in (quick, plain):
-            solution.solve([theta], [-2.5])
+        for each in (quick, plain):
+            each.solve([theta], [-2.5])
         assert np.array_equal(quick.values, plain.values, equal_nan=True)
     assert quick._batch._run and not plain._batch._run
 

@@ -57,9 +57,6 @@ DESIGN = Design('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 0.0}, tracer='L',
     'L slot Q A e out max(1.8*b,a+b)'))
 
 
-TURN = 2.0 * math.pi
-
-
 @lru_cache(maxsize=None)
 def _inverse(half: int, follows: bool) -> Program:
     """
@@ -83,7 +80,7 @@ def _inverse(half: int, follows: bool) -> Program:
         theta = arctangent(sin * along + cos * across, cos * along - sin * across)
         away = real(rank)
         if follows:
-            theta = theta + TURN * nearest_integer((angle(1) - theta) / TURN)
+            theta = theta + math.tau * nearest_integer((angle(1) - theta) / math.tau)
             away = abs(theta - angle(1))
         slide = b * cos + along
         held = half * slide - GRAZE * (a + b)
