@@ -95,12 +95,15 @@ class Bench:
             return [row for rate in rates for row in self._rows(scene, rate, lines)]
 
     def _rows(self, scene, rate, lines):
+        return [{'scene': scene, 'rate': rate, 'subject': name, **_summary(found)}
+                for name, found in self._bursts(rate, lines).items()]
+
+    def _bursts(self, rate, lines):
         bursts = {name: [] for name in lines}
         for _ in range(self.rounds):
             for name, line in lines.items():
                 bursts[name].append(line.burst(rate, round(rate * SECONDS[rate])))
-        return [{'scene': scene, 'rate': rate, 'subject': name, **_summary(found)}
-                for name, found in bursts.items()]
+        return bursts
 
     def parts(self, scene, rate):
         """Return the parts of a tick [us] in a process that is driven at a rate [Hz]."""
@@ -110,9 +113,7 @@ class Bench:
             given = ('--ready', str(self.ready(scene))) if kind == 'floor' else ()
             wanted[kind] = (*SUBJECT, kind, '--times', str(self.folder / kind), *given), heard
         with self.subjects(scene, wanted) as lines:
-            for _ in range(self.rounds):
-                for line in lines.values():
-                    line.burst(rate, round(rate * SECONDS[rate]))
+            self._bursts(rate, lines)
         return [{'scene': scene, 'rate': rate, 'subject': kind,
                  **json.loads((self.folder / kind).read_text())} for kind in wanted]
 

@@ -33,6 +33,12 @@ DEADLINE = 30.0
 PATIENCE = 0.5
 
 
+def resident(pid='self') -> int:
+    """Return the resident set size of a process [bytes]."""
+    with open(f'/proc/{pid}/statm') as text:
+        return int(text.read().split()[1]) * os.sysconf('SC_PAGE_SIZE')
+
+
 class Process:
     """A node in a process and a namespace of its own."""
 
@@ -50,8 +56,7 @@ class Process:
 
     def resident(self) -> int:
         """Return its resident set size [bytes]."""
-        with open(f'/proc/{self._process.pid}/statm') as text:
-            return int(text.read().split()[1]) * os.sysconf('SC_PAGE_SIZE')
+        return resident(self._process.pid)
 
     def running(self) -> bool:
         """Return whether it has not ended."""

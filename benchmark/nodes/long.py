@@ -24,7 +24,7 @@ from rclpy.serialization import serialize_message
 
 from . import scenes
 from .campaign import NODE, SUBJECT
-from .driving import Process
+from .driving import Process, resident
 
 MIB = 2 ** 20
 
@@ -44,7 +44,7 @@ def soak(bench, count):
         for done in range(1, count + 1):
             turn(serialize_message(next(cranks)))
             if done % (count // 100) == 0:
-                sizes.append(_resident())
+                sizes.append(resident())
                 assert ear.running()
     finally:
         ear.end()
@@ -54,11 +54,6 @@ def soak(bench, count):
     return {'messages': count, 'growth_mib': (settled[-1] - settled[0]) / MIB,
             'span_mib': (max(settled) - min(settled)) / MIB,
             'resident_mib': settled[-1] / MIB}
-
-
-def _resident():
-    with open('/proc/self/statm') as text:
-        return int(text.read().split()[1]) * os.sysconf('SC_PAGE_SIZE')
 
 
 def hold(bench, rate, seconds):

@@ -56,7 +56,12 @@ def ratio(rows, scene, rate, subject, other):
     """Return the median over the rounds of the ratio of two subjects' CPU times."""
     found = {row['subject']: row['cpus'] for row in rows
              if (row['scene'], row['rate']) == (scene, rate)}
-    return statistics.median(a / b for a, b in zip(found[subject], found[other]))
+    return in_turn(found[subject], found[other])
+
+
+def in_turn(values, others):
+    """Return the median over the rounds of the ratio within a round."""
+    return statistics.median(a / b for a, b in zip(values, others))
 
 
 def rates(rows):
@@ -77,14 +82,14 @@ def targets(result):
             [f'no subscriber (d) / does nothing, {rate:.0f} Hz', '<= 1.1', f'{nobody:.2f}',
              met(nobody, 1.1)]]
     body = tick[WALKER, 'kinematics']['tick']
-    times = _times(tick[WALKER, 'fresh'], tick[WALKER, 'kinematics'])
+    times = in_turn(tick[WALKER, 'fresh']['ticks'], tick[WALKER, 'kinematics']['ticks'])
     a_leg = 12 * tick['one leg', 'relay']['tick'] / body
     lines += [['body of the tick', '<= 80 us', f'{body:.0f} us', met(body, 80.0)],
               ['body with ordinary messages (b) / body', '>= 10', f'{times:.1f}',
                met(times, -10.0)],
               ['body of the relay (c) / body a leg', '>= 20', f'{a_leg:.0f}', met(a_leg, -20.0)]]
     pulls = {row['subject']: row['round_trips'] for row in result['services']}
-    trip = statistics.median(a / b for a, b in zip(pulls['servo 1'], pulls['trigger']))
+    trip = in_turn(pulls['servo 1'], pulls['trigger'])
     lines += [['service, 1 angle / Trigger', '<= 1.2', f'{trip:.2f}', met(trip, 1.2)]]
     starts = result['starts']
     start = statistics.median(starts['kinematics'])
@@ -164,16 +169,11 @@ def layers(result):
                   for name, values in zip(names, zip(*lines))])
 
 
-def _times(body, other):
-    """Return the median over the rounds of the ratio of two bodies."""
-    return statistics.median(a / b for a, b in zip(body['ticks'], other['ticks']))
-
-
 def bodies(result):
     """Return what the callbacks take."""
     hot = table(['in a loop', 'node', 'tick [us]', 'x floor'], [
         [body['scene'], NAMES[body['subject']], f'{body["tick"]:.0f}',
-         f'{_times(body, floor):.1f}']
+         f'{in_turn(body["ticks"], floor["ticks"]):.1f}']
         for body in result['bodies'] for floor in result['bodies']
         if floor['subject'] == 'floor' and floor['scene'] == body['scene']])
     cold = table(['12 legs, Hz', 'node', 'tick', *LAYERS], [
@@ -192,7 +192,7 @@ def services(rows):
     base = next(row['round_trips'] for row in rows if row['subject'] == 'trigger')
     return table(['service', 'p50 [us]', 'p99 [us]', 'x Trigger', 'CPU of the server [us]'], [
         [names[row['subject']], f'{row["p50"]:.0f}', f'{row["p99"]:.0f}',
-         f'{statistics.median(a / b for a, b in zip(row["round_trips"], base)):.2f}',
+         f'{in_turn(row["round_trips"], base):.2f}',
          f'{row["cpu"]:.0f}'] for row in rows])
 
 
