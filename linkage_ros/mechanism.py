@@ -164,7 +164,10 @@ class Structure:
 
         def turning(name):
             bar = self.sketch.directions.get(name)
-            return real(0.0) if bar is None else spin(bar, d)
+            if bar is None:
+                return real(0.0)
+            turned = spin(bar)
+            return turned.formula(*map(d, turned.of))
 
         def rate(link):
             if link.kind == 'prismatic' or link.name in self.sketch.cranks:

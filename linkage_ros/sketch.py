@@ -144,9 +144,10 @@ class Sketch:
         area = arm.offset(self.points[point].place)
         self.folds.append(planar.Limit(area, planar.GRAZE * self.distance(first, point)
                                        * self.distance(second, point)))
-        place = planar.mirror(arm, self.points[point].place)
-        bars = [place - self.points[end].place for end in (first, second)]
-        self._pair(name, first, second, planar.Dyad(*bars, ()),
+        ends = [(self.points[end].place, self._side(end, point).vector)
+                for end in (second, first)]
+        place, *bars = planar.mirror(arm, self.points[point].place, ends)
+        self._pair(name, first, second, planar.Dyad(*reversed(bars), ()),
                    self.distance(first, point), self.distance(second, point))
         self.points[name].place = place
         if isinstance(arm, planar.CrankArm) and pin and pin.centre is self.points[point].place:
