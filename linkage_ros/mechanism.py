@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.util import find_spec
@@ -24,7 +25,7 @@ from typing import Callable, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from . import inverse, language
+from . import language
 from .analysis import Analysis
 from .compiler import Batch, evaluate, Pose, Program
 from .expression import angle, derivative, dimension, Real, real, spin, where
@@ -37,6 +38,9 @@ SHORTEST, LONGEST = 1e-300, 1e300
 # result and keeps squares and products of lengths inside the range of float64.
 SMALL, LARGE = 1e-30, 1e30
 UNIT = dimension('[m]')
+
+# Reaches, dead points and inverses that a mechanism keeps.
+REMEMBERED = 64
 
 
 def check_bars(linkage: Mechanism):
@@ -212,23 +216,10 @@ class Structure:
         """Return whether an output depends on the first crank."""
         return self._output(output)[1].value != 0.0
 
-    def backward(self, output: str) -> Optional[inverse.Backward]:
-        """Return how an output drives the linkage backwards, if there is a closed form."""
-        given = angle(0) if self.turns(output) else in_own_unit(angle(0))
-        return inverse.backward(self.sketch, output, given, self.branches)
-
-    def _backward(self, output):
-        return self.backward(output).angles
-
 
 def in_metres(length: Real) -> Real:
     """Return a length counted in metres."""
     return where(abs(UNIT - 1.0) <= 0.0, length, length * UNIT)
-
-
-def in_own_unit(length: Real) -> Real:
-    """Return a length that is counted in metres, counted in the unit of the dimensions."""
-    return where(abs(UNIT - 1.0) <= 0.0, length, length / UNIT)
 
 
 class Mechanism(Analysis):
@@ -255,7 +246,7 @@ class Mechanism(Analysis):
         self._accelerate = accelerate
         self._lengths = _in_own_unit(self.dimensions, design.has_literal_lengths)
         self._evaluated = {}
-        self._poses, self._single = {}, {}
+        self._poses, self._single, self._found = {}, {}, OrderedDict()
         self.links = tuple(link._replace(zero=float(self._value(link.zero)))
                            for link in sketch.links)
 
@@ -301,11 +292,6 @@ class Mechanism(Analysis):
                           self.branches, self._accelerate)
         self._design.check(made)
         return made
-
-    def _on_other_branch(self, joint: str) -> Mechanism:
-        branches = {**self.branches, joint: -self.branches[joint]}
-        return type(self)(self._design, Structure(self._design, branches), self.dimensions,
-                          branches)
 
     def accelerated(self) -> Mechanism:
         """
@@ -412,6 +398,9 @@ class Mechanism(Analysis):
             If not every other crank is given, or a dimension is an array.
 
         """
+        return list(self._remembered('reach', others, lambda: self._arcs(others)))
+
+    def _arcs(self, others):
         _, margins = self._ready('margins', ())
         if margins.shape:
             raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
@@ -421,6 +410,16 @@ class Mechanism(Analysis):
                              f'the first is needed, got {len(others)}')
         return arcs(lambda theta: margins.over(theta, *others),
                     self._structure.sketch.limits, self._value)
+
+    def _remembered(self, what: str, about: tuple, find: Callable):
+        """Return what was found before, or find it; what was asked for longest ago is dropped."""
+        key = what, *about
+        if key not in self._found:
+            self._found[key] = find()
+            if len(self._found) > REMEMBERED:
+                self._found.popitem(last=False)
+        self._found.move_to_end(key)
+        return self._found[key]
 
     def function(self, points: Optional[Sequence[str]] = None, joints: Sequence[str] = (),
                  rates: Sequence[str] = ()) -> Callable:
