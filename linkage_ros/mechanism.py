@@ -473,7 +473,7 @@ class Mechanism(Analysis):
     def _vectors(self, kind, theta, points, *crank):
         names, pose = self._ready(kind, points, *crank)
         values = pose.over(*self._each_crank(theta))
-        pairs = np.moveaxis(values.reshape(-1, 2, *values.shape[1:]), 1, -1)
+        pairs = np.moveaxis(values.reshape(len(names), 2, *values.shape[1:]), 1, -1)
         return dict(zip(names, pairs))
 
     def _scalars(self, kind, theta, joints, *crank):
