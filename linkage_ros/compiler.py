@@ -43,6 +43,16 @@ BLOCK = 4096
 FEW = 32
 # Python's parser bounds how deep parentheses may nest.
 DEEPEST = 16
+# Programs and results that are kept for the next time they are asked for.
+KEPT = 128
+
+
+def keep(found: dict, key, value):
+    """Keep a value and return it; what was kept first is dropped where there are too many."""
+    found[key] = value
+    while len(found) > KEPT:
+        found.pop(next(iter(found)), None)
+    return value
 
 
 def _grazed(x, tolerance):
@@ -351,8 +361,8 @@ class Program:
     def _variant(self, decisions: tuple) -> _Variant:
         if decisions not in self._variants:
             decided = dict(zip(self._conditions, decisions))
-            self._variants[decisions] = _Variant(
-                self._outputs, decided, self._replaced, self._angles)
+            keep(self._variants, decisions, _Variant(
+                self._outputs, decided, self._replaced, self._angles))
         return self._variants[decisions]
 
 

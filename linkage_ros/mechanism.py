@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.util import find_spec
@@ -27,7 +26,7 @@ import numpy as np
 
 from . import language
 from .analysis import Analysis
-from .compiler import Batch, evaluate, Pose, Program
+from .compiler import Batch, evaluate, keep, Pose, Program
 from .expression import angle, derivative, dimension, Real, real, spin, where
 from .reach import arcs
 from .sketch import Sketch
@@ -38,9 +37,6 @@ SHORTEST, LONGEST = 1e-300, 1e300
 # result and keeps squares and products of lengths inside the range of float64.
 SMALL, LARGE = 1e-30, 1e30
 UNIT = dimension('[m]')
-
-# Reaches, dead points and inverses that a mechanism keeps.
-REMEMBERED = 64
 
 
 def check_bars(linkage: Mechanism):
@@ -113,7 +109,7 @@ class Structure:
         key = (kind, names, *crank)
         if key not in self._programs:
             outputs = getattr(self, f'_{kind}')(names, *crank)
-            self._programs[key] = Program(outputs, len(self.sketch.cranks))
+            keep(self._programs, key, Program(outputs, len(self.sketch.cranks)))
         return self._programs[key]
 
     def legs(self, points: Tuple[str, ...], joints: Tuple[str, ...],
@@ -121,7 +117,7 @@ class Structure:
         """Return the code for a leg of several; see `Mechanism.legs`."""
         key = points, joints, moving
         if key not in self._programs:
-            self._programs[key] = self._legs(*key)
+            keep(self._programs, key, self._legs(*key))
         return self._programs[key]
 
     def _points(self, names):
@@ -217,6 +213,10 @@ class Structure:
         return self._output(output)[1].value != 0.0
 
 
+def _hashable(names):
+    return names if names is None or isinstance(names, (str, tuple)) else tuple(names)
+
+
 def in_metres(length: Real) -> Real:
     """Return a length counted in metres."""
     return where(abs(UNIT - 1.0) <= 0.0, length, length * UNIT)
@@ -246,7 +246,7 @@ class Mechanism(Analysis):
         self._accelerate = accelerate
         self._lengths = _in_own_unit(self.dimensions, design.has_literal_lengths)
         self._evaluated = {}
-        self._poses, self._single, self._found = {}, {}, OrderedDict()
+        self._poses, self._placers, self._found = {}, {}, {}
         self.links = tuple(link._replace(zero=float(self._value(link.zero)))
                            for link in sketch.links)
 
@@ -332,13 +332,18 @@ class Mechanism(Analysis):
             If a joint does not exist.
 
         """
-        if isinstance(theta, float):
-            try:
-                return self._single[points](theta)
-            except (KeyError, TypeError):
-                # Not asked for before, or as a list.
-                pass
+        if isinstance(theta, float) and len(self.cranks) == 1:
+            wanted = _hashable(points)
+            place = self._placers.get(wanted) or self._placer(wanted)
+            return place(theta)
         return self._vectors('points', theta, points)
+
+    def _placer(self, wanted) -> Callable:
+        """Return what places joints at one crank angle, a float."""
+        names, pose = self._ready('points', wanted)
+        if pose.shape:
+            return lambda theta: self._vectors('points', theta, wanted)
+        return keep(self._placers, wanted, pose.placer(names))
 
     def velocity(self, theta, points: Optional[Sequence[str]] = None, crank: int = 0) -> dict:
         """
@@ -412,14 +417,9 @@ class Mechanism(Analysis):
                     self._structure.sketch.limits, self._value)
 
     def _remembered(self, what: str, about: tuple, find: Callable):
-        """Return what was found before, or find it; what was asked for longest ago is dropped."""
+        """Return what was found before, or find it."""
         key = what, *about
-        if key not in self._found:
-            self._found[key] = find()
-            if len(self._found) > REMEMBERED:
-                self._found.popitem(last=False)
-        self._found.move_to_end(key)
-        return self._found[key]
+        return self._found[key] if key in self._found else keep(self._found, key, find())
 
     def function(self, points: Optional[Sequence[str]] = None, joints: Sequence[str] = (),
                  rates: Sequence[str] = ()) -> Callable:
@@ -490,17 +490,11 @@ class Mechanism(Analysis):
 
     def _ready(self, kind: str, wanted, *crank: int) -> Tuple[Tuple[str, ...], Pose]:
         """Return the names that are wanted and the function that computes them."""
-        try:
-            return self._poses[(kind, wanted, *crank)]
-        except KeyError:
-            names = self._names(kind, wanted)
-        except TypeError:
-            return self._ready(kind, tuple(wanted), *crank)
-        pose = self._bound(kind, names, *crank)
-        if kind == 'points' and not pose.shape and len(self.cranks) == 1:
-            self._single[wanted] = pose.placer(names)
-        self._poses[(kind, wanted, *crank)] = names, pose
-        return names, pose
+        key = kind, _hashable(wanted), *crank
+        if key not in self._poses:
+            names = self._names(kind, key[1])
+            keep(self._poses, key, (names, self._bound(kind, names, *crank)))
+        return self._poses[key]
 
     def _bound(self, kind: str, names, *crank: int) -> Pose:
         program = self._structure.program(kind, names, *crank)
