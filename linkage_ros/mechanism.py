@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib.util import find_spec
 from itertools import chain, cycle
+from types import MappingProxyType
 from typing import Callable, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
@@ -27,7 +28,16 @@ import numpy as np
 from . import language
 from .analysis import Analysis
 from .compiler import Batch, evaluate, keep, Pose, Program
-from .expression import angle, derivative, dimension, Real, real, spin, where
+from .expression import (
+    angle,
+    derivative,
+    dimension,
+    gated,
+    Real,
+    real,
+    spin,
+    where,
+)
 from .reach import arcs
 from .sketch import Sketch
 
@@ -126,7 +136,13 @@ class Structure:
 
     def _velocities(self, names, crank=0):
         known = {}
-        return [derivative(part, {crank: 1.0}, known) for part in self._points(names)]
+        return [self._due(derivative(part, {crank: 1.0}, known), part)
+                for part in self._points(names)]
+
+    def _due(self, rate, value):
+        """Return a rate by one crank, NaN where other cranks leave no value to have it."""
+        alone = len(self.sketch.cranks) == 1 and rate.value is None
+        return rate if alone or not value.varies else gated(rate, abs(value), real(0.0))
 
     def _angles(self, names):
         values = self.sketch.joint_values
@@ -175,7 +191,7 @@ class Structure:
             return turning(link.name) - turning(link.parent)
 
         links = {link.name: link for link in self.sketch.links}
-        return [rate(links[n]) for n in names]
+        return [self._due(rate(links[n]), self.sketch.joint_values[n]) for n in names]
 
     def _margins(self, _):
         """Return each limit's margin, so much above its tolerance that a reached one is >= 0."""
@@ -201,8 +217,8 @@ class Structure:
         joint, _, axis = name.rpartition('.')
         if not joint:
             return self._angles([name]) + self._rates([name])
-        place = self._points([joint])['xy'.index(axis)]
-        return [place, derivative(place, {0: 1.0}, {})]
+        i = 'xy'.index(axis)
+        return [self._points([joint])[i], self._velocities([joint])[i]]
 
     def turns(self, output: str) -> bool:
         """Return whether an output is an angle, not a length."""
@@ -210,7 +226,8 @@ class Structure:
 
     def moves(self, output: str) -> bool:
         """Return whether an output depends on the first crank."""
-        return self._output(output)[1].value != 0.0
+        rate = self._output(output)[1]
+        return (rate.args[0] if rate.op == 'gated' else rate).value != 0.0
 
 
 def _hashable(names):
@@ -254,11 +271,11 @@ class Mechanism(Analysis):
         lengths = ', '.join(f'{k}={v}' for k, v in self.dimensions.items())
         return f'<{self.type} {lengths}>'
 
-    @property
-    def bar_lengths(self) -> dict:
+    @cached_property
+    def bar_lengths(self) -> Mapping:
         """The length [m] of each bar."""
-        return {(bar.first, bar.second): self._value(in_metres(bar.length))
-                for bar in self._structure.sketch.bars}
+        return MappingProxyType({(bar.first, bar.second): self._value(in_metres(bar.length))
+                                 for bar in self._structure.sketch.bars})
 
     def line_of(self, *joints: str) -> language.Line:
         """Return the line that places one of some joints, the last that does."""
@@ -269,12 +286,13 @@ class Mechanism(Analysis):
         return {self.line_of(name): np.isfinite(self._value(height))
                 for name, height in self._structure.sketch.triangles.items()}
 
-    @property
-    def frames(self) -> dict:
+    @cached_property
+    def frames(self) -> Mapping:
         """Where each link's joints lie [m], seen from the link: x along its bar."""
-        return {link: {name: tuple(self._value(in_metres(x)) for x in (place.x, place.y))
-                       for name, place in frame.items()}
-                for link, frame in self._structure.sketch.frames.items()}
+        return MappingProxyType({
+            link: {name: tuple(self._value(in_metres(x)) for x in (place.x, place.y))
+                   for name, place in frame.items()}
+            for link, frame in self._structure.sketch.frames.items()})
 
     def _value(self, expression: Real):
         with np.errstate(all='ignore'):

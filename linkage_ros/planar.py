@@ -100,12 +100,12 @@ class Limit(NamedTuple):
 
 
 class Arm:
-    """The arm between two points that both move."""
+    """The arm between two points that both move, of constant length where that is given."""
 
-    def __init__(self, foot: Complex, vector: Complex, span: Real):
+    def __init__(self, foot: Complex, vector: Complex, span: Real, length: Optional[Real] = None):
         self.foot = foot
         self.vector = vector
-        self.square = self.vector.squared()
+        self.square = vector.squared() if length is None else square(length)
         self._span = span
 
     def offset(self, point: Complex) -> Real:

@@ -93,6 +93,7 @@ class Sketch:
         self.folds = []
         self.cranks = []
         self._vectors = {}
+        self._ends = {}
         self._kites = {}
 
     def ground(self, name: str, x: Number, y: Number):
@@ -214,10 +215,13 @@ class Sketch:
     def _bar_between(self, first, second):
         """Return the vector between two joints of one link."""
         if (first, second) not in self._vectors:
-            link, frame = self._link_of(first, second)
-            length = (frame[second] - frame[first]).length()
-            vector = self.points[second].place - self.points[first].place
-            self._vectors[first, second] = _Vector(vector, length, link)
+            link = self._shared_link(first, second)
+            if not link:
+                raise SketchError(f'{first} and {second} are not joints of one moving link')
+            bar, frame = self._vectors[self._ends[link]], self.frames[link]
+            across = frame[second] - frame[first]
+            self._vectors[first, second] = _Vector(
+                bar.vector * (across / bar.length), across.length(), link)
         return self._vectors[first, second]
 
     def _side(self, first, second):
@@ -228,11 +232,10 @@ class Sketch:
             return _Vector(vector, vector.length(), GROUND)
         return self._bar_between(first, second)
 
-    def _link_of(self, first, second):
-        for link, frame in self.frames.items():
-            if first in frame and second in frame:
-                return link, frame
-        raise SketchError(f'{first} and {second} are not joints of one moving link')
+    def _shared_link(self, first, second):
+        """Return the moving link that two joints are on, None if there is none."""
+        return next((link for link, frame in self.frames.items()
+                     if first in frame and second in frame), None)
 
     def _numbered(self, word):
         taken = sum(link.name.rstrip('0123456789') == word for link in self.links)
@@ -249,6 +252,9 @@ class Sketch:
     def arm(self, first: str, second: str) -> planar.Arm:
         """Return the arm from one joint to another."""
         ends = self.points[first], self.points[second]
+        if self._shared_link(first, second):
+            bar = self._bar_between(first, second)
+            return planar.Arm(ends[0].place, bar.vector, bar.length, bar.length)
         for (foot, pin), reverse in ((ends, False), (ends[::-1], True)):
             if pin.crank and foot.home == GROUND and foot.place is not pin.crank.centre:
                 return planar.CrankArm(foot.place, pin.crank, reverse)
@@ -290,6 +296,7 @@ class Sketch:
         self.directions[name] = bar
         self.joint_values[name] = arctangent(relative.y, relative.x)
         self.frames[name] = {joint: Complex(0.0, 0.0), tip: Complex(length, 0.0)}
+        self._ends[name] = joint, tip
         return name
 
     def _add_to_frame(self, name, first, second, link, corner):
