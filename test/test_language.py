@@ -62,9 +62,9 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P ground 0 zz', 'dimension zz has no value; given: g, m, b, c'),
     ('P ground 0 g*', "'g*' is no number, dimension or arithmetic on them"),
     ('P ground 0 g.real', "'g.real' is no number, dimension or arithmetic on them"),
-    ('P ground 0 g**2', "'g ** 2' is no number"),
+    ('P ground 0 g**2', "'g**2' is no number"),
     ('P ground 0 max(g)', "'max(g)' is no number"),
-    ('P ground 0 True', "'True' is no number"),
+    ('P ground 0 True', 'dimension True has no value; given: g, m, b, c'),
     ('P ground 0 1/0', 'divides by zero'),
     ('P ground 0 1e999', 'too large'),
     ('P ground 0', 'expected "NAME ground X Y"'),
@@ -79,8 +79,10 @@ def test_a_wrong_line_is_refused_with_the_line_and_what_is_allowed(line, problem
 
 
 def test_a_name_that_calls_python_is_only_a_name():
-    with pytest.raises(ValueError, match='dimension __import__ has no value'):
+    with pytest.raises(ValueError, match='is no number, dimension or arithmetic on them'):
         made('P ground __import__("os") 0')
+    with pytest.raises(ValueError, match='dimension exit has no value'):
+        made('P ground exit 0')
 
 
 @pytest.mark.parametrize('joints', [None, [], 'O ground 0 0'])
