@@ -31,8 +31,15 @@ def checked_dimensions(design, given: Mapping[str, Any]) -> dict:
         if name not in design.dimensions:
             raise ValueError(f'{design.name} has no dimension {quoted(name)}; '
                              f'allowed: {listed(design.dimensions)}')
-    return {name: _checked(design, name, given.get(name, default))
-            for name, default in design.dimensions.items()}
+    lengths = {name: _checked(design, name, given.get(name, default))
+               for name, default in design.dimensions.items()}
+    try:
+        np.broadcast_shapes(*map(np.shape, lengths.values()))
+    except ValueError:
+        shapes = [f'{name} {np.shape(length)}' for name, length in lengths.items()]
+        raise ValueError(f'{design.name}: arrays of dimensions must have shapes that broadcast, '
+                         f'got {listed(shapes)}') from None
+    return lengths
 
 
 def _checked(design, name, value):

@@ -114,8 +114,10 @@ class Formula:
         waiting, begins = [], True
         for kind, word in self._tokens():
             begins = (self._operand if begins else self._operator)(kind, word, waiting)
+        if begins:
+            raise self._error()
         self._complete(waiting)
-        if begins or waiting:
+        if waiting:
             raise self._error()
 
     def _tokens(self):
@@ -137,7 +139,7 @@ class Formula:
         if kind == 'sign' or word in WORDS and word != 'pi':
             raise self._error()
         self._steps.append(math.pi if word == 'pi' else word if kind == 'name' else
-                           self._ranged(float(word), word))
+                           self._number(word))
         return False
 
     def _operator(self, kind, word, waiting) -> bool:
@@ -175,12 +177,21 @@ class Formula:
         with np.errstate(all='ignore'):
             self._steps[-_TAKES[step]:] = [self._ranged(float(_VALUES[step](*operands)))]
 
+    def _number(self, word):
+        number = float(word)
+        if not number and word.lower().split('e')[0].strip('0.'):
+            raise self._out_of_range(word, 'too small')
+        return self._ranged(number, word)
+
     def _ranged(self, number, word=None):
-        if not in_range(number):
-            size = abs(number)
-            wrong = 'too large' if size > LARGEST else 'too small' if size < SMALLEST else 'not real'
-            raise ValueError(f'{quoted(word or self.text)} is {wrong}: a number is {IN_RANGE}')
-        return number
+        if in_range(number):
+            return number
+        size = abs(number)
+        raise self._out_of_range(word or self.text, 'too large' if size > LARGEST else
+                                 'too small' if size < SMALLEST else 'not real')
+
+    def _out_of_range(self, word, wrong):
+        return ValueError(f'{quoted(word)} is {wrong}: a number is {IN_RANGE}')
 
     def _error(self):
         return ValueError(f'{quoted(self.text)} is no number, dimension or arithmetic on them; '

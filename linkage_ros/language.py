@@ -77,7 +77,7 @@ _NAME = re.compile(r'[A-Za-z][A-Za-z0-9_]{0,63}')
 # What a dimension cannot be called: words of arithmetic, and what `mechanisms.create` takes.
 _TAKEN = (*WORDS, 'joints', 'tracer', 'branches')
 # Letters in a line, and in what is said about it.
-_LONGEST, _SAID = 10000, 250
+_LONGEST, _SAID = 10000, 220
 # An angle [rad] beyond this was meant in degrees, unless it is written with `deg` or `pi`.
 _TURN = 6.2832
 

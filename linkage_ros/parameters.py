@@ -17,9 +17,12 @@
 from __future__ import annotations
 
 from array import array
+from collections.abc import Mapping
 from dataclasses import dataclass
 import math
-from typing import Any, List, Mapping, Optional, Tuple
+from typing import Any, List, Optional, Tuple
+
+from .words import elided, MESSAGE, quoted
 
 KINDS = {
     'bool': (bool, 'true or false'),
@@ -36,6 +39,9 @@ ROUNDED = 1e-6
 
 class SceneError(ValueError):
     """A parameter that cannot be; the text names it and says what is allowed."""
+
+    def __init__(self, text: str):
+        super().__init__(elided(text, MESSAGE))
 
 
 @dataclass(frozen=True)
@@ -95,7 +101,7 @@ class Field:
     def error(self, name: str, value: Any) -> SceneError:
         """Return the error that says what the parameter must be, and what it is."""
         shown = list(value) if isinstance(value, tuple) else value
-        return SceneError(f'{name} must be {self.allowed}, not {shown!r}')
+        return SceneError(f'{elided(name)} must be {self.allowed}, not {quoted(shown)}')
 
     def _holds(self, value) -> bool:
         if type(value) is not KINDS[self.kind][0]:
@@ -132,6 +138,8 @@ class Values:
     """The values that are given, by full parameter name, to be taken one by one."""
 
     def __init__(self, given: Mapping[str, Any]):
+        if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in given):
+            raise SceneError(f'a scene is values by the names of parameters, not {quoted(given)}')
         self._left = dict(given)
         self.parameters: List[Parameter] = []
 

@@ -32,6 +32,7 @@ from . import mechanisms
 from .assembly import Assembly, is_full_turn
 from .mechanism import Mechanism
 from .parameters import Field, Parameter, plain, SceneError, Values
+from .words import elided, listed, quoted
 
 __all__ = ['Crank', 'Machine', 'Scene', 'SceneError', 'in_words', 'load', 'plain', 'read']
 
@@ -44,14 +45,15 @@ FULL_TURN = ((-math.pi, math.pi),)
 
 # What the client library declares for itself.
 _ROS = re.compile(r'(use_sim_time|start_type_description_service|qos_overrides\..*)$')
-_NAME = re.compile(r'[A-Za-z](_?[A-Za-z0-9])*$')
+_NAME = re.compile(r'(?=.{1,64}$)[A-Za-z](_?[A-Za-z0-9])*')
 
 
 TYPES = (*mechanisms.TYPES, mechanisms.CUSTOM)
 
 MECHANISMS = Field(
     'string_array', 'Names of the mechanisms in the scene.', readers=ALL, read_only=True,
-    rule='at least one, each once, of letters, digits and single underscores, a letter first')
+    rule='at least one, each once, of up to 64 letters, digits and single underscores, a letter '
+         'first')
 FRAME_ID = Field('string', 'Frame that the poses are in.', readers=(KINEMATICS,))
 RATE = Field('double', 'Crank messages in a second [Hz]; 0: none.', 0.0, 1000.0, readers=(DRIVER,))
 TYPE = Field('string', 'Type of the mechanism.', readers=ALL, read_only=True,
@@ -133,7 +135,8 @@ def load(path: str) -> Scene:
     try:
         with open(path) as file:
             given = dict(_flattened(yaml.safe_load(file)['/**']['ros__parameters']))
-    except (yaml.YAMLError, KeyError, TypeError, AttributeError, UnicodeDecodeError) as error:
+    except (yaml.YAMLError, LookupError, TypeError, AttributeError, ValueError,
+            RecursionError) as error:
         reason = ' '.join(str(error).split())
         raise SceneError(f"{path} must be YAML with '/**:' and below it 'ros__parameters:' "
                          f'({reason})') from None
@@ -152,7 +155,7 @@ def read(given: Mapping[str, Any]) -> Scene:
     """
     values = Values(given)
     names = values.take('mechanisms', MECHANISMS, mechanisms.CATALOGUE)
-    if not names or len(set(names)) < len(names) or not all(map(_NAME.match, names)):
+    if not names or len(set(names)) < len(names) or not all(map(_NAME.fullmatch, names)):
         raise MECHANISMS.error('mechanisms', names)
     frame_id = values.take('frame_id', FRAME_ID, 'world')
     rate = values.take('rate', RATE, 50.0)
@@ -172,14 +175,14 @@ def _refuse_unknown(values, names):
             mechanism = name.split('.')[0]
             known = [p.name for p in values.parameters if p.name.startswith(f'{mechanism}.')]
             known = known or ['mechanisms', 'frame_id', 'rate', *(f'{n}.*' for n in names)]
-            raise SceneError(f'{name} is not a parameter of the scene; allowed: '
-                             f'{", ".join(known)}')
+            raise SceneError(f'{elided(name)} is not a parameter of the scene; allowed: '
+                             f'{listed(known, 180)}')
 
 
 def _machine(name: str, values: Values) -> Machine:
     type_ = values.take(f'{name}.type', TYPE, name)
     if type_ not in TYPES:
-        raise SceneError(f'{name}.type must be {TYPE.rule}, not {type_!r}')
+        raise SceneError(f'{name}.type must be {TYPE.rule}, not {quoted(type_)}')
     linkage, reach = _linkage(name, type_, values)
     scale = values.take(f'{name}.scale', SCALE, 1.0)
     return Machine(name, linkage, reach, scale, *_legs(name, linkage, values),
@@ -196,7 +199,7 @@ def _linkage(name, type_, values):
     except ValueError as error:
         raise SceneError(f'{name}.dimensions: {error}') from None
     if not reach:
-        lengths = ', '.join(f'{key}={value:g}' for key, value in dimensions.items())
+        lengths = listed(f'{key}={value:g}' for key, value in dimensions.items())
         raise SceneError(f'{name}.dimensions must let the {type_} be assembled at some crank '
                          f'angle, which {lengths} do not')
     return linkage, reach
@@ -271,8 +274,8 @@ def _can_have_more_legs(linkage) -> bool:
 def _points(name, linkage, values):
     points = values.take(f'{name}.points', POINTS, linkage.points)
     if not points or len(set(points)) < len(points) or set(points) - set(linkage.points):
-        raise SceneError(f'{name}.points must name some of {", ".join(linkage.points)}, each '
-                         f'once, not {list(points)}')
+        raise SceneError(f'{name}.points must name some of {listed(linkage.points)}, each '
+                         f'once, not {quoted(list(points))}')
     return points
 
 

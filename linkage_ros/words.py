@@ -17,11 +17,13 @@
 import reprlib
 from typing import Any, Iterable
 
-LONGEST = 60
+# Letters of a value, and of a whole message.
+LONGEST, MESSAGE = 60, 299
 
 _short = reprlib.Repr()
 _short.maxstring = _short.maxother = _short.maxlong = LONGEST
 _short.maxlevel = 3
+_short.maxlist = _short.maxtuple = _short.maxdict = LONGEST // 3
 
 
 def elided(text: str, most: int = LONGEST) -> str:
