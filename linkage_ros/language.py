@@ -227,6 +227,11 @@ def _check_number(line: Line, kind: str, number: Formula, dimensions: Mapping, f
 def check_numbers(lines: Iterable[Line], dimensions: Mapping):
     """Raise ValueError, with its line, for a number that cannot be, for dimensions or arrays."""
     fixed = has_literal_lengths(lines)
+    if not fixed:
+        # Counted in a power of two, which changes no digit, no product is too large or small.
+        longest = max((np.max(np.abs(length)) for length in dimensions.values()), default=1.0)
+        unit = 2.0 ** np.frexp(longest)[1]
+        dimensions = {name: length / unit for name, length in dimensions.items()}
     for line in lines:
         for kind, number in line.numbers():
             _check_number(line, kind, number, dimensions, fixed)
