@@ -30,6 +30,7 @@ from .curves import refined, sampled
 from .inverse import distinct, in_order, MonotoneBranches, nearest, within_a_turn, wrapped
 from .planar import GRAZE
 from .reach import is_full_turn
+from .words import listed, quoted
 
 # How near to zero a closure comes, as a part of its size, for the output to change quickly there.
 NEAR = 1e-2
@@ -230,8 +231,8 @@ class Analysis:
     def _check_output(self, output):
         allowed = (*self.joints, *(f'{name}.{axis}' for name in self.points for axis in 'xy'))
         if output not in allowed:
-            raise ValueError(f'{self.type} has no output {output!r}; '
-                             f'allowed: {", ".join(allowed)}')
+            raise ValueError(f'{self.type} has no output {quoted(output)}; '
+                             f'allowed: {listed(allowed)}')
         if not self._structure.moves(output):
             raise ValueError(f'{output} of {self.type} does not move with the first crank')
 

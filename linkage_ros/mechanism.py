@@ -27,6 +27,7 @@ import numpy as np
 
 from . import language
 from .analysis import Analysis
+from .arguments import checked_dimensions
 from .compiler import Batch, evaluate, keep, Pose, Program
 from .expression import (
     angle,
@@ -40,8 +41,7 @@ from .expression import (
 )
 from .reach import arcs
 from .sketch import Sketch
-
-SHORTEST, LONGEST = 1e-300, 1e300
+from .words import listed, quoted
 
 # Lengths beyond these are counted in a power of two of their own, which changes no bit of a
 # result and keeps squares and products of lengths inside the range of float64.
@@ -231,7 +231,14 @@ class Structure:
 
 
 def _hashable(names):
-    return names if names is None or isinstance(names, (str, tuple)) else tuple(names)
+    """Return names as a tuple, None or one name as it is; raise ValueError if they are none."""
+    try:
+        names = names if names is None or isinstance(names, (str, tuple)) else tuple(names)
+        hash(names)
+        return names
+    except TypeError:
+        raise ValueError('points and joints must be a name or a list of names, '
+                         f'got {quoted(names)}') from None
 
 
 def in_metres(length: Real) -> Real:
@@ -264,7 +271,7 @@ class Mechanism(Analysis):
         self._lengths = _in_own_unit(self.dimensions, design.has_literal_lengths)
         self._evaluated = {}
         self._poses, self._placers, self._found = {}, {}, {}
-        self.links = tuple(link._replace(zero=float(self._value(link.zero)))
+        self.links = tuple(link._replace(zero=np.asarray(self._value(link.zero)).tolist())
                            for link in sketch.links)
 
     def __repr__(self):
@@ -303,7 +310,7 @@ class Mechanism(Analysis):
         """The longest bar [m]."""
         return max(self.bar_lengths.values())
 
-    def with_dimensions(self, **changed) -> Mechanism:
+    def with_dimensions(self, /, **changed) -> Mechanism:
         """Return the same mechanism with other dimensions [m]; raises ValueError like create."""
         made = type(self)(self._design, self._structure,
                           checked_dimensions(self._design, {**self.dimensions, **changed}),
@@ -457,7 +464,7 @@ class Mechanism(Analysis):
             If a joint does not exist.
 
         """
-        wanted = tuple(self._names(kind, names if names is None else tuple(names))
+        wanted = tuple(self._names(kind, _hashable(names))
                        for kind, names in (('points', points), ('angles', joints),
                                            ('rates', rates)))
         return self._bound('parts', wanted).at
@@ -529,8 +536,8 @@ class Mechanism(Analysis):
         names = (wanted,) if isinstance(wanted, str) else wanted
         for name in names:
             if name not in allowed:
-                raise ValueError(f'{self.type} has no {what} {name!r}; '
-                                 f'allowed: {", ".join(allowed)}')
+                raise ValueError(f'{self.type} has no {what} {quoted(name)}; '
+                                 f'allowed: {listed(allowed)}')
         return names
 
 
@@ -541,43 +548,3 @@ def _in_own_unit(dimensions: Mapping, fixed: bool) -> dict:
         return {**dimensions, UNIT.args[0]: 1.0}
     unit = 2.0 ** np.frexp(longest)[1]
     return {UNIT.args[0]: unit, **{name: length / unit for name, length in dimensions.items()}}
-
-
-def checked_dimensions(design: Design, given: Mapping) -> dict:
-    """Return all dimensions of a design, defaults filled in; raise ValueError for a bad one."""
-    for name in given:
-        if name not in design.dimensions:
-            raise ValueError(f'{design.name} has no dimension {name!r}; '
-                             f'allowed: {", ".join(design.dimensions)}')
-    return {name: _checked(design, name, given.get(name, default))
-            for name, default in design.dimensions.items()}
-
-
-def _checked(design, name, value):
-    try:
-        if isinstance(value, (str, bytes, bool)):
-            raise TypeError
-        length = np.asarray(value, float)
-    except (TypeError, ValueError):
-        raise ValueError(f'{design.name}: dimension {name} must be a number, '
-                         f'got {value!r}') from None
-    if not np.all(np.isfinite(length)):
-        raise ValueError(f'{design.name}: dimension {name} must be finite, got {value!r}')
-    if name not in design.signed and not np.all(length > 0.0):
-        raise ValueError(f'{design.name}: dimension {name} must be positive, got {value!r}')
-    size = np.abs(length[length != 0.0])
-    if np.any((size < SHORTEST) | (size > LONGEST)):
-        raise ValueError(f'{design.name}: dimension {name} must lie between {SHORTEST:g} and '
-                         f'{LONGEST:g}, got {value!r}')
-    return length if length.ndim else float(length)
-
-
-def checked_branches(design: Design, given: Optional[Mapping]) -> dict:
-    """Return all assembly signs of a design; raise ValueError for a bad one."""
-    for name, sign in (given or {}).items():
-        if name not in design.branches:
-            allowed = ', '.join(design.branches) or 'none'
-            raise ValueError(f'{design.name} has no branch {name!r}; allowed: {allowed}')
-        if sign not in (1, -1):
-            raise ValueError(f'{design.name}: branch {name} must be +1 or -1, got {sign!r}')
-    return {**design.branches, **(given or {})}

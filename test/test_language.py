@@ -255,9 +255,16 @@ def test_an_angle_is_in_rad_or_in_degrees(angle, rad):
 
 def test_a_dimension_that_is_an_angle_is_not_more_than_a_turn_either():
     linkage = made('P slider A b Q p out', p=6.0)
-    for angle in (90.0, -7.0):
+    for angle in (90.0, -7.0, np.array([0.0, 7.0])):
         with pytest.raises(ValueError, match=re.escape('in degrees it is written (p)deg')):
             linkage.with_dimensions(p=angle)
+
+
+def test_a_dimension_that_is_an_angle_may_be_an_array():
+    swept = made('P slider A b+c Q p out', p=np.array([0.1, 0.2])).solve(0.5)['P']
+    for angle, place in zip((0.1, 0.2), swept):
+        one = made('P slider A b+c Q p out', p=angle).solve(0.5)['P']
+        np.testing.assert_allclose(place, one, rtol=1e-15)
 
 
 @pytest.mark.parametrize('unit', [2.0 ** -900, 2.0 ** 900])
@@ -455,6 +462,21 @@ ROLES = {
 }
 
 
+OUTPUTS = {
+    'solve': lambda text: BAR.solve(0.5, (text,)), 'one point': lambda text: BAR.solve(0.5, text),
+    'of an array': lambda text: BAR.solve([0.5], [text]),
+    'velocity': lambda text: BAR.velocity(0.5, (text,)),
+    'angle of a joint': lambda text: BAR.joint_angles(0.5, (text,)),
+    'rate': lambda text: BAR.joint_rates(0.5, (text,)),
+    'transmission': lambda text: BAR.transmission_angles(0.5, (text,)),
+    'function': lambda text: BAR.function((text,)),
+    'crank angle': lambda text: BAR.crank_angle(text, 0.5),
+    'changed dimension': lambda text: BAR.with_dimensions(**{text: 1.0}),
+    'changed value': lambda text: BAR.with_dimensions(b=text),
+}
+BAR = made()
+
+
 def refused(ask, text) -> bool:
     """Return whether a text is refused, as it has to be: soon, and in a short sentence."""
     start = time.process_time()
@@ -471,10 +493,10 @@ def refused(ask, text) -> bool:
 
 
 @pytest.mark.filterwarnings('error')
-@pytest.mark.parametrize('role', ROLES)
+@pytest.mark.parametrize('role', [*ROLES, *OUTPUTS])
 def test_a_hostile_text_is_refused_in_a_short_sentence(role):
     assert len(TEXTS) > 700
-    kept = [text for text in TEXTS if not refused(ROLES[role], text)]
+    kept = [text for text in TEXTS if not refused({**ROLES, **OUTPUTS}[role], text)]
     assert len(kept) < 0.1 * len(TEXTS) and all(len(text) < 20000 for text in kept)
     if role in ('line', 'number', 'length', 'angle'):
         assert len(kept) < 10, kept
@@ -501,3 +523,19 @@ def test_what_passes_is_only_what_is_documented():
             for word in text.split():
                 name = re.fullmatch('[A-Za-z][A-Za-z0-9_]*', word)
                 assert name or not number.sub('', word), text
+
+
+@pytest.mark.parametrize('names', [5, 0.5, True, object(), len, [5], [['A']], ({},), {'a': 'A'},
+                                   HUGE, [None], (None,), [b'A'], b'A'])
+def test_points_and_joints_are_names(names):
+    for ask in (BAR.solve, BAR.velocity, BAR.joint_angles, BAR.joint_rates,
+                BAR.transmission_angles, lambda _, names: BAR.function(names),
+                lambda _, names: BAR.crank_angle(names, 0.5)):
+        with pytest.raises(ValueError, match='must be a name or a list|custom has no') as e:
+            ask(0.5, names)
+        assert len(str(e.value)) < 300
+
+
+def test_one_point_is_one_name_to_a_function_as_well():
+    linkage = made('AB line A B 1')
+    assert linkage.function('AB')(0.5) == linkage.function(('AB',))(0.5)
