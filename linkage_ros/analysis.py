@@ -187,7 +187,7 @@ class Analysis:
             return
         theta = sampled(lo, hi)
         values, rates = self._split(pose.over(theta, *others))
-        size = np.nanmax(np.abs(values), axis=1, initial=0.0)
+        size = np.fmax.reduce(np.abs(values), axis=1, initial=0.0)
         for place in (0, -1):
             if abs(theta[place]) == math.pi:
                 yield from zip(repeat(theta[place]), abs(values[:, place]), rounding, size)
@@ -247,8 +247,8 @@ def _crossings(values, folds) -> tuple:
 def _approaches(theta, values, rates, near) -> tuple:
     """Return row and place of the samples after which a closure turns away close to zero."""
     sign = np.sign(values[:, :-1])
-    before, after = sign * rates[:, :-1], sign * rates[:, 1:]
     with np.errstate(all='ignore'):
+        before, after = sign * rates[:, :-1], sign * rates[:, 1:]
         # Where the tangents meet a smooth curve between two samples is lower than it gets.
         ahead = (sign * (values[:, 1:] - values[:, :-1]) - after * np.diff(theta)) / (
             before - after)

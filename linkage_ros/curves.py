@@ -95,9 +95,9 @@ def near_misses(values: np.ndarray) -> np.ndarray:
     There a curve has a least distance from zero that is small beside how much it bends.
     """
     before, inner, after = values[..., :-2], values[..., 1:-1], values[..., 2:]
-    sign = np.sign(inner)
-    bent = sign * (before - 2.0 * inner + after)
     with np.errstate(invalid='ignore'):
+        sign = np.sign(inner)
+        bent = sign * (before - 2.0 * inner + after)
         return ((sign * before >= sign * inner) & (sign * after >= sign * inner)
                 & (sign * inner <= 2.0 * bent))
 
