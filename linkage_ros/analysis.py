@@ -29,7 +29,6 @@ import numpy as np
 from .curves import refined, sampled
 from .inverse import distinct, in_order, MonotoneBranches, nearest, within_a_turn, wrapped
 from .planar import GRAZE
-from .reach import is_full_turn
 from .words import listed, quoted
 
 # How near to zero a closure comes, as a part of its size, for the output to change quickly there.
@@ -165,7 +164,8 @@ class Analysis:
 
     def _dead_points(self, others):
         reach = self.reach(*others)
-        ends = [] if is_full_turn(reach) else [end for arc in reach for end in arc]
+        # At -pi and pi a reach may only be cut, and a dead point there is found as a touch.
+        ends = [end for arc in reach for end in arc if abs(end) != math.pi]
         touched = [theta for theta, gap, rounding, _ in self._near_closures(others)
                    if gap <= rounding and all(abs(wrapped(theta - end)) > ONE for end in ends)]
         return distinct([*ends, *touched])

@@ -34,6 +34,8 @@ from .planar import Limit
 SAMPLES = 720
 # Arcs below this width [rad] are the rounding of one angle.
 NARROWEST = 2e-15
+# What margins may differ by from turn to turn, as a part of their size, and be the same.
+ALIKE = 1e-6
 
 
 def arcs(margins: Callable, limits: Sequence[Limit], value: Callable) -> List[Arc]:
@@ -57,11 +59,14 @@ def arcs(margins: Callable, limits: Sequence[Limit], value: Callable) -> List[Ar
     ends = [end for limit in limits if limit.crank == 0
             for end in _crank_ends(*map(value, (
                 limit.start, limit.end, limit.turn, limit.tolerance)))]
+    if not _is_periodic(margins):
+        # What follows a turn later is another assembly: the arcs are those of [-pi, pi].
+        ends.append(-math.pi)
     searched = [i for i, x in enumerate(limits) if x.margin.varies and x.crank != 0]
     if searched:
         ends += [end for arc in between(ends) for end in _limits(
             lambda theta: margins(theta)[searched], assembled, *arc)]
-    found = reachable_arcs(ends, assembled)
+    found = reachable_arcs(ends, assembled, joined=-math.pi not in ends)
     return [tuple(_trimmed(assembled, *arc)) for arc in found] if ends else found
 
 
@@ -98,22 +103,34 @@ def _trimmed(assembled, lo, hi):
     return np.where(assembled(ends), ends, refined(assembled, middle, ends)[0]).tolist()
 
 
-def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool]) -> List[Arc]:
-    """Return the arcs between angles where reachability may change, joined where they touch."""
+def _is_periodic(margins: Callable) -> bool:
+    """Return whether margins are the same a turn later."""
+    theta = np.linspace(-math.pi, math.pi, 66)[1:-1]
+    now, later = (np.nan_to_num(margins(theta + turn), nan=-1.0) for turn in (0.0, math.tau))
+    return bool(np.all(np.abs(now - later) <= ALIKE * np.abs(now).max(
+        axis=1, initial=0.0, keepdims=True)))
+
+
+def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
+                   joined: bool = True) -> List[Arc]:
+    """
+    Return the arcs between angles where reachability may change, in one where they touch.
+
+    They are joined across -pi and pi as well, unless that is not to be.
+    """
     parts = between(ends)
     held = [arc for arc in parts if bool(reachable(0.5 * (arc[0] + arc[1])))]
     if held == parts:
         return [(-math.pi, math.pi)]
-    joined: List[Arc] = []
+    found: List[Arc] = []
     for lo, hi in held:
-        if joined and lo - joined[-1][1] <= NARROWEST:
-            joined[-1] = joined[-1][0], hi
+        if found and lo - found[-1][1] <= NARROWEST:
+            found[-1] = found[-1][0], hi
         else:
-            joined.append((lo, hi))
-    if len(joined) > 1 and joined[0][0] + 2.0 * math.pi - joined[-1][1] <= NARROWEST:
-        joined[-1] = joined[-1][0], joined.pop(0)[1] + 2.0 * math.pi
-    return [(lo - 2.0 * math.pi, hi - 2.0 * math.pi) if lo >= math.pi else (lo, hi)
-            for lo, hi in joined]
+            found.append((lo, hi))
+    if joined and len(found) > 1 and found[0][0] + math.tau - found[-1][1] <= NARROWEST:
+        found[-1] = found[-1][0], found.pop(0)[1] + math.tau
+    return [(lo - math.tau, hi - math.tau) if lo >= math.pi else (lo, hi) for lo, hi in found]
 
 
 def is_full_turn(reach: Sequence[Arc]) -> bool:

@@ -18,6 +18,7 @@ import math
 import tracemalloc
 
 from linkage_ros import mechanisms
+from linkage_ros.inverse import distinct
 import numpy as np
 import pytest
 
@@ -200,6 +201,27 @@ def test_no_angles_give_no_places(kind):
     assert {value.shape for value in found.solve(none).values()} == {(0, 3, 2)}
     for ask in (found.velocity, found.joint_angles, found.joint_rates, found.transmission_angles):
         assert all(value.size == 0 for value in ask(none).values())
+
+
+def test_the_reach_past_a_change_point_is_that_of_the_turn_from_minus_pi_to_pi():
+    # The four-bar changes sides at pi; the bar on its rocker meets C on one of them only.
+    found = linkage('O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'B dyad A Q 2 3 left',
+                    'R ground 4 -4', 'C dyad B R 3 2.5 left')
+    reach, theta = found.reach(), np.linspace(-math.pi, math.pi, 4001)[:-1]
+    placed = np.isfinite(found.solve(theta)['C']).all(-1)
+    held = np.any([(lo <= theta) & (theta <= hi) for lo, hi in reach], axis=0)
+    assert placed.any() and not placed.all() and (placed == held).all()
+    assert all(-math.pi <= lo < hi <= math.pi for lo, hi in reach)
+    ends = [end for arc in reach for end in arc if abs(end) != math.pi]
+    assert found.dead_points() == pytest.approx(sorted([-math.pi, *ends]))
+
+
+@pytest.mark.parametrize('theta', [3.1415926535897927, math.pi, -math.pi, 1e9, -7.0, 0.0])
+def test_a_dead_point_is_between_minus_pi_and_pi(theta):
+    wrapped = distinct([theta])
+    assert -math.pi <= wrapped[0] < math.pi
+    assert abs(math.remainder(wrapped[0] - theta, math.tau)) < 1e-6
+    assert wrapped == [theta] or not -math.pi <= theta < math.pi
 
 
 @pytest.mark.parametrize('lengths, expected', [
