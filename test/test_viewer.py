@@ -15,6 +15,7 @@
 """The viewer: what its page is sent, what its sliders do, and who may look."""
 
 import asyncio
+import cmath
 import contextlib
 import itertools
 import json
@@ -40,8 +41,8 @@ from linkage_ros.kinematics import Kinematics  # noqa: E402
 from linkage_ros.servo_inverse import ServoInverse  # noqa: E402
 from linkage_ros.viewer import Viewer  # noqa: E402
 from linkage_ros.web.feed import Feed  # noqa: E402
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor  # noqa: E402
 import rclpy  # noqa: E402
+from rclpy.logging import get_logger  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from ros_harness import Graph, Process  # noqa: E402
@@ -87,6 +88,11 @@ class Show:
     def values(self, name):
         """Return the value of a parameter on each node that has it."""
         return [node.get_parameter(name).value for node in self.nodes if node.has_parameter(name)]
+
+    def value(self, kind, name):
+        """Return the value of a parameter on the node of a kind."""
+        node, = (node for node in self.nodes if isinstance(node, kind))
+        return node.get_parameter(name).value
 
     def entities(self):
         """Return how many subscriptions and clients the viewer has."""
@@ -180,6 +186,17 @@ class Page:
 
         return await browser.until(known, keys)
 
+    async def shown(self, mechanism, name, value):
+        """Wait until a parameter is shown with a value."""
+        def known():
+            for said in reversed(self.said):
+                if said['op'] == 'scene':
+                    return any(one['key'] == mechanism and setting['name'] == name
+                               and setting['value'] == value
+                               for one in said['mechanisms'] for setting in one['settings'])
+
+        await browser.until(known, (mechanism, name, value))
+
     async def ask(self, op, mechanism, **fields):
         """Return the answer to a request."""
         number = next(self._ids)
@@ -239,7 +256,7 @@ def test_every_slider_has_a_value_a_range_and_a_meaning(lever):
     assert settings['points']['value'] == ['O', 'Q', 'A', 'L']
 
 
-def test_a_slider_sets_every_node_that_has_the_parameter(show):
+def test_a_slider_sets_the_node_that_owns_the_parameter(show):
     running = show(LEVER)
 
     async def use(url):
@@ -251,7 +268,7 @@ def test_a_slider_sets_every_node_that_has_the_parameter(show):
             await page.heard('value', mechanism='/lever', name='crank.speed', value=-2.5)
 
     asyncio.run(use(running.viewer.url))
-    assert running.values('lever.dimensions.b') == [160.0, 160.0, 160.0]
+    assert running.value(Kinematics, 'lever.dimensions.b') == 160.0
     assert running.values('lever.crank.speed') == [-2.5]
 
 
@@ -275,25 +292,34 @@ def test_a_refusal_says_why_and_changes_nothing(lever, values, reason):
     assert lever.values('lever.dimensions.b') == [150.0] * 3
 
 
-def test_what_one_node_refuses_no_node_keeps(graph, show):
-    def picky(**kwargs):
-        node = rclpy.create_node('picky', **kwargs)
-        node.declare_parameter('lever.dimensions.b', 150.0, ParameterDescriptor(
-            floating_point_range=[FloatingPointRange(from_value=140.0, to_value=155.0)]))
-        return node
+def test_what_kinematics_does_not_show_is_set_on_the_node_that_does(graph, show):
+    def other(name, value):
+        def made(**kwargs):
+            node = rclpy.create_node(name, **kwargs)
+            node.declare_parameter('lever.dimensions.b', value)
+            node.declare_parameter('lever.spring', value)
+            return node
+        return made
 
-    running = show(LEVER, before=lambda: graph.start(picky))
+    def before():
+        # Their names come before that of kinematics.
+        before.first, before.second = (graph.start(other(name, value)) for name, value in (
+            ('a_node', 1.0), ('b_node', 2.0)))
+
+    running = show(LEVER, before=before)
 
     async def use(url):
         async with Page(url) as page:
-            cast = await page.cast('/lever', '/drop')
-            assert 'dimensions.b' in {one['name'] for one in cast['/lever']['settings']}
-            return await page.set('/lever', dimensions__b=160.0), await page.set(
-                '/lever', dimensions__b=152.0)
+            await page.cast('/lever', '/drop')
+            await page.shown('/lever', 'dimensions.b', 150.0)
+            await page.shown('/lever', 'spring', 1.0)
+            assert await page.set('/lever', dimensions__b=152.0) == ''
+            assert await page.set('/lever', spring=3) == ''
 
-    refused, granted = asyncio.run(use(running.viewer.url))
-    assert '160' in refused and granted == ''
-    assert running.values('lever.dimensions.b') == [152.0] * 3
+    asyncio.run(use(running.viewer.url))
+    assert running.value(Kinematics, 'lever.dimensions.b') == 152.0
+    assert [node.get_parameter(f'lever.{name}').value for node in (before.first, before.second)
+            for name in ('dimensions.b', 'spring')] == [1.0, 3.0, 2.0, 2.0]
 
 
 def test_a_change_that_somebody_else_makes_is_shown(show):
@@ -335,8 +361,30 @@ def test_a_dragged_lever_is_where_it_was_dragged_to_and_stays_there(show):
     assert running.values('lever.crank.start') == [answer['servo']]
 
 
+@pytest.mark.parametrize('lengths, sign', [
+    ((80.0, 150.0, 0.0), 1.0), ((80.0, 150.0, 25.0), -1.0), ((1.0, 150.0, 0.0), 1.0)])
+def test_a_lever_that_is_dragged_beyond_its_reach_goes_to_its_end(show, lengths, sign):
+    running = show({**LEVER, **{f'lever.dimensions.{name}': length
+                                for name, length in zip('abe', lengths)}})
+    a, b, e = lengths
+    end = sign * math.asin((a - sign * e) / b)
+
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/lever', '/drop')
+            return [await page.ask('drag', '/lever', angle=sign * beyond)
+                    for beyond in (2.0, 1.0)]
+
+    for answer in asyncio.run(use(running.viewer.url)):
+        assert 'cannot be reached; the lever reaches [' in answer['reason']
+        assert answer['value'] == pytest.approx(end, abs=1e-9)
+        servo = running.values('lever.crank.start')[0]
+        pin = 1j * a * cmath.exp(1j * servo) + 1j * b
+        slot = cmath.phase(pin / 1j) - math.asin(e / abs(pin))
+        assert slot == pytest.approx(end, abs=1e-9)
+
+
 @pytest.mark.parametrize('mechanism, angle, reason', [
-    ('/lever', 1.0, r'cannot be reached; the lever reaches \[-0.5625'),
     ('/drop', 0.1, 'drop has no lever'),
     ('/gone', 0.1, "no mechanism '/gone'; there are: /drop, /lever"),
     ('/lever', 'up', 'not understood'),
@@ -563,7 +611,7 @@ def unpacked(text):
 
 
 def test_what_is_read_without_unpacking_is_what_unpacking_gives():
-    feed = Feed('/leg', MarkerArray, lambda _, id_: id_)
+    feed = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
     looks = []
     for text in (walker(1), walker(2), walker(3), walker(4, legs=1), walker(5),
                  walker(6, width=2.0), walker(7, frame='earth'), walker(8), FILLED, FILLED):
@@ -575,13 +623,15 @@ def test_what_is_read_without_unpacking_is_what_unpacking_gives():
 
 
 def test_markers_that_are_gone_are_drawn_no_more():
-    feed = Feed('/leg', MarkerArray, lambda _, id_: id_)
+    feed = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
     feed.newest = walker(1)
     assert set(feed.drawn()[0]) == {0, 1}
     one = deserialize_message(walker(2), MarkerArray)
     one.markers = [marker for marker in one.markers if marker.type == Marker.SPHERE_LIST]
     feed.newest = serialize_message(one)
-    assert struct.pack('<II', 0, 0) in feed.drawn()[1]
+    looks, records = feed.drawn()
+    assert [look['kind'] for look in looks.values()] == ['joints']
+    assert records.endswith(struct.pack('<II', 1, 0))
 
 
 class Seen:
@@ -617,7 +667,7 @@ class Seen:
     async def number(self, name, label):
         """Return the number that a slider shows."""
         return float(await self.page.value(
-            f'{self.row(name, label)}.querySelector("input[type=number]").value'))
+            f'{self.row(name, label)}.querySelector("input[type=text]").value'))
 
     async def view(self, name):
         """Show one mechanism."""
@@ -694,17 +744,18 @@ def test_a_dragged_slider_sets_the_nodes_and_a_refused_one_springs_back(show, lo
     async def doing(seen):
         await seen.view('lever')
         await seen.slide('lever', 'b', 0.7)
-        await browser.until(lambda: running.values('lever.dimensions.b')[0] > 200.0)
+        await browser.until(lambda: running.value(Kinematics, 'lever.dimensions.b') > 200.0)
 
         async def agreed():
-            return running.values('lever.dimensions.b') == [await seen.number('lever', 'b')] * 3
+            return running.value(Kinematics, 'lever.dimensions.b') == await seen.number(
+                'lever', 'b')
 
         await browser.until(agreed)
         assert await seen.reason('lever', 'b') == ''
 
         await seen.slide('lever', 'e', 1.0)
         await browser.until(lambda: seen.reason('lever', 'e'))
-        kept, = set(running.values('lever.dimensions.e'))
+        kept = running.value(Kinematics, 'lever.dimensions.e')
 
         async def sprung():
             return abs(await seen.number('lever', 'e') - kept) < 1e-5 * abs(kept) + 1e-9
