@@ -22,10 +22,12 @@ import json
 import math
 from pathlib import Path
 import re
+import resource
 import signal
 import socket
 import struct
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -40,6 +42,7 @@ from linkage_ros.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.kinematics import Kinematics  # noqa: E402
 from linkage_ros.servo_inverse import ServoInverse  # noqa: E402
 from linkage_ros.viewer import Viewer  # noqa: E402
+from linkage_ros.web import server  # noqa: E402
 from linkage_ros.web.feed import Feed  # noqa: E402
 import rclpy  # noqa: E402
 from rclpy.logging import get_logger  # noqa: E402
@@ -138,12 +141,13 @@ class Page:
         except BaseException:
             await self._session.close()
             raise
-        self._reading = asyncio.ensure_future(self._read())
+        self.reading = asyncio.ensure_future(self._read())
         return self
 
     async def __aexit__(self, *_):
         await self.socket.close()
-        await self._reading
+        with contextlib.suppress(asyncio.CancelledError):
+            await self.reading
         await self._session.close()
 
     async def _read(self):
@@ -458,18 +462,205 @@ def test_nodes_that_come_later_or_in_a_namespace_are_found(graph, show):
     assert running.values('leg.crank.speed') == [2.0]
 
 
-def test_nonsense_is_answered_or_ignored(show):
+NONSENSE = [
+    '', '[]', 'null', '\x00', '{"op": 1}', '{"op": {}}', '["op"]', '[' * 60000, '{"a":' * 10000,
+    '9' * 60000, '{"op": "drag", "angle": ' + '[' * 3000 + ']' * 3000 + '}', b'\xff\xfe', b'{}']
+
+
+@pytest.mark.parametrize('text', NONSENSE, ids=range(len(NONSENSE)))
+def test_nonsense_is_answered(lever, text):
     async def use(url):
         async with Page(url) as page:
-            await page.cast('/leg')
-            for nonsense in ('', '[]', '{"op": 1}', 'null', '{"op": "set"}', '\x00'):
-                await page.socket.send_str(nonsense)
-            await page.socket.send_bytes(b'\xff\xfe')
-            assert 'not understood' in (await page.ask('set', '/leg'))['reason']
-            assert 'not understood' in (await page.ask('set', '/leg', values=3))['reason']
-            assert 'unknown request' in (await page.ask('fly', '/leg'))['reason']
+            await (page.socket.send_bytes if isinstance(text, bytes) else page.socket.send_str)(
+                text)
+            answer = await page.heard('answer', id=None)
+            assert 'the request is not understood: ' in answer['reason']
+            assert 'unknown request' in (await page.ask('fly', '/lever'))['reason']
 
-    asyncio.run(use(show(LEG).viewer.url))
+    asyncio.run(use(lever.viewer.url))
+
+
+REQUESTS = [
+    *(('set', {'values': {name: value}}, f'lever.{name} must be .*, not {shown}')
+      for name, value, shown in (
+        ('leg_pairs', '1e20', r'1e\+20'), ('leg_pairs', '1' + 20 * '0', r'1e\+20'),
+        ('leg_pairs', 19 * '9', r'1e\+19'), ('leg_pairs', '-1e400', '-inf'),
+        ('leg_pairs', 'true', 'True'), ('leg_pairs', '2.5', '2.5'),
+        ('dimensions.a', 400 * '9', 'inf'), ('dimensions.a', 5000 * '9', 'inf'),
+        ('dimensions.a', '1e400', 'inf'), ('dimensions.a', 'NaN', 'nan'),
+        ('dimensions.a', '-Infinity', '-inf'), ('dimensions.a', '[[[1]]]', r'\[\[\[1\]\]\]'),
+        ('dimensions.a', '{"a": NaN}', '{.*}'), ('dimensions.a', 'null', 'None'),
+        ('dimensions.a', f'"{50000 * "x"}"', "'x*[.]{3}x*'$"), ('points', '["O"]', '.*'))),
+    ('set', {'values': {'crank.speed': '1e300'}}, '100'),
+    ('set', {'values': {'crank.start': 17 * '9'}}, '12.566'),
+    ('set', {'values': {50000 * 'x': '1'}}, "lever has no parameter 'x*[.]{3}x*'$"),
+    ('set', {'values': {'\\ud800': '1'}}, 'lever has no parameter'),
+    ('set', {'values': '3'}, 'not understood'), ('set', {'values': '[[[], 1]]'}, 'not understood'),
+    ('set', {'values': '{}', 'mechanism': '{}'}, 'not understood'),
+    ('set', {}, "not understood: it lacks 'values'"), ('drag', {}, "it lacks 'angle'"),
+    *(('drag', {'angle': angle}, 'angle must be a finite number')
+      for angle in ('1e400', '-1e400', 'NaN', 400 * '9', 'true', '[1]', '"1"')),
+    ('drag', {'angle': '1e308'}, 'cannot be reached'),
+    (50000 * 'x', {}, "unknown request 'x*[.]{3}x*'$"),
+]
+
+
+@pytest.mark.parametrize('op, fields, reason', REQUESTS, ids=range(len(REQUESTS)))
+def test_a_request_is_answered_whatever_it_holds(lever, op, fields, reason):
+    def text(value):
+        return value if isinstance(value, str) else '{%s}' % ', '.join(
+            f'"{name}": {inner}' for name, inner in value.items())
+
+    members = {'op': f'"{op}"', 'id': '7', 'mechanism': '"/lever"', **fields}
+
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/lever', '/drop')
+            await page.socket.send_str('{%s}' % ', '.join(
+                f'"{name}": {text(value)}' for name, value in members.items()))
+            return await page.heard('answer', id=7)
+
+    said = asyncio.run(use(lever.viewer.url))['reason']
+    assert re.search(reason, said) and len(said) < 300
+    assert (lever.values('lever.crank.speed'), lever.values('lever.leg_pairs')) == ([1.0], [1])
+
+
+def test_of_many_requests_at_once_each_is_answered(lever):
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/lever', '/drop')
+            answers = await asyncio.gather(*(page.ask('set', '/lever', values={}) for _ in range(
+                500)))
+            return [answer['reason'] for answer in answers]
+
+    reasons = asyncio.run(use(lever.viewer.url))
+    assert reasons[0] == '' and set(reasons) <= {'', '64 requests wait already'}
+
+
+@pytest.mark.parametrize('frames, code, reason', [
+    ([(aiohttp.WSMsgType.TEXT, b'[' * 100000)], 1009, b'a message may have 65536 bytes'),
+    ([(aiohttp.WSMsgType.TEXT, b'\xff\xfe')], 1007, b'a text must be UTF-8'),
+    ([(aiohttp.WSMsgType.CONTINUATION, b'')], 1002, b'this is no WebSocket frame'),
+    ([(3, b'')], 1002, b'this is no WebSocket frame'),
+])
+def test_what_is_no_message_closes_the_connection_with_a_reason(address, frames, code, reason):
+    async def use():
+        async with Page(address) as page:
+            await page.heard('scene')
+            page.reading.cancel()
+            for kind, data in frames:
+                await page.socket._writer.send_frame(data, kind)
+            while (message := await page.socket.receive()).type != aiohttp.WSMsgType.CLOSE:
+                pass
+            return message.data, message.extra.encode()
+
+    assert asyncio.run(use()) == (code, reason)
+
+
+class Deaf:
+    """A client that asks, and reads nothing."""
+
+    def __init__(self, url):
+        host, port = url[len('http://'):-1].split(':')
+        self._socket = socket.socket()
+        # So that little is read on its behalf.
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        self._socket.connect((host, int(port)))
+        self._host = f'Host: {host}:{port}\r\n'
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._socket.close()
+
+    def request(self, path):
+        """Return the bytes of a request for a file."""
+        return f'GET {path} HTTP/1.1\r\n{self._host}\r\n'.encode()
+
+    def upgrade(self):
+        """Make the connection a WebSocket."""
+        self._socket.sendall(self.request('/socket').replace(
+            b'\r\n\r\n', b'\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n'
+            b'Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n'))
+        assert b' 101 ' in self._socket.recv(64)
+
+    @staticmethod
+    def frame(data, kind=1):
+        """Return the bytes of a WebSocket frame."""
+        size = len(data)
+        head = bytes([0x80 | kind, 0x80 | min(size, 126)])
+        return head + (struct.pack('>H', size) if size > 125 else b'') + bytes(4) + data
+
+    def flood(self, data, seconds):
+        """Send something again and again; return whether it was let, and was not sent home."""
+        self._socket.settimeout(0.2)
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            try:
+                self._socket.send(data)
+            except TimeoutError:
+                pass
+            except OSError:
+                return False
+        return True
+
+
+def resident():
+    """Return the memory that this process holds [MB]."""
+    return int(Path('/proc/self/statm').read_text().split()[1]) * resource.getpagesize() / 1e6
+
+
+FLOODS = {
+    'answers': Deaf.frame(b'{"op": "fly", "id": "' + b'x' * 60000 + b'"}'),
+    'refusals': Deaf.frame(b'[]') * 1000,
+    'settings': Deaf.frame(b'{"op": "set", "mechanism": "/leg", "values": '
+                           b'{"crank.speed": 1}, "id": 1}') * 100,
+    'pings': Deaf.frame(b'x' * 125, kind=9) * 500,
+    'drawn': Deaf.frame(b'{"op": "drawn"}') * 1000,
+    'files': None,
+}
+
+
+@pytest.mark.skipif(not Path('/proc/self/statm').exists(), reason='memory is read from /proc')
+@pytest.mark.parametrize('what, seconds', [
+    ('answers', 2.0), *(pytest.param(what, 15.0, marks=pytest.mark.long) for what in FLOODS)])
+def test_a_client_that_does_not_read_costs_little_and_harms_nobody(show, what, seconds):
+    running = show({**LEG, 'leg.crank.speed': 1.0})
+    url = running.viewer.url
+
+    async def use():
+        async with Page(url) as page:
+            await page.cast('/leg')
+            await browser.until(lambda: page.pictures)
+            before, pictures = resident(), page.pictures
+            with Deaf(url) as deaf:
+                data = FLOODS[what] or deaf.request('/panel.js') * 100
+                if FLOODS[what]:
+                    deaf.upgrade()
+                await asyncio.to_thread(deaf.flood, data, seconds)
+                assert page.pictures - pictures > 5 * seconds
+                assert await page.set('/leg', crank__speed=2.0) == ''
+                return resident() - before
+
+    assert asyncio.run(use()) < 30.0
+
+
+def test_a_client_that_does_not_read_is_sent_home(show, monkeypatch):
+    monkeypatch.setattr(server, 'SECONDS_TO_READ', 0.3)
+    with Deaf(show(LEG).viewer.url) as deaf:
+        deaf.upgrade()
+        assert not deaf.flood(FLOODS['answers'], 10.0)
+
+
+def test_a_client_that_does_not_read_does_not_keep_the_viewer_from_ending(show):
+    running = show(LEG)
+    with Deaf(running.viewer.url) as deaf:
+        deaf.upgrade()
+        assert deaf.flood(FLOODS['answers'], 1.0)
+        before = time.monotonic()
+        running.viewer._server.stop()
+        assert time.monotonic() - before < 5.0
 
 
 @pytest.fixture

@@ -20,6 +20,7 @@ from contextlib import suppress
 from importlib.resources import files
 import ipaddress
 import json
+import logging
 import socket
 from threading import Thread
 from urllib.parse import urlsplit
@@ -43,7 +44,6 @@ HEADERS = {
 MOST_BYTES, MOST_WAITING = 1 << 16, 64
 SECONDS_TO_CLOSE = 1.0
 SECONDS_TO_READ = 10.0
-SECONDS_BETWEEN_WARNINGS = 5.0
 # More figures than a number of ours has; what they say to a double is enough.
 MOST_FIGURES = 18
 CLOSED_FOR = {
@@ -103,7 +103,10 @@ class Server:
         app = web.Application(middlewares=[self._guard])
         app.add_routes([web.get('/', _file), web.get('/socket', self._visit),
                         web.get('/{name}', _file)])
-        runner = web.AppRunner(app, access_log=None, shutdown_timeout=SECONDS_TO_CLOSE)
+        logger = logging.Logger('web', logging.WARNING)
+        logger.addHandler(Sentence(self._bridge.warn))
+        runner = web.AppRunner(
+            app, access_log=None, logger=logger, shutdown_timeout=SECONDS_TO_CLOSE)
         await runner.setup()
         try:
             await web.TCPSite(runner, self._host, port).start()
@@ -151,7 +154,7 @@ class Server:
         socket_ = Socket(
             timeout=SECONDS_TO_CLOSE, max_msg_size=MOST_BYTES, heartbeat=20.0, compress=False)
         await socket_.prepare(request)
-        visitor = Visitor(self._stage, socket_, self._bridge.node.get_logger())
+        visitor = Visitor(self._stage, socket_, self._bridge.warn)
         self._visitors.add(visitor)
         try:
             await visitor.stay()
@@ -161,6 +164,19 @@ class Server:
         finally:
             self._visitors.discard(visitor)
         return socket_
+
+
+class Sentence(logging.Handler):
+    """Says in one sentence what is logged, for what others send is no traceback of ours."""
+
+    def __init__(self, say):
+        super().__init__()
+        self._say = say
+
+    def emit(self, record):
+        """Say it."""
+        error = record.exc_info[1] if record.exc_info else ''
+        self._say(f'{record.getMessage()}: {error!r}')
 
 
 class Socket(web.WebSocketResponse):
@@ -180,10 +196,10 @@ class Visitor:
     request is answered. Nothing is gathered for one that does not read, which is sent home.
     """
 
-    def __init__(self, stage, socket_, logger):
+    def __init__(self, stage, socket_, warn):
         self._stage = stage
         self._socket = socket_
-        self._logger = logger
+        self._warn = warn
         self._texts = {}
         self._offered = set()
         self._looks = {}
@@ -227,6 +243,8 @@ class Visitor:
 
     async def _hear(self):
         async for message in self._socket:
+            # Others have their turn, however much comes.
+            await asyncio.sleep(0)
             said = {}
             try:
                 said = _parsed(message.data)
@@ -256,11 +274,13 @@ class Visitor:
             return {'reason': f'unknown request {shortened(op)}'}
         except Refused as reason:
             return {'reason': str(reason)}
-        except (KeyError, TypeError, ValueError) as error:
-            return {'reason': f'{op} is not understood: {error!r}'}
+        except KeyError as error:
+            return {'reason': f'{op} is not understood: it lacks {error}'}
+        except (TypeError, ValueError) as error:
+            return {'reason': f'{op} is not understood: {error}'}
         except Exception as error:
             # The browser would wait for ever for what raised.
-            self._logger.error(f'{op}: {error!r}', throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
+            self._warn(f'{op}: {error!r}')
             return {'reason': f'internal error: {error!r}'}
 
     async def _send(self):

@@ -89,13 +89,13 @@ class Setting:
     message: object
 
     def __post_init__(self):
-        self.take(self.message)
+        self._type = Parameter.Type(self.message.type)
 
-    def take(self, message):
-        """Take over a value that the node has now."""
-        self._type = Parameter.Type(message.type)
-        value = parameter_value_to_python(message)
-        self.value = list(map(_shown, value)) if isinstance(value, list) else _shown(value)
+    @property
+    def value(self):
+        """Its value, as JSON has it."""
+        value = parameter_value_to_python(self.message)
+        return list(map(_shown, value)) if isinstance(value, list) else _shown(value)
 
     def described(self) -> dict:
         """Return what the page needs to draw it."""

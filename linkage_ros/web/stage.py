@@ -364,15 +364,16 @@ class Stage:
 
     def _notice_one(self, cast, node, name, parameter):
         setting = cast.settings.get(name)
-        if setting is None:
+        if setting is None or parameter.value.type != setting.message.type:
             if node in self._nodes:
                 self._seen = None
-        elif node == setting.node:
-            with suppress(ValueError):
-                setting.take(parameter.value)
-                for visitor in self.audience:
-                    visitor.tell((cast.key, name), {'op': 'value', 'mechanism': cast.key,
-                                                    'name': name, 'value': setting.value})
+            return
+        if node != setting.node:
+            return
+        setting.message = parameter.value
+        for visitor in self.audience:
+            visitor.tell((cast.key, name), {'op': 'value', 'mechanism': cast.key,
+                                            'name': name, 'value': setting.value})
 
 
 def _joined(space, name):
