@@ -60,6 +60,8 @@ LEVER = {**RATE, 'mechanisms': ['lever', 'drop'], 'lever.type': 'slotted_lever',
 LEG = {**RATE, 'mechanisms': ['leg'], 'leg.type': 'jansen', 'leg.crank.speed': 0.0,
        'leg.crank.start': 1.0}
 
+ENDS = aiohttp.WSMsgType.CLOSE, aiohttp.WSMsgType.CLOSING, aiohttp.WSMsgType.CLOSED
+
 needs_browser = pytest.mark.skipif(
     not browser.found(), reason=f'none of {", ".join(browser.NAMES)} is installed')
 
@@ -133,6 +135,7 @@ class Page:
         self._lazy = lazy
         self._ids = itertools.count(1)
         self.said, self.looks, self.points, self.pictures = [], {}, {}, 0
+        self.end = None
 
     async def __aenter__(self):
         self._session = aiohttp.ClientSession()
@@ -141,23 +144,23 @@ class Page:
         except BaseException:
             await self._session.close()
             raise
-        self.reading = asyncio.ensure_future(self._read())
+        self._reading = asyncio.ensure_future(self._read())
         return self
 
     async def __aexit__(self, *_):
         await self.socket.close()
-        with contextlib.suppress(asyncio.CancelledError):
-            await self.reading
+        await self._reading
         await self._session.close()
 
     async def _read(self):
-        async for message in self.socket:
+        while (message := await self.socket.receive()).type not in ENDS:
             if message.type == aiohttp.WSMsgType.TEXT:
                 self._hear(message.json())
             else:
                 self._draw(message.data)
                 if not self._lazy:
                     await self.socket.send_json({'op': 'drawn'})
+        self.end = message.data, message.extra
 
     def _hear(self, said):
         if said['op'] == 'look':
@@ -537,22 +540,19 @@ def test_of_many_requests_at_once_each_is_answered(lever):
     assert reasons[0] == '' and set(reasons) <= {'', '64 requests wait already'}
 
 
-@pytest.mark.parametrize('frames, code, reason', [
-    ([(aiohttp.WSMsgType.TEXT, b'[' * 100000)], 1009, b'a message may have 65536 bytes'),
-    ([(aiohttp.WSMsgType.TEXT, b'\xff\xfe')], 1007, b'a text must be UTF-8'),
-    ([(aiohttp.WSMsgType.CONTINUATION, b'')], 1002, b'this is no WebSocket frame'),
-    ([(3, b'')], 1002, b'this is no WebSocket frame'),
+@pytest.mark.parametrize('kind, data, code, reason', [
+    (aiohttp.WSMsgType.TEXT, b'[' * 100000, 1009, 'a message may have 65536 bytes'),
+    (aiohttp.WSMsgType.TEXT, b'\xff\xfe', 1007, 'a text must be UTF-8'),
+    (aiohttp.WSMsgType.CONTINUATION, b'', 1002, 'this is no WebSocket frame'),
+    (3, b'', 1002, 'this is no WebSocket frame'),
 ])
-def test_what_is_no_message_closes_the_connection_with_a_reason(address, frames, code, reason):
+def test_what_is_no_message_closes_the_connection_with_a_reason(address, kind, data, code, reason):
     async def use():
         async with Page(address) as page:
             await page.heard('scene')
-            page.reading.cancel()
-            for kind, data in frames:
-                await page.socket._writer.send_frame(data, kind)
-            while (message := await page.socket.receive()).type != aiohttp.WSMsgType.CLOSE:
-                pass
-            return message.data, message.extra.encode()
+            await page.socket._writer.send_frame(data, kind)
+            await browser.until(lambda: page.end)
+            return page.end
 
     assert asyncio.run(use()) == (code, reason)
 
