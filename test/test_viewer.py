@@ -44,6 +44,13 @@ from linkage_ros.servo_inverse import ServoInverse  # noqa: E402
 from linkage_ros.viewer import Viewer  # noqa: E402
 from linkage_ros.web import server  # noqa: E402
 from linkage_ros.web.feed import Feed  # noqa: E402
+from linkage_ros.web.stage import LATCHED  # noqa: E402
+from rcl_interfaces.msg import (  # noqa: E402
+    Parameter as ParameterMessage,  # noqa: E402
+    ParameterDescriptor,
+    ParameterEvent,
+    ParameterValue,
+)
 import rclpy  # noqa: E402
 from rclpy.logging import get_logger  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
@@ -214,6 +221,10 @@ class Page:
         """Set parameters, __ for a point; return the reason of a refusal, or nothing."""
         return (await self.ask('set', mechanism, values={
             name.replace('__', '.'): value for name, value in values.items()}))['reason']
+
+    def forget(self):
+        """Forget what was drawn."""
+        self.looks, self.points, self.said = {}, {}, []
 
     def drawn(self, mechanism, kind):
         """Return the points of a mechanism's marker."""
@@ -824,6 +835,209 @@ def test_markers_that_are_gone_are_drawn_no_more():
     looks, records = feed.drawn()
     assert [look['kind'] for look in looks.values()] == ['joints']
     assert records.endswith(struct.pack('<II', 1, 0))
+
+
+def swapped(message):
+    """Return a message as a machine of the other byte order writes it."""
+    text, size = bytearray(b'\0\0\0\0'), {'boolean': 1, 'uint8': 1, 'int32': 4,
+                                          'uint32': 4, 'float': 4, 'double': 8}
+    form = {'boolean': '?', 'uint8': 'B', 'int32': 'i', 'uint32': 'I', 'float': 'f',
+            'double': 'd'}
+
+    def number(kind, value):
+        text.extend(bytes(-(len(text) - 4) % size[kind]))
+        text.extend(struct.pack('>' + form[kind], value))
+
+    def write(kind, value):
+        if kind.startswith('sequence<'):
+            number('uint32', len(value))
+            for one in value:
+                write(kind[len('sequence<'):-1], one)
+        elif kind == 'string':
+            number('uint32', len(value) + 1)
+            text.extend(value.encode() + b'\0')
+        elif kind in size:
+            number(kind, value)
+        else:
+            for name, inner in value.get_fields_and_field_types().items():
+                write(inner, getattr(value, name))
+
+    write('', message)
+    return bytes(text)
+
+
+def test_markers_in_the_other_byte_order_are_drawn_alike():
+    feed = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    for step in (1, 2, 3):
+        text = walker(step)
+        feed.newest = swapped(deserialize_message(text, MarkerArray))
+        assert feed.newest[4:] != text[4:]
+        assert feed.drawn()[1] == unpacked(text)
+
+
+def spoilt(part, number):
+    """Return a message that cannot be drawn for one number in it."""
+    message = deserialize_message(walker(1), MarkerArray)
+    marker = message.markers[0]
+    parts = marker.points[0], marker.pose.position, marker.pose.orientation, marker.scale
+    parts[part].x = number
+    return serialize_message(message)
+
+
+def hostile(rng, text):
+    """Yield bytes that are no message, or one with other numbers than were written."""
+    yield from (b'', b'\0', b'\0\1\0', b'\0\1\0\0', b'\xff' * 64, text[:4] + b'\xff' * 500)
+    yield from (text[:size] for size in rng.integers(0, len(text) - 8, 20))
+    yield from (rng.bytes(size) for size in rng.integers(0, 2000, 20))
+    yield from (text[:4] + rng.bytes(size) for size in rng.integers(0, 2000, 20))
+    yield from (rng.bytes(4) + text[4:] for _ in range(20))
+    for _ in range(200):
+        places = bytearray(text)
+        for place in rng.integers(0, len(text), 3):
+            places[place] = rng.integers(256)
+        yield bytes(places)
+    for number in (math.nan, math.inf, -1e300):
+        yield from (spoilt(part, number) for part in range(4))
+
+
+def test_of_what_cannot_be_drawn_nothing_stays():
+    rng = np.random.default_rng(5)
+    feed = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    for step, text in enumerate(hostile(rng, walker(0))):
+        for feed.newest in (text, walker(step)):
+            looks, records = feed.drawn()
+            json.dumps(looks, allow_nan=False)
+            at, read = 0, {}
+            while at < len(records):
+                number, count = struct.unpack_from('<II', records, at)
+                read[number] = np.frombuffer(records, '<f4', 3 * count, at + 8)
+                assert np.isfinite(read[number]).all()
+                at += 8 + 12 * count
+        shown = b''.join(struct.pack('<II', number, len(places) // 3) + places.tobytes()
+                         for number, places in read.items() if len(places))
+        assert shown == unpacked(walker(step))
+
+
+def test_markers_with_ever_new_ids_are_not_gathered():
+    feed = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    for step in range(50):
+        message = deserialize_message(walker(step), MarkerArray)
+        for marker in message.markers:
+            marker.id += 2 * step
+        feed.newest = serialize_message(message)
+        looks, records = feed.drawn()
+        assert len(looks) == 2 and len(records) == len(unpacked(walker(step)))
+
+
+def test_messages_that_cannot_be_read_are_dropped_and_said_once(show, capfd):
+    running = show(LEG, kinds=())
+    node = running.graph.node
+    markers = node.create_publisher(MarkerArray, 'leg/markers', 1)
+    locus = node.create_publisher(Marker, 'leg/locus', LATCHED)
+    events = node.create_publisher(ParameterEvent, '/parameter_events', 10)
+
+    async def use(url):
+        async with Page(url) as first, Page(url) as second:
+            async def good(step):
+                wanted = walker(step)
+                points = np.frombuffer(unpacked(wanted)[-12:], '<f4')
+
+                def seen():
+                    markers.publish(wanted)
+                    return all((page.drawn('/leg', 'joints')[-1:] == points).any()
+                               for page in (first, second))
+
+                await browser.until(seen)
+
+            async def bad(text):
+                before = [(page, page.pictures) for page in (first, second)]
+                for publisher in (markers, locus, events):
+                    publisher.publish(text)
+                await browser.until(lambda: all(page.pictures > had for page, had in before))
+
+            await good(0)
+            for step, text in enumerate((b'', b'\0\1\0\0', walker(1)[:99], spoilt(
+                    1, math.nan))):
+                await bad(text)
+                await good(step + 1)
+
+    asyncio.run(use(running.viewer.url))
+    said = capfd.readouterr().err
+    assert said.count('a message on /leg/markers is dropped: ') == 1
+    assert said.count('a message on /leg/locus is dropped: ') == 1
+    assert 'Traceback' not in said
+
+
+def test_what_other_nodes_say_of_a_parameter_is_anything(graph, show):
+    def other(**kwargs):
+        node = rclpy.create_node('a_node', **kwargs)
+        for name, value in (('nan', math.nan), ('list', [1.0, math.inf]), ('bytes', [b'a'])):
+            node.declare_parameter(f'leg.{name}', value)
+        node.declare_parameter('leg.none', descriptor=ParameterDescriptor(dynamic_typing=True))
+        return node
+
+    running = show(LEG, before=lambda: graph.start(other))
+    events = running.graph.node.create_publisher(ParameterEvent, '/parameter_events', 10)
+
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/leg')
+            await page.shown('/leg', 'nan', None)
+            await page.shown('/leg', 'list', [1.0, None])
+            for kind in (0, 1, 4, 99):
+                said = ParameterEvent(node='/kinematics')
+                said.changed_parameters = [ParameterMessage(
+                    name='leg.dimensions.m', value=ParameterValue(type=kind))]
+                events.publish(said)
+            await page.shown('/leg', 'dimensions.m', 15.0)
+            assert await page.set('/leg', dimensions__m=14.5) == ''
+            await page.heard('value', name='dimensions.m', value=14.5)
+            json.dumps(page.said, allow_nan=False)
+
+    asyncio.run(use(running.viewer.url))
+
+
+@pytest.mark.long
+def test_nodes_that_end_and_come_again_are_drawn_again(graph, show):
+    running = show(LEG, kinds=(CrankDriver,))
+
+    async def come_and_go(page, scene):
+        kinematics = graph.start(Kinematics, scene)
+        await browser.until(lambda: len(page.drawn(f'/{scene["mechanisms"][0]}', 'strip')))
+        page.forget()
+        graph.end(kinematics)
+        await page.heard('scene', mechanisms=[])
+
+    async def use(url):
+        async with Page(url) as page:
+            for scene in (LEG, LEG, {**RATE, 'mechanisms': ['drop'], 'drop.type': 'water_drop'}):
+                await come_and_go(page, scene)
+
+    asyncio.run(use(running.viewer.url))
+
+
+@pytest.mark.long
+def test_pages_that_come_and_go_leave_nothing(show):
+    running = show(LEG)
+
+    async def visit(url):
+        async with Page(url) as page:
+            await browser.until(lambda: len(page.drawn('/leg', 'joints')))
+
+    async def use(url):
+        before, at_rest = 0.0, running.entities()
+        for turn in range(6):
+            await asyncio.gather(*(visit(url) for _ in range(200)))
+            for _ in range(30):
+                await visit(url)
+            if turn == 1:
+                before = resident()
+        await browser.until(lambda: running.entities() == at_rest)
+        assert resident() - before < 10.0
+        loop = running.viewer._server._loop
+        await browser.until(lambda: len(asyncio.all_tasks(loop)) == 1)
+
+    asyncio.run(use(running.viewer.url))
 
 
 class Seen:

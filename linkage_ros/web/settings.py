@@ -131,5 +131,7 @@ HOLDS = {
 
 
 def _shown(value):
-    """Return a value, None for a number that JSON cannot say."""
+    """Return a value as JSON can say it: None for a number that is not finite."""
+    if isinstance(value, bytes):
+        return value[0]
     return None if isinstance(value, float) and not math.isfinite(value) else value
