@@ -1075,6 +1075,15 @@ class Seen:
         return float(await self.page.value(
             f'{self.row(name, label)}.querySelector("input[type=text]").value'))
 
+    async def write(self, name, label, text):
+        """Write a number beside a slider."""
+        await self.page.write(
+            f'{self.row(name, label)}.querySelector("input[type=text]")', text)
+
+    async def red(self, name, label):
+        """Return whether a row is marked as refused."""
+        return await self.page.value(f'{self.row(name, label)}.classList.contains("refused")')
+
     async def view(self, name):
         """Show one mechanism."""
         await self.page.click('[...document.querySelectorAll("#views button")].find('
@@ -1085,6 +1094,10 @@ class Seen:
         width = await self.page.value('document.getElementById("picture").clientWidth')
         top = await self.page.value('document.getElementById("picture").getBoundingClientRect().y')
         return (await self.page.picture())[int(top):, :int(width)]
+
+
+# Of joints.
+ORANGE = 230, 159, 0
 
 
 def coloured(picture, red, green, blue):
@@ -1175,6 +1188,101 @@ def test_a_dragged_slider_sets_the_nodes_and_a_refused_one_springs_back(show, lo
 
 @pytest.mark.long
 @needs_browser
+def test_a_number_can_be_written_with_a_point_or_a_comma(show, looked_at):
+    running = show(LEVER)
+
+    async def doing(seen):
+        await seen.view('lever')
+        for text, value in (('80,5', 80.5), ('81.25', 81.25), (',5e2', 50.0), ('  90 ', 90.0)):
+            await seen.write('lever', 'a', text)
+            await browser.until(
+                lambda wanted=value: running.value(Kinematics, 'lever.dimensions.a') == wanted)
+            assert await seen.reason('lever', 'a') == ''
+        for text in ('1,234.5', '8x', '0x50', '--8', 'Infinity', '1e400', 400 * '9'):
+            await seen.write('lever', 'a', text)
+            await browser.until(lambda: seen.reason('lever', 'a'))
+            assert await seen.reason('lever', 'a') == (
+                f'Refused: {text} is not a number that can be set')
+            assert await seen.number('lever', 'a') == 90.0
+        await seen.write('lever', 'a', '')
+        assert await seen.number('lever', 'a') == 90.0
+        await seen.write('lever', 'branch L', '1e20')
+        await browser.until(lambda: seen.reason('lever', 'branch L'))
+        assert 'a whole number from -1 to 1, not 1e+20' in await seen.reason('lever', 'branch L')
+        await seen.write('lever', 'a', '91')
+        await browser.until(lambda: running.value(Kinematics, 'lever.dimensions.a') == 91.0)
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
+def test_a_refusal_is_forgotten_when_the_good_value_is_back(show, looked_at):
+    running = show(LEVER)
+
+    async def doing(seen):
+        await seen.view('lever')
+
+        async def refused():
+            await seen.write('lever', 'b', '1e6')
+            await browser.until(lambda: seen.reason('lever', 'b'))
+            assert await seen.number('lever', 'b') == running.value(
+                Kinematics, 'lever.dimensions.b')
+            assert not await seen.red('lever', 'b')
+
+        async def forgotten():
+            return await seen.reason('lever', 'b') == ''
+
+        await refused()
+        await seen.write('lever', 'b', '150')
+        await browser.until(forgotten)
+        await refused()
+        await seen.write('lever', 'b', '151')
+        await browser.until(forgotten)
+        await refused()
+
+        async def set_elsewhere():
+            # By somebody who comes later.
+            for node in running.nodes:
+                if isinstance(node, Kinematics):
+                    value = node.get_parameter('lever.dimensions.b').value
+                    node.set_parameters([Parameter('lever.dimensions.b', value=value + 1.0)])
+            await asyncio.sleep(0.2)
+            return await forgotten()
+
+        await browser.until(set_elsewhere)
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
+def test_a_picture_of_what_is_far_off_is_drawn_and_left(show, looked_at):
+    running = show(LEG, kinds=())
+    node = running.graph.node
+    markers = node.create_publisher(MarkerArray, 'leg/markers', 1)
+    node.create_publisher(Marker, 'leg/locus', LATCHED)
+
+    async def doing(seen):
+        def published(text):
+            async def drawn():
+                markers.publish(text)
+                return len(coloured(await seen.canvas(), *ORANGE)) > 100
+            return drawn
+
+        await browser.until(published(walker(1)))
+        for far in (1e9, 1e17, 1e30, 3e38):
+            for part in range(4):
+                for _ in range(3):
+                    markers.publish(spoilt(part, far))
+                    await asyncio.sleep(0.02)
+                await browser.until(published(walker(1)))
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
 def test_the_lever_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
     running = show({**LEVER, 'lever.crank.speed': 0.0})
 
@@ -1188,7 +1296,7 @@ def test_the_lever_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
 
         await browser.until(lambda: seen.page.value(f'!!({seen.row("lever", "lever")})'))
         await browser.until(settled)
-        rows, columns = coloured(await seen.canvas(), 230, 159, 0).T
+        rows, columns = coloured(await seen.canvas(), *ORANGE).T
         top = await seen.page.value('document.getElementById("picture").getBoundingClientRect().y')
         tip = float(columns[rows < rows.min() + 10].mean()), top + int(rows.min()) + 8
         pivot = float(columns[rows > rows.max() - 10].mean()), top + int(rows.max()) - 8
@@ -1217,6 +1325,9 @@ def test_the_lever_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
         await dragged(lambda: seen.reason('lever', 'lever'), at(0.4), at(0.5), at(1.2))
         assert 'the lever reaches' in await seen.reason('lever', 'lever')
         await browser.until(shown)
+        await browser.until(lambda: lever_of(running.values('lever.crank.start')[0]) == (
+            pytest.approx(math.asin(80.0 / 150.0), abs=1e-9)))
+        assert not await seen.red('lever', 'lever')
 
     looked_at(running, doing)
 
