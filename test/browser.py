@@ -157,6 +157,7 @@ class Browser:
 
     async def write(self, expression: str, text: str):
         """Write a text in place of what an element says, key by key, and press Enter."""
+        await self.value(f'({expression}).scrollIntoView()')
         await self.click(expression)
         await self.value(f'({expression}).select()')
         for key in (*text, '\r'):

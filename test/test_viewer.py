@@ -792,6 +792,15 @@ def test_a_viewer_that_cannot_listen_ends_in_one_sentence(tmp_path, parameters, 
     assert len(said) == 1 and named in said[0]
 
 
+@pytest.mark.long
+def test_a_port_that_is_no_parameter_is_refused(tmp_path):
+    scene = tmp_path / 'scene.yaml'
+    scene.write_text(json.dumps({'/**': {'ros__parameters': {'port': 0}}}))
+    code, printed = Process('viewer', scene, '--port', '8050').end()
+    said = [line for line in printed.splitlines() if '[FATAL]' in line]
+    assert code == 1 and len(said) == 1 and "'--port'" in said[0]
+
+
 def walker(step, legs=2, frame='world', width=1.0):
     """Return a message as kinematics sends it."""
     made = messages.Markers('leg', frame, (0.0, 1.0, 2.0, 0.5, 0.0, 0.0), [(0, 1), (1, 2)], width)
@@ -1206,6 +1215,7 @@ def test_a_number_can_be_written_with_a_point_or_a_comma(show, looked_at):
             assert await seen.number('lever', 'a') == 90.0
         await seen.write('lever', 'a', '')
         assert await seen.number('lever', 'a') == 90.0
+        await seen.page.value(f'{seen.row("lever", "branch L")}.closest("details").open = true')
         await seen.write('lever', 'branch L', '1e20')
         await browser.until(lambda: seen.reason('lever', 'branch L'))
         assert 'a whole number from -1 to 1, not 1e+20' in await seen.reason('lever', 'branch L')
