@@ -158,11 +158,15 @@ class Server:
         self._visitors.add(visitor)
         try:
             await visitor.stay()
-        except asyncio.TimeoutError:
-            # What it does not read would be waited for even while the connection is closed.
-            request.transport.abort()
+        except (ConnectionError, asyncio.TimeoutError):
+            # It has left, or does not read.
+            pass
         finally:
             self._visitors.discard(visitor)
+            transport = request.transport
+            if transport and transport.get_write_buffer_size():
+                # A connection that is closed would wait for ever until this is read.
+                transport.abort()
         return socket_
 
 
@@ -183,9 +187,10 @@ class Socket(web.WebSocketResponse):
     """A WebSocket that says why it is closed."""
 
     async def close(self, *, code=WSCloseCode.OK, message=b'', **kwargs):
-        """Close it."""
-        return await super().close(
+        """Close it; raise TimeoutError if nothing is read at the other end."""
+        closing = super().close(
             code=code, message=message or CLOSED_FOR.get(code, b''), **kwargs)
+        return await asyncio.wait_for(closing, 2 * SECONDS_TO_CLOSE)
 
 
 class Visitor:
@@ -218,7 +223,15 @@ class Visitor:
         self._news.set()
 
     async def stay(self):
-        """Serve the browser until it leaves; raise TimeoutError if it does not read."""
+        """
+        Serve the browser until it leaves.
+
+        Raises
+        ------
+        ConnectionError, TimeoutError
+            If it leaves without a word, or does not read.
+
+        """
         self._stage.enter(self)
         tasks = [asyncio.ensure_future(doing)
                  for doing in (self._hear(), self._answer(), self._send())]
@@ -226,9 +239,6 @@ class Visitor:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in done:
                 task.result()
-        except ConnectionError:
-            # It has left.
-            pass
         finally:
             self._stage.leave(self)
             for task in tasks:
@@ -238,8 +248,8 @@ class Visitor:
     async def close(self):
         """Send the browser home."""
         with suppress(asyncio.TimeoutError):
-            await asyncio.wait_for(self._socket.close(
-                code=WSCloseCode.GOING_AWAY, message=b'the viewer ended'), SECONDS_TO_CLOSE)
+            await self._socket.close(
+                code=WSCloseCode.GOING_AWAY, message=b'the viewer ended')
 
     async def _hear(self):
         async for message in self._socket:
