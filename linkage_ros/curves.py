@@ -36,9 +36,9 @@ CUTS = np.arange(1, 16) / 16
 LEAST = 1e-18
 
 
-def sampled(lo: float, hi: float, samples: int = SAMPLES) -> np.ndarray:
+def sampled(lo: float, hi: float, samples: int = SAMPLES, fewest: int = 9) -> np.ndarray:
     """Return angles [rad] over an arc, evenly and ever denser towards both of its ends."""
-    even = np.linspace(lo, hi, max(9, math.ceil(samples * (hi - lo) / math.tau)))
+    even = np.linspace(lo, hi, max(fewest, math.ceil(samples * (hi - lo) / math.tau)))
     steps = (hi - lo) * 0.5 ** np.arange(2, HALVINGS)
     theta = np.concatenate([even, lo + steps, hi - steps])
     return np.unique(np.clip(theta, lo, hi))

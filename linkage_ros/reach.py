@@ -30,8 +30,9 @@ import numpy as np
 from .curves import Arc, lowest, near_misses, refined, sampled
 from .planar import Limit
 
-# Samples of a whole turn in search of ends without a closed form.
-SAMPLES = 720
+# Samples of a whole turn in search of ends without a closed form, samples of an arc at least, and
+# how often arcs inside arcs are searched.
+SAMPLES, FEWEST, ROUNDS = 720, 33, 4
 # Arcs below this width [rad] are the rounding of one angle.
 NARROWEST = 2e-15
 # What margins may differ by from turn to turn, as a part of their size, and be the same.
@@ -52,9 +53,15 @@ def arcs(margins: Callable, limits: Sequence[Limit], value: Callable) -> List[Ar
         From an expression of dimensions to its value.
 
     """
-    def assembled(theta):
+    def failing(theta):
+        """Return the number of the first limit that is not kept, that of all where none is."""
         with np.errstate(invalid='ignore'):
-            return (margins(np.ravel(theta)) >= 0.0).all(axis=0).reshape(np.shape(theta))
+            kept = margins(np.ravel(theta)) >= 0.0
+        return np.vstack([kept, np.zeros(kept.shape[1:], bool)]).argmin(axis=0).reshape(
+            np.shape(theta))
+
+    def assembled(theta):
+        return failing(theta) == len(limits)
 
     ends = [end for limit in limits if limit.crank == 0
             for end in _crank_ends(*map(value, (
@@ -62,23 +69,32 @@ def arcs(margins: Callable, limits: Sequence[Limit], value: Callable) -> List[Ar
     if not _is_periodic(margins):
         # What follows a turn later is another assembly: the arcs are those of [-pi, pi].
         ends.append(-math.pi)
-    searched = [i for i, x in enumerate(limits) if x.margin.varies and x.crank != 0]
-    if searched:
-        ends += [end for arc in between(ends) for end in _limits(
-            lambda theta: margins(theta)[searched], assembled, *arc)]
+    if any(x.margin.varies and x.crank != 0 for x in limits):
+        ends += [end for arc in between(ends) for end in _limits(margins, failing, *arc)]
     found = reachable_arcs(ends, assembled, joined=-math.pi not in ends)
     return [tuple(_trimmed(assembled, *arc)) for arc in found] if ends else found
 
 
-def _limits(margins, assembled, lo, hi) -> List[float]:
-    """Return the angles where a linkage stops or starts to be assembled on an arc."""
-    theta = sampled(lo, hi, SAMPLES)
-    theta = np.unique(np.concatenate([theta, _touches(margins, theta)]))
-    held = assembled(theta)
-    found = np.flatnonzero(held[1:] != held[:-1])
-    start = np.where(held[found], theta[found], theta[found + 1])
-    last, _ = refined(assembled, start, theta[found] + theta[found + 1] - start)
-    return last.tolist()
+def _limits(margins, failing, lo, hi) -> List[float]:
+    """
+    Return the angles on an arc next to which a limit stops or starts to be the first not kept.
+
+    What stands on a limited joint may be limited itself on part of a narrow arc: each arc that is
+    found is searched again.
+    """
+    ends = [lo, hi]
+    for _ in range(ROUNDS):
+        theta = np.unique(np.concatenate([
+            sampled(*arc, SAMPLES, FEWEST) for arc in zip(ends, ends[1:])]))
+        theta = np.unique(np.concatenate([theta, _touches(margins, theta)]))
+        first = failing(theta)
+        place = np.flatnonzero(first[1:] != first[:-1])
+        before, after = refined(lambda x, as_before=first[place][:, None]: failing(x) == as_before,
+                                theta[place], theta[place + 1])
+        known, ends = len(ends), sorted({lo, hi, *before.tolist(), *after.tolist()})
+        if len(ends) == known:
+            break
+    return ends[1:-1]
 
 
 def _touches(margins, theta) -> np.ndarray:
