@@ -106,7 +106,9 @@ class Arm:
     def __init__(self, foot: Complex, vector: Complex, span: Real, length: Optional[Real] = None):
         self.foot = foot
         self.vector = vector
-        self.square = vector.squared() if length is None else square(length)
+        # A constant tells nothing of a point that cannot be assembled.
+        self.square = vector.squared() if length is None else gated(
+            square(length), abs(vector.x), real(0.0))
         self._span = span
 
     def offset(self, point: Complex) -> Real:

@@ -155,12 +155,16 @@ def test_a_joint_that_cannot_be_assembled_has_no_velocity_by_any_crank():
         assert np.isfinite([velocity['C'], velocity['D']]).all() and np.isfinite(rates['AC'])
 
 
-def test_a_parallelogram_on_what_is_not_there_has_no_angle_either():
+@pytest.mark.parametrize('last, lines', [
+    ('R', ['P parallelogram O A Q', 'R parallelogram A M P']), ('L', ['L slot Q M 0.2 out 1']),
+    ('D', ['D dyad Q M 1 0.8 left']), ('D', ['D dyad M Q 1 0.8 left', 'E rigid M D 1 1 left']),
+    ('E', ['C D E inversor Q M 2 1.8']), ('C', ['D dyad M A 2 2 left', 'C mirror D M A'])])
+def test_what_hangs_on_a_joint_that_is_not_there_has_no_angle_either(last, lines):
     found = linkage('O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'M dyad A Q 2.5 0.5 left',
-                    'P parallelogram O A Q', 'R parallelogram A M P')
+                    *lines)
     theta = np.linspace(-3.1, 3.1, 60)
     place, angles, rates = found.solve(theta), found.joint_angles(theta), found.joint_rates(theta)
-    lost = np.isnan(place['R']).any(-1)
+    lost = np.isnan(place[last]).any(-1)
     assert lost.any() and not lost.all()
     for link in found.links:
         off = np.isnan(place[link.tip]).any(-1) | np.isnan(place[link.joint]).any(-1)
