@@ -37,9 +37,9 @@ class CrankDriver(node.SceneNode):
         self._timer = self.create_timer(1.0, self._tick)
         # On system time a timer sleeps until an old time comes round again, if that is set back.
         self.create_timer(1.0, self._wake, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self.follow(self.scene)
+        self.adopt(self.prepare(self.scene))
 
-    def follow(self, new):
+    def adopt(self, new):
         """Let every crank go on as the scene says: from where it is, or from a new start."""
         now = 0 if self._now is None else max(self._now, self._time().nanoseconds)
         cranks = {f'{name}_{link}': crank for name, machine in new.machines.items()

@@ -42,10 +42,10 @@ class Kinematics(node.SceneNode):
         self._outlets = {name: Outlet(self, name) for name in self.scene.machines}
         self._names, self._routes = None, ()
         self._reader = reading.Reader()
-        self.follow(self.scene)
+        self.adopt(self.prepare(self.scene))
         self.create_subscription(JointState, 'crank_states', self._turn, ANY, raw=True)
 
-    def follow(self, new):
+    def adopt(self, new):
         """Make anew what has changed."""
         for name, machine in new.machines.items():
             self._outlets[name].follow(machine, new.frame_id)

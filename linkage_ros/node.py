@@ -17,6 +17,7 @@
 from functools import wraps
 import gc
 import signal
+from typing import Any
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -61,8 +62,9 @@ class SceneNode(Node):
     """
     A node that acts on a scene.
 
-    A subclass builds itself from `self.scene` and overrides `follow`, which is called with each
-    new scene; a change that makes no scene is refused, and what was there goes on.
+    A subclass overrides `prepare` and `adopt`, and starts with `self.adopt(self.prepare(
+    self.scene))`; each new scene comes the same way. A change that makes no scene, or that cannot
+    be prepared, is refused, and what was there goes on.
 
     Raises
     ------
@@ -87,8 +89,16 @@ class SceneNode(Node):
         self.add_on_set_parameters_callback(self._judge)
         self.add_post_set_parameters_callback(self._accept)
 
-    def follow(self, new: scene.Scene):
-        """Act on a new scene."""
+    def prepare(self, new: scene.Scene) -> Any:
+        """
+        Make all that a new scene needs, and change nothing in the node.
+
+        It may run in a worker thread while messages are handled; SceneError refuses the scene.
+        """
+        return new
+
+    def adopt(self, prepared: Any):
+        """Swap in what was prepared; quick, on the executor's thread."""
 
     def _shown(self):
         return [p for p in self.scene.parameters if p.name in self._own]
@@ -113,11 +123,14 @@ class SceneNode(Node):
         return {**self._given, **{p.name: p.value for p in parameters if p.name in self._own}}
 
     def _judge(self, parameters):
+        if self._echoing:
+            return SetParametersResult(successful=True)
         try:
             for parameter in parameters:
                 if parameter.name in self._own and parameter.type_ == Parameter.Type.NOT_SET:
                     raise scene.SceneError(f'{parameter.name} cannot be removed')
-            scene.read(self._changed(parameters))
+            new = scene.read(self._changed(parameters))
+            self._prepared = new, self.prepare(new)
         except scene.SceneError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
@@ -125,8 +138,8 @@ class SceneNode(Node):
     def _accept(self, parameters):
         if not self._echoing:
             self._given = self._changed(parameters)
-            self.scene = scene.read(self._given)
-            self.follow(self.scene)
+            self.scene, prepared = self._prepared
+            self.adopt(prepared)
             self._echo()
 
     def _echo(self):

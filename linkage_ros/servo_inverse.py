@@ -41,7 +41,7 @@ class ServoInverse(node.SceneNode):
         self._known = {}
         self.create_service(ServoInverseType, 'servo_inverse', self.answer)
 
-    def follow(self, new):
+    def adopt(self, new):
         """Forget what was asked about."""
         self._known = {}
 
