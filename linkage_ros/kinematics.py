@@ -42,8 +42,12 @@ class Kinematics(node.SceneNode):
         self._outlets = {name: Outlet(self, name) for name in self.scene.machines}
         self._names, self._routes = None, ()
         self._reader = reading.Reader()
-        self.adopt(self.prepare(self.scene))
+        self.begin()
         self.create_subscription(JointState, 'crank_states', self._turn, ANY, raw=True)
+
+    def serves(self):
+        """Say which mechanisms it moves."""
+        return f'moves {scene.listed(self.scene.machines)} by crank_states'
 
     def adopt(self, new):
         """Make anew what has changed."""

@@ -19,23 +19,48 @@ from __future__ import annotations
 from array import array
 from dataclasses import dataclass
 import math
+import re
 from typing import Any, List, Mapping, Optional, Tuple
 
 KINDS = {
     'bool': (bool, 'true or false'),
     'integer': (int, 'a whole number'),
-    'double': (float, 'a finite number with a decimal point'),
-    'string': (str, 'a text'),
-    'double_array': (float, 'a list of finite numbers with a decimal point'),
-    'string_array': (str, 'a list of texts'),
+    'double': (float, 'a finite number'),
+    'string': (str, 'a text of up to 1000 letters'),
+    'double_array': (float, 'a list of finite numbers'),
+    'string_array': (str, 'a list of texts of up to 1000 letters'),
 }
 
 # How far, relatively, a value may be beyond an end of its range; the client library allows it.
 ROUNDED = 1e-6
 
+TEXT = re.compile(r'.{0,1000}', re.DOTALL)
+LONGEST_LIST = 10000
+LONGEST_MESSAGE = 299
+LONGEST_SHOWN = 60
+
 
 class SceneError(ValueError):
     """A parameter that cannot be; the text names it and says what is allowed."""
+
+    def __init__(self, text: str):
+        super().__init__(shortened(text, LONGEST_MESSAGE))
+
+
+def shortened(text: str, most: int = LONGEST_SHOWN) -> str:
+    """Return a text, one that is longer than `most` letters without its middle."""
+    if len(text) <= most:
+        return text
+    end = (most - 3) // 2
+    return f'{text[:most - 3 - end]}...{text[-end:]}'
+
+
+def shown(value: Any) -> str:
+    """Return a value as a message shows it."""
+    try:
+        return shortened(repr(list(value) if isinstance(value, tuple) else value))
+    except ValueError:
+        return 'a number of thousands of digits'
 
 
 @dataclass(frozen=True)
@@ -50,11 +75,13 @@ class Field:
     meaning : str
         In words, with the unit.
     low, high : float, optional
-        The ends of its range, for a slider too.
+        The ends of its range.
     positive : bool
         Whether it must be above zero.
     rule : str
         What else is asked of it.
+    pattern : re.Pattern
+        What a text must match.
     readers : tuple of str
         The nodes that act on it.
     read_only : bool
@@ -68,8 +95,14 @@ class Field:
     high: Optional[float] = None
     positive: bool = False
     rule: str = ''
+    pattern: re.Pattern = TEXT
     readers: Tuple[str, ...] = ()
     read_only: bool = False
+
+    @property
+    def shared(self) -> bool:
+        """Whether more than one node acts on it."""
+        return len(self.readers) > 1
 
     @property
     def allowed(self) -> str:
@@ -78,28 +111,44 @@ class Field:
         if self.positive:
             words.append('above 0')
         if self.high is not None:
-            words.append(f'up to {self.high:g}' if self.positive
-                         else f'from {self.low:g} to {self.high:g}')
+            words.append(f'from {self.low:g} to {self.high:g}')
         return ' '.join(words) + (self.rule and f', {self.rule}')
 
     def checked(self, name: str, value: Any) -> Any:
-        """Return a value, a list as a tuple; raise SceneError if it cannot be."""
+        """
+        Return a value, a list as a tuple; raise SceneError if it cannot be.
+
+        A whole number is taken for the number that it is; an empty list may be of any kind.
+        """
         several = self.kind.endswith('_array')
         # The client library hands over an empty list as nothing at all.
         value = () if several and value is None else plain(value)
-        if isinstance(value, tuple) != several or not all(
-                map(self._holds, value if several else [value])):
+        if isinstance(value, tuple) != several:
             raise self.error(name, value)
-        return value
+        taken = [self._taken(one) for one in (value if several else [value])]
+        if len(taken) > LONGEST_LIST or not all(map(self._holds, taken)):
+            raise self.error(name, value)
+        return tuple(taken) if several else taken[0]
 
     def error(self, name: str, value: Any) -> SceneError:
         """Return the error that says what the parameter must be, and what it is."""
-        shown = list(value) if isinstance(value, tuple) else value
-        return SceneError(f'{name} must be {self.allowed}, not {shown!r}')
+        return SceneError(f'{shortened(name, 100)} must be {self.allowed}, not {shown(value)}')
+
+    def _taken(self, value):
+        try:
+            return float(value) if type(value) is int and self._type is float else value
+        except OverflowError:
+            return value
+
+    @property
+    def _type(self):
+        return KINDS[self.kind][0]
 
     def _holds(self, value) -> bool:
-        if type(value) is not KINDS[self.kind][0]:
+        if type(value) is not self._type:
             return False
+        if isinstance(value, str):
+            return bool(self.pattern.fullmatch(value))
         if isinstance(value, float) and not math.isfinite(value) or self.positive and value <= 0:
             return False
         return self.high is None or self.low <= value <= self.high or any(
@@ -113,19 +162,6 @@ class Parameter:
     name: str
     field: Field
     value: Any
-
-    @property
-    def range(self) -> Optional[Tuple[float, float]]:
-        """
-        The least and greatest value it can be changed to while a node runs.
-
-        A slider has a hundred stops, counted from zero: the ends are whole stops.
-        """
-        if self.field.high is not None:
-            return self.field.low, self.field.high
-        if self.field.positive:
-            return 0.1 * self.value, 10.1 * self.value
-        return None
 
 
 class Values:

@@ -40,6 +40,11 @@ class ServoInverse(node.SceneNode):
         super().__init__(scene.INVERSE, **kwargs)
         self._known = {}
         self.create_service(ServoInverseType, 'servo_inverse', self.answer)
+        self.begin()
+
+    def serves(self):
+        """Say of which mechanisms it answers."""
+        return f'answers servo_inverse for {scene.listed(self.scene.machines)}'
 
     def adopt(self, new):
         """Forget what was asked about."""

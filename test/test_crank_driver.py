@@ -152,11 +152,11 @@ def test_a_new_dimension_keeps_the_crank_in_its_new_reach(graph):
 
 @pytest.mark.parametrize('name, value, reason', [
     ('drop.crank.speed', 1000.0, 'drop.crank.speed .*100'),
-    ('drop.crank.speed', 1, 'drop.crank.speed must be .* decimal point'),
+    ('drop.crank.speed', True, 'drop.crank.speed must be'),
     ('drop.crank.speed', math.nan, 'drop.crank.speed .*100'),
     ('drop.crank.speed', 'fast', 'drop.crank.speed must be'),
     ('drop.crank.sweep', [2.0, 1.0], 'drop.crank.sweep must be .* lower end'),
-    ('drop.dimensions.a', -1.0, 'drop.dimensions.a .*0.1'),
+    ('drop.dimensions.a', -1.0, 'drop.dimensions.a must be .* above 0'),
     ('rate', -1.0, 'rate .*1000'),
     ('rate', 1e9, 'rate .*1000'),
     ('mechanisms', ['water_drop'], 'mechanisms'),
