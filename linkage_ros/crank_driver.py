@@ -27,6 +27,9 @@ from .motion import Motion
 # By how much the clock may run ahead of steady time between two messages [ns]: a clock is slewed.
 JUMP = 10 ** 8
 
+# In thirty years [ns] nobody waits for the next message.
+LONGEST_PERIOD = 1e18
+
 
 class CrankDriver(node.SceneNode):
     """Publishes every crank's angle as a function of the node's time, on `crank_states`."""
@@ -61,7 +64,7 @@ class CrankDriver(node.SceneNode):
         if not rate:
             self._timer.cancel()
             return
-        period = round(1e9 / rate)
+        period = round(min(1e9 / rate, LONGEST_PERIOD))
         if self._timer.timer_period_ns != period or self._timer.is_canceled():
             self._timer.timer_period_ns = period
             self._timer.reset()

@@ -32,7 +32,6 @@ from rcl_interfaces.msg import (
 )
 import rclpy
 from rclpy.clock import Clock, ClockType
-from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import get_logger
@@ -212,15 +211,14 @@ class SceneNode(Node):
             for change in one.changes:
                 if change.result is None:
                     self._set_at_once(change)
-            one.answer()
 
     def _set_at_once(self, change):
-        try:
-            change.result = self.set_parameters_atomically(change.parameters)
-        except ParameterNotDeclaredException:
-            unknown = [p.name for p in change.parameters if not self.has_parameter(p.name)]
+        unknown = [p.name for p in change.parameters if not self.has_parameter(p.name)]
+        if unknown:
             change.refuse(f'{scene.shortened(unknown[0])} is not a parameter of '
                           f'{self.get_fully_qualified_name()}')
+        else:
+            change.result = self.set_parameters_atomically(change.parameters)
 
     def _outcome(self, base, changes) -> State:
         """Return the state after changes; those that cannot be are refused."""

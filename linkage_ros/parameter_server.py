@@ -29,70 +29,76 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.parameter import Parameter
 from rclpy.parameter_service import ParameterService
 
-# How long the end of a node waits for its worker [s].
-PATIENCE = 1.0
+# How long the end of a node waits for its worker, and how soon the worker notices the end [s].
+PATIENCE, LONGEST_WAIT = 1.0, 0.1
+
+# A client holds ten answers that it has not taken yet; more are not sent without a pause [s].
+BURST, PAUSE = 8, 0.005
 
 
 class Worker:
     """
-    A thread that works through a queue while there is something in it.
+    A thread that works through a queue of what is asked for while there is something in it.
 
-    `work` is called there with all that waits; what it returns is called on the executor's thread.
+    `judge` is called there with all that waits; what it returns is called on the executor's
+    thread, and after it one answer after the other.
     """
 
-    def __init__(self, node, work: Callable[[list], Callable[[], None]]):
-        self._node, self._work = node, work
+    def __init__(self, node, judge: Callable[[list], Callable[[], None]]):
+        self._node, self._judge = node, judge
         self._lock = threading.Lock()
-        self._waiting: list = []
+        self._waiting: List[Asked] = []
         self._thread: Optional[threading.Thread] = None
-        self._ended = False
+        self._ended = threading.Event()
 
-    def add(self, *asked):
+    def add(self, asked: 'Asked'):
         """Let something be worked on, after all that waits."""
         with self._lock:
-            self._waiting += asked
-            if self._thread is None and not self._ended:
+            self._waiting.append(asked)
+            if self._thread is None and not self._ended.is_set():
                 self._thread = threading.Thread(target=self._run, daemon=True)
                 self._thread.start()
 
     def end(self):
         """Take nothing more, and wait for what is being worked on, but not for ever."""
         with self._lock:
-            self._ended, thread = True, self._thread
+            self._ended.set()
+            thread = self._thread
         if thread is not None:
             thread.join(PATIENCE)
 
     def _run(self):
         while asked := self._take():
-            finish = self._work(asked)
-            done = threading.Event()
-            self._hand_over(finish, done)
-            # What comes next is judged by what this changes.
-            while not done.wait(0.1):
-                if self._ended:
-                    return
+            self._hand_over(self._judge(asked))
+            for number, one in enumerate(asked, 1):
+                self._hand_over(one.answer)
+                if number % BURST == 0:
+                    self._ended.wait(PAUSE)
 
     def _take(self):
         with self._lock:
-            asked, self._waiting = ([], []) if self._ended else (self._waiting, [])
-            if not asked:
+            asked, self._waiting = self._waiting, []
+            if not asked or self._ended.is_set():
                 self._thread = None
+                return []
             return asked
 
-    def _hand_over(self, finish, done):
-        executor = self._node.executor
-        if executor is None or self._ended:
-            done.set()
+    def _hand_over(self, act):
+        """Let the executor act, and wait until it has."""
+        executor, done = self._node.executor, threading.Event()
+        if executor is None:
             return
 
         def on_its_thread():
             try:
-                if not self._ended:
-                    finish()
+                if not self._ended.is_set():
+                    act()
             finally:
                 done.set()
 
         executor.create_task(on_its_thread)
+        while not (self._ended.is_set() or done.wait(LONGEST_WAIT)):
+            pass
 
 
 @dataclass
