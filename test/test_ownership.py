@@ -169,7 +169,8 @@ def test_a_sweep_is_followed_though_the_crank_was_started_elsewhere(graph):
     graph.until(lambda: driver._follower._owned)
     assert graph.set(owner, lever__crank__sweep=[2.0, 3.0]).successful
     graph.until(lambda: of(driver, 'lever.crank.sweep') == (2.0, 3.0))
-    assert 2.0 <= driver._motions['lever_crank'].at(driver._now)[0] <= 3.0
+    now = graph.until(lambda: driver._now)
+    assert 2.0 <= driver._motions['lever_crank'].at(now)[0] <= 3.0
     assert graph.set(driver, lever__crank__speed=2.0).successful
     assert not graph.set(driver, lever__crank__start=0.4).successful
     assert graph.set(driver, lever__crank__start=2.5).successful
