@@ -327,8 +327,9 @@ def run(node_class, name: str, args=None, executor_class=Executor) -> int:
         rclpy.init(args=args)
         _refuse_arguments(args)
     except (RuntimeError, scene.SceneError) as error:
+        # What the client library makes of an argument may be as long as that.
         rclpy.try_shutdown()
-        return _failed(name, error)
+        return _failed(name, scene.shortened(f'bad arguments: {error}', 299))
     node = None
     try:
         node = node_class()
@@ -367,6 +368,6 @@ def _refuse_arguments(args):
                                'those of ROS, after --ros-args')
 
 
-def _failed(name: str, error: Exception) -> int:
+def _failed(name: str, error) -> int:
     get_logger(name).fatal(str(error))
     return 1

@@ -33,7 +33,7 @@ from rclpy.parameter_service import ParameterService
 PATIENCE, LONGEST_WAIT = 1.0, 0.1
 
 # A client holds ten answers that it has not taken yet; more are not sent without a pause [s].
-BURST, PAUSE = 8, 0.005
+BURST, PAUSE = 5, 0.01
 
 
 class Worker:
