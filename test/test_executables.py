@@ -40,11 +40,12 @@ def harness():
 @pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_a_node_quietly(harness, name, stop):
     from rcl_interfaces.msg import Log
-    from rclpy.qos import qos_profile_rosout_default
+    from rclpy.qos import DurabilityPolicy, QoSProfile
 
     process = harness.Process(name, ROOT / 'config' / 'all.yaml')
     with harness.Graph(process.domain) as graph:
-        logged = graph.listen(Log, '/rosout', qos_profile_rosout_default)
+        logged = graph.listen(Log, '/rosout', QoSProfile(
+            depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL))
         graph.until(lambda: any('ready: ' in message.msg for message in logged))
     process.interrupt(stop)
     code, printed = process.end()
