@@ -20,13 +20,22 @@ Numbers come from the linkage's own closures and outputs, each with its exact ra
 
 from __future__ import annotations
 
+from itertools import repeat
+import math
 from typing import Callable, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .inverse import ClosedForm, distinct, EXTREMES, in_order, nearest, Pieces, wrapped
+from .curves import refined, sampled
+from .inverse import distinct, in_order, MonotoneBranches, nearest, within_a_turn, wrapped
 from .planar import GRAZE
-from .reach import sign_changes
+from .reach import is_full_turn
+from .words import listed, quoted
+
+# How near to zero a closure comes, as a part of its size, for the output to change quickly there.
+NEAR = 1e-2
+# Dead points nearer to an end of the reach than this [rad] are that end.
+ONE = 1e-9
 
 
 class Analysis:
@@ -63,10 +72,8 @@ class Analysis:
 
         Notes
         -----
-        A value beyond an extreme by no more than rounding counts as the extreme. An output that
-        a bar or a slot ties to the crank pin (a rocker, a block, a lever), a coordinate of the
-        pin or of such a link, and the corner of an inversor with its pole on the crank circle
-        are closed forms; any other is bracketed and refined to the last digit.
+        A value beyond an extreme by no more than rounding counts as the extreme. Every answer is
+        bracketed between extremes of the output and refined to the last digit.
 
         A linkage with one change point in a turn is the same only after two turns: for it the
         answers are those of the turn [-pi, pi), and `near` should lie there.
@@ -157,21 +164,52 @@ class Analysis:
         return np.min([np.full(np.shape(theta), np.inf), *away], axis=0)[()]
 
     def _dead_points(self, others):
-        key = ('dead points', *others)
-        if key not in self._poses:
-            reach, found = self.reach(*others), []
-            for tolerance, curve in self._closures(others):
-                pieces = Pieces(curve, reach, (), False, 2.0 * tolerance, tolerance)
-                found += in_order(pieces.answers(np.zeros(1))).ravel().tolist()
-            self._poses[key] = distinct(theta for theta in found if theta == theta)
-        return self._poses[key]
+        reach = self.reach(*others)
+        ends = [] if is_full_turn(reach) else [end for arc in reach for end in arc]
+        touched = [theta for theta, gap, rounding, _ in self._near_closures(others)
+                   if gap <= rounding and all(abs(wrapped(theta - end)) > ONE for end in ends)]
+        return distinct([*ends, *touched])
 
-    def _closures(self, others):
-        """Return for all that vanishes at dead points its tolerance, and its curve and rate."""
-        pose = self._curve('closures', (), others)
-        return [(float(self._value(closure.tolerance)),
-                 lambda theta, i=i: pose(theta)[2 * i:2 * i + 2])
-                for i, closure in enumerate(self._structure.closures)]
+    def _near_closures(self, others) -> list:
+        """
+        Return the crank angles next to which a dyad stretches or folds, or nearly does.
+
+        Each with how near the closure comes to zero, its rounding and its size.
+        """
+        return self._remembered('near closures', others, lambda: [
+            found for arc in self.reach(*others) for part in within_a_turn(*arc)
+            for found in self._near_closures_on(*part, others)])
+
+    def _near_closures_on(self, lo, hi, others):
+        pose = self._bound('closures', ())
+        rounding = [2.0 * float(self._value(x.tolerance)) for x in self._structure.closures]
+        if not rounding:
+            return
+        theta = sampled(lo, hi)
+        values, rates = self._split(pose.over(theta, *others))
+        size = np.nanmax(np.abs(values), axis=1, initial=0.0)
+        for place in (0, -1):
+            if abs(theta[place]) == math.pi:
+                yield from zip(repeat(theta[place]), abs(values[:, place]), rounding, size)
+        folds = [x in self._structure.sketch.folds for x in self._structure.closures]
+        searched = ((_crossings(values, folds), values),
+                    (_approaches(theta, values, rates, NEAR * size[:, None]), rates))
+        for kind, ((row, place), sampled_) in enumerate(searched):
+            def unchanged(angles, kind=kind, row=row, start=sampled_[row, place] >= 0.0):
+                now = self._split(pose.over(angles.ravel(), *others))[kind]
+                now = now.reshape(-1, *angles.shape)[row, np.arange(len(row))]
+                return (now >= 0.0) == start[:, None]
+
+            found, _ = refined(unchanged, theta[place], theta[place + 1])
+            gaps = np.abs(self._split(pose.over(found, *others))[0][row, np.arange(len(row))])
+            # A fold that changes sign vanishes between two neighbouring angles.
+            yield from ((angle, gap if kind else 0.0, rounding[i], size[i])
+                        for angle, gap, i in zip(found.tolist(), gaps.tolist(), row.tolist()))
+
+    @staticmethod
+    def _split(rows):
+        """Return the closures and their rates."""
+        return rows[0::2], rows[1::2]
 
     def _curve(self, kind, name, others):
         pose = self._bound(kind, name)
@@ -179,37 +217,40 @@ class Analysis:
 
     def _inverse(self, output: str, others: Tuple[float, ...]) -> Callable:
         """Return the function from values of an output, shape (n,), to candidates (k, n)."""
-        key = ('inverse', output, others)
-        if key not in self._poses:
-            self._check_output(output)
-            self._poses[key] = self._solver(output, others)
-        return self._poses[key]
+        self._check_output(output)
+        return self._remembered('inverse', (output, *others),
+                                lambda: self._branches(output, others).answers)
 
-    def _solver(self, output, others):
-        reach, angular = self.reach(*others), self._structure.turns(output)
-        curve = self._curve('output', output, others)
-        pieces = Pieces(curve, reach, self._marks(others), angular,
-                        GRAZE * (np.pi if angular else self.longest))
-        backward = None if others or not pieces.moves else self._structure.backward(output)
-        if backward is None:
-            return pieces.answers
-        twin = backward.joint and self._on_other_branch(backward.joint)
-        return ClosedForm(self._curve('backward', output, ()), curve,
-                          twin and twin._curve('output', output, ()), reach, angular).answers
-
-    def _marks(self, others):
-        """Return the crank angles at which the linkage is nearest to closing or coming apart."""
-        key = ('marks', *others)
-        if key not in self._poses:
-            self._poses[key] = [
-                end for arc in self.reach(*others) for _, closure in self._closures(others)
-                for end in sign_changes(lambda theta, f=closure: f(theta)[1], *arc, EXTREMES)]
-        return self._poses[key]
+    def _branches(self, output, others):
+        angular = self._structure.turns(output)
+        marks = distinct(theta for theta, gap, _, size in self._near_closures(others)
+                         if gap <= NEAR * size)
+        return MonotoneBranches(self._curve('output', output, others), self.reach(*others),
+                                marks, angular, GRAZE * (math.pi if angular else self.longest))
 
     def _check_output(self, output):
         allowed = (*self.joints, *(f'{name}.{axis}' for name in self.points for axis in 'xy'))
         if output not in allowed:
-            raise ValueError(f'{self.type} has no output {output!r}; '
-                             f'allowed: {", ".join(allowed)}')
+            raise ValueError(f'{self.type} has no output {quoted(output)}; '
+                             f'allowed: {listed(allowed)}')
         if not self._structure.moves(output):
             raise ValueError(f'{output} of {self.type} does not move with the first crank')
+
+
+def _crossings(values, folds) -> tuple:
+    """Return row and place of the samples after which one of the folds changes sign."""
+    above = values >= 0.0
+    return np.nonzero((above[:, 1:] != above[:, :-1]) & np.array(folds)[:, None]
+                      & np.isfinite(values[:, 1:]) & np.isfinite(values[:, :-1]))
+
+
+def _approaches(theta, values, rates, near) -> tuple:
+    """Return row and place of the samples after which a closure turns away close to zero."""
+    sign = np.sign(values[:, :-1])
+    before, after = sign * rates[:, :-1], sign * rates[:, 1:]
+    with np.errstate(all='ignore'):
+        # Where the tangents meet a smooth curve between two samples is lower than it gets.
+        ahead = (sign * (values[:, 1:] - values[:, :-1]) - after * np.diff(theta)) / (
+            before - after)
+        bound = sign * values[:, :-1] + before * ahead
+        return np.nonzero((before < 0.0) & (after >= 0.0) & ~(bound > near))

@@ -35,7 +35,7 @@ import warnings
 
 import numpy as np
 
-from .expression import Real
+from .expression import in_order, Real
 
 # A block of this many poses stays in the second-level cache; measured in benchmark/.
 BLOCK = 4096
@@ -43,6 +43,16 @@ BLOCK = 4096
 FEW = 32
 # Python's parser bounds how deep parentheses may nest.
 DEEPEST = 16
+# Programs and results that are kept for the next time they are asked for.
+KEPT = 128
+
+
+def keep(found: dict, key, value):
+    """Keep a value and return it; what was kept first is dropped where there are too many."""
+    found[key] = value
+    while len(found) > KEPT:
+        found.pop(next(iter(found)), None)
+    return value
 
 
 def _grazed(x, tolerance):
@@ -123,13 +133,15 @@ _EVALUATED = {
 
 def evaluate(node: Real, dimensions: Mapping, known: dict):
     """Return the value of an expression of dimensions alone; known is shared between calls."""
-    if node.op == 'constant':
-        return np.float64(node.value)
-    if node.op == 'dimension':
-        return np.asarray(dimensions[node.args[0]], float)[()]
-    if node not in known:
-        values = [evaluate(a, dimensions, known) for a in node.args]
-        known[node] = _EVALUATED[node.op](*values)[()]
+    for x in in_order([node], lambda x: () if x in known else x.operands):
+        if x in known:
+            continue
+        if x.op == 'constant':
+            known[x] = np.float64(x.value)
+        elif x.op == 'dimension':
+            known[x] = np.asarray(dimensions[x.args[0]], float)[()]
+        else:
+            known[x] = _EVALUATED[x.op](*map(known.get, x.operands))[()]
     return known[node]
 
 
@@ -149,14 +161,23 @@ class _Listing:
         self._uses = self._count_uses()
 
     def _number(self, node: Real) -> int:
-        if node not in self._known:
-            self._known[node] = self._enter(node)
+        for x in in_order([node], self._needed):
+            if x not in self._known:
+                self._known[x] = self._enter(x)
         return self._known[node]
 
-    def _enter(self, node: Real) -> int:
+    def _needed(self, node: Real) -> tuple:
+        if node in self._known:
+            return ()
         if node.op == 'where' and node.args[0] in self._decided:
-            return self._number(node.args[1 if self._decided[node.args[0]] else 2])
-        args = tuple(self._number(a) if isinstance(a, Real) else a for a in node.args)
+            return (node.args[1 if self._decided[node.args[0]] else 2],)
+        return node.operands
+
+    def _enter(self, node: Real) -> int:
+        needed = self._needed(node)
+        if len(needed) == 1 and node.op in ('where', 'rated'):
+            return self._known[needed[0]]
+        args = tuple(self._known[a] for a in needed) or node.args
         key = (node.op, tuple(sorted(args)) if node.op in ('add', 'multiply') else args)
         if key not in self._numbers:
             self._numbers[key] = len(self.entries)
@@ -340,8 +361,8 @@ class Program:
     def _variant(self, decisions: tuple) -> _Variant:
         if decisions not in self._variants:
             decided = dict(zip(self._conditions, decisions))
-            self._variants[decisions] = _Variant(
-                self._outputs, decided, self._replaced, self._angles)
+            keep(self._variants, decisions, _Variant(
+                self._outputs, decided, self._replaced, self._angles))
         return self._variants[decisions]
 
 

@@ -23,6 +23,7 @@ from sensor_msgs.msg import JointState
 from . import node, scene
 from .messages import JointStates
 from .motion import Motion
+from .words import listed
 
 # By how much the clock may run ahead of steady time between two messages [ns]: a clock is slewed.
 JUMP = 10 ** 8
@@ -97,7 +98,7 @@ class CrankDriver(node.SceneNode):
 
     def serves(self):
         """Say which cranks it turns, how often."""
-        return f'turns {scene.listed(self._motions)} on crank_states at {self.scene.rate:g} Hz'
+        return f'turns {listed(self._motions, 200)} on crank_states at {self.scene.rate:g} Hz'
 
     def _wake(self):
         set_back = self._now is not None and self._time().nanoseconds < self._now

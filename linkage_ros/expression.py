@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from functools import reduce
 from math import cos, sin
-from typing import Callable, Union
+from typing import Callable, Iterable, Iterator, NamedTuple, Tuple, Union
 
 
 class Real:
@@ -33,18 +33,23 @@ class Real:
     One operation on real numbers, or a leaf: a constant, a dimension or an angle that is given.
 
     `varies` tells whether the value depends on a crank angle; what does not is computed once
-    for each change of dimensions. `positive` marks what is known to be above zero. `rule` is the
+    for each change of dimensions. `positive` marks what is known to be above zero. `rate` is the
     rate where geometry knows it in fewer operations than differentiating the expression takes.
     """
 
-    __slots__ = ('op', 'args', 'varies', 'positive', 'rule')
+    __slots__ = ('op', 'args', 'varies', 'positive', 'rate')
 
-    def __init__(self, op, args, varies=None, positive=False):
+    def __init__(self, op, args, varies=None, positive=False, rate=None):
         self.op = op
         self.args = args
         self.varies = any(a.varies for a in args) if varies is None else varies
         self.positive = positive
-        self.rule = None
+        self.rate = rate
+
+    @property
+    def operands(self) -> tuple:
+        """The expressions that the operation is done on."""
+        return tuple(a for a in self.args if isinstance(a, Real))
 
     @property
     def value(self):
@@ -228,13 +233,17 @@ def exact_sum(*terms: Number) -> Real:
 
 def _summands(x: Real) -> list:
     """Return the terms that a sum or difference is made of."""
-    if x.op == 'negative':
-        return [-term for term in _summands(x.args[0])]
-    if x.op == 'subtract':
-        return _summands(x.args[0]) + _summands(-x.args[1])
-    if x.op == 'add':
-        return _summands(x.args[0]) + _summands(x.args[1])
-    return [x]
+    terms, waiting = [], [(x, False)]
+    while waiting:
+        x, minus = waiting.pop()
+        if x.op == 'negative':
+            waiting.append((x.args[0], not minus))
+        elif x.op in ('add', 'subtract'):
+            first, second = x.args
+            waiting += [(second, minus != (x.op == 'subtract')), (first, minus)]
+        else:
+            terms.append(-x if minus else x)
+    return terms
 
 
 def where(condition: Real, chosen: Number, otherwise: Number) -> Real:
@@ -263,7 +272,9 @@ class Complex:
         return Complex(self.x - other.x, self.y - other.y)
 
     def __neg__(self) -> Complex:
-        return Complex(-self.x, -self.y)
+        opposite = Complex(-self.x, -self.y)
+        opposite.spin = self.spin
+        return opposite
 
     def __mul__(self, other) -> Complex:
         if isinstance(other, Complex):
@@ -315,6 +326,22 @@ def dot(p: Complex, q: Complex) -> Real:
     return p.x * q.x + p.y * q.y
 
 
+def in_order(outputs: Iterable[Real], needed: Callable) -> Iterator[Real]:
+    """Yield expressions and all that they need, a sequence for each, every one after its own."""
+    done, waiting = set(), list(reversed(list(outputs)))
+    while waiting:
+        node = waiting[-1]
+        if node in done:
+            waiting.pop()
+            continue
+        missing = [x for x in needed(node) if x not in done]
+        if missing:
+            waiting += reversed(missing)
+        else:
+            done.add(waiting.pop())
+            yield node
+
+
 def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
     """
     Differentiate an expression with respect to time.
@@ -329,39 +356,53 @@ def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
         Derivatives found so far, shared between calls.
 
     """
-    if not node.varies:
-        return real(0.0)
-    if node not in known:
-        if node.rule:
-            known[node] = node.rule(lambda x: derivative(x, rates, known))
+    def needed(x):
+        if x in known or not x.varies or x.op in _STEPS:
+            return ()
+        return x.rate.of if x.rate else x.operands
+
+    for x in in_order([node], needed):
+        if x in known:
+            continue
+        if not x.varies or x.op in _STEPS:
+            known[x] = real(0.0)
+        elif x.rate:
+            known[x] = x.rate.formula(*map(known.get, x.rate.of))
         else:
-            inner = [derivative(a, rates, known) for a in node.args if isinstance(a, Real)]
-            known[node] = _RULES[node.op](node, rates, *inner)
+            known[x] = _RULES[x.op](x, rates, *map(known.get, x.operands))
     return known[node]
 
 
-def rated(x: Real, rule: Callable) -> Real:
-    """Give an expression its rate, a function of the derivative of expressions."""
+class Rate(NamedTuple):
+    """A rate that geometry knows: a formula of the rates of some expressions."""
+
+    of: Tuple[Real, ...]
+    formula: Callable
+
+
+def with_rate(x: Real, *of: Real, formula: Callable) -> Real:
+    """Return the expression with a rate of its own, a formula of the rates of others."""
+    if not x.varies:
+        return x
     if x.op == 'negative':
-        rated(x.args[0], lambda d: -rule(d))
-    if x.varies:
-        x.rule = rule
-    return x
+        return -with_rate(x.args[0], *of, formula=lambda *rates: -formula(*rates))
+    # A node of its own: what it stands for may be part of another expression, or of the formula.
+    return Real('rated', (x,), positive=x.positive, rate=Rate(of, formula))
 
 
-def spun(vector: Complex, spin: Callable) -> Complex:
-    """Give a vector of constant length its angular velocity, in the same way."""
-    rated(vector.x, lambda d: -(spin(d) * vector.y))
-    rated(vector.y, lambda d: spin(d) * vector.x)
-    vector.spin = spin
-    return vector
+def with_spin(vector: Complex, spin: Rate) -> Complex:
+    """Return a vector of constant length with the angular velocity that is given."""
+    x, y = vector.x, vector.y
+    turned = Complex(with_rate(x, *spin.of, formula=lambda *d: -(spin.formula(*d) * y)),
+                     with_rate(y, *spin.of, formula=lambda *d: spin.formula(*d) * x))
+    turned.spin = spin
+    return turned
 
 
-def spin(vector: Complex, d: Callable) -> Real:
-    """Return the angular velocity of a vector, for a derivative d of expressions."""
-    if vector.spin:
-        return vector.spin(d)
-    return cross(vector, Complex(d(vector.x), d(vector.y))) / vector.squared()
+def spin(vector: Complex) -> Rate:
+    """Return the angular velocity of a vector."""
+    return vector.spin or Rate((vector.x, vector.y), lambda dx, dy: cross(
+        vector, Complex(dx, dy)) / vector.squared())
 
 
 def _sqrt_rule(node, _, dx, *__):
@@ -387,6 +428,5 @@ _RULES = {
     'root': _sqrt_rule,
     'where': lambda n, _, dc, dx, dy: where(n.args[0], dx, dy),
     'gated': lambda n, _, dx, *__: gated(dx, *n.args[1:]),
-    'less': lambda n, *_: real(0.0),
-    'less_equal': lambda n, *_: real(0.0),
 }
+_STEPS = frozenset({'less', 'less_equal'})

@@ -15,38 +15,35 @@
 """
 Crank angles that bring about a wanted value of any output.
 
-Where the output fixes a joint that is one bar or one slot away from the crank pin, the linkage is
-driven backwards, with the constructions that it is made of: `backward`. Every other output is cut
-at its extremes into monotone pieces, in each of which a value is found by Newton's method kept
-inside a bracket, to the last digit: `Pieces`.
+The output is cut into branches on which it rises or falls all along: at its extremes, at the ends
+of the reach, and where the linkage passes a dead point. On a branch a value is found by Newton's
+method kept inside a bracket, to the last digit.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Callable, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Callable, Iterable, List, NamedTuple, Sequence
 
 import numpy as np
 
-from . import planar
-from .expression import angle, arctangent, Complex, Real
-from .reach import Arc, between, NARROWEST, sign_changes
-from .sketch import GROUND, Link, Sketch
+from .curves import Arc, LEAST, refined, sampled, turns
 
-TURN = 2.0 * math.pi
-# Samples of an arc in search of extremes, and of a piece in search of a bracket.
-EXTREMES, SAMPLES = 360, 65
-# Rounding of an angle on its way through a closed form [rad].
-ROUNDED = 8 * 2.0 ** -52 * math.pi
-# Marks nearer to each other than this [rad] are one.
-CLOSE = 1e-9
+# Answers that are no further apart than this [rad] are one.
+CLOSE = 1e-13
+# A step to the outermost sample of an arc by more than this part of the output breaks it off.
+BROKEN = 1e-6
 # Newton's method halves its error more than once a step; bisection needs one step a bit.
 STEPS = 200
+# An output that changes by no more than so many times its rounding stands still.
+STILL = 64.0
+# What a value may miss, as a part of the output's range, before it counts as stepped over.
+MISSED = 1e-9
 
 
 def wrapped(theta):
     """Return angles [rad] in [-pi, pi)."""
-    theta = theta - TURN * np.floor((theta + math.pi) / TURN)
+    theta = theta - math.tau * np.floor((theta + math.pi) / math.tau)
     return np.where(theta >= math.pi, -math.pi, theta)
 
 
@@ -56,34 +53,21 @@ def in_order(answers: np.ndarray) -> np.ndarray:
 
     Each row ascends in [-pi, pi), holds no angle twice, and is filled up with NaN.
     """
-    rows = np.sort(wrapped(answers), axis=0)
+    rows = np.sort(wrapped(np.where(np.abs(answers) < LEAST, 0.0, answers)), axis=0)
     if len(rows) > 1:
-        rows[1:][np.diff(rows, axis=0) <= NARROWEST] = np.nan
+        rows[1:][np.diff(rows, axis=0) <= CLOSE] = np.nan
         last = np.nanmax(rows, axis=0, initial=-np.inf)
-        again = (rows == last) & (last - rows[0] >= TURN - NARROWEST)
+        again = (rows == last) & (last - rows[0] >= math.tau - CLOSE)
         rows = np.sort(np.where(again, np.nan, rows), axis=0)
     most = int(np.isfinite(rows).sum(axis=0).max(initial=0))
     rows = rows[:max(most, 1)] if len(rows) else np.full((1, answers.shape[1]), np.nan)
     return np.moveaxis(rows, 0, -1)
 
 
-def inside(theta: np.ndarray, arcs: Sequence[Arc]) -> np.ndarray:
-    """Return angles [rad] that lie on arcs, at an end those beyond it by rounding; NaN others."""
-    if any(hi - lo >= TURN for lo, hi in arcs):
-        return theta
-    kept = np.full(theta.shape, np.nan)
-    for lo, hi in arcs:
-        past = np.mod(theta - lo, TURN)
-        kept = np.where(past <= hi - lo, theta, kept)
-        kept = np.where((past > hi - lo) & (past - (hi - lo) <= ROUNDED), hi, kept)
-        kept = np.where(past >= TURN - ROUNDED, lo, kept)
-    return kept
-
-
 def nearest(answers: np.ndarray, near) -> np.ndarray:
     """Return of answers, shape (..., k), the one nearest to an angle, whole turns included."""
     near = np.asarray(near, float)[..., None]
-    theta = answers + TURN * np.round((near - answers) / TURN)
+    theta = answers + math.tau * np.round((near - answers) / math.tau)
     away = np.where(np.isnan(theta), np.inf, np.abs(theta - near))
     best = np.argmin(away, axis=-1)[..., None]
     return np.take_along_axis(np.broadcast_to(theta, away.shape), best, -1)[..., 0][()]
@@ -91,25 +75,21 @@ def nearest(answers: np.ndarray, near) -> np.ndarray:
 
 def distinct(theta: Iterable[float]) -> List[float]:
     """Return angles [rad] in [-pi, pi), in order, without those next to another."""
-    kept: List[float] = []
-    for each in sorted(wrapped(np.array(list(theta), float)).tolist()):
-        if not kept or each - kept[-1] > CLOSE and each - kept[0] < TURN - CLOSE:
-            kept.append(each)
-    return kept
+    found = np.array(list(theta), float)
+    return [x for x in in_order(found[:, None])[0].tolist() if x == x]
 
 
-class _Piece(NamedTuple):
-    """An arc on which an output is monotone: samples of it; whether it is a whole turn."""
+class _Branch(NamedTuple):
+    """Samples of an arc on which an output rises, or falls if the sign is -1."""
 
     theta: np.ndarray
     value: np.ndarray
     sign: float
-    whole: bool
 
 
-class Pieces:
+class MonotoneBranches:
     """
-    An output over the reach, in monotone pieces.
+    An output over the reach, in branches on which it rises or falls all along.
 
     Parameters
     ----------
@@ -118,109 +98,124 @@ class Pieces:
     reach : sequence of (float, float)
         The crank angles that can be assembled [rad].
     marks : sequence of float
-        Crank angles next to which the output may change quickly.
+        Crank angles [rad] next to which the output may change quickly or break off.
     angular : bool
         Whether the output is an angle, compared modulo a turn.
-    tolerance : float
-        How far beyond an extreme a value still counts as the extreme.
-    short : float
-        How far short of an extreme it does.
+    rounding : float
+        What the output is rounded to at least; a value so far beyond an extreme is the extreme.
 
     """
 
     def __init__(self, curve: Callable, reach: Sequence[Arc], marks: Sequence[float],
-                 angular: bool, tolerance: float, short: float = 0.0):
+                 angular: bool, rounding: float):
         self._curve = curve
         self._angular = angular
-        self._tolerance = tolerance
-        self._short = short
-        self._marks = distinct(marks)
-        self._pieces = [piece for arc in reach for piece in self._cut(*arc)]
-
-    @property
-    def moves(self) -> bool:
-        """Whether the output changes by more than rounding."""
-        return bool(self._pieces)
+        self._rounding = rounding
+        runs = [run for arc in _cut(reach, marks) for run in self._runs(*arc)]
+        self._range = max((np.ptp(value) for _, value, *_ in runs), default=0.0)
+        self._branches = [branch for run in runs for branch in self._branched(*run)] \
+            if self._moves(runs) else []
 
     def answers(self, values: np.ndarray) -> np.ndarray:
         """Return the crank angles [rad] for values, shape (n,), as shape (candidates, n)."""
-        found = [np.full(values.shape, np.nan)]
-        for piece in self._pieces:
-            for target in self._targets(piece, values):
-                held = np.flatnonzero(np.isfinite(target))
-                if len(held):
-                    found.append(np.full(values.shape, np.nan))
-                    found[-1][held] = self._solved(piece, target[held])
-        return np.array(found)
+        asked = [(branch, place, target[place]) for branch in self._branches
+                 for target in self._targets(branch, values)
+                 if len(place := np.flatnonzero(np.isfinite(target)))]
+        found = np.full((max(len(asked), 1), *values.shape), np.nan)
+        if asked:
+            theta = self._solved(*map(np.concatenate, zip(*(
+                _bracketed(branch, target) for branch, _, target in asked))))
+            ends = np.cumsum([len(place) for _, place, _ in asked])[:-1]
+            near = 0.25 * self._rounding
+            for row, (branch, place, target), part in zip(found, asked, np.split(theta, ends)):
+                part = np.where(target <= branch.value[0] + near, branch.theta[0], part)
+                row[place] = np.where(target >= branch.value[-1] - near, branch.theta[-1], part)
+        return found
 
-    def _cut(self, lo, hi):
-        whole = hi - lo >= TURN
-        spread = np.ptp(self._sampled(self._grid(lo, hi, SAMPLES)))
-        if not spread > self._tolerance:
-            return
-        ends = [end for arc in self._split(lo, hi)
-                for end in sign_changes(lambda theta: self._curve(theta)[1], *arc, EXTREMES)]
-        if whole and np.diff(self._curve(np.array([lo, hi]))[1] >= 0.0):
-            ends.append(lo)
-        arcs = between(ends) if whole else list(zip([lo, *ends], [*ends, hi]))
-        for start, end in arcs:
-            theta = self._grid(start, end, SAMPLES)
-            value = self._sampled(theta)
-            sign = 1.0 if value[-1] >= value[0] else -1.0
-            yield _Piece(theta, np.maximum.accumulate(sign * value), sign, whole and not ends)
+    def _runs(self, lo, hi):
+        """Yield samples as angles, values, rates and rounding, cut where there is no value."""
+        theta = sampled(lo, hi)
+        theta[[0, -1]] = self._unbroken(theta[[0, -1]], theta[[1, -2]], theta[len(theta) // 2])
+        digit = 4.0 * np.spacing(np.abs(theta).clip(1e-3))
+        around = (theta + digit * np.array([[0.0], [1.0], [-1.0]])).clip(theta[0], theta[-1])
+        value, rate = self._curve(around.ravel()).reshape(2, *around.shape)
+        with np.errstate(all='ignore'):
+            # What the rate does not explain of the values next to each is rounding.
+            noise = np.abs(self._difference(value[1:] - value[0])
+                           - rate[0] * (around[1:] - theta)).max(axis=0)
+        noise[~np.isfinite(noise)] = 0.0
+        known = np.isfinite(value[0])
+        for run in np.split(np.arange(len(theta)), np.flatnonzero(~known)):
+            run = run[known[run]]
+            if len(run) > 1:
+                values = np.unwrap(value[0, run]) if self._angular else value[0, run]
+                yield theta[run], values, rate[0, run], noise[run]
 
-    def _split(self, lo, hi) -> List[Arc]:
-        inside = [mark + TURN * math.ceil((lo - mark) / TURN) for mark in self._marks]
-        ends = [lo, *sorted(mark for mark in inside if lo < mark < hi), hi]
-        return list(zip(ends, ends[1:]))
+    def _unbroken(self, ends, beside, middle):
+        """Return the ends of an arc, or where the output breaks off right before them."""
+        values = self._curve(np.array([*ends, *beside, middle]))[0]
+        start, size = values[2:4], BROKEN * (math.pi if self._angular else np.ptp(values[2:]))
+        with np.errstate(invalid='ignore'):
+            return refined(lambda x: ~(np.abs(self._difference(
+                self._curve(x.ravel())[0].reshape(x.shape) - start[:, None])) > size),
+                beside, np.nextafter(ends, 2.0 * ends - beside))[0]
 
-    def _grid(self, lo, hi, samples):
-        """Return samples of an arc, dense towards its ends and towards marks."""
-        fraction = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, samples))
-        parts = [start + (end - start) * fraction for start, end in self._split(lo, hi)]
-        return np.unique(np.concatenate([np.clip(part, lo, hi) for part in parts]))
+    def _moves(self, runs) -> bool:
+        """Return whether the output changes by more than rounding."""
+        if not runs:
+            return False
+        _, values, _, noise = (np.concatenate(part) for part in zip(*runs))
+        noise = STILL * (noise + np.median(noise)) + self._rounding
+        return bool(np.any(np.abs(values - np.median(values)) > noise))
 
-    def _sampled(self, theta):
-        value = self._curve(theta)[0]
-        return np.unwrap(value) if self._angular else value
+    def _branched(self, theta, value, rate, noise):
+        least = 4.0 * (noise + self._rounding)
+        with np.errstate(invalid='ignore'):
+            places = np.array(turns(value, rate, least), int)
+            rising = rate[places] >= 0.0
+            ends, _ = refined(lambda x: (self._curve(x.ravel())[1] >= 0.0).reshape(
+                x.shape) == rising[:, None], theta[places], theta[places + 1])
+        reached = self._curve(ends)[0] if len(ends) else ends
+        reached = value[places] + self._difference(reached - value[places])
+        theta = np.insert(theta, places + 1, ends)
+        value = np.insert(value, places + 1, reached)
+        cuts = [0, *(places + 1 + np.arange(len(places))).tolist(), len(theta) - 1]
+        for first, last in zip(cuts, cuts[1:]):
+            part = slice(first, last + 1)
+            sign = 1.0 if value[last] >= value[first] else -1.0
+            yield _Branch(theta[part], np.maximum.accumulate(sign * value[part]), sign)
 
-    def _targets(self, piece, values):
-        """Yield the values as the piece counts them; NaN where it does not hold them."""
-        lo, hi = piece.value[0], piece.value[-1]
-        values = piece.sign * values
-        if piece.whole:
-            turns = int(round((hi - lo) / TURN))
-            first = values + TURN * np.ceil((lo - values) / TURN)
-            for turn in range(turns):
-                yield np.clip(first + turn * TURN, lo, hi)
-            return
-        slack = self._tolerance
+    def _difference(self, gap):
+        return gap - math.tau * np.round(gap / math.tau) if self._angular else gap
+
+    def _targets(self, branch, values):
+        """Yield the values as the branch counts them; NaN where it does not hold them."""
+        lo, hi = branch.value[0], branch.value[-1]
+        values, slack = branch.sign * values, self._rounding
+        turn, count = math.tau, int((hi - lo + 2.0 * slack) // math.tau) + 1
         if not self._angular:
-            held = (values >= lo - slack) & (values <= hi + slack)
-            yield np.where(held, np.clip(values, lo, hi), np.nan)
-            return
-        first = values + TURN * np.ceil((lo - slack - values) / TURN)
-        for turn in range(int((hi - lo + 2.0 * slack) // TURN) + 1):
-            target = first + turn * TURN
-            yield np.where(target <= hi + slack, np.clip(target, lo, hi), np.nan)
+            turn, count = 0.0, 1
+        else:
+            values = values + math.tau * np.ceil((lo - slack - values) / math.tau)
+        for i in range(count):
+            target = values + i * turn
+            held = (target >= lo - slack) & (target <= hi + slack)
+            yield np.where(held, np.clip(target, lo, hi), np.nan)
 
-    def _solved(self, piece, target):
-        """Return where the piece meets its targets, by Newton's method inside a bracket."""
-        index = np.clip(np.searchsorted(piece.value, target), 1, len(piece.theta) - 1)
-        lo, hi = piece.theta[index - 1], piece.theta[index]
+    def _solved(self, lo, hi, target, sign):
+        """Return where the output meets its targets, by Newton's method inside a bracket."""
         theta, step = 0.5 * (lo + hi), hi - lo
-        best, least = theta, np.full(theta.shape, np.inf)
+        best, least, steepest = theta, np.full(theta.shape, np.inf), np.zeros(theta.shape)
         done = np.zeros(theta.shape, bool)
         for _ in range(STEPS):
             value, rate = self._curve(theta)
-            gap = piece.sign * value - target
-            if self._angular:
-                gap = gap - TURN * np.round(gap / TURN)
+            gap = self._difference(sign * value - target)
             closer = np.abs(gap) < least
             best, least = np.where(closer, theta, best), np.where(closer, np.abs(gap), least)
+            steepest = np.where(closer, np.abs(rate), steepest)
             lo, hi = np.where(gap < 0.0, theta, lo), np.where(gap < 0.0, hi, theta)
             with np.errstate(all='ignore'):
-                guess = theta - gap / (piece.sign * rate)
+                guess = theta - gap / (sign * rate)
             digit = np.spacing(np.maximum(np.abs(lo), np.abs(hi)))
             done |= (least == 0.0) | (hi - lo <= digit) | (np.abs(guess - theta) <= digit)
             if done.all():
@@ -228,198 +223,29 @@ class Pieces:
             good = (lo < guess) & (guess < hi) & (np.abs(guess - theta) < 0.5 * step)
             following = np.where(good, guess, 0.5 * (lo + hi))
             theta, step = following, np.abs(following - theta)
-        best = np.where(target >= piece.value[-1] - self._short, piece.theta[-1], best)
-        return np.where(target <= piece.value[0] + self._short, piece.theta[0], best)
+        # Where the output breaks off, its sides enclose values that it never has.
+        far = STILL * np.spacing(math.pi) * steepest + MISSED * self._range + self._rounding
+        return np.where(least <= far, best, np.nan)
 
 
-class Backward(NamedTuple):
-    """The crank angles [rad] that an output allows, and the joint whose branch tells which is."""
-
-    angles: Tuple[Real, ...]
-    joint: Optional[str]
-
-
-def backward(sketch: Sketch, output: str, value: Real,
-             branches: Mapping[str, int]) -> Optional[Backward]:
-    """
-    Drive a linkage with one crank from one of its outputs.
-
-    Parameters
-    ----------
-    sketch : Sketch
-        The linkage.
-    output : str
-        A link's name, or a joint's name with .x or .y.
-    value : Real
-        The value it is to have, an expression of angle 0.
-    branches : mapping
-        The joints with an assembly sign.
-
-    Returns
-    -------
-    Backward or None
-        None where no single dyad, slot or circle leads from the output to the crank.
-
-    """
-    return _Reversed(sketch, value, branches).driven_by(output)
+def within_a_turn(lo: float, hi: float):
+    """Yield an arc [rad] in one or two parts within [-pi, pi]."""
+    for turn in (0.0, math.tau):
+        start, end = max(lo - turn, -math.pi), min(hi - turn, math.pi)
+        if start < end:
+            yield start, end
 
 
-class ClosedForm:
-    """
-    The crank angles that an output allows, of which the linkage's branch takes some.
-
-    Parameters
-    ----------
-    backward : callable
-        From values, shape (n,), to candidates [rad], shape (k, n).
-    curve : callable
-        From crank angles to the output and its rate.
-    twin : callable, optional
-        The same of the linkage on its other branch: a candidate belongs to the branch that
-        gives the value back more nearly.
-    reach : sequence of (float, float)
-        The crank angles that can be assembled [rad].
-    angular : bool
-        Whether the output is an angle, compared modulo a turn.
-
-    """
-
-    def __init__(self, backward: Callable, curve: Callable, twin: Optional[Callable],
-                 reach: Sequence[Arc], angular: bool):
-        self._backward = backward
-        self._reach = reach
-        self._curve = curve
-        self._twin = twin
-        self._angular = angular
-
-    def answers(self, values: np.ndarray) -> np.ndarray:
-        """Return the crank angles [rad] for values, shape (n,), as shape (candidates, n)."""
-        theta = inside(self._backward(values), self._reach)
-        miss = self._miss(self._curve, theta, values)
-        if self._twin is None:
-            return np.where(np.isfinite(miss), theta, np.nan)
-        return np.where(miss <= self._miss(self._twin, theta, values), theta, np.nan)
-
-    def _miss(self, curve, theta, values):
-        miss = curve(theta)[0] - values
-        if self._angular:
-            miss = miss - TURN * np.round(miss / TURN)
-        return np.where(np.isnan(miss), np.inf, np.abs(miss))
+def _cut(reach: Sequence[Arc], marks: Sequence[float]):
+    """Yield the reach as arcs within [-pi, pi], cut beside marks, which may be dead points."""
+    for lo, hi in reach:
+        for start, end in within_a_turn(lo, hi):
+            inside = [mark for mark in marks if start < mark < end]
+            yield from zip([start, *inside], [*inside, end])
 
 
-class _Reversed:
-    """A linkage that one of its outputs drives."""
-
-    def __init__(self, sketch, value, branches):
-        self._sketch = sketch
-        self._value = value
-        self._branches = branches
-        self._links = {link.name: link for link in sketch.links}
-        self._pin = next(name for name, point in sketch.points.items() if point.crank)
-        self._crank = sketch.points[self._pin].crank
-
-    def driven_by(self, output):
-        name, _, axis = output.rpartition('.')
-        if not name:
-            link = self._links[output]
-            if link.parent != GROUND or output == 'crank':
-                return None
-            if link.kind == 'prismatic':
-                return self._through_place(link.tip, self._on_line(link, self._value))
-            return self._through_link(link, [self._turned(link)])
-        point = self._sketch.points[name]
-        if name in self._sketch.corners:
-            return self._through_inversor(axis, *self._sketch.corners[name])
-        home = self._links.get(point.home)
-        if home and home.parent == GROUND and home.kind == 'revolute':
-            bars = self._across(home, name, axis)
-            return self._cranks(bars) if home.name == 'crank' else self._through_link(home, bars)
-        for link in self._links.values():
-            if link.kind == 'prismatic' and (link.parent, link.tip) == (GROUND, name):
-                start, along = self._line(link)
-                slide = (self._value - getattr(start, axis)) / getattr(along, axis)
-                return self._through_place(name, start + along * slide)
-        return None
-
-    def _cranks(self, bars, joint=None):
-        """Return the crank angles for vectors along the crank."""
-        bars = [bar * self._crank.zero.conjugate() for bar in bars]
-        return Backward(tuple(arctangent(bar.y, bar.x) for bar in bars), joint)
-
-    def _turned(self, link) -> Complex:
-        """Return the unit vector of a link on the ground that is turned by the value."""
-        return self._follower(link, Complex(1.0, 0.0)).bar()
-
-    def _follower(self, link, local: Complex) -> planar.Crank:
-        """Return a point of a link on the ground as the pin of a crank."""
-        upright = link.zero.value != 0.0
-        zero = Complex(0.0, 1.0) if upright else Complex(1.0, 0.0)
-        centre, length = self._sketch.points[link.joint].place, local.length()
-        return planar.Crank(centre, length, zero * (local / length), angle(0))
-
-    def _across(self, link, name, axis) -> List[Complex]:
-        """Return the unit vectors of a link on the ground that put a joint's coordinate there."""
-        local = self._sketch.frames[link.name][name]
-        start, along = ((Complex(self._value, 0.0), Complex(0.0, 1.0)) if axis == 'x' else
-                        (Complex(0.0, self._value), Complex(1.0, 0.0)))
-        centre = self._sketch.points[link.joint]
-        rail = planar.Rail(centre.place, start, along, centre.span)
-        found = [planar.slider(rail, local.length(), side) for side in (1.0, -1.0)]
-        return [each.rod * local.conjugate() / local.squared() for each in found]
-
-    def _through_link(self, link: Link, bars: List[Complex]):
-        """Go from unit vectors of a link on the ground to the crank, by a bar or a slot."""
-        centre = self._sketch.points[link.joint].place
-        for slide in self._links.values():
-            if slide.parent == link.name and slide.kind == 'prismatic' and slide.tip == self._pin:
-                offset = self._sketch.frames[slide.name][self._pin].y
-                rails = [planar.Rail(self._crank.centre, centre + bar.turned() * offset, bar,
-                                     self._span()) for bar in bars]
-                return self._cranks([planar.slider(rail, self._crank.length, side).rod
-                                     for rail in rails for side in (1.0, -1.0)], link.tip)
-        for tip, local in self._sketch.frames[link.name].items():
-            radius = self._rod(tip)
-            if radius is None or tip == link.joint:
-                continue
-            arms = ([planar.CrankArm(self._crank.centre, self._follower(link, local))]
-                    if len(bars) == 1 else [self._arm(centre + bar * local) for bar in bars])
-            return self._through_rod(tip, radius, arms)
-        return None
-
-    def _through_place(self, tip, place):
-        """Go from the place of a joint to the crank, by a bar."""
-        radius = self._rod(tip)
-        return None if radius is None else self._through_rod(tip, radius, [self._arm(place)])
-
-    def _through_rod(self, tip, radius, arms):
-        dyads = [planar.dyad(arm, self._crank.length, radius, side, smooth=False)
-                 for arm in arms for side in (planar.LEFT, planar.RIGHT)]
-        return self._cranks([dyad.first for dyad in dyads], tip)
-
-    def _through_inversor(self, axis, pole, pin, power):
-        arm = self._sketch.arm(pole, pin)
-        if pin != self._pin or not isinstance(arm, planar.CrankArm):
-            return None
-        bar = arm.crank_of_inverse(axis, self._value, power)
-        return bar and self._cranks([bar * self._crank.zero])
-
-    def _rod(self, tip) -> Optional[Real]:
-        """Return the length of the bar from the pin to a joint that has a branch, if any."""
-        for bar in self._sketch.bars:
-            if {bar.first, bar.second} == {self._pin, tip} and tip in self._branches:
-                return bar.length
-        return None
-
-    def _line(self, link) -> Tuple[Complex, Complex]:
-        """Return the start and unit vector of the line that a block slides on."""
-        return self._sketch.points[link.joint].place, self._sketch.lines[link.name]
-
-    def _on_line(self, link, slide) -> Complex:
-        start, along = self._line(link)
-        return start + along * slide
-
-    def _arm(self, place) -> planar.Arm:
-        return planar.Arm(self._crank.centre, place - self._crank.centre, self._span())
-
-    def _span(self) -> Real:
-        return self._sketch.points[self._links['crank'].joint].span
+def _bracketed(branch: _Branch, target: np.ndarray) -> tuple:
+    """Return the samples on both sides of targets, the targets, and the sign of the branch."""
+    index = np.clip(np.searchsorted(branch.value, target), 1, len(branch.theta) - 1)
+    return (branch.theta[index - 1], branch.theta[index], target,
+            np.full(target.shape, branch.sign))

@@ -20,18 +20,28 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib.util import find_spec
 from itertools import chain, cycle
+from types import MappingProxyType
 from typing import Callable, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from . import inverse, language
+from . import language
 from .analysis import Analysis
-from .compiler import Batch, evaluate, Pose, Program
-from .expression import angle, derivative, dimension, Real, real, spin, where
+from .arguments import checked_dimensions
+from .compiler import Batch, evaluate, keep, Pose, Program
+from .expression import (
+    angle,
+    derivative,
+    dimension,
+    gated,
+    Real,
+    real,
+    spin,
+    where,
+)
 from .reach import arcs
 from .sketch import Sketch
-
-SHORTEST, LONGEST = 1e-300, 1e300
+from .words import listed, quoted
 
 # Lengths beyond these are counted in a power of two of their own, which changes no bit of a
 # result and keeps squares and products of lengths inside the range of float64.
@@ -109,7 +119,7 @@ class Structure:
         key = (kind, names, *crank)
         if key not in self._programs:
             outputs = getattr(self, f'_{kind}')(names, *crank)
-            self._programs[key] = Program(outputs, len(self.sketch.cranks))
+            keep(self._programs, key, Program(outputs, len(self.sketch.cranks)))
         return self._programs[key]
 
     def legs(self, points: Tuple[str, ...], joints: Tuple[str, ...],
@@ -117,7 +127,7 @@ class Structure:
         """Return the code for a leg of several; see `Mechanism.legs`."""
         key = points, joints, moving
         if key not in self._programs:
-            self._programs[key] = self._legs(*key)
+            keep(self._programs, key, self._legs(*key))
         return self._programs[key]
 
     def _points(self, names):
@@ -126,7 +136,13 @@ class Structure:
 
     def _velocities(self, names, crank=0):
         known = {}
-        return [derivative(part, {crank: 1.0}, known) for part in self._points(names)]
+        return [self._due(derivative(part, {crank: 1.0}, known), part)
+                for part in self._points(names)]
+
+    def _due(self, rate, value):
+        """Return a rate by one crank, NaN where other cranks leave no value to have it."""
+        alone = len(self.sketch.cranks) == 1 and rate.value is None
+        return rate if alone or not value.varies else gated(rate, abs(value), real(0.0))
 
     def _angles(self, names):
         values = self.sketch.joint_values
@@ -164,7 +180,10 @@ class Structure:
 
         def turning(name):
             bar = self.sketch.directions.get(name)
-            return real(0.0) if bar is None else spin(bar, d)
+            if bar is None:
+                return real(0.0)
+            turned = spin(bar)
+            return turned.formula(*map(d, turned.of))
 
         def rate(link):
             if link.kind == 'prismatic' or link.name in self.sketch.cranks:
@@ -172,7 +191,7 @@ class Structure:
             return turning(link.name) - turning(link.parent)
 
         links = {link.name: link for link in self.sketch.links}
-        return [rate(links[n]) for n in names]
+        return [self._due(rate(links[n]), self.sketch.joint_values[n]) for n in names]
 
     def _margins(self, _):
         """Return each limit's margin, so much above its tolerance that a reached one is >= 0."""
@@ -198,8 +217,8 @@ class Structure:
         joint, _, axis = name.rpartition('.')
         if not joint:
             return self._angles([name]) + self._rates([name])
-        place = self._points([joint])['xy'.index(axis)]
-        return [place, derivative(place, {0: 1.0}, {})]
+        i = 'xy'.index(axis)
+        return [self._points([joint])[i], self._velocities([joint])[i]]
 
     def turns(self, output: str) -> bool:
         """Return whether an output is an angle, not a length."""
@@ -207,25 +226,24 @@ class Structure:
 
     def moves(self, output: str) -> bool:
         """Return whether an output depends on the first crank."""
-        return self._output(output)[1].value != 0.0
+        rate = self._output(output)[1]
+        return (rate.args[0] if rate.op == 'gated' else rate).value != 0.0
 
-    def backward(self, output: str) -> Optional[inverse.Backward]:
-        """Return how an output drives the linkage backwards, if there is a closed form."""
-        given = angle(0) if self.turns(output) else in_own_unit(angle(0))
-        return inverse.backward(self.sketch, output, given, self.branches)
 
-    def _backward(self, output):
-        return self.backward(output).angles
+def _hashable(names):
+    """Return names as a tuple, None or one name as it is; raise ValueError if they are none."""
+    try:
+        names = names if names is None or isinstance(names, (str, tuple)) else tuple(names)
+        hash(names)
+        return names
+    except TypeError:
+        raise ValueError('points and joints must be a name or a list of names, '
+                         f'got {quoted(names)}') from None
 
 
 def in_metres(length: Real) -> Real:
     """Return a length counted in metres."""
     return where(abs(UNIT - 1.0) <= 0.0, length, length * UNIT)
-
-
-def in_own_unit(length: Real) -> Real:
-    """Return a length that is counted in metres, counted in the unit of the dimensions."""
-    return where(abs(UNIT - 1.0) <= 0.0, length, length / UNIT)
 
 
 class Mechanism(Analysis):
@@ -252,19 +270,19 @@ class Mechanism(Analysis):
         self._accelerate = accelerate
         self._lengths = _in_own_unit(self.dimensions, design.has_literal_lengths)
         self._evaluated = {}
-        self._poses, self._single = {}, {}
-        self.links = tuple(link._replace(zero=float(self._value(link.zero)))
+        self._poses, self._placers, self._found = {}, {}, {}
+        self.links = tuple(link._replace(zero=np.asarray(self._value(link.zero)).tolist())
                            for link in sketch.links)
 
     def __repr__(self):
         lengths = ', '.join(f'{k}={v}' for k, v in self.dimensions.items())
         return f'<{self.type} {lengths}>'
 
-    @property
-    def bar_lengths(self) -> dict:
+    @cached_property
+    def bar_lengths(self) -> Mapping:
         """The length [m] of each bar."""
-        return {(bar.first, bar.second): self._value(in_metres(bar.length))
-                for bar in self._structure.sketch.bars}
+        return MappingProxyType({(bar.first, bar.second): self._value(in_metres(bar.length))
+                                 for bar in self._structure.sketch.bars})
 
     def line_of(self, *joints: str) -> language.Line:
         """Return the line that places one of some joints, the last that does."""
@@ -275,12 +293,13 @@ class Mechanism(Analysis):
         return {self.line_of(name): np.isfinite(self._value(height))
                 for name, height in self._structure.sketch.triangles.items()}
 
-    @property
-    def frames(self) -> dict:
+    @cached_property
+    def frames(self) -> Mapping:
         """Where each link's joints lie [m], seen from the link: x along its bar."""
-        return {link: {name: tuple(self._value(in_metres(x)) for x in (place.x, place.y))
-                       for name, place in frame.items()}
-                for link, frame in self._structure.sketch.frames.items()}
+        return MappingProxyType({
+            link: {name: tuple(self._value(in_metres(x)) for x in (place.x, place.y))
+                   for name, place in frame.items()}
+            for link, frame in self._structure.sketch.frames.items()})
 
     def _value(self, expression: Real):
         with np.errstate(all='ignore'):
@@ -291,18 +310,13 @@ class Mechanism(Analysis):
         """The longest bar [m]."""
         return max(self.bar_lengths.values())
 
-    def with_dimensions(self, **changed) -> Mechanism:
+    def with_dimensions(self, /, **changed) -> Mechanism:
         """Return the same mechanism with other dimensions [m]; raises ValueError like create."""
         made = type(self)(self._design, self._structure,
                           checked_dimensions(self._design, {**self.dimensions, **changed}),
                           self.branches, self._accelerate)
         self._design.check(made)
         return made
-
-    def _on_other_branch(self, joint: str) -> Mechanism:
-        branches = {**self.branches, joint: -self.branches[joint]}
-        return type(self)(self._design, Structure(self._design, branches), self.dimensions,
-                          branches)
 
     def accelerated(self) -> Mechanism:
         """
@@ -343,13 +357,18 @@ class Mechanism(Analysis):
             If a joint does not exist.
 
         """
-        if isinstance(theta, float):
-            try:
-                return self._single[points](theta)
-            except (KeyError, TypeError):
-                # Not asked for before, or as a list.
-                pass
+        if isinstance(theta, float) and len(self.cranks) == 1:
+            wanted = _hashable(points)
+            place = self._placers.get(wanted) or self._placer(wanted)
+            return place(theta)
         return self._vectors('points', theta, points)
+
+    def _placer(self, wanted) -> Callable:
+        """Return what places joints at one crank angle, a float."""
+        names, pose = self._ready('points', wanted)
+        if pose.shape:
+            return lambda theta: self._vectors('points', theta, wanted)
+        return keep(self._placers, wanted, pose.placer(names))
 
     def velocity(self, theta, points: Optional[Sequence[str]] = None, crank: int = 0) -> dict:
         """
@@ -409,6 +428,9 @@ class Mechanism(Analysis):
             If not every other crank is given, or a dimension is an array.
 
         """
+        return list(self._remembered('reach', others, lambda: self._arcs(others)))
+
+    def _arcs(self, others):
         _, margins = self._ready('margins', ())
         if margins.shape:
             raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
@@ -418,6 +440,11 @@ class Mechanism(Analysis):
                              f'the first is needed, got {len(others)}')
         return arcs(lambda theta: margins.over(theta, *others),
                     self._structure.sketch.limits, self._value)
+
+    def _remembered(self, what: str, about: tuple, find: Callable):
+        """Return what was found before, or find it."""
+        key = what, *about
+        return self._found[key] if key in self._found else keep(self._found, key, find())
 
     def function(self, points: Optional[Sequence[str]] = None, joints: Sequence[str] = (),
                  rates: Sequence[str] = ()) -> Callable:
@@ -437,7 +464,7 @@ class Mechanism(Analysis):
             If a joint does not exist.
 
         """
-        wanted = tuple(self._names(kind, names if names is None else tuple(names))
+        wanted = tuple(self._names(kind, _hashable(names))
                        for kind, names in (('points', points), ('angles', joints),
                                            ('rates', rates)))
         return self._bound('parts', wanted).at
@@ -471,7 +498,7 @@ class Mechanism(Analysis):
     def _vectors(self, kind, theta, points, *crank):
         names, pose = self._ready(kind, points, *crank)
         values = pose.over(*self._each_crank(theta))
-        pairs = np.moveaxis(values.reshape(-1, 2, *values.shape[1:]), 1, -1)
+        pairs = np.moveaxis(values.reshape(len(names), 2, *values.shape[1:]), 1, -1)
         return dict(zip(names, pairs))
 
     def _scalars(self, kind, theta, joints, *crank):
@@ -488,17 +515,11 @@ class Mechanism(Analysis):
 
     def _ready(self, kind: str, wanted, *crank: int) -> Tuple[Tuple[str, ...], Pose]:
         """Return the names that are wanted and the function that computes them."""
-        try:
-            return self._poses[(kind, wanted, *crank)]
-        except KeyError:
-            names = self._names(kind, wanted)
-        except TypeError:
-            return self._ready(kind, tuple(wanted), *crank)
-        pose = self._bound(kind, names, *crank)
-        if kind == 'points' and not pose.shape and len(self.cranks) == 1:
-            self._single[wanted] = pose.placer(names)
-        self._poses[(kind, wanted, *crank)] = names, pose
-        return names, pose
+        key = kind, _hashable(wanted), *crank
+        if key not in self._poses:
+            names = self._names(kind, key[1])
+            keep(self._poses, key, (names, self._bound(kind, names, *crank)))
+        return self._poses[key]
 
     def _bound(self, kind: str, names, *crank: int) -> Pose:
         program = self._structure.program(kind, names, *crank)
@@ -515,8 +536,8 @@ class Mechanism(Analysis):
         names = (wanted,) if isinstance(wanted, str) else wanted
         for name in names:
             if name not in allowed:
-                raise ValueError(f'{self.type} has no {what} {name!r}; '
-                                 f'allowed: {", ".join(allowed)}')
+                raise ValueError(f'{self.type} has no {what} {quoted(name)}; '
+                                 f'allowed: {listed(allowed)}')
         return names
 
 
@@ -527,43 +548,3 @@ def _in_own_unit(dimensions: Mapping, fixed: bool) -> dict:
         return {**dimensions, UNIT.args[0]: 1.0}
     unit = 2.0 ** np.frexp(longest)[1]
     return {UNIT.args[0]: unit, **{name: length / unit for name, length in dimensions.items()}}
-
-
-def checked_dimensions(design: Design, given: Mapping) -> dict:
-    """Return all dimensions of a design, defaults filled in; raise ValueError for a bad one."""
-    for name in given:
-        if name not in design.dimensions:
-            raise ValueError(f'{design.name} has no dimension {name!r}; '
-                             f'allowed: {", ".join(design.dimensions)}')
-    return {name: _checked(design, name, given.get(name, default))
-            for name, default in design.dimensions.items()}
-
-
-def _checked(design, name, value):
-    try:
-        if isinstance(value, (str, bytes, bool)):
-            raise TypeError
-        length = np.asarray(value, float)
-    except (TypeError, ValueError):
-        raise ValueError(f'{design.name}: dimension {name} must be a number, '
-                         f'got {value!r}') from None
-    if not np.all(np.isfinite(length)):
-        raise ValueError(f'{design.name}: dimension {name} must be finite, got {value!r}')
-    if name not in design.signed and not np.all(length > 0.0):
-        raise ValueError(f'{design.name}: dimension {name} must be positive, got {value!r}')
-    size = np.abs(length[length != 0.0])
-    if np.any((size < SHORTEST) | (size > LONGEST)):
-        raise ValueError(f'{design.name}: dimension {name} must lie between {SHORTEST:g} and '
-                         f'{LONGEST:g}, got {value!r}')
-    return length if length.ndim else float(length)
-
-
-def checked_branches(design: Design, given: Optional[Mapping]) -> dict:
-    """Return all assembly signs of a design; raise ValueError for a bad one."""
-    for name, sign in (given or {}).items():
-        if name not in design.branches:
-            allowed = ', '.join(design.branches) or 'none'
-            raise ValueError(f'{design.name} has no branch {name!r}; allowed: {allowed}')
-        if sign not in (1, -1):
-            raise ValueError(f'{design.name}: branch {name} must be +1 or -1, got {sign!r}')
-    return {**design.branches, **(given or {})}

@@ -42,6 +42,7 @@ from rclpy.utilities import remove_ros_args
 from . import scene, slider
 from .ownership import Announcer, Follower
 from .parameter_server import Asked, Change, ParameterServer, Worker
+from .words import elided, listed, quoted
 
 try:
     from rclpy.experimental import EventsExecutor as Executor
@@ -135,7 +136,7 @@ class SceneNode(Node):
 
     def serves(self) -> str:
         """Return in words what the node does, for its first message."""
-        return scene.listed(self.scene.machines)
+        return listed(self.scene.machines, 200)
 
     def destroy_node(self):
         """End the worker too."""
@@ -215,7 +216,7 @@ class SceneNode(Node):
     def _set_at_once(self, change):
         unknown = [p.name for p in change.parameters if not self.has_parameter(p.name)]
         if unknown:
-            change.refuse(f'{scene.shortened(unknown[0])} is not a parameter of '
+            change.refuse(f'{elided(unknown[0])} is not a parameter of '
                           f'{self.get_fully_qualified_name()}')
         else:
             change.result = self.set_parameters_atomically(change.parameters)
@@ -259,7 +260,7 @@ class SceneNode(Node):
         if owner:
             raise scene.SceneError(
                 f'{name} belongs to {owner} while it runs: ros2 param set {owner} {name} '
-                + quote(scene.shown(value)))
+                + quote(quoted(list(value) if isinstance(value, tuple) else value)))
 
     def _merged(self, base, changes, strict) -> State:
         """Return the state after changes: all of them together, else half by half."""
@@ -274,7 +275,7 @@ class SceneNode(Node):
         except Exception as problem:
             # Whoever asked waits for ever for a service that raised.
             self.get_logger().error(f'internal error: {problem!r}')
-            reason = scene.shortened(f'internal error: {problem!r}', 299)
+            reason = elided(f'internal error: {problem!r}', 299)
         if len(changes) == 1:
             changes[0].refuse(reason)
             return base
@@ -329,7 +330,7 @@ def run(node_class, name: str, args=None, executor_class=Executor) -> int:
     except (RuntimeError, scene.SceneError) as error:
         # What the client library makes of an argument may be as long as that.
         rclpy.try_shutdown()
-        return _failed(name, scene.shortened(f'bad arguments: {error}', 299))
+        return _failed(name, elided(f'bad arguments: {error}', 299))
     node = None
     try:
         node = node_class()
@@ -364,7 +365,7 @@ def _spin(node, executor):
 def _refuse_arguments(args):
     unknown = remove_ros_args(args)[1:]
     if unknown:
-        raise scene.SceneError(f'unknown argument {scene.shown(unknown[0])}: there are none but '
+        raise scene.SceneError(f'unknown argument {quoted(unknown[0])}: there are none but '
                                'those of ROS, after --ros-args')
 
 

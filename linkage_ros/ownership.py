@@ -27,6 +27,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from . import scene
 from .parameter_server import Asked, Change
+from .words import elided, listed, quoted
 
 TOPIC = 'scene_parameters'
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -82,15 +83,15 @@ class Follower:
         missing = set(machines) ^ set(values.get('mechanisms') or ())
         self._owned = {name for name in here if '.' in name
                        and name.partition('.')[0] in machines.keys() - missing - unlike.keys()}
-        self._say('unlike', [f'{name} is {scene.shown(here[name])} here and '
-                             f'{scene.shown(values[name])} there' for name in unlike.values()],
+        self._say('unlike', [f'{name} is {quoted(here[name])} here and '
+                             f'{quoted(values[name])} there' for name in unlike.values()],
                   'another mechanism, which is not followed')
         self._say('missing', sorted(missing), 'other mechanisms')
         followed = sorted(self._owned - fixed)
         if started:
             self._said.pop('values', None)
             self._say('values', [
-                f'{name} was {scene.shown(here[name])} and is now {scene.shown(values[name])}'
+                f'{name} was {quoted(here[name])} and is now {quoted(values[name])}'
                 for name in followed if here[name] != values[name]],
                 'other values, which are followed')
         changes = [Change([Parameter(name, value=values[name])], followed=True)
@@ -106,7 +107,7 @@ class Follower:
         """Warn of something once, and again when it is another thing."""
         if particulars and particulars != self._said.get(kind):
             self._node.get_logger().warning(
-                f'{scene.shortened(self._owner)} has {what}: {scene.listed(particulars)}')
+                f'{elided(self._owner)} has {what}: {listed(particulars, 1000)}')
         self._said[kind] = particulars
 
 

@@ -17,10 +17,13 @@
 from __future__ import annotations
 
 from array import array
+from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 import re
-from typing import Any, List, Mapping, Optional, Tuple
+from typing import Any, List, Optional, Tuple
+
+from .words import elided, MESSAGE, quoted
 
 KINDS = {
     'bool': (bool, 'true or false'),
@@ -36,31 +39,13 @@ ROUNDED = 1e-6
 
 TEXT = re.compile(r'.{0,1000}', re.DOTALL)
 LONGEST_LIST = 10000
-LONGEST_MESSAGE = 299
-LONGEST_SHOWN = 60
 
 
 class SceneError(ValueError):
     """A parameter that cannot be; the text names it and says what is allowed."""
 
     def __init__(self, text: str):
-        super().__init__(shortened(text, LONGEST_MESSAGE))
-
-
-def shortened(text: str, most: int = LONGEST_SHOWN) -> str:
-    """Return a text, one that is longer than `most` letters without its middle."""
-    if len(text) <= most:
-        return text
-    end = (most - 3) // 2
-    return f'{text[:most - 3 - end]}...{text[-end:]}'
-
-
-def shown(value: Any) -> str:
-    """Return a value as a message shows it."""
-    try:
-        return shortened(repr(list(value) if isinstance(value, tuple) else value))
-    except ValueError:
-        return 'a number of thousands of digits'
+        super().__init__(elided(text, MESSAGE))
 
 
 @dataclass(frozen=True)
@@ -132,7 +117,8 @@ class Field:
 
     def error(self, name: str, value: Any) -> SceneError:
         """Return the error that says what the parameter must be, and what it is."""
-        return SceneError(f'{shortened(name, 100)} must be {self.allowed}, not {shown(value)}')
+        shown = list(value) if isinstance(value, tuple) else value
+        return SceneError(f'{elided(name, 100)} must be {self.allowed}, not {quoted(shown)}')
 
     def _taken(self, value):
         try:

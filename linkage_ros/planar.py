@@ -34,7 +34,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import reduce
-from typing import NamedTuple, Optional, Tuple
+from typing import NamedTuple, Optional, Sequence, Tuple
 
 from .expression import (
     arctangent,
@@ -44,15 +44,16 @@ from .expression import (
     dot,
     exact_sum,
     gated,
-    rated,
+    Rate,
     Real,
     root,
     sine,
     spin,
-    spun,
     square,
     square_root,
     where,
+    with_rate,
+    with_spin,
 )
 
 LEFT, RIGHT = 1.0, -1.0
@@ -74,7 +75,7 @@ class Crank:
         """Return the vector from the centre to the pin."""
         s, h = sine(0.5 * self.angle), cosine(0.5 * self.angle)
         turned = self.zero * Complex(1.0 - 2.0 * square(s), 2.0 * s * h)
-        return spun(turned * self.length, lambda d: d(self.angle))
+        return with_spin(turned * self.length, Rate((self.angle,), lambda rate: rate))
 
 
 class Limit(NamedTuple):
@@ -99,12 +100,12 @@ class Limit(NamedTuple):
 
 
 class Arm:
-    """The arm between two points that both move."""
+    """The arm between two points that both move, of constant length where that is given."""
 
-    def __init__(self, foot: Complex, vector: Complex, span: Real):
+    def __init__(self, foot: Complex, vector: Complex, span: Real, length: Optional[Real] = None):
         self.foot = foot
         self.vector = vector
-        self.square = self.vector.squared()
+        self.square = vector.squared() if length is None else square(length)
         self._span = span
 
     def offset(self, point: Complex) -> Real:
@@ -121,11 +122,15 @@ class Arm:
         margin = self.square - square(radius)
         return self._limit(radius, size, -1.0, margin)
 
-    def _rate(self, margin, sign):
-        return rated(margin, lambda d: -(sign * d(self.square)))
+    def mirrored(self, point: Complex) -> Complex:
+        """Return the mirror image of a point in the line of the arm."""
+        return point - self.vector.turned() * (2.0 * self.offset(point) / self.square)
+
+    def _with_rate(self, margin, sign):
+        return with_rate(margin, self.square, formula=lambda rate: -(sign * rate))
 
     def _limit(self, radius, size, sign, margin):
-        self._rate(margin, sign)
+        margin = self._with_rate(margin, sign)
         # At the limit the length is the radius: the square moves by that times what lengths do.
         return Limit(margin, GRAZE * abs(radius) * (size + self._span))
 
@@ -141,21 +146,40 @@ class CrankArm(Arm):
         s, h = _half_angle(crank.angle, turn)
         vector = along * Complex((g - m) + 2.0 * m * square(h), 2.0 * m * s * h)
         self.foot = crank.centre + crank.bar() if reverse else ground
-        self.vector = -vector if reverse else vector
         self.square = square(g - m) + 4.0 * g * m * square(h)
         self._crank, self._along, self._turn = crank, -along if reverse else along, turn
         self._line = along
         self._area = 2.0 * g * m * s * h * (1.0 if reverse else -1.0)
         self._g, self._m, self._s, self._h = g, m, s, h
-        bar = crank.bar() * (-1.0 if reverse else 1.0)
-        rated(self.vector.x, lambda d: -(d(crank.angle) * bar.y))
-        rated(self.vector.y, lambda d: d(crank.angle) * bar.x)
+        bar = crank.bar()
+        vector = Complex(
+            with_rate(vector.x, crank.angle, formula=lambda rate: -(rate * bar.y)),
+            with_rate(vector.y, crank.angle, formula=lambda rate: rate * bar.x))
+        # An arm of two equal lengths bisects them, and still does where it has no length.
+        turning = where(self._is_isosceles, 0.5,
+                        m * ((m - g) + 2.0 * g * square(h)) / self.square)
+        vector.spin = Rate((crank.angle,), lambda rate: rate * turning)
+        self.vector = -vector if reverse else vector
+
+    @property
+    def _is_isosceles(self) -> Real:
+        return abs(self._g - self._m) <= 0.0
 
     def offset(self, point: Complex) -> Real:
         """Return the cross product of the arm and the vector from its foot to a point."""
         if point is self._crank.centre:
             return self._area
         return super().offset(point)
+
+    def mirrored(self, point: Complex) -> Complex:
+        """Return the mirror image of a point in the line of the arm."""
+        image = super().mirrored(point)
+        if point is not self._crank.centre:
+            return image
+        s, m = self._s, self._m
+        centre = point + self._line.turned() * Complex(self._h, s) * (2.0 * m * s)
+        return Complex(where(self._is_isosceles, centre.x, image.x),
+                       where(self._is_isosceles, centre.y, image.y))
 
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
@@ -176,7 +200,7 @@ class CrankArm(Arm):
         # The smaller gap is the one next to which the margin can vanish.
         margin = where(abs(start) <= abs(end), start + sign * gm * square(s),
                        end - sign * gm * square(h))
-        self._rate(margin, sign)
+        margin = self._with_rate(margin, sign)
         tolerance = GRAZE * abs(radius) * (size + self._g + self._m)
         gap, half = (start, s) if sign > 0.0 else (end, h)
         grown = square_root(gm) * self._first_sign(sign)
@@ -235,7 +259,8 @@ def _half_angle(theta: Real, turn: Complex) -> Tuple[Real, Real]:
     cos = where(ahead, large, small)
     sin = where(ahead, small, large) * where(turn.y < 0.0, -1.0, 1.0)
     s, h = s * cos + h * sin, h * cos - s * sin
-    return (rated(s, lambda d: 0.5 * d(theta) * h), rated(h, lambda d: -(0.5 * d(theta) * s)))
+    return (with_rate(s, theta, formula=lambda rate: 0.5 * rate * h),
+            with_rate(h, theta, formula=lambda rate: -(0.5 * rate * s)))
 
 
 class Dyad(NamedTuple):
@@ -262,12 +287,15 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) 
     u, v = 0.5 + skew, roots[0] * roots[1] / twice * side
     bars = arm.vector * Complex(u, v), arm.vector * Complex(skew - 0.5, v)
 
-    def turning(along, length):
-        """Add to the arm's turning that of a bar, along + i v, on the arm."""
-        return lambda d: spin(arm.vector, d) + (
-            (along * d(v) - v * d(skew)) * arm.square / square(length))
+    turning = spin(arm.vector)
 
-    return Dyad(spun(bars[0], turning(u, first)), spun(bars[1], turning(skew - 0.5, second)),
+    def with_turning(bar, along, length):
+        """Add to the arm's turning that of a bar, along + i v, on the arm."""
+        return with_spin(bar, Rate(
+            (v, skew, *turning.of), lambda dv, dskew, *rates: turning.formula(*rates) + (
+                (along * dv - v * dskew) * arm.square / square(length))))
+
+    return Dyad(with_turning(bars[0], u, first), with_turning(bars[1], skew - 0.5, second),
                 limits)
 
 
@@ -286,9 +314,31 @@ def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
     return Complex(0.5 + (first - second) * (first + second) / twice, height / twice * side)
 
 
-def mirror(arm: Arm, point: Complex) -> Complex:
-    """Return the mirror image of a point in the line of an arm: the far corner of a kite."""
-    return point - arm.vector.turned() * (2.0 * arm.offset(point) / arm.square)
+def mirror(arm: Arm, point: Complex,
+           ends: Sequence[Tuple[Complex, Complex]]) -> Tuple[Complex, ...]:
+    """
+    Return the mirror image of a point in the line of an arm, and the bars from both ends to it.
+
+    For each end of the arm, its foot first, its place and its bar to the point are given; a bar's
+    image turns twice as fast as the arm, less what the bar itself turns.
+    """
+    image, turning, bars = arm.mirrored(point), spin(arm.vector), []
+    for place, bar in ends:
+        own = spin(bar)
+        bars.append(with_spin(image - place, Rate(
+            (*turning.of, *own.of), lambda *rates, own=own: 2.0 * turning.formula(
+                *rates[:len(turning.of)]) - own.formula(*rates[len(turning.of):]))))
+    return _with_velocity(image, arm.foot, bars[0]), *bars
+
+
+def _with_velocity(place: Complex, start: Complex, bar: Complex) -> Complex:
+    """Return a place with the velocity of the end of a bar of constant length from a start."""
+    turning = spin(bar)
+    return Complex(
+        with_rate(place.x, start.x, *turning.of,
+                  formula=lambda rate, *rates: rate - turning.formula(*rates) * bar.y),
+        with_rate(place.y, start.y, *turning.of,
+                  formula=lambda rate, *rates: rate + turning.formula(*rates) * bar.x))
 
 
 def transmission(found: Dyad) -> Real:

@@ -16,22 +16,21 @@
 Which crank angles can be assembled.
 
 The ends of the reach are the angles where a margin vanishes. For the dyad or slot of a crank they
-are closed forms of exactly rounded gaps; elsewhere they are bracketed and refined to rounding.
-Between two neighbouring ends one pose decides for the whole arc.
+are closed forms of exactly rounded gaps; elsewhere they are bracketed. Between two neighbouring
+ends one pose decides for the whole arc, and at each end the linkage can still be assembled.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Callable, Iterable, List, Sequence, Tuple
+from typing import Callable, Iterable, List, Sequence
 
 import numpy as np
 
+from .curves import Arc, lowest, near_misses, refined, sampled
 from .planar import Limit
 
-Arc = Tuple[float, float]
-
-# Samples on an arc in search of ends without a closed form.
+# Samples of a whole turn in search of ends without a closed form.
 SAMPLES = 720
 # Arcs below this width [rad] are the rounding of one angle.
 NARROWEST = 2e-15
@@ -51,20 +50,58 @@ def arcs(margins: Callable, limits: Sequence[Limit], value: Callable) -> List[Ar
         From an expression of dimensions to its value.
 
     """
-    closed = [limit for limit in limits if limit.crank == 0]
-    ends = [end for limit in closed
+    def assembled(theta):
+        with np.errstate(invalid='ignore'):
+            return (margins(np.ravel(theta)) >= 0.0).all(axis=0).reshape(np.shape(theta))
+
+    ends = [end for limit in limits if limit.crank == 0
             for end in _crank_ends(*map(value, (
                 limit.start, limit.end, limit.turn, limit.tolerance)))]
-    for i in [i for i, x in enumerate(limits) if x.margin.varies and x.crank != 0]:
-        for lo, hi in between(ends):
-            ends += sign_changes(lambda theta, i=i: margins(theta)[i], lo, hi)
-    return reachable_arcs(ends, lambda theta: bool(np.all(margins(theta) >= 0.0)))
+    searched = [i for i, x in enumerate(limits) if x.margin.varies and x.crank != 0]
+    if searched:
+        ends += [end for arc in between(ends) for end in _limits(
+            lambda theta: margins(theta)[searched], assembled, *arc)]
+    found = reachable_arcs(ends, assembled)
+    return [tuple(_trimmed(assembled, *arc)) for arc in found] if ends else found
+
+
+def _limits(margins, assembled, lo, hi) -> List[float]:
+    """Return the angles where a linkage stops or starts to be assembled on an arc."""
+    theta = sampled(lo, hi, SAMPLES)
+    theta = np.unique(np.concatenate([theta, _touches(margins, theta)]))
+    held = assembled(theta)
+    found = np.flatnonzero(held[1:] != held[:-1])
+    start = np.where(held[found], theta[found], theta[found + 1])
+    last, _ = refined(assembled, start, theta[found] + theta[found + 1] - start)
+    return last.tolist()
+
+
+def _touches(margins, theta) -> np.ndarray:
+    """Return where margins come nearest to zero between samples."""
+    values = margins(theta)
+    row, place = np.nonzero(near_misses(values))
+    sign = np.sign(values[row, place + 1])[:, None]
+    chosen = np.arange(len(row))
+
+    def distance(angles):
+        found = margins(angles.ravel()).reshape(-1, *angles.shape)
+        return sign * found[row, chosen]
+
+    return lowest(distance, theta[place], theta[place + 2])
+
+
+def _trimmed(assembled, lo, hi):
+    """Return an arc whose ends can be assembled."""
+    if hi - lo >= math.tau:
+        return lo, hi
+    ends, middle = np.array([lo, hi]), np.full(2, 0.5 * (lo + hi))
+    return np.where(assembled(ends), ends, refined(assembled, middle, ends)[0]).tolist()
 
 
 def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool]) -> List[Arc]:
     """Return the arcs between angles where reachability may change, joined where they touch."""
     parts = between(ends)
-    held = [arc for arc in parts if reachable(0.5 * (arc[0] + arc[1]))]
+    held = [arc for arc in parts if bool(reachable(0.5 * (arc[0] + arc[1])))]
     if held == parts:
         return [(-math.pi, math.pi)]
     joined: List[Arc] = []
@@ -77,6 +114,11 @@ def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool]) ->
         joined[-1] = joined[-1][0], joined.pop(0)[1] + 2.0 * math.pi
     return [(lo - 2.0 * math.pi, hi - 2.0 * math.pi) if lo >= math.pi else (lo, hi)
             for lo, hi in joined]
+
+
+def is_full_turn(reach: Sequence[Arc]) -> bool:
+    """Return whether a reach is one arc of a whole turn."""
+    return len(reach) == 1 and reach[0][1] - reach[0][0] >= math.tau
 
 
 def _crank_ends(start: float, end: float, turn: float, tolerance: float) -> List[float]:
@@ -99,41 +141,3 @@ def between(ends: Iterable[float]) -> List[Arc]:
     if not marks:
         return [(-math.pi, math.pi)]
     return list(zip(marks, marks[1:] + [marks[0] + 2.0 * math.pi]))
-
-
-def sign_changes(margin: Callable, lo: float, hi: float, samples: int = SAMPLES) -> List[float]:
-    """Return the angles where a margin changes sign, or stops existing, on an arc."""
-    theta = 0.5 * (lo + hi) - 0.5 * (hi - lo) * np.cos(np.linspace(0.0, math.pi, samples))
-    theta[0], theta[-1] = lo, hi
-    theta = np.unique(np.concatenate([theta, _turning_points(margin, theta)]))
-    above = margin(theta) >= 0.0
-    return [_bisected(margin, *theta[i:i + 2]) for i in np.flatnonzero(above[1:] != above[:-1])]
-
-
-def _turning_points(margin: Callable, theta: np.ndarray) -> np.ndarray:
-    """Return the extremes of a margin that come nearest to zero between samples."""
-    value = margin(theta)
-    inner, before, after = value[1:-1], value[:-2], value[2:]
-    dips = (inner > 0.0) & (inner <= before) & (inner <= after)
-    bumps = (inner < 0.0) & (inner >= before) & (inner >= after)
-    found = np.flatnonzero(dips | bumps) + 1
-    lo, hi = theta[found - 1], theta[found + 1]
-    down = np.where(dips[found - 1], 1.0, -1.0)
-    for _ in range(60 if len(found) else 0):
-        third = (hi - lo) / 3.0
-        left, right = down * margin(lo + third), down * margin(hi - third)
-        lo, hi = np.where(left > right, lo + third, lo), np.where(left > right, hi, hi - third)
-    return 0.5 * (lo + hi)
-
-
-def _bisected(margin: Callable, lo: float, hi: float) -> float:
-    """Return the last angle, to the last digit, on the side of a sign change that is >= 0."""
-    within = bool(margin(lo) >= 0.0)
-    while True:
-        middle = 0.5 * (lo + hi)
-        if not lo < middle < hi:
-            return float(lo if within else hi)
-        if bool(margin(middle) >= 0.0) == within:
-            lo = middle
-        else:
-            hi = middle

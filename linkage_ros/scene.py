@@ -22,19 +22,21 @@ node declares. No ROS is needed.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field as some, replace
 from functools import lru_cache
 import math
 import re
-from typing import Any, Dict, List, Mapping, Optional, Tuple
+from typing import Any, Dict, List, Optional, Tuple
 
 from . import mechanisms
 from .assembly import Assembly, is_full_turn
 from .mechanism import Mechanism
-from .parameters import Field, Parameter, plain, SceneError, shortened, shown, Values
+from .parameters import Field, Parameter, plain, SceneError, Values
+from .words import elided, listed, quoted
 
-__all__ = ['Crank', 'Machine', 'Parameter', 'Scene', 'SceneError', 'in_words', 'listed', 'load',
-           'plain', 'read', 'shortened', 'shown']
+__all__ = ['Crank', 'Machine', 'Parameter', 'Scene', 'SceneError', 'in_words', 'load', 'plain',
+           'read']
 
 DRIVER, KINEMATICS, INVERSE = ALL = 'crank_driver', 'kinematics', 'servo_inverse'
 # Whose values of the parameters that several nodes act on count.
@@ -43,19 +45,18 @@ OWNER = KINEMATICS
 # What a crank that swings by default leaves of its reach at each end, as a part of its width.
 MARGIN = 0.01
 NARROWEST_SWEEP = 1e-6
-MOST_LISTED = 6
 FULL_TURN = ((-math.pi, math.pi),)
 
 # What the client library declares for itself.
 _ROS = re.compile(r'(use_sim_time|start_type_description_service|qos_overrides\..*)$')
-_NAME = re.compile(r'(?=.{1,60}$)[A-Za-z](_?[A-Za-z0-9])*')
+_NAME = re.compile(r'(?=.{1,64}$)[A-Za-z](_?[A-Za-z0-9])*')
 
 
 TYPES = (*mechanisms.TYPES, mechanisms.CUSTOM)
 
 MECHANISMS = Field(
     'string_array', 'Names of the mechanisms in the scene.', readers=ALL, read_only=True,
-    rule='at least one, each once, of up to 60 letters, digits and single underscores, '
+    rule='at least one, each once, of up to 64 letters, digits and single underscores, '
          'a letter first', pattern=_NAME)
 FRAME_ID = Field('string', 'Frame that the poses are in.', readers=(KINEMATICS,),
                  rule='1 to 100 letters, digits and _ . : - /, the first a letter, digit or _',
@@ -162,7 +163,8 @@ def load(path: str) -> Scene:
     try:
         with open(path) as file:
             given = dict(_flattened(yaml.safe_load(file)['/**']['ros__parameters']))
-    except (yaml.YAMLError, KeyError, TypeError, AttributeError, UnicodeDecodeError) as error:
+    except (yaml.YAMLError, LookupError, TypeError, AttributeError, ValueError,
+            RecursionError) as error:
         reason = ' '.join(str(error).split())
         raise SceneError(f"{path} must be YAML with '/**:' and below it 'ros__parameters:' "
                          f'({reason})') from None
@@ -205,12 +207,6 @@ def read(given: Mapping[str, Any], before: Optional[Scene] = None, strict: bool 
     return Scene(machines, frame_id, rate, tuple(values.parameters))
 
 
-def listed(names) -> str:
-    """Return names as text, for messages: the first ones, and how many more there are."""
-    first, more = list(names)[:MOST_LISTED], len(names) - MOST_LISTED
-    return ', '.join(first) + (f' and {more} more' if more > 0 else '')
-
-
 def in_words(arcs) -> str:
     """Return arcs as text, for messages."""
     return ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in arcs)
@@ -218,6 +214,8 @@ def in_words(arcs) -> str:
 
 def _parted(given) -> Dict[str, Dict[str, Any]]:
     """Return the values by mechanism, those of none under an empty name."""
+    if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in given):
+        raise SceneError(f'a scene is values by the names of parameters, not {quoted(given)}')
     parts = {}
     for name, value in given.items():
         mechanism, dot, _ = name.partition('.')
@@ -229,8 +227,8 @@ def _refuse_unknown(names, known):
     for name in names:
         known = [f'{name}.type', *known] if f'{name}.*' in known else known
         if not _ROS.match(name):
-            raise SceneError(f'{shortened(name)} is not a parameter of the scene; allowed: '
-                             f'{", ".join(known)}')
+            raise SceneError(f'{elided(name)} is not a parameter of the scene; allowed: '
+                             f'{listed(known, 180)}')
 
 
 def _machine(name: str, given: Mapping[str, Any], old: Optional[Machine], strict) -> Machine:
@@ -239,7 +237,7 @@ def _machine(name: str, given: Mapping[str, Any], old: Optional[Machine], strict
     values = Values(given)
     type_ = values.take(f'{name}.type', TYPE, name)
     if type_ not in TYPES:
-        raise SceneError(f'{name}.type must be {TYPE.rule}, not {shown(type_)}')
+        raise SceneError(f'{name}.type must be {TYPE.rule}, not {quoted(type_)}')
     linkage, reach = _linkage(name, type_, values)
     scale = values.take(f'{name}.scale', SCALE, 1.0)
     legs = _legs(name, linkage, values)
@@ -261,7 +259,7 @@ def _linkage(name, type_, values):
     except ValueError as error:
         raise SceneError(f'{name}.dimensions: {error}') from None
     if not reach:
-        lengths = ', '.join(f'{key}={value:g}' for key, value in dimensions.items())
+        lengths = listed(f'{key}={value:g}' for key, value in dimensions.items())
         raise SceneError(f'{name}.dimensions must let the {type_} be assembled at some crank '
                          f'angle, which {lengths} do not')
     return linkage, reach
@@ -333,8 +331,8 @@ def _can_have_more_legs(linkage) -> bool:
 def _points(name, linkage, values):
     points = values.take(f'{name}.points', POINTS, linkage.points)
     if not points or len(set(points)) < len(points) or set(points) - set(linkage.points):
-        raise SceneError(f'{name}.points must name some of {", ".join(linkage.points)}, each '
-                         f'once, not {shown(points)}')
+        raise SceneError(f'{name}.points must name some of {listed(linkage.points)}, each '
+                         f'once, not {quoted(list(points))}')
     return points
 
 
@@ -371,7 +369,7 @@ def _check_sweep(name, sweep, reach):
         raise SWEEP.error(name, sweep)
     if not is_full_turn(reach) and not any(_inside(*sweep, arc) for arc in reach):
         raise SceneError(f'{name} must be inside the reach {in_words(reach)} rad, '
-                         f'not {shown(sweep)}')
+                         f'not {quoted(list(sweep))}')
 
 
 def _inside(low, high, arc) -> bool:

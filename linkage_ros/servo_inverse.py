@@ -21,6 +21,7 @@ import sys
 import numpy as np
 
 from . import node, scene
+from .words import listed
 
 try:
     from linkage_interfaces.srv import ServoInverse as ServoInverseType
@@ -44,7 +45,7 @@ class ServoInverse(node.SceneNode):
 
     def serves(self):
         """Say of which mechanisms it answers."""
-        return f'answers servo_inverse for {scene.listed(self.scene.machines)}'
+        return f'answers servo_inverse for {listed(self.scene.machines, 200)}'
 
     def adopt(self, new):
         """Forget what was asked about."""

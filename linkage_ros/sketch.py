@@ -65,6 +65,7 @@ class _Point:
     place: Complex
     home: str
     span: Real
+    stands_on: frozenset = frozenset()
     crank: Optional[planar.Crank] = None
 
 
@@ -92,6 +93,7 @@ class Sketch:
         self.folds = []
         self.cranks = []
         self._vectors = {}
+        self._ends = {}
         self._kites = {}
 
     def ground(self, name: str, x: Number, y: Number):
@@ -109,7 +111,7 @@ class Sketch:
         self.cranks.append(link)
         self._hang(centre, name, crank.bar(), length, upright, link)
         self.joint_values[link] = turning
-        self._place(name, centre, crank.bar(), link, length)
+        self._place(name, centre, crank.bar(), link, length, ())
         self.points[name].crank = crank
 
     def dyad(self, name: str, first: str, second: str, to_first: Real, to_second: Real,
@@ -126,14 +128,14 @@ class Sketch:
         corner = planar.triangle(base, to_first, to_second, side)
         self.triangles[name] = corner.y
         self.limits.append(planar.Limit(abs(corner.y), real(0.0)))
-        self._place(name, first, vector * corner, link, to_first)
+        self._place(name, first, vector * corner, link, to_first, (second,))
         self._bar(second, name, vector * (corner - Complex(1.0, 0.0)), to_second, link)
         self._add_to_frame(name, first, second, link, corner)
 
     def line(self, name: str, first: str, second: str, distance: Real):
         """Add a point on the line of a bar, a distance [m] from first, towards second."""
         vector, base, link = self._bar_between(first, second)
-        self._place(name, first, vector * (distance / base), link, abs(distance))
+        self._place(name, first, vector * (distance / base), link, abs(distance), (second,))
         if (first, second) in self._kites:
             self.points[name].place = self._kites[first, second].beyond_kite(-(distance / base))
         self._add_to_frame(name, first, second, link, Complex(distance / base, 0.0))
@@ -144,10 +146,11 @@ class Sketch:
         area = arm.offset(self.points[point].place)
         self.folds.append(planar.Limit(area, planar.GRAZE * self.distance(first, point)
                                        * self.distance(second, point)))
-        place = planar.mirror(arm, self.points[point].place)
-        bars = [place - self.points[end].place for end in (first, second)]
-        self._pair(name, first, second, planar.Dyad(*bars, ()),
-                   self.distance(first, point), self.distance(second, point))
+        ends = [(self.points[end].place, self._side(end, point).vector)
+                for end in (second, first)]
+        place, *bars = planar.mirror(arm, self.points[point].place, ends)
+        self._pair(name, first, second, planar.Dyad(*reversed(bars), ()),
+                   self.distance(first, point), self.distance(second, point), point)
         self.points[name].place = place
         if isinstance(arm, planar.CrankArm) and pin and pin.centre is self.points[point].place:
             self._kites[first, name] = arm
@@ -158,7 +161,7 @@ class Sketch:
         self.folds.append(planar.Limit(cross(to_first.vector, to_second.vector),
                                        planar.GRAZE * to_first.length * to_second.length))
         self._pair(name, first, second, planar.Dyad(to_second.vector, to_first.vector, ()),
-                   to_second.length, to_first.length)
+                   to_second.length, to_first.length, corner)
 
     def inversor(self, names: Tuple[str, str, str], pole: str, pin: str, long: Real, short: Real):
         """Add a Peaucellier cell: the joint right of pole -> pin, the corner, the left joint."""
@@ -167,7 +170,7 @@ class Sketch:
         self.limits += found.right.limits
         self._pair(right, pole, pin, found.right, long, short)
         link = self._hang(right, corner, found.left.second, short)
-        self._place(corner, right, found.left.second, link, short)
+        self._place(corner, right, found.left.second, link, short, ())
         self.points[corner].place = self.points[pole].place + found.inverse
         self.corners[corner] = pole, pin, (long - short) * (long + short)
         self._pair(left, pole, pin, found.left, long, short)
@@ -180,7 +183,7 @@ class Sketch:
         found = planar.slot(self.arm(pivot, pin), offset, half)
         self.limits.append(found.limit)
         lever = self._hang(pivot, tip, found.along, length, True, self._numbered('lever'))
-        self._place(tip, pivot, found.along * length, lever, length)
+        self._place(tip, pivot, found.along * length, lever, length, (pin,))
         self.transmissions[tip] = arctangent(abs(found.slide), offset)
         self._slide('slide', lever, pivot, pin, found.slide, Complex(0.0, offset))
 
@@ -192,7 +195,7 @@ class Sketch:
         found = planar.slider(rail, rod, side)
         self.limits += found.limits
         link = self._hang(pin, name, found.rod, rod)
-        self._place(name, pin, found.rod, link, rod)
+        self._place(name, pin, found.rod, link, rod, (origin,))
         self.transmissions[name] = arctangent(abs(found.reach), rail.height)
         block = self._slide('block', GROUND, origin, name, found.place, Complex(0.0, 0.0),
                             direction)
@@ -212,10 +215,13 @@ class Sketch:
     def _bar_between(self, first, second):
         """Return the vector between two joints of one link."""
         if (first, second) not in self._vectors:
-            link, frame = self._link_of(first, second)
-            length = (frame[second] - frame[first]).length()
-            vector = self.points[second].place - self.points[first].place
-            self._vectors[first, second] = _Vector(vector, length, link)
+            link = self._shared_link(first, second)
+            if not link:
+                raise SketchError(f'{first} and {second} are not joints of one moving link')
+            bar, frame = self._vectors[self._ends[link]], self.frames[link]
+            across = frame[second] - frame[first]
+            self._vectors[first, second] = _Vector(
+                bar.vector * (across / bar.length), across.length(), link)
         return self._vectors[first, second]
 
     def _side(self, first, second):
@@ -226,11 +232,10 @@ class Sketch:
             return _Vector(vector, vector.length(), GROUND)
         return self._bar_between(first, second)
 
-    def _link_of(self, first, second):
-        for link, frame in self.frames.items():
-            if first in frame and second in frame:
-                return link, frame
-        raise SketchError(f'{first} and {second} are not joints of one moving link')
+    def _shared_link(self, first, second):
+        """Return the moving link that two joints are on, None if there is none."""
+        return next((link for link, frame in self.frames.items()
+                     if first in frame and second in frame), None)
 
     def _numbered(self, word):
         taken = sum(link.name.rstrip('0123456789') == word for link in self.links)
@@ -247,6 +252,9 @@ class Sketch:
     def arm(self, first: str, second: str) -> planar.Arm:
         """Return the arm from one joint to another."""
         ends = self.points[first], self.points[second]
+        if self._shared_link(first, second):
+            bar = self._bar_between(first, second)
+            return planar.Arm(ends[0].place, bar.vector, bar.length, bar.length)
         for (foot, pin), reverse in ((ends, False), (ends[::-1], True)):
             if pin.crank and foot.home == GROUND and foot.place is not pin.crank.centre:
                 return planar.CrankArm(foot.place, pin.crank, reverse)
@@ -255,19 +263,22 @@ class Sketch:
 
     def _between(self, first, second):
         """Return the vector between two joints; bars from one joint to both keep more digits."""
+        ends = [self.points[end] for end in (first, second)]
+        shared = ends[0].stands_on & ends[1].stands_on
         for name in self.points:
-            if (name, first) in self._vectors and (name, second) in self._vectors:
-                return self._vectors[name, second].vector - self._vectors[name, first].vector
-        return self.points[second].place - self.points[first].place
+            bars = [self._vectors.get((name, end)) for end in (first, second)]
+            if name in shared and all(bars):
+                return bars[1].vector - bars[0].vector
+        return ends[1].place - ends[0].place
 
     def distance(self, first: str, second: str) -> Real:
         """Return the constant distance [m] of two joints of one link or of the ground."""
         return self._side(first, second).length
 
-    def _pair(self, name, first, second, found, to_first, to_second):
+    def _pair(self, name, first, second, found, to_first, to_second, *others):
         """Join the two bars of a dyad: the joint belongs to the first, the second is cut there."""
         link = self._hang(first, name, found.first, to_first)
-        self._place(name, first, found.first, link, to_first)
+        self._place(name, first, found.first, link, to_first, (second, *others))
         link = self._hang(second, name, found.second, to_second)
         self._bar(second, name, found.second, to_second, link)
         self.transmissions[name] = planar.transmission(found)
@@ -285,6 +296,7 @@ class Sketch:
         self.directions[name] = bar
         self.joint_values[name] = arctangent(relative.y, relative.x)
         self.frames[name] = {joint: Complex(0.0, 0.0), tip: Complex(length, 0.0)}
+        self._ends[name] = joint, tip
         return name
 
     def _add_to_frame(self, name, first, second, link, corner):
@@ -292,10 +304,11 @@ class Sketch:
         frame = self.frames[link]
         frame[name] = frame[first] + (frame[second] - frame[first]) * corner
 
-    def _place(self, name, start, vector, link, length):
-        """Place a joint at the end of a bar from another."""
+    def _place(self, name, start, vector, link, length, others):
+        """Place a joint at the end of a bar from another; it stands on others as well."""
         origin = self.points[start]
-        self.points[name] = _Point(origin.place + vector, link, origin.span + length)
+        stands_on = frozenset().union(*({x} | self.points[x].stands_on for x in (start, *others)))
+        self.points[name] = _Point(origin.place + vector, link, origin.span + length, stands_on)
         self._bar(start, name, vector, length, link)
 
     def _bar(self, first, second, vector, length, link):

@@ -18,8 +18,6 @@ import math
 
 from accuracy import case_of, truth
 from linkage_ros import mechanisms
-from linkage_ros.inverse import Pieces
-from linkage_ros.planar import GRAZE
 import numpy as np
 import pytest
 import reference
@@ -155,27 +153,47 @@ def four_bar(**changed):
     return mechanisms.create('four_bar', **changed)
 
 
-@pytest.mark.parametrize('kind, output', [
-    ('four_bar', 'QB'), ('four_bar', 'A.x'), ('slider_crank', 'block'), ('slider_crank', 'B.x'),
-    ('slotted_lever', 'lever'), ('slotted_lever', 'L.x'), ('peaucellier', 'C.y'),
-    ('jansen', 'BC'), ('jansen', 'D.y'), ('klann', 'BD'), ('pantograph', 'FB'),
-    ('whitworth', 'lever')])
-def test_the_closed_form_and_the_bracketed_search_agree(kind, output):
-    rng = np.random.default_rng(4)
-    for side in (1, -1):
-        linkage = mechanisms.create(kind)
-        linkage = mechanisms.create(kind, branches=dict.fromkeys(linkage.branches, side)) \
-            if kind in ('four_bar', 'slider_crank', 'slotted_lever', 'whitworth') else linkage
-        wanted = value_at(linkage, output, inside(linkage, rng, 40))
-        closed = linkage.crank_angle(output, wanted)
-        assert linkage._structure.backward(output) is not None
-        searched = Pieces(linkage._curve('output', output, ()), linkage.reach(),
-                          linkage._marks(()), turned(linkage, output), GRAZE * linkage.longest)
-        searched = np.sort(searched.answers(wanted), axis=0).T
-        searched = searched[:, :closed.shape[1]]
-        assert (np.isfinite(closed) == np.isfinite(searched)).all()
-        np.testing.assert_allclose(np.sort(np.mod(closed, 2 * math.pi)),
-                                   np.sort(np.mod(searched, 2 * math.pi)), atol=1e-8)
+CHANGE_POINTS = [
+    {'a': 1.0, 'b': 2.0, 'c': 3.0, 'd': 4.0, 'p': 1.0}, {'a': 1.0, 'b': 4.0, 'c': 2.0, 'd': 3.0},
+    {'a': 3.0, 'b': 1.0, 'c': 2.0, 'd': 4.0}, {'a': 2.0, 'b': 2.0, 'c': 2.0, 'd': 2.0}]
+
+
+@pytest.mark.parametrize('lengths', CHANGE_POINTS)
+@pytest.mark.parametrize('output', ['P.x', 'P.y', 'B.x', 'B.y', 'QB', 'AB'])
+def test_answers_are_those_of_the_turn_that_the_change_point_begins(lengths, output):
+    linkage = mechanisms.create('four_bar', **lengths)
+    theta = inside(linkage, np.random.default_rng(5), 40)
+    theta = np.mod(theta + math.pi, 2 * math.pi) - math.pi
+    wanted = value_at(linkage, output, theta)
+    answers = linkage.crank_angle(output, wanted)
+    back = difference(linkage, output, value_at(linkage, output, answers), wanted[:, None])
+    assert (np.abs(back[np.isfinite(answers)]) < 1e-13 * linkage.longest).all()
+    away = np.nanmin(np.abs(answers - theta[:, None]), axis=1)
+    # A rhombus stands still on one half of its turn, where any angle would do.
+    moving = np.abs(value_at(linkage, output, theta + 1e-4) - wanted) > 1e-9
+    assert (away[moving] < 1e-7).all()
+
+
+@pytest.mark.parametrize('output', ['LR', 'R.x', 'L.x', 'lever', 'slide', 'block'])
+def test_a_pin_that_passes_the_pivot_breaks_the_output_off_and_not_the_answers(output):
+    lever = mechanisms.create('whitworth', a=100.0, b=100.0, c=60.0, d=400.0)
+    theta = np.linspace(-3.1, 3.1, 40)
+    wanted = value_at(lever, output, theta)
+    answers = lever.crank_angle(output, wanted)
+    assert (np.nanmin(np.abs(answers - theta[:, None]), axis=1) < 1e-7).all()
+    back = difference(lever, output, value_at(lever, output, answers), wanted[:, None])
+    assert (np.abs(back[np.isfinite(answers)]) < 1e-12 * lever.longest).all()
+
+
+@pytest.mark.parametrize('pole, still', [
+    ('-r 0', 'x'), ('r 0', 'x'), ('0 r', 'y'), ('0 -r', 'y'), ('-0.7 0', 'x'), ('0 0.7', 'y')])
+def test_a_guide_that_is_straight_up_to_rounding_stands_still_across_its_line(pole, still):
+    guide = mechanisms.create('custom', r=0.7, joints=(
+        f'P ground {pole}', 'O ground 0 0', 'A crank O r', 'B C D inversor P A 2.1 0.9'))
+    values = guide.solve(np.linspace(*guide.reach()[0], 50)[1:-1])['C'][:, 'xy'.index(still)]
+    assert np.ptp(values) < 1e-14
+    answers = guide.crank_angle(f'C.{still}', values)
+    assert answers.shape == (48, 1) and np.isnan(answers).all()
 
 
 def test_the_inversor_s_height_gives_the_crank_by_its_tangent():

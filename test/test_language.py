@@ -14,14 +14,20 @@
 
 """The words in which linkages are written, and what is said about a slip of the pen."""
 
+from fractions import Fraction
 import math
+import random
 import re
+import time
 
-from linkage_ros import language, mechanisms
+from hostile_texts import LEGAL, mutations, TEXTS
+from linkage_ros import language, mechanisms, scene
 import numpy as np
 import pytest
 
 FOUR_BAR = ('O ground 0 0', 'Q ground g 0', 'A crank O m', 'B dyad A Q b c left')
+# More digits than Python writes.
+HUGE = pytest.param(10 ** 5000, id='huge')
 LENGTHS = {'g': 4.0, 'm': 1.0, 'b': 3.0, 'c': 2.5}
 
 
@@ -62,31 +68,118 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P ground 0 zz', 'dimension zz has no value; given: g, m, b, c'),
     ('P ground 0 g*', "'g*' is no number, dimension or arithmetic on them"),
     ('P ground 0 g.real', "'g.real' is no number, dimension or arithmetic on them"),
-    ('P ground 0 g**2', "'g ** 2' is no number"),
+    ('P ground 0 g**2', "'g**2' is no number"),
     ('P ground 0 max(g)', "'max(g)' is no number"),
-    ('P ground 0 True', "'True' is no number"),
+    ('P ground 0 True', 'dimension True has no value; given: g, m, b, c'),
     ('P ground 0 1/0', 'divides by zero'),
     ('P ground 0 1e999', 'too large'),
     ('P ground 0', 'expected "NAME ground X Y"'),
+    ('P P S inversor Q A 3 1', 'joint P is placed already'),
+    ('P S P inversor Q A 3 1', 'joint P is placed already'),
+    ('P Q S inversor Q A 3 1', 'joint Q is placed already'),
+    ('P S T inversor P A 3 1', 'joint P is not placed before'),
+    ('P ground 0, 0', "'0,' is no number"),
+    ('P ground 0, 0', 'numbers are separated by spaces, without commas'),
+    ('P ground 0,0', 'numbers are separated by spaces, without commas'),
+    ('P ground 2 * m 0', 'arithmetic has no spaces: 2*r, not 2 * r'),
+    ('P ground 2 *m', 'arithmetic has no spaces'),
+    ('P ground max(m, g) 0', 'arithmetic has no spaces'),
+    ('P ground 0 sqrt(m-g', "'sqrt(m-g' is no number"),
+    ('P ground 0 sqrt(m-g)', "'sqrt(m-g)' is not finite"),
+    ('P ground 0 sqrt(1-2)', "'sqrt(1-2)' is not real: a number is 0 or between 1e-70 and 1e70"),
+    ('P ground 0 m/(g-4)', 'is not finite'),
+    ('P ground 0 m/(1-1)', 'divides by zero'),
+    ('P ground 0 1e-400', "'1e-400' is too small"),
+    ('P ground 0 1e-71*m', "'1e-71' is too small"),
+    ('P ground 0 1e40*1e40', "'1e40*1e40' is too large"),
+    ('P ground 0 ' + '9' * 310, 'is too large: a number is 0 or between 1e-70 and 1e70'),
+    ('P ground g*g*1e70 0', "'g*g*1e70' must be 0 or between 1e-70 and 1e70"),
+    ('P ground 0 30deg', "'30deg' is in degrees, but Y is a length"),
+    ('P slider A b Q 90 out', '90 is more than a turn; in degrees it is written 90deg'),
+    ('P slider A b Q -90 out', '-90 is more than a turn; in degrees it is written -90deg'),
+    ('P slider A b Q 45*2 out', 'in degrees it is written (45*2)deg'),
+    ('P slider A b Q m+90 out', 'in degrees it is written (m+90)deg'),
+    ('P slider A b Q 90 deg out', 'an angle is in rad, or in degrees: 30deg'),
+    ('P dyad A Q 1 1 left R ground 0 0', 'one line a joint'),
+    ('P' * 65 + ' ground 0 0', 'a letter, then up to 63 letters, digits and underscores'),
 ])
 def test_a_wrong_line_is_refused_with_the_line_and_what_is_allowed(line, problem):
     if problem is None:
         assert made(line).reach()
         return
-    with pytest.raises(ValueError, match=re.escape(f'joint line "{line}": ') + '.*'
+    shown = line if len(line) <= 60 else line[:57] + '...'
+    with pytest.raises(ValueError, match=re.escape(f'joint line "{shown}": ') + '.*'
                        + re.escape(problem)):
         made(line)
 
 
 def test_a_name_that_calls_python_is_only_a_name():
-    with pytest.raises(ValueError, match='dimension __import__ has no value'):
+    with pytest.raises(ValueError, match='is no number, dimension or arithmetic on them'):
         made('P ground __import__("os") 0')
+    with pytest.raises(ValueError, match='dimension exit has no value'):
+        made('P ground exit 0')
 
 
-@pytest.mark.parametrize('joints', [None, [], 'O ground 0 0'])
+def in_order(*numbers):
+    """Return a chain of dyads' lines: the ground, then those of these numbers."""
+    lines = ['O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'P dyad A Q 3 2.5 left',
+             'R dyad P Q 2 2 left', 'S dyad R P 3 3 left', 'T dyad S R 2 2.5 right']
+    return [lines[number - 1] for number in (1, 2, 3, *numbers)]
+
+
+def test_a_line_that_comes_too_early_says_which_one_to_move():
+    assert mechanisms.create('custom', joints=in_order(4, 5, 6, 7)).reach()
+    for numbers, problem in {
+            (5, 4, 6, 7): 'joint P is placed later, in line 5: move it up',
+            (4, 5, 7, 6): 'joint S is placed later, in line 7: move it up',
+            (7, 6, 5, 4): 'joint S is placed later, in line 5: move it up'}.items():
+        with pytest.raises(ValueError, match=problem):
+            mechanisms.create('custom', joints=in_order(*numbers))
+
+
+@pytest.mark.parametrize('lines, circle', [
+    (('P dyad A R 2 2 left', 'R dyad Q P 2 2 left'), 'joints P, R wait'),
+    (('P dyad A S 2 2 left', 'R dyad Q P 2 2 left', 'S rigid P R 1 1 left'), 'joints P, S wait'),
+    (('P ground 1 1', 'S rigid P R 1 1 left', 'R dyad Q T 2 2 left', 'T mirror A Q S'),
+     'joints S, T, R wait')])
+def test_a_group_of_three_bars_is_named_by_the_joints_that_wait_for_each_other(lines, circle):
+    with pytest.raises(ValueError, match=f'{circle} for each other: only groups of two bars'):
+        mechanisms.create('custom', joints=in_order() + list(lines))
+
+
+def test_a_long_circle_and_a_long_list_are_elided():
+    many = [f'P{i} dyad P{i + 1} Q 1 1 left' for i in range(500)]
+    with pytest.raises(ValueError, match=r'joints P0, P500, P499, .*, \.\.\. \(501\) wait'):
+        mechanisms.create('custom', joints=[*in_order(), *many, 'P500 dyad P0 Q 1 1 left'])
+    many = [f'P{i} ground {i} 0' for i in range(500)]
+    with pytest.raises(ValueError, match=r'there are: O, Q, A, P0, .*, \.\.\. \(503\)$'):
+        mechanisms.create('custom', joints=[*in_order(), *many, 'Z dyad X Q 1 1 left'])
+
+
+@pytest.mark.parametrize('joints', [
+    None, [], (), '', 'O ground 0 0', 'O ground 0 0\nA crank O 1', b'O ground 0 0', 5, 0.5, True,
+    {'O ground 0 0'}, frozenset(FOUR_BAR), dict.fromkeys(FOUR_BAR), len, str, object(), iter(()),
+    np.array('O ground 0 0'), np.array([])])
 def test_joints_are_a_list_of_lines(joints):
     with pytest.raises(ValueError, match='joints must be a list of lines, one a joint'):
         mechanisms.create('custom', joints=joints)
+
+
+@pytest.mark.parametrize('line', [None, 5, b'P ground 0 0', ['P ground 0 0'], {}, 1j, math.nan,
+                                  np.array(['P', 'ground', '0', '0']), HUGE])
+def test_a_line_is_a_text(line):
+    with pytest.raises(ValueError, match='joints must be lines of text, but line 5 is'):
+        made(line)
+
+
+@pytest.mark.parametrize('kind', [list, tuple, iter, np.array, lambda lines: map(str, lines)])
+def test_lines_may_come_in_any_order_keeping_kind(kind):
+    assert mechanisms.create('custom', joints=kind(FOUR_BAR), **LENGTHS).points == tuple('OQAB')
+
+
+def test_a_linkage_has_up_to_two_thousand_lines():
+    with pytest.raises(ValueError, match='joints must be up to 2000 lines, got more'):
+        mechanisms.create('custom', joints=iter(lambda: 'O ground 0 0', None))
 
 
 def test_a_linkage_needs_a_crank():
@@ -111,9 +204,109 @@ def test_the_last_joint_is_traced_unless_another_is_named():
 
 @pytest.mark.parametrize('number, value', [
     ('g', 4.0), ('2*m', 2.0), ('g-m/2', 3.5), ('-(g+m)*2', -10.0), ('max(m,b)', 3.0),
-    ('1.5e-2', 0.015), ('g/m/2', 2.0), ('--m', 1.0)])
+    ('1.5e-2', 0.015), ('g/m/2', 2.0), ('--m', 1.0), ('pi', math.pi),
+    ('m-pi/2', 1.0 - math.pi / 2), ('sqrt(2)', math.sqrt(2)), ('sqrt(g*g+b*b)', 5.0),
+    ('sqrt(max(m,g))', 2.0), ('.5', 0.5),
+    ('max(max(m,g),-max(b,c))', 4.0), ('2.*m', 2.0), ('1E2', 100.0), ('2*-m', -2.0), ('-0', 0.0),
+    ('b-b', 0.0), ('(((g)))', 4.0), ('+'.join(['m', 'g'] * 250), 1250.0),
+    ('(' * 4000 + 'g' + ')' * 4000, 4.0), ('1e-70*1e70', 1.0)])
 def test_a_number_is_arithmetic_on_dimensions(number, value):
     assert made(f'P ground {number} 0').solve(0.0, ('P',))['P'].tolist() == [value, 0.0]
+
+
+def arithmetic(rng, depth):
+    """Return arithmetic at random, that Python's own grammar reads as well."""
+    if not depth or rng.random() < 0.15:
+        return rng.choice(('g', 'm', 'b', 'c', 'pi', '2', '0.5', '1e-3', '.25', '3.'))
+    one, two = (arithmetic(rng, depth - 1) for _ in range(2))
+    return rng.choice((f'{one}+{two}', f'{one}-{two}', f'{one}*{two}', f'{one}/{two}', f'-{one}',
+                       f'({one})', f'({one}-{two})', f'max({one},{two})', f'sqrt({one})'))
+
+
+def test_arithmetic_is_what_python_makes_of_the_same_letters():
+    rng, tried = random.Random(5), 0
+    known = {**LENGTHS, 'pi': math.pi, 'sqrt': math.sqrt, 'max': max}
+    for _ in range(200):
+        number = arithmetic(rng, 5)
+        try:
+            value = eval(number, known)
+        except (ValueError, ZeroDivisionError):
+            with pytest.raises(ValueError, match='joint line "P ground'):
+                made(f'P ground {number} 0')
+            continue
+        found = made(f'P ground {number} 0').solve(0.0, ('P',))['P'][0]
+        assert found == pytest.approx(value, rel=1e-13, abs=1e-13), number
+        tried += 1
+    assert 100 < tried < 200
+
+
+@pytest.mark.parametrize('angle, rad', [
+    ('30deg', math.radians(30)), ('-12.5deg', math.radians(-12.5)), ('90deg', math.pi / 2),
+    ('pi/2', math.pi / 2), ('-pi', -math.pi), ('2*pi', 2 * math.pi), ('450deg', math.pi / 2),
+    ('(m+29)deg', math.radians(30)), ('pi/2-30deg', math.radians(60)), ('6.2832', 6.2832),
+    ('p', 0.7), ('(p)deg', math.radians(0.7)), ('p*pi/180', math.radians(0.7)), ('p/2-m', -0.65)])
+def test_an_angle_is_in_rad_or_in_degrees(angle, rad):
+    linkage = made(f'P slider A b+c Q {angle} out', 'S line A B p', p=0.7)
+    place = linkage.solve(0.4)
+    along = place['P'] - place['Q']
+    assert math.sin(math.atan2(along[1], along[0]) - rad) == pytest.approx(0.0, abs=1e-14)
+    assert np.dot(place['P'] - place['A'], (math.cos(rad), math.sin(rad))) > 0.0
+
+
+def test_a_dimension_that_is_an_angle_is_not_more_than_a_turn_either():
+    linkage = made('P slider A b Q p out', p=6.0)
+    for angle in (90.0, -7.0, np.array([0.0, 7.0])):
+        with pytest.raises(ValueError, match=re.escape('in degrees it is written (p)deg')):
+            linkage.with_dimensions(p=angle)
+
+
+def test_a_dimension_that_is_an_angle_may_be_an_array():
+    swept = made('P slider A b+c Q p out', p=np.array([0.1, 0.2])).solve(0.5)['P']
+    for angle, place in zip((0.1, 0.2), swept):
+        one = made('P slider A b+c Q p out', p=angle).solve(0.5)['P']
+        np.testing.assert_allclose(place, one, rtol=1e-15)
+
+
+@pytest.mark.parametrize('unit', [2.0 ** -900, 2.0 ** 900])
+def test_lengths_that_grow_with_the_dimensions_are_right_at_any_size(unit):
+    lines = ('P ground g*b/c sqrt(m*g)', 'R slider A sqrt(b*b+c*c) Q m/g out',
+             'S line A B max(0,b-c)/2', 'T slider A b+c Q pi/2*(m/g) in')
+    place, scaled = (made(*lines, **{name: length * size for name, length in LENGTHS.items()})
+                     .solve(0.7) for size in (1.0, unit))
+    for joint, where in place.items():
+        np.testing.assert_array_equal(scaled[joint], where * unit, joint)
+
+
+@pytest.mark.parametrize('line', ['P ground g/c 0', 'P ground g*g 0', 'P ground g+1 0',
+                                  'P slider A b+c Q m out', 'P slider A b+c Q m*g out'])
+def test_other_lengths_are_in_metres_and_those_are_bounded(line):
+    place = made(line).solve(0.7)['P']
+    assert np.isfinite(place).all()
+    with pytest.raises(ValueError, match='must be 0 or between 1e-70 and 1e70|more than a turn'):
+        made(line, **{name: length * 1e71 for name, length in LENGTHS.items()})
+
+
+@pytest.mark.parametrize('name', ['pi', 'max', 'sqrt', 'deg', '', ' ', 'g ', 'a.b', '_a', '2a',
+                                  '\u03bb', '\uff47', 'a' * 65, 'a\n', 'a-b', '[m]'])
+def test_some_names_are_not_for_dimensions(name):
+    with pytest.raises(ValueError, match='no dimension can be called'):
+        made(**{name: 1.0})
+    with pytest.raises(ValueError, match='no dimension can be called'):
+        scene.read(four_bar_scene(**{f'f.dimensions.{name}': 1.0}))
+
+
+@pytest.mark.parametrize('name', ['tracer', 'joints', 'branches'])
+def test_what_create_takes_is_no_dimension(name):
+    given = four_bar_scene(**{f'f.dimensions.{name}': 1.0})
+    with pytest.raises(scene.SceneError, match=f"no dimension can be called '{name}'"):
+        scene.read({**given, 'f.joints': [*FOUR_BAR, f'P ground {name} 0']})
+    with pytest.raises(ValueError, match=f"no dimension can be called '{name}'"):
+        made(f'P ground {name} 0')
+
+
+def test_any_other_name_is_for_a_dimension():
+    for name in ('lambda', 'type_', 'inf', 'nan', 'e', 'x', 'None', 'a' * 64, 'maximum', 'pi2'):
+        assert made(f'P ground {name} 0', **{name: 2.5}).solve(0.0)['P'][0] == 2.5
 
 
 def test_every_construction_says_what_follows_it_in_the_module_s_text():
@@ -160,3 +353,189 @@ def test_any_two_joints_of_a_link_carry_a_triangle_or_a_line():
 def test_links_have_names_of_their_own():
     with pytest.raises(ValueError, match='its link A_B_C would have the name of another'):
         made('A_B line A B 1', 'C dyad A_B Q 3 3 left', 'B_C dyad A Q 3 3 left')
+
+
+@pytest.mark.parametrize('value', [
+    None, '1', b'1', True, 1j, [1j], ['1', '2'], [None, 1.0], [True, False], {}, {1.0}, {'a': 1.0},
+    [[1.0], [1.0, 2.0]], [], [[]], object(), len, np.array([1.0, 'a'], object), iter([1.0]),
+    np.datetime64('2026-01-01'), np.array(1j), [[[]]] * 3, slice(1), 10 ** 400, [10 ** 400],
+    HUGE, math.nan, math.inf, -math.inf, [1.0, math.nan], -1.0, 0, [1.0, 0.0], 1e301, 1e-301])
+def test_a_dimension_is_a_number_or_an_array_of_numbers(value):
+    for create in (lambda: made(b=value), lambda: mechanisms.create('four_bar', b=value)):
+        with pytest.raises(ValueError, match='dimension b must .*, got ') as said:
+            create()
+        assert len(str(said.value)) < 300
+
+
+@pytest.mark.parametrize('value', [3, 3.0, Fraction(3), np.float32(3), np.int8(3), np.array(3),
+                                   np.float64(3)])
+def test_any_number_is_a_dimension(value):
+    np.testing.assert_array_equal(made(b=value).solve(0.5)['B'], made(b=3.0).solve(0.5)['B'])
+
+
+def test_arrays_of_dimensions_have_shapes_that_broadcast():
+    shapes = re.escape('must have shapes that broadcast, got g (), m (), b (2,), c (3,)')
+    with pytest.raises(ValueError, match=shapes):
+        made(b=[3.0, 3.1], c=[2.5, 2.6, 2.7])
+
+
+@pytest.mark.parametrize('branches', [
+    'B', ['B'], [('B', 1)], 5, {'B'}, ('B', 1), True, object(), b'B', {'B': 'x'}, {'B': '1'},
+    {'B': None}, {'B': 0}, {'B': 2}, {'B': 0.5}, {'B': math.nan}, {'B': 1j}, {'B': [1]}, {'B': {}},
+    {'B': True}, {'B': np.array([1, 1])}, {'B': np.array(['x'])}, {'B': 10 ** 5000}, {5: 1},
+    {None: 1}, {('B',): 1}, {'b': 1}, {'A': 1}, {'B ': 1}])
+@pytest.mark.parametrize('kind', ['custom', 'four_bar'])
+def test_branches_are_a_sign_for_some_joints(kind, branches):
+    own = {'joints': FOUR_BAR, **LENGTHS} if kind == 'custom' else {}
+    with pytest.raises(ValueError, match=r'must be \+1 or -1|has no branch|must be a mapping'):
+        mechanisms.create(kind, branches=branches, **own)
+
+
+@pytest.mark.parametrize('sign', [-1, -1.0, np.int64(-1), np.float32(-1)])
+def test_any_minus_one_is_the_other_sign(sign):
+    assert made(branches={'B': sign}).branches == {'B': -1}
+
+
+@pytest.mark.parametrize('tracer', [3, [], ['B'], {}, b'B', 0.5, True, False, object(), ('B',)])
+def test_a_tracer_is_a_name(tracer):
+    with pytest.raises(ValueError, match='tracer must be the name of a joint, got'):
+        mechanisms.create('custom', joints=FOUR_BAR, tracer=tracer, **LENGTHS)
+
+
+@pytest.mark.parametrize('kind', [None, 5, [], {}, set(), ['custom'], b'custom', True, 1j,
+                                  object(), np.array(['custom', 'jansen']), HUGE, 'Jansen', ''])
+def test_a_type_is_one_of_the_catalogue_or_custom(kind):
+    for ask in (mechanisms.create, mechanisms.design, mechanisms.defaults):
+        with pytest.raises(ValueError, match='type .*; allowed: water_drop, jansen') as said:
+            ask(kind)
+        assert len(str(said.value)) < 300
+
+
+@pytest.mark.parametrize('names', [5, None, [None], [5], [['g']], [b'g'], 'g h'])
+def test_the_names_of_dimensions_are_texts(names):
+    with pytest.raises(ValueError, match='dimensions must be a list|no dimension can be'):
+        mechanisms.design('custom', FOUR_BAR, None, names)
+
+
+@pytest.mark.parametrize('given', [None, 5, 'mechanisms', ['mechanisms'], {5: 1.0}, {None: 1.0},
+                                   {b'mechanisms': ['jansen']}, {('mechanisms',): 1}])
+def test_a_scene_is_given_by_the_names_of_parameters(given):
+    with pytest.raises(scene.SceneError, match='a scene is values by the names of parameters'):
+        scene.read(given)
+
+
+def four_bar_scene(**more):
+    """Return the parameters of a scene with a four-bar."""
+    return {'mechanisms': ['f'], 'f.type': 'custom', 'f.joints': list(FOUR_BAR),
+            **{f'f.dimensions.{name}': length for name, length in LENGTHS.items()}, **more}
+
+
+# What a text may be taken for; the names of Python's own arguments are no dimensions of the last.
+ROLES = {
+    'line': made,
+    'first line': lambda text: made(lines=(text,)),
+    'joint': lambda text: made(f'{text} ground 0 0'),
+    'joint before': lambda text: made(f'P dyad A {text} 3 3 left'),
+    'number': lambda text: made(f'P ground {text} 0'),
+    'length': lambda text: made(f'P crank O {text}'),
+    'angle': lambda text: made(f'P slider A 3 Q {text} out'),
+    'side': lambda text: made(f'P dyad A Q 3 3 {text}'),
+    'joints': lambda text: mechanisms.create('custom', joints=text, **LENGTHS),
+    'dimension': lambda text: mechanisms.design('custom', (*FOUR_BAR, f'P ground {text} 0'), None,
+                                                (*LENGTHS, text)),
+    'value': lambda text: made(b=text),
+    'tracer': lambda text: mechanisms.create('custom', joints=FOUR_BAR, tracer=text, **LENGTHS),
+    'branch': lambda text: made(branches={text: 1}),
+    'sign': lambda text: made(branches={'B': text}),
+    'type': mechanisms.create, 'design': mechanisms.design, 'defaults': mechanisms.defaults,
+    'scene': lambda text: scene.read({'mechanisms': [text]}),
+    'parameter': lambda text: scene.read({text: 1.0}),
+    'parameter of one': lambda text: scene.read(four_bar_scene(**{f'f.{text}': 1.0})),
+    'type in a scene': lambda text: scene.read({'mechanisms': ['f'], 'f.type': text}),
+    'line in a scene': lambda text: scene.read(four_bar_scene(**{'f.joints': [*FOUR_BAR, text]})),
+    'tracer in a scene': lambda text: scene.read(four_bar_scene(**{'f.tracer': text})),
+    'dimension in a scene':
+        lambda text: scene.read(four_bar_scene(**{f'f.dimensions.{text}': 1.0})),
+    'value in a scene': lambda text: scene.read(four_bar_scene(**{'f.dimensions.b': text})),
+    'branch in a scene': lambda text: scene.read(four_bar_scene(**{f'f.branches.{text}': 1})),
+    'points in a scene': lambda text: scene.read(four_bar_scene(**{'f.points': [text]})),
+}
+
+
+OUTPUTS = {
+    'solve': lambda text: BAR.solve(0.5, (text,)), 'one point': lambda text: BAR.solve(0.5, text),
+    'of an array': lambda text: BAR.solve([0.5], [text]),
+    'velocity': lambda text: BAR.velocity(0.5, (text,)),
+    'angle of a joint': lambda text: BAR.joint_angles(0.5, (text,)),
+    'rate': lambda text: BAR.joint_rates(0.5, (text,)),
+    'transmission': lambda text: BAR.transmission_angles(0.5, (text,)),
+    'function': lambda text: BAR.function((text,)),
+    'crank angle': lambda text: BAR.crank_angle(text, 0.5),
+    'changed dimension': lambda text: BAR.with_dimensions(**{text: 1.0}),
+    'changed value': lambda text: BAR.with_dimensions(b=text),
+}
+BAR = made()
+
+
+def refused(ask, text) -> bool:
+    """Return whether a text is refused, as it has to be: soon, and in a short sentence."""
+    start = time.process_time()
+    try:
+        ask(text)
+        return False
+    except ValueError as error:
+        said, kind = str(error), type(error)
+    finally:
+        assert time.process_time() - start < 0.5, text[:60]
+    assert kind in (ValueError, scene.SceneError), (kind, text[:60])
+    assert 10 < len(said) < 300 and said.isprintable(), (text[:60], said)
+    return True
+
+
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('role', [*ROLES, *OUTPUTS])
+def test_a_hostile_text_is_refused_in_a_short_sentence(role):
+    assert len(TEXTS) > 700
+    kept = [text for text in TEXTS if not refused({**ROLES, **OUTPUTS}[role], text)]
+    assert len(kept) < 0.1 * len(TEXTS) and all(len(text) < 20000 for text in kept)
+    if role in ('line', 'number', 'length', 'angle'):
+        assert len(kept) < 10, kept
+
+
+@pytest.mark.parametrize('line', LEGAL)
+def test_the_lines_that_are_mutated_are_legal(line):
+    assert made(line).points[4] == 'P'
+
+
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('count, seed', [
+    (1500, 1), pytest.param(60000, 2, marks=pytest.mark.long),
+    pytest.param(60000, 3, marks=pytest.mark.long)])
+def test_a_line_with_slips_is_refused_or_makes_a_linkage(count, seed):
+    outcomes = [refused(made, text) for text in mutations(count, seed)]
+    assert 0.5 < sum(outcomes) / count < 0.98
+
+
+def test_what_passes_is_only_what_is_documented():
+    number = re.compile(r'[0-9.eE]+|[+*/(),-]|max|sqrt|pi|deg|[gmbc]')
+    for text in mutations(1500, 4):
+        if not refused(made, text):
+            for word in text.split():
+                name = re.fullmatch('[A-Za-z][A-Za-z0-9_]*', word)
+                assert name or not number.sub('', word), text
+
+
+@pytest.mark.parametrize('names', [5, 0.5, True, object(), len, [5], [['A']], ({},), {'a': 'A'},
+                                   HUGE, [None], (None,), [b'A'], b'A'])
+def test_points_and_joints_are_names(names):
+    for ask in (BAR.solve, BAR.velocity, BAR.joint_angles, BAR.joint_rates,
+                BAR.transmission_angles, lambda _, names: BAR.function(names),
+                lambda _, names: BAR.crank_angle(names, 0.5)):
+        with pytest.raises(ValueError, match='must be a name or a list|custom has no') as e:
+            ask(0.5, names)
+        assert len(str(e.value)) < 300
+
+
+def test_one_point_is_one_name_to_a_function_as_well():
+    linkage = made('AB line A B 1')
+    assert linkage.function('AB')(0.5) == linkage.function(('AB',))(0.5)

@@ -155,7 +155,7 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
         '', ' ', '/world', 'my world', 'world\n', 'w\0', '\t', '-x', 'w' * 101, 'w' * 10 ** 6,
         '<world/>', 'w"', "w'", 'w&', 'w\u200bw', '\u2028')],
     ({'mechanisms': ['jansen\n']}, 'mechanisms must be'),
-    ({'mechanisms': ['j' * 61]}, 'mechanisms must be .* up to 60 letters'),
+    ({'mechanisms': ['j' * 65]}, 'mechanisms must be .* up to 64 letters'),
     ({'jansen.type': 'j' * 10 ** 6}, 'jansen.type must be'),
     ({'q' * 10 ** 6: 1.0}, 'qqq.* is not a parameter of the scene'),
     ({'jansen.' + 'q' * 10 ** 6: 1.0}, 'jansen.qqq.* is not a parameter of the scene'),

@@ -42,7 +42,9 @@ from . import (
     watt,
     whitworth,
 )
-from ..mechanism import checked_branches, checked_dimensions, Design, Mechanism, Structure
+from ..arguments import checked_branches, checked_dimensions
+from ..mechanism import Design, Mechanism, Structure
+from ..words import quoted
 
 # What a scene shows when it names no mechanism.
 CATALOGUE = 'water_drop', 'jansen', 'peaucellier', 'slotted_lever'
@@ -72,11 +74,11 @@ def design(type_: str, /, joints=None, tracer=None, dimensions=()) -> Design:
         For an unknown type or a bad line; the text says what is allowed.
 
     """
-    if type_ == CUSTOM:
-        return custom.design(custom.given_lines(joints), tracer, tuple(dimensions))
-    if type_ not in TYPES:
-        raise ValueError(f'unknown mechanism type {type_!r}; '
+    if not isinstance(type_, str) or type_ not in (*TYPES, CUSTOM):
+        raise ValueError(f'unknown mechanism type {quoted(type_)}; '
                          f'allowed: {", ".join((*TYPES, CUSTOM))}')
+    if type_ == CUSTOM:
+        return custom.given(joints, tracer, dimensions)
     if joints is not None or tracer is not None:
         raise ValueError(f'joints and tracer are for type custom, not for {type_}')
     return TYPES[type_].DESIGN
@@ -84,8 +86,8 @@ def design(type_: str, /, joints=None, tracer=None, dimensions=()) -> Design:
 
 def defaults(type_: str, /) -> dict:
     """Return the dimensions [m] of a type; ValueError if it is not in the catalogue."""
-    if type_ not in TYPES:
-        raise ValueError(f'no defaults for type {type_!r}; allowed: {", ".join(TYPES)}')
+    if not isinstance(type_, str) or type_ not in TYPES:
+        raise ValueError(f'no defaults for type {quoted(type_)}; allowed: {", ".join(TYPES)}')
     return dict(TYPES[type_].DESIGN.dimensions)
 
 

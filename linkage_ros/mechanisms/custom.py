@@ -14,17 +14,22 @@
 
 """Linkages that users write down themselves; see `language` for the words."""
 
-from functools import lru_cache
-from typing import Optional, Sequence, Tuple
+from collections.abc import Mapping, Set
+from functools import lru_cache, partial
+from itertools import islice
+from typing import Iterable, List, Optional, Tuple
 
 import numpy as np
 
 from .. import language
 from ..mechanism import check_bars, Design, Mechanism
+from ..words import listed, quoted
+
+MOST_LINES = 2000
 
 
 @lru_cache(maxsize=64)
-def design(joints: Tuple[str, ...], tracer: Optional[str], given: Tuple[str, ...]) -> Design:
+def design(joints: Tuple[str, ...], tracer: Optional[str], names: Tuple[str, ...]) -> Design:
     """
     Return the design that lines of joints make.
 
@@ -39,19 +44,21 @@ def design(joints: Tuple[str, ...], tracer: Optional[str], given: Tuple[str, ...
         raise ValueError('a linkage needs at least one crank line')
     for line in lines:
         for name in language.lengths([line]):
-            if name not in given:
-                raise line.error(f'dimension {name} has no value; '
-                                 f'given: {", ".join(given) or "none"}')
+            language.check_name(name)
+            if name not in names:
+                raise line.error(f'dimension {name} has no value; given: {listed(names)}')
     used = language.lengths(lines)
-    names = [name for line in lines for name in line.names]
-    if tracer is not None and tracer not in names:
-        raise ValueError(f'tracer {tracer!r} is no joint; allowed: {", ".join(names)}')
+    placed = [name for line in lines for name in line.names]
+    if tracer is not None and tracer not in placed:
+        raise ValueError(f'tracer {quoted(tracer)} is no joint; allowed: {listed(placed)}')
     signed = frozenset(name for name, length in used.items() if not length)
-    return Design('custom', dict.fromkeys(used, 1.0), joints, tracer or names[-1], signed, check)
+    return Design('custom', dict.fromkeys(used, 1.0), joints, tracer or placed[-1], signed,
+                  partial(check, lines))
 
 
-def check(linkage: Mechanism):
-    """Raise ValueError, with its line, where a bar has no length or a triangle cannot exist."""
+def check(lines: List[language.Line], linkage: Mechanism):
+    """Raise ValueError, with its line, for a number, a bar or a triangle that cannot be."""
+    language.check_numbers(lines, linkage.dimensions)
     check_bars(linkage)
     for line, exists in linkage.triangles().items():
         if not np.all(exists):
@@ -59,9 +66,34 @@ def check(linkage: Mechanism):
                              'other two together')
 
 
-def given_lines(joints: Sequence[str]) -> Tuple[str, ...]:
-    """Return the joints as a tuple of lines; raise ValueError if they are none."""
-    if isinstance(joints, str) or not joints:
-        raise ValueError(f'joints must be a list of lines, one a joint, got {joints!r}')
-    return tuple(joints)
+def given(joints: Iterable[str], tracer: Optional[str], dimensions: Iterable[str]) -> Design:
+    """Return the design of what a user gives; raise ValueError for what is none."""
+    if tracer is not None and not isinstance(tracer, str):
+        raise ValueError(f'tracer must be the name of a joint, got {quoted(tracer)}')
+    lines = given_lines(joints)
+    try:
+        names = tuple(dimensions)
+    except TypeError:
+        raise ValueError('dimensions must be a list of names, '
+                         f'got {quoted(dimensions)}') from None
+    for name in names:
+        language.check_name(name)
+    return design(lines, tracer, names)
 
+
+def given_lines(joints: Iterable[str]) -> Tuple[str, ...]:
+    """Return the joints as a tuple of lines; raise ValueError if they are none."""
+    try:
+        # A set has no order, and of a mapping only the keys would be read.
+        unfit = isinstance(joints, (str, bytes, Mapping, Set))
+        lines = () if unfit else tuple(islice(joints, MOST_LINES + 1))
+    except TypeError:
+        lines = ()
+    if not lines:
+        raise ValueError(f'joints must be a list of lines, one a joint, got {quoted(joints)}')
+    if len(lines) > MOST_LINES:
+        raise ValueError(f'joints must be up to {MOST_LINES} lines, got more')
+    for number, line in enumerate(lines, 1):
+        if not isinstance(line, str):
+            raise ValueError(f'joints must be lines of text, but line {number} is {quoted(line)}')
+    return tuple(map(str, lines))

@@ -1,0 +1,53 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Values of others, short enough to be repeated in a message."""
+
+import reprlib
+from typing import Any, Iterable
+
+# Letters of a value, and of a whole message.
+LONGEST, MESSAGE = 60, 299
+
+_short = reprlib.Repr()
+_short.maxstring = _short.maxother = _short.maxlong = LONGEST
+_short.maxlevel = 3
+_short.maxlist = _short.maxtuple = _short.maxdict = LONGEST // 3
+
+
+def elided(text: str, most: int = LONGEST) -> str:
+    """Return a text in one line of at most so many letters, unprintable ones escaped."""
+    start = ''.join(c if c.isprintable() else ascii(c)[1:-1] for c in text[:most + 1])
+    return start if len(start) <= most else start[:most - 3] + '...'
+
+
+def quoted(value: Any) -> str:
+    """Return a value as Python writes it, at most LONGEST letters of it."""
+    try:
+        return elided(_short.repr(value))
+    except Exception:
+        # An integer of more digits than Python writes, or a class that cannot write itself.
+        return f'a {elided(type(value).__name__, LONGEST - 2)}'
+
+
+def listed(names: Iterable[str], most: int = LONGEST) -> str:
+    """Return names in a row; of many the first, and how many there are."""
+    names = list(names)
+    kept, text = [], ''
+    for name in names:
+        kept.append(elided(name, most // 2))
+        text = ', '.join(kept)
+        if len(text) > most:
+            return ', '.join((*kept[:-1], f'... ({len(names)})'))
+    return text or 'none'

@@ -1,0 +1,196 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Linkages whose bars are alike, whose arms vanish, or of which a part cannot be assembled."""
+
+import math
+import tracemalloc
+
+from linkage_ros import mechanisms
+import numpy as np
+import pytest
+
+STEP = 1e-6
+
+
+def linkage(*joints, **dimensions):
+    """Return a linkage written down."""
+    return mechanisms.create('custom', joints=joints, **dimensions)
+
+
+FOUR_BAR = 'O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'B dyad A Q 3.5 3 left'
+ALIKE = {
+    'one name for both bars': linkage(*FOUR_BAR, 'C dyad B O b b left', b=3.0),
+    'one number for both bars': linkage(*FOUR_BAR, 'C dyad B O 3 3 left'),
+    'one product for both bars': linkage(*FOUR_BAR, 'C dyad B O 2*b b*2 left', b=1.5),
+    'equal bars on two moving joints': linkage(*FOUR_BAR, 'C dyad A B 3 3 left',
+                                               'D dyad C B 2 2 right'),
+    'equal bars in a five-bar': linkage(
+        'O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'C crank Q 0.8', 'P dyad A C b b left',
+        b=2.0),
+    'a slot through the pivot on a rocker': linkage(
+        *FOUR_BAR, 'R ground 5 4', 'L slot R B 0 out 5'),
+    'a slot through the crank centre': linkage(*FOUR_BAR, 'L slot O A 0 out 5'),
+    'an inversor of equal bars': linkage(*FOUR_BAR, 'C D E inversor O B 4 4'),
+    'an inversor on a rocker': linkage(*FOUR_BAR, 'C D E inversor O B a b', a=5.0, b=3.0),
+    'a kite on a coupler': linkage(*FOUR_BAR, 'P rigid A B 2 2 left', 'E dyad P Q 3 4 left',
+                                   'C mirror B P A'),
+    'a rhombus of a kite': linkage('O ground 0 0', 'C ground -r 0', 'A crank O r',
+                                   'B mirror O C A', 'D rigid B A r r left', r=0.3),
+}
+
+
+def asked(angles):
+    """Return the angles of cranks as they are asked for: one by itself, several in a list."""
+    angles = list(angles)
+    return angles if len(angles) > 1 else angles[0]
+
+
+@pytest.mark.parametrize('kind', ALIKE)
+def test_bars_that_are_alike_have_velocities_and_rates(kind):
+    found = ALIKE[kind]
+    for crank in range(len(found.cranks)):
+        theta = [np.linspace(-3.0, 3.0, 31) + 0.05 * i for i in range(len(found.cranks))]
+        now, before, after = (asked(x + side * STEP * (i == crank) for i, x in enumerate(theta))
+                              for side in (0.0, -1.0, 1.0))
+        velocity, rate = found.velocity(now, crank=crank), found.joint_rates(now, crank=crank)
+        places = [found.solve(there) for there in (before, after)]
+        angles = [found.joint_angles(there) for there in (before, after)]
+        for name in found.points:
+            numeric = (places[1][name] - places[0][name]) / (2.0 * STEP)
+            np.testing.assert_allclose(velocity[name], numeric, atol=1e-7 * found.longest,
+                                       rtol=1e-6, err_msg=name)
+        for name in found.joints:
+            step = angles[1][name] - angles[0][name]
+            step = (step + math.pi) % (2.0 * math.pi) - math.pi
+            np.testing.assert_allclose(rate[name], step / (2.0 * STEP), atol=1e-6, rtol=1e-6,
+                                       err_msg=name)
+
+
+@pytest.mark.parametrize('kind', ALIKE)
+def test_bars_that_are_alike_can_be_asked_about_their_motion(kind):
+    found = ALIKE[kind]
+    others = [0.4] * (len(found.cranks) - 1)
+    assert all(math.isfinite(theta) for theta in found.dead_points(*others))
+    assert found.distance_to_dead_point(0.5, *others) >= 0.0
+    parts = found.function(rates=found.joints)(0.5, *others)
+    assert len(parts) == 2 * len(found.points) + len(found.joints) * len(found.cranks)
+    place = found.solve(asked([0.5, *others]))
+    name = next(name for name in reversed(found.points) if np.isfinite(place[name]).all())
+    answers = found.crank_angle(f'{name}.x', place[name][0], others=others)
+    assert np.nanmin(np.abs(answers - 0.5)) < 1e-7
+
+
+@pytest.mark.parametrize('away', [0.0, 1e-15, 1e-12, 1e-8, 1e-4, 0.1])
+def test_a_kite_over_an_arm_of_no_length_has_its_velocity(away):
+    # B is the crank's centre, mirrored: it goes round a circle of radius r about C at crank speed.
+    r = 0.3
+    kite = linkage('O ground 0 0', 'C ground -r 0', 'A crank O r', 'B mirror O C A', r=r)
+    for theta in (math.pi - away, away - math.pi, -away):
+        expected = [-r * math.sin(theta), r * math.cos(theta)]
+        np.testing.assert_allclose(kite.velocity(theta)['B'], expected, atol=1e-15)
+        rates = kite.joint_rates(theta)
+        assert rates['CB'] == pytest.approx(1.0, abs=1e-14)
+        assert rates['AB'] == pytest.approx(-1.0, abs=1e-14)
+
+
+@pytest.mark.parametrize('away', [1e-15, 1e-12, 1e-8, 1e-4, 0.1])
+def test_a_lever_whose_pin_passes_the_pivot_turns_at_half_the_speed_of_the_crank(away):
+    lever = mechanisms.create('slotted_lever', a=0.7, b=0.7)
+    for theta in (math.pi - away, away - math.pi, 0.5):
+        assert lever.joint_rates(theta)['lever'] == pytest.approx(0.5, abs=1e-14)
+
+
+def test_a_joint_that_cannot_be_assembled_leaves_those_alone_that_do_not_stand_on_it():
+    cranks = 'O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'C crank Q 0.8'
+    alone = linkage(*cranks, 'P dyad A C 2 1.5 left')
+    for bars in ('0.01 0.01', '1e6 1e6', '9 1'):
+        both = linkage(*cranks, f'D dyad A C {bars} left', 'P dyad A C 2 1.5 left')
+        theta = [np.linspace(-3.0, 3.0, 40), np.linspace(2.0, -3.0, 40)]
+        for points in (None, ('P',)):
+            np.testing.assert_array_equal(both.solve(theta, points)['P'], alone.solve(theta)['P'])
+        for name in ('AP', 'CP'):
+            np.testing.assert_array_equal(both.joint_angles(theta)[name],
+                                          alone.joint_angles(theta)[name])
+            np.testing.assert_array_equal(both.joint_rates(theta, (name,))[name],
+                                          alone.joint_rates(theta, (name,))[name])
+
+
+@pytest.mark.parametrize('far', [0.0, 1e3, 1e6])
+def test_an_arm_that_is_a_bar_keeps_its_length_however_far_the_linkage_is_from_the_origin(far):
+    found = linkage('O ground x x', 'Q ground x+4 x', 'A crank O 1', 'B dyad A Q 3.5 3 left',
+                    'C rigid A B 2 2 left', 'L slot O A 0.6 out 3', 'D dyad A B 3 2 left',
+                    'E dyad C B 2.5 2 right', x=far)
+    near = linkage('O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'B dyad A Q 3.5 3 left',
+                   'C rigid A B 2 2 left', 'L slot O A 0.6 out 3', 'D dyad A B 3 2 left',
+                   'E dyad C B 2.5 2 right')
+    theta = np.linspace(-3.0, 3.0, 30)
+    here, there = near.joint_angles(theta), found.joint_angles(theta)
+    np.testing.assert_allclose(there['slide'], 0.8, rtol=1e-15)
+    for name in ('AD', 'BD', 'CE', 'BE'):
+        # They stand on one link, which they never move on.
+        np.testing.assert_allclose(there[name], here[name], atol=2e-15 + 1e-15 * far)
+    assert found.dead_points() == []
+
+
+def test_a_joint_that_cannot_be_assembled_has_no_velocity_by_any_crank():
+    found = linkage('O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'D crank Q 1',
+                    'B dyad O A 0.2 0.2 left', 'C dyad A D 3 2 left')
+    for crank in (0, 1):
+        velocity = found.velocity([0.3, 0.1], crank=crank)
+        rates = found.joint_rates([0.3, 0.1], crank=crank)
+        assert np.isnan(velocity['B']).all() and np.isnan([rates['OB'], rates['AB']]).all()
+        assert np.isfinite([velocity['C'], velocity['D']]).all() and np.isfinite(rates['AC'])
+
+
+def test_a_long_chain_is_no_matter_of_recursion():
+    chain = linkage(*FOUR_BAR[:3], 'B0 dyad A Q 3.5 3 left', *(
+        f'B{i} dyad B{i - 1} Q 3 3 left' for i in range(1, 120)))
+    velocity, rates = chain.velocity(0.5, ('B119',)), chain.joint_rates(0.5)
+    assert np.isfinite(velocity['B119']).all() and len(rates) == 241
+    ahead, behind = (chain.solve(0.5 + step, ('B119',))['B119'] for step in (1e-7, -1e-7))
+    np.testing.assert_allclose(velocity['B119'], (ahead - behind) / 2e-7, rtol=1e-5)
+    assert chain.reach() == [(-math.pi, math.pi)]
+
+
+def test_what_is_asked_again_and_again_does_not_pile_up():
+    five_bar = mechanisms.create('five_bar')
+
+    def ask(first, last):
+        for other in np.linspace(first, last, 150).tolist():
+            five_bar.crank_angle('P.y', 40.0, others=(other,))
+        return tracemalloc.get_traced_memory()[0]
+
+    tracemalloc.start()
+    try:
+        before, after = ask(0.9, 1.0), ask(0.9001, 1.0001)
+    finally:
+        tracemalloc.stop()
+    assert after - before < 200_000
+
+
+@pytest.mark.parametrize('kind', list(mechanisms.TYPES))
+def test_no_angles_give_no_places(kind):
+    found = mechanisms.create(kind)
+    none = asked([np.empty((0, 3))] * len(found.cranks))
+    assert {value.shape for value in found.solve(none).values()} == {(0, 3, 2)}
+    for ask in (found.velocity, found.joint_angles, found.joint_rates, found.transmission_angles):
+        assert all(value.size == 0 for value in ask(none).values())
+
+
+@pytest.mark.parametrize('lengths, expected', [
+    ({'a': 2.0, 'b': 3.0, 'c': 2.0, 'd': 3.0}, [-math.pi, 0.0]),
+    ({'a': 1.0, 'b': 2.0, 'c': 3.0, 'd': 4.0}, [-math.pi])])
+def test_a_dead_point_at_zero_is_zero(lengths, expected):
+    assert mechanisms.create('four_bar', **lengths).dead_points() == expected
