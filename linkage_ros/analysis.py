@@ -29,7 +29,6 @@ import numpy as np
 from .curves import refined, sampled
 from .inverse import distinct, in_order, MonotoneBranches, nearest, within_a_turn, wrapped
 from .planar import GRAZE
-from .reach import is_full_turn
 from .words import listed, quoted
 
 # How near to zero a closure comes, as a part of its size, for the output to change quickly there.
@@ -165,7 +164,8 @@ class Analysis:
 
     def _dead_points(self, others):
         reach = self.reach(*others)
-        ends = [] if is_full_turn(reach) else [end for arc in reach for end in arc]
+        # At -pi and pi a reach may only be cut, and a dead point there is found as a touch.
+        ends = [end for arc in reach for end in arc if abs(end) != math.pi]
         touched = [theta for theta, gap, rounding, _ in self._near_closures(others)
                    if gap <= rounding and all(abs(wrapped(theta - end)) > ONE for end in ends)]
         return distinct([*ends, *touched])
@@ -187,7 +187,7 @@ class Analysis:
             return
         theta = sampled(lo, hi)
         values, rates = self._split(pose.over(theta, *others))
-        size = np.nanmax(np.abs(values), axis=1, initial=0.0)
+        size = np.fmax.reduce(np.abs(values), axis=1, initial=0.0)
         for place in (0, -1):
             if abs(theta[place]) == math.pi:
                 yield from zip(repeat(theta[place]), abs(values[:, place]), rounding, size)
@@ -247,8 +247,8 @@ def _crossings(values, folds) -> tuple:
 def _approaches(theta, values, rates, near) -> tuple:
     """Return row and place of the samples after which a closure turns away close to zero."""
     sign = np.sign(values[:, :-1])
-    before, after = sign * rates[:, :-1], sign * rates[:, 1:]
     with np.errstate(all='ignore'):
+        before, after = sign * rates[:, :-1], sign * rates[:, 1:]
         # Where the tangents meet a smooth curve between two samples is lower than it gets.
         ahead = (sign * (values[:, 1:] - values[:, :-1]) - after * np.diff(theta)) / (
             before - after)

@@ -36,9 +36,9 @@ CUTS = np.arange(1, 16) / 16
 LEAST = 1e-18
 
 
-def sampled(lo: float, hi: float, samples: int = SAMPLES) -> np.ndarray:
+def sampled(lo: float, hi: float, samples: int = SAMPLES, fewest: int = 9) -> np.ndarray:
     """Return angles [rad] over an arc, evenly and ever denser towards both of its ends."""
-    even = np.linspace(lo, hi, max(9, math.ceil(samples * (hi - lo) / math.tau)))
+    even = np.linspace(lo, hi, max(fewest, math.ceil(samples * (hi - lo) / math.tau)))
     steps = (hi - lo) * 0.5 ** np.arange(2, HALVINGS)
     theta = np.concatenate([even, lo + steps, hi - steps])
     return np.unique(np.clip(theta, lo, hi))
@@ -95,9 +95,9 @@ def near_misses(values: np.ndarray) -> np.ndarray:
     There a curve has a least distance from zero that is small beside how much it bends.
     """
     before, inner, after = values[..., :-2], values[..., 1:-1], values[..., 2:]
-    sign = np.sign(inner)
-    bent = sign * (before - 2.0 * inner + after)
     with np.errstate(invalid='ignore'):
+        sign = np.sign(inner)
+        bent = sign * (before - 2.0 * inner + after)
         return ((sign * before >= sign * inner) & (sign * after >= sign * inner)
                 & (sign * inner <= 2.0 * bent))
 

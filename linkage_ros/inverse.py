@@ -43,8 +43,9 @@ MISSED = 1e-9
 
 def wrapped(theta):
     """Return angles [rad] in [-pi, pi)."""
-    theta = theta - math.tau * np.floor((theta + math.pi) / math.tau)
-    return np.where(theta >= math.pi, -math.pi, theta)
+    turned = theta - math.tau * np.floor((theta + math.pi) / math.tau)
+    turned = np.where((turned < -math.pi) | (turned >= math.pi), -math.pi, turned)
+    return np.where((theta >= -math.pi) & (theta < math.pi), theta, turned)
 
 
 def in_order(answers: np.ndarray) -> np.ndarray:

@@ -250,7 +250,8 @@ class Mechanism(Analysis):
     """
     A linkage whose dimensions are set.
 
-    A pose depends on the crank angle alone: any angle, in any order, gives the same numbers.
+    A pose depends on the crank angle alone: any angle, in any order, gives the same numbers. Joint
+    angles in arrays may differ by an ulp from those asked for one by one.
     Make one with `linkage_ros.mechanisms.create`.
     """
 

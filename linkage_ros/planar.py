@@ -46,6 +46,7 @@ from .expression import (
     gated,
     Rate,
     Real,
+    real,
     root,
     sine,
     spin,
@@ -329,6 +330,17 @@ def mirror(arm: Arm, point: Complex,
             (*turning.of, *own.of), lambda *rates, own=own: 2.0 * turning.formula(
                 *rates[:len(turning.of)]) - own.formula(*rates[len(turning.of):]))))
     return _with_velocity(image, arm.foot, bars[0]), *bars
+
+
+def parallel(bar: Complex, place: Complex) -> Complex:
+    """Return a bar like another one, NaN where its end has no place."""
+    def there(part):
+        return gated(part, abs(place.x), real(0.0))
+
+    turning = spin(bar)
+    same = Complex(there(bar.x), there(bar.y))
+    same.spin = Rate(turning.of, lambda *rates: there(turning.formula(*rates)))
+    return same
 
 
 def _with_velocity(place: Complex, start: Complex, bar: Complex) -> Complex:

@@ -30,10 +30,13 @@ import numpy as np
 from .curves import Arc, lowest, near_misses, refined, sampled
 from .planar import Limit
 
-# Samples of a whole turn in search of ends without a closed form.
-SAMPLES = 720
+# Samples of a whole turn in search of ends without a closed form, samples of an arc at least, and
+# how often arcs inside arcs are searched.
+SAMPLES, FEWEST, ROUNDS = 720, 33, 4
 # Arcs below this width [rad] are the rounding of one angle.
 NARROWEST = 2e-15
+# What margins may differ by from turn to turn, as a part of their size, and be the same.
+ALIKE = 1e-6
 
 
 def arcs(margins: Callable, limits: Sequence[Limit], value: Callable) -> List[Arc]:
@@ -50,30 +53,48 @@ def arcs(margins: Callable, limits: Sequence[Limit], value: Callable) -> List[Ar
         From an expression of dimensions to its value.
 
     """
-    def assembled(theta):
+    def failing(theta):
+        """Return the number of the first limit that is not kept, that of all where none is."""
         with np.errstate(invalid='ignore'):
-            return (margins(np.ravel(theta)) >= 0.0).all(axis=0).reshape(np.shape(theta))
+            kept = margins(np.ravel(theta)) >= 0.0
+        return np.vstack([kept, np.zeros(kept.shape[1:], bool)]).argmin(axis=0).reshape(
+            np.shape(theta))
+
+    def assembled(theta):
+        return failing(theta) == len(limits)
 
     ends = [end for limit in limits if limit.crank == 0
             for end in _crank_ends(*map(value, (
                 limit.start, limit.end, limit.turn, limit.tolerance)))]
-    searched = [i for i, x in enumerate(limits) if x.margin.varies and x.crank != 0]
-    if searched:
-        ends += [end for arc in between(ends) for end in _limits(
-            lambda theta: margins(theta)[searched], assembled, *arc)]
-    found = reachable_arcs(ends, assembled)
+    if not _is_periodic(margins):
+        # What follows a turn later is another assembly: the arcs are those of [-pi, pi].
+        ends.append(-math.pi)
+    if any(x.margin.varies and x.crank != 0 for x in limits):
+        ends += [end for arc in between(ends) for end in _limits(margins, failing, *arc)]
+    found = reachable_arcs(ends, assembled, joined=-math.pi not in ends)
     return [tuple(_trimmed(assembled, *arc)) for arc in found] if ends else found
 
 
-def _limits(margins, assembled, lo, hi) -> List[float]:
-    """Return the angles where a linkage stops or starts to be assembled on an arc."""
-    theta = sampled(lo, hi, SAMPLES)
-    theta = np.unique(np.concatenate([theta, _touches(margins, theta)]))
-    held = assembled(theta)
-    found = np.flatnonzero(held[1:] != held[:-1])
-    start = np.where(held[found], theta[found], theta[found + 1])
-    last, _ = refined(assembled, start, theta[found] + theta[found + 1] - start)
-    return last.tolist()
+def _limits(margins, failing, lo, hi) -> List[float]:
+    """
+    Return the angles on an arc next to which a limit stops or starts to be the first not kept.
+
+    What stands on a limited joint may be limited itself on part of a narrow arc: each arc that is
+    found is searched again.
+    """
+    ends = [lo, hi]
+    for _ in range(ROUNDS):
+        theta = np.unique(np.concatenate([
+            sampled(*arc, SAMPLES, FEWEST) for arc in zip(ends, ends[1:])]))
+        theta = np.unique(np.concatenate([theta, _touches(margins, theta)]))
+        first = failing(theta)
+        place = np.flatnonzero(first[1:] != first[:-1])
+        before, after = refined(lambda x, as_before=first[place][:, None]: failing(x) == as_before,
+                                theta[place], theta[place + 1])
+        known, ends = len(ends), sorted({lo, hi, *before.tolist(), *after.tolist()})
+        if len(ends) == known:
+            break
+    return ends[1:-1]
 
 
 def _touches(margins, theta) -> np.ndarray:
@@ -98,22 +119,34 @@ def _trimmed(assembled, lo, hi):
     return np.where(assembled(ends), ends, refined(assembled, middle, ends)[0]).tolist()
 
 
-def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool]) -> List[Arc]:
-    """Return the arcs between angles where reachability may change, joined where they touch."""
+def _is_periodic(margins: Callable) -> bool:
+    """Return whether margins are the same a turn later."""
+    theta = np.linspace(-math.pi, math.pi, 66)[1:-1]
+    now, later = (np.nan_to_num(margins(theta + turn), nan=-1.0) for turn in (0.0, math.tau))
+    return bool(np.all(np.abs(now - later) <= ALIKE * np.abs(now).max(
+        axis=1, initial=0.0, keepdims=True)))
+
+
+def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
+                   joined: bool = True) -> List[Arc]:
+    """
+    Return the arcs between angles where reachability may change, in one where they touch.
+
+    They are joined across -pi and pi as well, unless that is not to be.
+    """
     parts = between(ends)
     held = [arc for arc in parts if bool(reachable(0.5 * (arc[0] + arc[1])))]
     if held == parts:
         return [(-math.pi, math.pi)]
-    joined: List[Arc] = []
+    found: List[Arc] = []
     for lo, hi in held:
-        if joined and lo - joined[-1][1] <= NARROWEST:
-            joined[-1] = joined[-1][0], hi
+        if found and lo - found[-1][1] <= NARROWEST:
+            found[-1] = found[-1][0], hi
         else:
-            joined.append((lo, hi))
-    if len(joined) > 1 and joined[0][0] + 2.0 * math.pi - joined[-1][1] <= NARROWEST:
-        joined[-1] = joined[-1][0], joined.pop(0)[1] + 2.0 * math.pi
-    return [(lo - 2.0 * math.pi, hi - 2.0 * math.pi) if lo >= math.pi else (lo, hi)
-            for lo, hi in joined]
+            found.append((lo, hi))
+    if joined and len(found) > 1 and found[0][0] + math.tau - found[-1][1] <= NARROWEST:
+        found[-1] = found[-1][0], found.pop(0)[1] + math.tau
+    return [(lo - math.tau, hi - math.tau) if lo >= math.pi else (lo, hi) for lo, hi in found]
 
 
 def is_full_turn(reach: Sequence[Arc]) -> bool:

@@ -160,8 +160,10 @@ class Sketch:
         to_first, to_second = (self._side(corner, end) for end in (first, second))
         self.folds.append(planar.Limit(cross(to_first.vector, to_second.vector),
                                        planar.GRAZE * to_first.length * to_second.length))
-        self._pair(name, first, second, planar.Dyad(to_second.vector, to_first.vector, ()),
-                   to_second.length, to_first.length, corner)
+        place = self.points[first].place + to_second.vector
+        bars = [planar.parallel(side.vector, place) for side in (to_second, to_first)]
+        self._pair(name, first, second, planar.Dyad(*bars, ()), to_second.length,
+                   to_first.length, corner)
 
     def inversor(self, names: Tuple[str, str, str], pole: str, pin: str, long: Real, short: Real):
         """Add a Peaucellier cell: the joint right of pole -> pin, the corner, the left joint."""

@@ -155,6 +155,16 @@ class Browser:
         await self._mouse('mousePressed', x, y)
         await self._mouse('mouseReleased', x, y)
 
+    async def write(self, expression: str, text: str):
+        """Write a text in place of what an element says, key by key, and press Enter."""
+        await self.value(f'({expression}).scrollIntoView()')
+        await self.click(expression)
+        await self.value(f'({expression}).select()')
+        for key in (*text, '\r'):
+            await self._do('Input.dispatchKeyEvent', type='keyDown', text=key,
+                           key={'\r': 'Enter'}.get(key, key))
+            await self._do('Input.dispatchKeyEvent', type='keyUp')
+
     async def drag(self, *places):
         """Press the mouse at the first place, go to the others, release it at the last."""
         await self._mouse('mousePressed', *places[0])

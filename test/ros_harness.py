@@ -72,6 +72,12 @@ class Graph:
         return self._add(node_class(
             context=self.context, parameter_overrides=overrides, **kwargs))
 
+    def end(self, node):
+        """End a node."""
+        self._executor.remove_node(node)
+        self._nodes.remove(node)
+        node.destroy_node()
+
     def listen(self, type_, topic, qos=10):
         """Return the list that the messages of a topic are gathered in."""
         gathered = []

@@ -15,16 +15,19 @@
 """The viewer: what its page is sent, what its sliders do, and who may look."""
 
 import asyncio
+import cmath
 import contextlib
 import itertools
 import json
 import math
 from pathlib import Path
 import re
+import resource
 import signal
 import socket
 import struct
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -39,9 +42,17 @@ from linkage_ros.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.kinematics import Kinematics  # noqa: E402
 from linkage_ros.servo_inverse import ServoInverse  # noqa: E402
 from linkage_ros.viewer import Viewer  # noqa: E402
+from linkage_ros.web import server  # noqa: E402
 from linkage_ros.web.feed import Feed  # noqa: E402
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor  # noqa: E402
+from linkage_ros.web.stage import LATCHED  # noqa: E402
+from rcl_interfaces.msg import (  # noqa: E402
+    Parameter as ParameterMessage,  # noqa: E402
+    ParameterDescriptor,
+    ParameterEvent,
+    ParameterValue,
+)
 import rclpy  # noqa: E402
+from rclpy.logging import get_logger  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from ros_harness import Graph, Process  # noqa: E402
@@ -55,6 +66,8 @@ LEVER = {**RATE, 'mechanisms': ['lever', 'drop'], 'lever.type': 'slotted_lever',
          'drop.type': 'water_drop'}
 LEG = {**RATE, 'mechanisms': ['leg'], 'leg.type': 'jansen', 'leg.crank.speed': 0.0,
        'leg.crank.start': 1.0}
+
+ENDS = aiohttp.WSMsgType.CLOSE, aiohttp.WSMsgType.CLOSING, aiohttp.WSMsgType.CLOSED
 
 needs_browser = pytest.mark.skipif(
     not browser.found(), reason=f'none of {", ".join(browser.NAMES)} is installed')
@@ -87,6 +100,11 @@ class Show:
     def values(self, name):
         """Return the value of a parameter on each node that has it."""
         return [node.get_parameter(name).value for node in self.nodes if node.has_parameter(name)]
+
+    def value(self, kind, name):
+        """Return the value of a parameter on the node of a kind."""
+        node, = (node for node in self.nodes if isinstance(node, kind))
+        return node.get_parameter(name).value
 
     def entities(self):
         """Return how many subscriptions and clients the viewer has."""
@@ -124,6 +142,7 @@ class Page:
         self._lazy = lazy
         self._ids = itertools.count(1)
         self.said, self.looks, self.points, self.pictures = [], {}, {}, 0
+        self.end = None
 
     async def __aenter__(self):
         self._session = aiohttp.ClientSession()
@@ -141,13 +160,14 @@ class Page:
         await self._session.close()
 
     async def _read(self):
-        async for message in self.socket:
+        while (message := await self.socket.receive()).type not in ENDS:
             if message.type == aiohttp.WSMsgType.TEXT:
                 self._hear(message.json())
             else:
                 self._draw(message.data)
                 if not self._lazy:
                     await self.socket.send_json({'op': 'drawn'})
+        self.end = message.data, message.extra
 
     def _hear(self, said):
         if said['op'] == 'look':
@@ -180,6 +200,17 @@ class Page:
 
         return await browser.until(known, keys)
 
+    async def shown(self, mechanism, name, value):
+        """Wait until a parameter is shown with a value."""
+        def known():
+            for said in reversed(self.said):
+                if said['op'] == 'scene':
+                    return any(one['key'] == mechanism and setting['name'] == name
+                               and setting['value'] == value
+                               for one in said['mechanisms'] for setting in one['settings'])
+
+        await browser.until(known, (mechanism, name, value))
+
     async def ask(self, op, mechanism, **fields):
         """Return the answer to a request."""
         number = next(self._ids)
@@ -190,6 +221,10 @@ class Page:
         """Set parameters, __ for a point; return the reason of a refusal, or nothing."""
         return (await self.ask('set', mechanism, values={
             name.replace('__', '.'): value for name, value in values.items()}))['reason']
+
+    def forget(self):
+        """Forget what was drawn."""
+        self.looks, self.points, self.said = {}, {}, []
 
     def drawn(self, mechanism, kind):
         """Return the points of a mechanism's marker."""
@@ -232,14 +267,14 @@ def test_every_slider_has_a_value_a_range_and_a_meaning(lever):
     assert {'crank.speed', 'crank.start', 'dimensions.a', 'dimensions.b', 'dimensions.e'} <= set(
         settings)
     assert settings['dimensions.a']['value'] == 80.0
-    assert settings['dimensions.a']['low'] == pytest.approx(8.0)
+    assert 0.0 < settings['dimensions.a']['low'] < 80.0 < settings['dimensions.a']['high']
     assert (settings['crank.speed']['low'], settings['crank.speed']['high']) == (-100.0, 100.0)
     assert '[rad/s]' in settings['crank.speed']['meaning']
     assert settings['type'] == {**settings['type'], 'value': 'slotted_lever', 'fixed': True}
     assert settings['points']['value'] == ['O', 'Q', 'A', 'L']
 
 
-def test_a_slider_sets_every_node_that_has_the_parameter(show):
+def test_a_slider_sets_the_node_that_owns_the_parameter(show):
     running = show(LEVER)
 
     async def use(url):
@@ -251,12 +286,12 @@ def test_a_slider_sets_every_node_that_has_the_parameter(show):
             await page.heard('value', mechanism='/lever', name='crank.speed', value=-2.5)
 
     asyncio.run(use(running.viewer.url))
-    assert running.values('lever.dimensions.b') == [160.0, 160.0, 160.0]
+    assert running.value(Kinematics, 'lever.dimensions.b') == 160.0
     assert running.values('lever.crank.speed') == [-2.5]
 
 
 @pytest.mark.parametrize('values, reason', [
-    ({'dimensions__b': 1e6}, r'lever\.dimensions\.b .*15'),
+    ({'dimensions__b': -150.0}, r'lever\.dimensions\.b .*-150'),
     ({'dimensions__b': 'long'}, 'lever.dimensions.b must be a finite number'),
     ({'dimensions__b': True}, 'lever.dimensions.b must be a finite number'),
     ({'dimensions__q': 1.0}, "lever has no parameter 'dimensions.q'"),
@@ -275,25 +310,34 @@ def test_a_refusal_says_why_and_changes_nothing(lever, values, reason):
     assert lever.values('lever.dimensions.b') == [150.0] * 3
 
 
-def test_what_one_node_refuses_no_node_keeps(graph, show):
-    def picky(**kwargs):
-        node = rclpy.create_node('picky', **kwargs)
-        node.declare_parameter('lever.dimensions.b', 150.0, ParameterDescriptor(
-            floating_point_range=[FloatingPointRange(from_value=140.0, to_value=155.0)]))
-        return node
+def test_what_kinematics_does_not_show_is_set_on_the_node_that_does(graph, show):
+    def other(name, value):
+        def made(**kwargs):
+            node = rclpy.create_node(name, **kwargs)
+            node.declare_parameter('lever.dimensions.b', value)
+            node.declare_parameter('lever.spring', value)
+            return node
+        return made
 
-    running = show(LEVER, before=lambda: graph.start(picky))
+    def before():
+        # Their names come before that of kinematics.
+        before.first, before.second = (graph.start(other(name, value)) for name, value in (
+            ('a_node', 1.0), ('b_node', 2.0)))
+
+    running = show(LEVER, before=before)
 
     async def use(url):
         async with Page(url) as page:
-            cast = await page.cast('/lever', '/drop')
-            assert 'dimensions.b' in {one['name'] for one in cast['/lever']['settings']}
-            return await page.set('/lever', dimensions__b=160.0), await page.set(
-                '/lever', dimensions__b=152.0)
+            await page.cast('/lever', '/drop')
+            await page.shown('/lever', 'dimensions.b', 150.0)
+            await page.shown('/lever', 'spring', 1.0)
+            assert await page.set('/lever', dimensions__b=152.0) == ''
+            assert await page.set('/lever', spring=3) == ''
 
-    refused, granted = asyncio.run(use(running.viewer.url))
-    assert '160' in refused and granted == ''
-    assert running.values('lever.dimensions.b') == [152.0] * 3
+    asyncio.run(use(running.viewer.url))
+    assert running.value(Kinematics, 'lever.dimensions.b') == 152.0
+    assert [node.get_parameter(f'lever.{name}').value for node in (before.first, before.second)
+            for name in ('dimensions.b', 'spring')] == [1.0, 3.0, 2.0, 2.0]
 
 
 def test_a_change_that_somebody_else_makes_is_shown(show):
@@ -335,8 +379,30 @@ def test_a_dragged_lever_is_where_it_was_dragged_to_and_stays_there(show):
     assert running.values('lever.crank.start') == [answer['servo']]
 
 
+@pytest.mark.parametrize('lengths, sign', [
+    ((80.0, 150.0, 0.0), 1.0), ((80.0, 150.0, 25.0), -1.0), ((1.0, 150.0, 0.0), 1.0)])
+def test_a_lever_that_is_dragged_beyond_its_reach_goes_to_its_end(show, lengths, sign):
+    running = show({**LEVER, **{f'lever.dimensions.{name}': length
+                                for name, length in zip('abe', lengths)}})
+    a, b, e = lengths
+    end = sign * math.asin((a - sign * e) / b)
+
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/lever', '/drop')
+            return [await page.ask('drag', '/lever', angle=sign * beyond)
+                    for beyond in (2.0, 1.0)]
+
+    for answer in asyncio.run(use(running.viewer.url)):
+        assert 'cannot be reached; the lever reaches [' in answer['reason']
+        assert answer['value'] == pytest.approx(end, abs=1e-9)
+        servo = running.values('lever.crank.start')[0]
+        pin = 1j * a * cmath.exp(1j * servo) + 1j * b
+        slot = cmath.phase(pin / 1j) - math.asin(e / abs(pin))
+        assert slot == pytest.approx(end, abs=1e-9)
+
+
 @pytest.mark.parametrize('mechanism, angle, reason', [
-    ('/lever', 1.0, r'cannot be reached; the lever reaches \[-0.5625'),
     ('/drop', 0.1, 'drop has no lever'),
     ('/gone', 0.1, "no mechanism '/gone'; there are: /drop, /lever"),
     ('/lever', 'up', 'not understood'),
@@ -410,18 +476,204 @@ def test_nodes_that_come_later_or_in_a_namespace_are_found(graph, show):
     assert running.values('leg.crank.speed') == [2.0]
 
 
-def test_nonsense_is_answered_or_ignored(show):
+NONSENSE = [
+    '', '[]', 'null', '\x00', '{"op": 1}', '{"op": {}}', '["op"]', '[' * 60000, '{"a":' * 10000,
+    '9' * 60000, '{"op": "drag", "angle": ' + '[' * 3000 + ']' * 3000 + '}', b'\xff\xfe', b'{}']
+
+
+@pytest.mark.parametrize('text', NONSENSE, ids=range(len(NONSENSE)))
+def test_nonsense_is_answered(lever, text):
     async def use(url):
         async with Page(url) as page:
-            await page.cast('/leg')
-            for nonsense in ('', '[]', '{"op": 1}', 'null', '{"op": "set"}', '\x00'):
-                await page.socket.send_str(nonsense)
-            await page.socket.send_bytes(b'\xff\xfe')
-            assert 'not understood' in (await page.ask('set', '/leg'))['reason']
-            assert 'not understood' in (await page.ask('set', '/leg', values=3))['reason']
-            assert 'unknown request' in (await page.ask('fly', '/leg'))['reason']
+            await (page.socket.send_bytes if isinstance(text, bytes) else page.socket.send_str)(
+                text)
+            answer = await page.heard('answer', id=None)
+            assert 'the request is not understood: ' in answer['reason']
+            assert 'unknown request' in (await page.ask('fly', '/lever'))['reason']
 
-    asyncio.run(use(show(LEG).viewer.url))
+    asyncio.run(use(lever.viewer.url))
+
+
+REQUESTS = [
+    *(('set', {'values': {name: value}}, f'lever.{name} must be .*, not {shown}')
+      for name, value, shown in (
+        ('leg_pairs', '1e20', r'1e\+20'), ('leg_pairs', '1' + 20 * '0', r'1e\+20'),
+        ('leg_pairs', 19 * '9', r'1e\+19'), ('leg_pairs', '-1e400', '-inf'),
+        ('leg_pairs', 'true', 'True'), ('leg_pairs', '2.5', '2.5'),
+        ('dimensions.a', 400 * '9', 'inf'), ('dimensions.a', 5000 * '9', 'inf'),
+        ('dimensions.a', '1e400', 'inf'), ('dimensions.a', 'NaN', 'nan'),
+        ('dimensions.a', '-Infinity', '-inf'), ('dimensions.a', '[[[1]]]', r'\[\[\[1\]\]\]'),
+        ('dimensions.a', '{"a": NaN}', '{.*}'), ('dimensions.a', 'null', 'None'),
+        ('dimensions.a', f'"{50000 * "x"}"', "'x*[.]{3}x*'$"), ('points', '["O"]', '.*'))),
+    ('set', {'values': {'crank.speed': '1e300'}}, '100'),
+    ('set', {'values': {'crank.start': 17 * '9'}}, '12.566'),
+    ('set', {'values': {50000 * 'x': '1'}}, "lever has no parameter 'x*[.]{3}x*'$"),
+    ('set', {'values': {'\\ud800': '1'}}, 'lever has no parameter'),
+    ('set', {'values': '3'}, 'not understood'), ('set', {'values': '[[[], 1]]'}, 'not understood'),
+    ('set', {'values': '{}', 'mechanism': '{}'}, 'not understood'),
+    ('set', {}, "not understood: it lacks 'values'"), ('drag', {}, "it lacks 'angle'"),
+    *(('drag', {'angle': angle}, 'angle must be a finite number')
+      for angle in ('1e400', '-1e400', 'NaN', 400 * '9', 'true', '[1]', '"1"')),
+    ('drag', {'angle': '1e308'}, 'cannot be reached'),
+    (50000 * 'x', {}, "unknown request 'x*[.]{3}x*'$"),
+]
+
+
+@pytest.mark.parametrize('op, fields, reason', REQUESTS, ids=range(len(REQUESTS)))
+def test_a_request_is_answered_whatever_it_holds(lever, op, fields, reason):
+    def text(value):
+        return value if isinstance(value, str) else '{%s}' % ', '.join(
+            f'"{name}": {inner}' for name, inner in value.items())
+
+    members = {'op': f'"{op}"', 'id': '7', 'mechanism': '"/lever"', **fields}
+
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/lever', '/drop')
+            await page.socket.send_str('{%s}' % ', '.join(
+                f'"{name}": {text(value)}' for name, value in members.items()))
+            return await page.heard('answer', id=7)
+
+    said = asyncio.run(use(lever.viewer.url))['reason']
+    assert re.search(reason, said) and len(said) < 300
+    assert (lever.values('lever.crank.speed'), lever.values('lever.leg_pairs')) == ([1.0], [1])
+
+
+def test_of_many_requests_at_once_each_is_answered(lever):
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/lever', '/drop')
+            answers = await asyncio.gather(*(page.ask('set', '/lever', values={}) for _ in range(
+                500)))
+            return [answer['reason'] for answer in answers]
+
+    reasons = asyncio.run(use(lever.viewer.url))
+    assert reasons[0] == '' and set(reasons) <= {'', '64 requests wait already'}
+
+
+@pytest.mark.parametrize('kind, data, code, reason', [
+    (aiohttp.WSMsgType.TEXT, b'[' * 100000, 1009, 'a message may have 65536 bytes'),
+    (aiohttp.WSMsgType.TEXT, b'\xff\xfe', 1007, 'a text must be UTF-8'),
+    (aiohttp.WSMsgType.CONTINUATION, b'', 1002, 'this is no WebSocket frame'),
+    (3, b'', 1002, 'this is no WebSocket frame'),
+])
+def test_what_is_no_message_closes_the_connection_with_a_reason(address, kind, data, code, reason):
+    async def use():
+        async with Page(address) as page:
+            await page.heard('scene')
+            await page.socket._writer.send_frame(data, kind)
+            await browser.until(lambda: page.end)
+            return page.end
+
+    assert asyncio.run(use()) == (code, reason)
+
+
+class Deaf:
+    """A client that asks, and reads nothing."""
+
+    def __init__(self, url):
+        host, port = url[len('http://'):-1].split(':')
+        self._socket = socket.socket()
+        # So that little is read on its behalf.
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        self._socket.connect((host, int(port)))
+        self._host = f'Host: {host}:{port}\r\n'
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._socket.close()
+
+    def request(self, path):
+        """Return the bytes of a request for a file."""
+        return f'GET {path} HTTP/1.1\r\n{self._host}\r\n'.encode()
+
+    def upgrade(self):
+        """Make the connection a WebSocket."""
+        self._socket.sendall(self.request('/socket').replace(
+            b'\r\n\r\n', b'\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n'
+            b'Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n'))
+        assert b' 101 ' in self._socket.recv(64)
+
+    @staticmethod
+    def frame(data, kind=1):
+        """Return the bytes of a WebSocket frame."""
+        size = len(data)
+        head = bytes([0x80 | kind, 0x80 | min(size, 126)])
+        return head + (struct.pack('>H', size) if size > 125 else b'') + bytes(4) + data
+
+    def flood(self, data, seconds):
+        """Send something again and again; return whether it was let, and was not sent home."""
+        self._socket.settimeout(0.2)
+        end, left = time.monotonic() + seconds, data
+        while time.monotonic() < end:
+            try:
+                left = left[self._socket.send(left):] or data
+            except TimeoutError:
+                pass
+            except OSError:
+                return False
+        return True
+
+
+def resident():
+    """Return the memory that this process holds [MB]."""
+    return int(Path('/proc/self/statm').read_text().split()[1]) * resource.getpagesize() / 1e6
+
+
+FLOODS = {
+    'answers': Deaf.frame(b'{"op": "fly", "id": "' + b'x' * 60000 + b'"}'),
+    'refusals': Deaf.frame(b'[]') * 1000,
+    'settings': Deaf.frame(b'{"op": "set", "mechanism": "/leg", "values": '
+                           b'{"crank.speed": 1}, "id": 1}') * 100,
+    'pings': Deaf.frame(b'x' * 125, kind=9) * 500,
+    'drawn': Deaf.frame(b'{"op": "drawn"}') * 1000,
+    'files': None,
+}
+
+
+@pytest.mark.skipif(not Path('/proc/self/statm').exists(), reason='memory is read from /proc')
+@pytest.mark.parametrize('what, seconds', [
+    ('answers', 2.0), *(pytest.param(what, 15.0, marks=pytest.mark.long) for what in FLOODS)])
+def test_a_client_that_does_not_read_costs_little_and_harms_nobody(show, what, seconds):
+    running = show({**LEG, 'leg.crank.speed': 1.0})
+    url = running.viewer.url
+
+    async def use():
+        async with Page(url) as page:
+            await page.cast('/leg')
+            await browser.until(lambda: page.pictures)
+            before, pictures = resident(), page.pictures
+            with Deaf(url) as deaf:
+                data = FLOODS[what] or deaf.request('/panel.js') * 100
+                if FLOODS[what]:
+                    deaf.upgrade()
+                begun = time.monotonic()
+                await asyncio.to_thread(deaf.flood, data, seconds)
+                assert page.pictures - pictures > 5 * (time.monotonic() - begun) - 5
+                assert await page.set('/leg', crank__speed=2.0) == ''
+                return resident() - before
+
+    assert asyncio.run(use()) < 30.0
+
+
+@pytest.mark.parametrize('last', [b'', b'nonsense'])
+def test_a_client_that_does_not_read_is_sent_home(show, monkeypatch, last):
+    monkeypatch.setattr(server, 'SECONDS_TO_READ', 0.3)
+    with Deaf(show(LEG).viewer.url) as deaf:
+        deaf.upgrade()
+        assert not deaf.flood(FLOODS['answers'] + last, 10.0)
+
+
+def test_a_client_that_does_not_read_does_not_keep_the_viewer_from_ending(show):
+    running = show(LEG)
+    with Deaf(running.viewer.url) as deaf:
+        deaf.upgrade()
+        assert deaf.flood(FLOODS['answers'], 1.0)
+        before = time.monotonic()
+        running.viewer._server.stop()
+        assert time.monotonic() - before < 5.0
 
 
 @pytest.fixture
@@ -541,6 +793,15 @@ def test_a_viewer_that_cannot_listen_ends_in_one_sentence(tmp_path, parameters, 
     assert len(said) == 1 and named in said[0]
 
 
+@pytest.mark.long
+def test_a_port_that_is_no_parameter_is_refused(tmp_path):
+    scene = tmp_path / 'scene.yaml'
+    scene.write_text(json.dumps({'/**': {'ros__parameters': {'port': 0}}}))
+    code, printed = Process('viewer', scene, '--port', '8050').end()
+    said = [line for line in printed.splitlines() if '[FATAL]' in line]
+    assert code == 1 and len(said) == 1 and "'--port'" in said[0]
+
+
 def walker(step, legs=2, frame='world', width=1.0):
     """Return a message as kinematics sends it."""
     made = messages.Markers('leg', frame, (0.0, 1.0, 2.0, 0.5, 0.0, 0.0), [(0, 1), (1, 2)], width)
@@ -563,7 +824,7 @@ def unpacked(text):
 
 
 def test_what_is_read_without_unpacking_is_what_unpacking_gives():
-    feed = Feed('/leg', MarkerArray, lambda _, id_: id_)
+    feed = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
     looks = []
     for text in (walker(1), walker(2), walker(3), walker(4, legs=1), walker(5),
                  walker(6, width=2.0), walker(7, frame='earth'), walker(8), FILLED, FILLED):
@@ -575,13 +836,218 @@ def test_what_is_read_without_unpacking_is_what_unpacking_gives():
 
 
 def test_markers_that_are_gone_are_drawn_no_more():
-    feed = Feed('/leg', MarkerArray, lambda _, id_: id_)
+    feed = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
     feed.newest = walker(1)
     assert set(feed.drawn()[0]) == {0, 1}
     one = deserialize_message(walker(2), MarkerArray)
     one.markers = [marker for marker in one.markers if marker.type == Marker.SPHERE_LIST]
     feed.newest = serialize_message(one)
-    assert struct.pack('<II', 0, 0) in feed.drawn()[1]
+    looks, records = feed.drawn()
+    assert [look['kind'] for look in looks.values()] == ['joints']
+    assert records.endswith(struct.pack('<II', 1, 0))
+
+
+def swapped(message):
+    """Return a message as a machine of the other byte order writes it."""
+    text, size = bytearray(b'\0\0\0\0'), {'boolean': 1, 'uint8': 1, 'int32': 4,
+                                          'uint32': 4, 'float': 4, 'double': 8}
+    form = {'boolean': '?', 'uint8': 'B', 'int32': 'i', 'uint32': 'I', 'float': 'f',
+            'double': 'd'}
+
+    def number(kind, value):
+        text.extend(bytes(-(len(text) - 4) % size[kind]))
+        text.extend(struct.pack('>' + form[kind], value))
+
+    def write(kind, value):
+        if kind.startswith('sequence<'):
+            number('uint32', len(value))
+            for one in value:
+                write(kind[len('sequence<'):-1], one)
+        elif kind == 'string':
+            number('uint32', len(value) + 1)
+            text.extend(value.encode() + b'\0')
+        elif kind in size:
+            number(kind, value)
+        else:
+            for name, inner in value.get_fields_and_field_types().items():
+                write(inner, getattr(value, name))
+
+    write('', message)
+    return bytes(text)
+
+
+def test_markers_in_the_other_byte_order_are_drawn_alike():
+    feed = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    for step in (1, 2, 3):
+        text = walker(step)
+        feed.newest = swapped(deserialize_message(text, MarkerArray))
+        assert feed.newest[4:] != text[4:]
+        assert feed.drawn()[1] == unpacked(text)
+
+
+def spoilt(part, number):
+    """Return a message that cannot be drawn for one number in it."""
+    message = deserialize_message(walker(1), MarkerArray)
+    marker = message.markers[0]
+    parts = marker.points[0], marker.pose.position, marker.pose.orientation, marker.scale
+    parts[part].x = number
+    return serialize_message(message)
+
+
+def hostile(rng, text):
+    """Yield bytes that are no message, or one with other numbers than were written."""
+    yield from (b'', b'\0', b'\0\1\0', b'\0\1\0\0', b'\xff' * 64, text[:4] + b'\xff' * 500)
+    yield from (text[:size] for size in rng.integers(0, len(text) - 8, 20))
+    yield from (rng.bytes(size) for size in rng.integers(0, 2000, 20))
+    yield from (text[:4] + rng.bytes(size) for size in rng.integers(0, 2000, 20))
+    yield from (rng.bytes(4) + text[4:] for _ in range(20))
+    for _ in range(200):
+        places = bytearray(text)
+        for place in rng.integers(0, len(text), 3):
+            places[place] = rng.integers(256)
+        yield bytes(places)
+    for number in (math.nan, math.inf, -1e300):
+        yield from (spoilt(part, number) for part in range(4))
+
+
+def test_of_what_cannot_be_drawn_nothing_stays():
+    rng = np.random.default_rng(5)
+    feed = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    for step, text in enumerate(hostile(rng, walker(0))):
+        for feed.newest in (text, walker(step)):
+            looks, records = feed.drawn()
+            json.dumps(looks, allow_nan=False)
+            at, read = 0, {}
+            while at < len(records):
+                number, count = struct.unpack_from('<II', records, at)
+                read[number] = np.frombuffer(records, '<f4', 3 * count, at + 8)
+                assert np.isfinite(read[number]).all()
+                at += 8 + 12 * count
+        shown = b''.join(struct.pack('<II', number, len(places) // 3) + places.tobytes()
+                         for number, places in read.items() if len(places))
+        assert shown == unpacked(walker(step))
+
+
+def test_markers_with_ever_new_ids_are_not_gathered():
+    feed = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    for step in range(50):
+        message = deserialize_message(walker(step), MarkerArray)
+        for marker in message.markers:
+            marker.id += 2 * step
+        feed.newest = serialize_message(message)
+        looks, records = feed.drawn()
+        assert len(looks) == 2 and len(records) == len(unpacked(walker(step)))
+
+
+def test_messages_that_cannot_be_read_are_dropped_and_said_once(show, capfd):
+    running = show(LEG, kinds=())
+    node = running.graph.node
+    markers = node.create_publisher(MarkerArray, 'leg/markers', 1)
+    locus = node.create_publisher(Marker, 'leg/locus', LATCHED)
+    events = node.create_publisher(ParameterEvent, '/parameter_events', 10)
+
+    async def use(url):
+        async with Page(url) as first, Page(url) as second:
+            async def good(step):
+                wanted = walker(step)
+                points = np.frombuffer(unpacked(wanted)[-12:], '<f4')
+
+                def seen():
+                    markers.publish(wanted)
+                    return all((page.drawn('/leg', 'joints')[-1:] == points).any()
+                               for page in (first, second))
+
+                await browser.until(seen)
+
+            async def bad(text):
+                before = [(page, page.pictures) for page in (first, second)]
+                for publisher in (markers, locus, events):
+                    publisher.publish(text)
+                await browser.until(lambda: all(page.pictures > had for page, had in before))
+
+            await good(0)
+            for step, text in enumerate((b'', b'\0\1\0\0', walker(1)[:99], spoilt(
+                    1, math.nan))):
+                await bad(text)
+                await good(step + 1)
+
+    asyncio.run(use(running.viewer.url))
+    said = capfd.readouterr().err
+    assert said.count('a message on /leg/markers is dropped: ') == 1
+    assert said.count('a message on /leg/locus is dropped: ') == 1
+    assert 'Traceback' not in said
+
+
+def test_what_other_nodes_say_of_a_parameter_is_anything(graph, show):
+    def other(**kwargs):
+        node = rclpy.create_node('a_node', **kwargs)
+        for name, value in (('nan', math.nan), ('list', [1.0, math.inf]), ('bytes', [b'a'])):
+            node.declare_parameter(f'leg.{name}', value)
+        node.declare_parameter('leg.none', descriptor=ParameterDescriptor(dynamic_typing=True))
+        return node
+
+    running = show(LEG, before=lambda: graph.start(other))
+    events = running.graph.node.create_publisher(ParameterEvent, '/parameter_events', 10)
+
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/leg')
+            await page.shown('/leg', 'nan', None)
+            await page.shown('/leg', 'list', [1.0, None])
+            for kind in (0, 1, 4, 99):
+                said = ParameterEvent(node='/kinematics')
+                said.changed_parameters = [ParameterMessage(
+                    name='leg.dimensions.m', value=ParameterValue(type=kind))]
+                events.publish(said)
+            await page.shown('/leg', 'dimensions.m', 15.0)
+            assert await page.set('/leg', dimensions__m=14.5) == ''
+            await page.heard('value', name='dimensions.m', value=14.5)
+            json.dumps(page.said, allow_nan=False)
+
+    asyncio.run(use(running.viewer.url))
+
+
+@pytest.mark.long
+def test_nodes_that_end_and_come_again_are_drawn_again(graph, show):
+    running = show(LEG, kinds=(CrankDriver,))
+
+    async def come_and_go(page, scene):
+        kinematics = graph.start(Kinematics, scene)
+        await browser.until(lambda: len(page.drawn(f'/{scene["mechanisms"][0]}', 'strip')))
+        page.forget()
+        graph.end(kinematics)
+        await page.heard('scene', mechanisms=[])
+
+    async def use(url):
+        async with Page(url) as page:
+            for scene in (LEG, LEG, {**RATE, 'mechanisms': ['drop'], 'drop.type': 'water_drop'}):
+                await come_and_go(page, scene)
+
+    asyncio.run(use(running.viewer.url))
+
+
+@pytest.mark.long
+def test_pages_that_come_and_go_leave_nothing(show):
+    running = show(LEG)
+
+    async def visit(url):
+        async with Page(url) as page:
+            await browser.until(lambda: len(page.drawn('/leg', 'joints')))
+
+    async def use(url):
+        before, at_rest = 0.0, running.entities()
+        for turn in range(6):
+            await asyncio.gather(*(visit(url) for _ in range(200)))
+            for _ in range(30):
+                await visit(url)
+            if turn == 1:
+                before = resident()
+        await browser.until(lambda: running.entities() == at_rest)
+        assert resident() - before < 10.0
+        loop = running.viewer._server._loop
+        await browser.until(lambda: len(asyncio.all_tasks(loop)) == 1)
+
+    asyncio.run(use(running.viewer.url))
 
 
 class Seen:
@@ -617,7 +1083,16 @@ class Seen:
     async def number(self, name, label):
         """Return the number that a slider shows."""
         return float(await self.page.value(
-            f'{self.row(name, label)}.querySelector("input[type=number]").value'))
+            f'{self.row(name, label)}.querySelector("input[type=text]").value'))
+
+    async def write(self, name, label, text):
+        """Write a number beside a slider."""
+        await self.page.write(
+            f'{self.row(name, label)}.querySelector("input[type=text]")', text)
+
+    async def red(self, name, label):
+        """Return whether a row is marked as refused."""
+        return await self.page.value(f'{self.row(name, label)}.classList.contains("refused")')
 
     async def view(self, name):
         """Show one mechanism."""
@@ -629,6 +1104,10 @@ class Seen:
         width = await self.page.value('document.getElementById("picture").clientWidth')
         top = await self.page.value('document.getElementById("picture").getBoundingClientRect().y')
         return (await self.page.picture())[int(top):, :int(width)]
+
+
+# Of joints.
+ORANGE = 230, 159, 0
 
 
 def coloured(picture, red, green, blue):
@@ -694,17 +1173,18 @@ def test_a_dragged_slider_sets_the_nodes_and_a_refused_one_springs_back(show, lo
     async def doing(seen):
         await seen.view('lever')
         await seen.slide('lever', 'b', 0.7)
-        await browser.until(lambda: running.values('lever.dimensions.b')[0] > 200.0)
+        await browser.until(lambda: running.value(Kinematics, 'lever.dimensions.b') > 200.0)
 
         async def agreed():
-            return running.values('lever.dimensions.b') == [await seen.number('lever', 'b')] * 3
+            return running.value(Kinematics, 'lever.dimensions.b') == await seen.number(
+                'lever', 'b')
 
         await browser.until(agreed)
         assert await seen.reason('lever', 'b') == ''
 
-        await seen.slide('lever', 'e', 1.0)
+        await seen.write('lever', 'e', '7000')
         await browser.until(lambda: seen.reason('lever', 'e'))
-        kept, = set(running.values('lever.dimensions.e'))
+        kept = running.value(Kinematics, 'lever.dimensions.e')
 
         async def sprung():
             return abs(await seen.number('lever', 'e') - kept) < 1e-5 * abs(kept) + 1e-9
@@ -712,6 +1192,102 @@ def test_a_dragged_slider_sets_the_nodes_and_a_refused_one_springs_back(show, lo
         await browser.until(sprung)
         assert re.match('Refused: .*lever.dimensions', await seen.reason('lever', 'e'))
         assert abs(kept) < 1500.0
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
+def test_a_number_can_be_written_with_a_point_or_a_comma(show, looked_at):
+    running = show(LEVER)
+
+    async def doing(seen):
+        await seen.view('lever')
+        for text, value in (('80,5', 80.5), ('81.25', 81.25), (',5e2', 50.0), ('  90 ', 90.0)):
+            await seen.write('lever', 'a', text)
+            await browser.until(
+                lambda wanted=value: running.value(Kinematics, 'lever.dimensions.a') == wanted)
+            assert await seen.reason('lever', 'a') == ''
+        for text in ('1,234.5', '8x', '0x50', '--8', 'Infinity', '1e400', 400 * '9'):
+            await seen.write('lever', 'a', text)
+            await browser.until(lambda: seen.reason('lever', 'a'))
+            assert await seen.reason('lever', 'a') == (
+                f'Refused: {text} is not a number that can be set')
+            assert await seen.number('lever', 'a') == 90.0
+        await seen.write('lever', 'a', '')
+        assert await seen.number('lever', 'a') == 90.0
+        await seen.page.value(f'{seen.row("lever", "branch L")}.closest("details").open = true')
+        await seen.write('lever', 'branch L', '1e20')
+        await browser.until(lambda: seen.reason('lever', 'branch L'))
+        assert 'a whole number from -1 to 1, not 1e+20' in await seen.reason('lever', 'branch L')
+        await seen.write('lever', 'a', '91')
+        await browser.until(lambda: running.value(Kinematics, 'lever.dimensions.a') == 91.0)
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
+def test_a_refusal_is_forgotten_when_the_good_value_is_back(show, looked_at):
+    running = show(LEVER)
+
+    async def doing(seen):
+        await seen.view('lever')
+
+        async def refused():
+            await seen.write('lever', 'b', '-150')
+            await browser.until(lambda: seen.reason('lever', 'b'))
+            assert await seen.number('lever', 'b') == running.value(
+                Kinematics, 'lever.dimensions.b')
+            assert not await seen.red('lever', 'b')
+
+        async def forgotten():
+            return await seen.reason('lever', 'b') == ''
+
+        await refused()
+        await seen.write('lever', 'b', '150')
+        await browser.until(forgotten)
+        await refused()
+        await seen.write('lever', 'b', '151')
+        await browser.until(forgotten)
+        await refused()
+
+        async def set_elsewhere():
+            # By somebody who comes later.
+            for node in running.nodes:
+                if isinstance(node, Kinematics):
+                    value = node.get_parameter('lever.dimensions.b').value
+                    node.set_parameters([Parameter('lever.dimensions.b', value=value + 1.0)])
+            await asyncio.sleep(0.2)
+            return await forgotten()
+
+        await browser.until(set_elsewhere)
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
+def test_a_picture_of_what_is_far_off_is_drawn_and_left(show, looked_at):
+    running = show(LEG, kinds=())
+    node = running.graph.node
+    markers = node.create_publisher(MarkerArray, 'leg/markers', 1)
+    node.create_publisher(Marker, 'leg/locus', LATCHED)
+
+    async def doing(seen):
+        def published(text):
+            async def drawn():
+                markers.publish(text)
+                return len(coloured(await seen.canvas(), *ORANGE)) > 100
+            return drawn
+
+        await browser.until(published(walker(1)))
+        for far in (1e9, 1e17, 1e30, 3e38):
+            for part in range(4):
+                for _ in range(3):
+                    markers.publish(spoilt(part, far))
+                    await asyncio.sleep(0.02)
+                await browser.until(published(walker(1)))
 
     looked_at(running, doing)
 
@@ -731,7 +1307,7 @@ def test_the_lever_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
 
         await browser.until(lambda: seen.page.value(f'!!({seen.row("lever", "lever")})'))
         await browser.until(settled)
-        rows, columns = coloured(await seen.canvas(), 230, 159, 0).T
+        rows, columns = coloured(await seen.canvas(), *ORANGE).T
         top = await seen.page.value('document.getElementById("picture").getBoundingClientRect().y')
         tip = float(columns[rows < rows.min() + 10].mean()), top + int(rows.min()) + 8
         pivot = float(columns[rows > rows.max() - 10].mean()), top + int(rows.max()) - 8
@@ -760,6 +1336,9 @@ def test_the_lever_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
         await dragged(lambda: seen.reason('lever', 'lever'), at(0.4), at(0.5), at(1.2))
         assert 'the lever reaches' in await seen.reason('lever', 'lever')
         await browser.until(shown)
+        await browser.until(lambda: lever_of(running.values('lever.crank.start')[0]) == (
+            pytest.approx(math.asin(80.0 / 150.0), abs=1e-9)))
+        assert not await seen.red('lever', 'lever')
 
     looked_at(running, doing)
 

@@ -57,7 +57,7 @@ TYPES = MappingProxyType({m.DESIGN.name: m for m in (
 CUSTOM = 'custom'
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=32)
 def _structure(design, branches):
     return Structure(design, dict(branches))
 

@@ -19,6 +19,7 @@ from queue import Empty, SimpleQueue
 
 SECONDS_TO_ANSWER = 3.0
 SECONDS_BETWEEN_TRIES = 0.02
+SECONDS_BETWEEN_WARNINGS = 5.0
 
 
 class NoAnswer(Exception):
@@ -76,6 +77,10 @@ class Bridge:
         except asyncio.TimeoutError:
             raise NoAnswer(f'{client.srv_name} does not answer') from None
 
+    def warn(self, text: str):
+        """Say what went wrong, not too often."""
+        self.node.get_logger().warning(text, throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
+
     def hand_over(self, function, *args):
         """Let a function run in the web's thread, if that is still there."""
         try:
@@ -89,7 +94,10 @@ class Bridge:
         future = self.loop.create_future()
         asked = await self.ask(client.call_async, request)
         asked.add_done_callback(lambda done: self.hand_over(_settle, future, done.result()))
-        return await future
+        try:
+            return await future
+        finally:
+            self.ask(client.remove_pending_request, asked)
 
     def _work(self):
         while True:

@@ -23,30 +23,38 @@ from visualization_msgs.msg import Marker
 from .. import wire
 
 KINDS = {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'strip', Marker.SPHERE_LIST: 'joints'}
+SECONDS_BETWEEN_WARNINGS = 5.0
 
 
 class Feed:
     """
     The newest message of a topic with markers, made ready to be drawn when somebody asks.
 
-    Messages come in serialised, and those that nobody draws are never unpacked.
+    Messages come in serialised, and those that nobody draws are never unpacked. One that cannot be
+    drawn is dropped: what was drawn before stays.
 
     Parameters
     ----------
+    topic : str
+        Where the messages come from.
     mechanism : str
         What the markers belong to.
     type_ : type
         Marker or MarkerArray.
     number : callable
-        Returns a number for a marker of this feed, the same for the same marker.
+        Returns a number for the first marker of a message, the second and so on; always the same.
+    logger : rclpy logger
+        Told of messages that are dropped.
 
     """
 
-    def __init__(self, mechanism: str, type_, number):
+    def __init__(self, topic: str, mechanism: str, type_, number, logger):
         self.newest = None
+        self.topic = topic
         self._mechanism = mechanism
         self._type = type_
         self._number = number
+        self._logger = logger
         self._drawn = None
         self._layout = None
         self._looks = {}
@@ -66,42 +74,42 @@ class Feed:
             x, y, z; all little-endian.
 
         """
-        newest = self.newest
-        if newest is not self._drawn:
-            places = self._layout.read(newest) if self._layout else None
-            self._records = self._recorded(self._unpack(newest) if places is None else places)
-            self._drawn = newest
+        if self.newest is not self._drawn:
+            self._drawn = self.newest
+            try:
+                self._draw(self._drawn)
+            except Exception as error:
+                # What the middleware raises is its own affair, and the bytes are anybody's.
+                self._logger.warning(f'a message on {self.topic} is dropped: {error}',
+                                     throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
         return self._looks, self._records
+
+    def _draw(self, text):
+        places = self._layout.read(text) if self._layout else None
+        if places is None:
+            self._unpack(text)
+        else:
+            self._records = _recorded(self._counts, _shown(places))
 
     def _unpack(self, text):
         message = deserialize_message(text, self._type)
+        markers = [marker for marker in _markers(message)
+                   if marker.type in KINDS and marker.action == Marker.ADD]
+        numbers = [self._number(i) for i in range(len(markers))]
+        looks = {number: _look(self._mechanism, marker)
+                 for number, marker in zip(numbers, markers)}
         # What is no longer sent is drawn without points.
-        looks, counts, places, skipped = dict(self._looks), dict.fromkeys(self._looks, 0), [], 0
-        for marker in _markers(message):
-            number = self._number(marker.ns, marker.id)
-            if marker.type not in KINDS or marker.action != Marker.ADD or counts.get(number):
-                skipped += len(marker.points)
-                continue
-            looks[number] = _look(self._mechanism, marker)
-            # In the order of the message.
-            counts.pop(number, None)
-            counts[number] = len(marker.points)
-            places += [(p.x, p.y, p.z) for p in marker.points]
-        same = looks == self._looks and list(counts.items()) == list(self._counts.items())
-        if same and self._layout and self._layout.alike(text):
+        counts = {**dict.fromkeys(self._counts, 0),
+                  **{number: len(marker.points) for number, marker in zip(numbers, markers)}}
+        places = _places(markers)
+        records = _recorded(counts, _shown(places))
+        if (looks, counts) == (self._looks, self._counts) and self._layout and (
+                self._layout.alike(text)):
             self._layout.ignore_what_differs(text)
         else:
-            self._layout = None if skipped else Layout(text, message)
-        self._looks, self._counts = looks, counts
-        return np.array(places).reshape(-1, 3)
-
-    def _recorded(self, places):
-        records, start = [], 0
-        for number, count in self._counts.items():
-            part = places[start:start + count].astype('<f4')
-            records += [struct.pack('<II', number, count), part.tobytes()]
-            start += count
-        return b''.join(records)
+            self._layout = Layout(text, message) if len(places) == len(
+                _places(_markers(message))) else None
+        self._looks, self._counts, self._records = looks, counts, records
 
 
 class Layout:
@@ -121,6 +129,7 @@ class Layout:
 
     def __init__(self, text: bytes, message):
         self._text = np.frombuffer(text, np.uint8)
+        places = _places(_markers(message))
         points = [point for marker in _markers(message) for point in marker.points]
         unused = wire.distinct(3 * len(points))
         for point, place in zip(points, unused.reshape(-1, 3).tolist()):
@@ -138,6 +147,8 @@ class Layout:
         stamp = wire.pack(wire.SENTINEL)
         for place in wire.places(marked.tobytes(), stamp):
             self._fixed[place:place + len(stamp)] = False
+        # In another encoding the numbers stand elsewhere, or the other way round.
+        self._found = self._found and np.array_equal(self.read(text), places)
 
     def alike(self, text: bytes) -> bool:
         """Return whether a message can have the same layout."""
@@ -166,9 +177,32 @@ def _markers(message):
     return getattr(message, 'markers', [message])
 
 
+def _places(markers):
+    return np.array([(point.x, point.y, point.z) for marker in markers
+                     for point in marker.points]).reshape(-1, 3)
+
+
+def _shown(numbers):
+    """Return numbers as they are drawn; raise ValueError if that cannot be."""
+    with np.errstate(over='ignore'):
+        shown = np.asarray(numbers).astype('<f4')
+    if not np.isfinite(shown).all():
+        raise ValueError('a number in it is not finite, or too large to be drawn')
+    return shown
+
+
+def _recorded(counts, places):
+    records, start = [], 0
+    for number, count in counts.items():
+        records += [struct.pack('<II', number, count), places[start:start + count].tobytes()]
+        start += count
+    return b''.join(records)
+
+
 def _look(mechanism, marker):
     place, turn, colour = marker.pose.position, marker.pose.orientation, marker.color
-    return {
-        'mechanism': mechanism, 'kind': KINDS[marker.type],
-        'pose': [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w],
-        'width': marker.scale.x, 'colour': [colour.r, colour.g, colour.b, colour.a]}
+    pose = [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]
+    colours = [colour.r, colour.g, colour.b, colour.a]
+    _shown([*pose, *colours, marker.scale.x])
+    return {'mechanism': mechanism, 'kind': KINDS[marker.type], 'pose': pose,
+            'width': marker.scale.x, 'colour': colours}

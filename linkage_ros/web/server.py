@@ -15,18 +15,20 @@
 """The page's server: plain files and one WebSocket, in a thread of its own."""
 
 import asyncio
-from collections import deque
 from concurrent.futures import Future
+from contextlib import suppress
 from importlib.resources import files
 import ipaddress
 import json
+import logging
 import socket
 from threading import Thread
 from urllib.parse import urlsplit
 
 from aiohttp import web, WSCloseCode
 
-from .stage import Refused
+from .settings import shortened
+from .stage import Refused, SCENE
 
 PAGE = files(__package__) / 'page'
 KINDS = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript',
@@ -39,8 +41,16 @@ HEADERS = {
     'Referrer-Policy': 'no-referrer',
     'X-Content-Type-Options': 'nosniff',
 }
-MOST_BYTES, MOST_AT_ONCE = 1 << 16, 64
+MOST_BYTES, MOST_WAITING = 1 << 16, 64
 SECONDS_TO_CLOSE = 1.0
+SECONDS_TO_READ = 10.0
+# More figures than a number of ours has; what they say to a double is enough.
+MOST_FIGURES = 18
+CLOSED_FOR = {
+    WSCloseCode.MESSAGE_TOO_BIG: f'a message may have {MOST_BYTES} bytes'.encode(),
+    WSCloseCode.INVALID_TEXT: b'a text must be UTF-8',
+    WSCloseCode.PROTOCOL_ERROR: b'this is no WebSocket frame',
+}
 
 
 class Server:
@@ -67,10 +77,11 @@ class Server:
 
     def __init__(self, stage, bridge, host: str, port: int):
         self._stage = stage
+        self._bridge = bridge
         self._host = host
         self._visitors = set()
         started = Future()
-        self._thread = Thread(target=lambda: asyncio.run(self._serve(bridge, port, started)),
+        self._thread = Thread(target=lambda: asyncio.run(self._serve(port, started)),
                               name='web', daemon=True)
         self._thread.start()
         self._loop, self._stopping, self.port = started.result()
@@ -87,12 +98,15 @@ class Server:
             self._loop.call_soon_threadsafe(self._stopping.set)
             self._thread.join()
 
-    async def _serve(self, bridge, port, started):
-        bridge.loop = asyncio.get_running_loop()
+    async def _serve(self, port, started):
+        self._bridge.loop = asyncio.get_running_loop()
         app = web.Application(middlewares=[self._guard])
         app.add_routes([web.get('/', _file), web.get('/socket', self._visit),
                         web.get('/{name}', _file)])
-        runner = web.AppRunner(app, access_log=None, shutdown_timeout=SECONDS_TO_CLOSE)
+        logger = logging.Logger('web', logging.WARNING)
+        logger.addHandler(Sentence(self._bridge.warn))
+        runner = web.AppRunner(
+            app, access_log=None, logger=logger, shutdown_timeout=SECONDS_TO_CLOSE)
         await runner.setup()
         try:
             await web.TCPSite(runner, self._host, port).start()
@@ -101,10 +115,9 @@ class Server:
             started.set_exception(error)
             return
         stopping = asyncio.Event()
-        started.set_result((bridge.loop, stopping, runner.addresses[0][1]))
+        started.set_result((self._bridge.loop, stopping, runner.addresses[0][1]))
         await stopping.wait()
-        for visitor in list(self._visitors):
-            await visitor.close()
+        await asyncio.gather(*(visitor.close() for visitor in self._visitors))
         await runner.cleanup()
 
     @web.middleware
@@ -119,7 +132,7 @@ class Server:
         origin = request.headers.get('Origin')
         if not self._is_own(host):
             raise web.HTTPForbidden(text=f'{host!r} is not a name of this server.\n')
-        if origin is not None and urlsplit(origin).netloc.lower() != host.lower():
+        if origin is not None and _parts(origin).netloc.lower() != host.lower():
             raise web.HTTPForbidden(text=f'{origin!r} is a foreign origin.\n')
         response = await handler(request)
         if not response.prepared:
@@ -127,10 +140,7 @@ class Server:
         return response
 
     def _is_own(self, host) -> bool:
-        try:
-            name = urlsplit(f'//{host}').hostname or ''
-        except ValueError:
-            return False
+        name = _parts(f'//{host}').hostname or ''
         if name in ('localhost', self._host.lower(), socket.gethostname().lower()):
             return True
         try:
@@ -141,35 +151,66 @@ class Server:
         return address.is_loopback or self._host in ('', '0.0.0.0', '::')
 
     async def _visit(self, request):
-        socket_ = web.WebSocketResponse(
+        socket_ = Socket(
             timeout=SECONDS_TO_CLOSE, max_msg_size=MOST_BYTES, heartbeat=20.0, compress=False)
         await socket_.prepare(request)
-        visitor = Visitor(self._stage, socket_)
+        visitor = Visitor(self._stage, socket_, self._bridge.warn)
         self._visitors.add(visitor)
         try:
             await visitor.stay()
+        except (ConnectionError, asyncio.TimeoutError):
+            # It has left, or does not read.
+            pass
         finally:
             self._visitors.discard(visitor)
+            transport = request.transport
+            if transport and transport.get_write_buffer_size():
+                # A connection that is closed would wait for ever until this is read.
+                transport.abort()
         return socket_
+
+
+class Sentence(logging.Handler):
+    """Says in one sentence what is logged, for what others send is no traceback of ours."""
+
+    def __init__(self, say):
+        super().__init__()
+        self._say = say
+
+    def emit(self, record):
+        """Say it."""
+        error = record.exc_info[1] if record.exc_info else ''
+        self._say(f'{record.getMessage()}: {error!r}')
+
+
+class Socket(web.WebSocketResponse):
+    """A WebSocket that says why it is closed."""
+
+    async def close(self, *, code=WSCloseCode.OK, message=b'', **kwargs):
+        """Close it; raise TimeoutError if nothing is read at the other end."""
+        closing = super().close(
+            code=code, message=message or CLOSED_FOR.get(code, b''), **kwargs)
+        return await asyncio.wait_for(closing, 2 * SECONDS_TO_CLOSE)
 
 
 class Visitor:
     """
     A browser that looks.
 
-    It is sent what is new, the newest only, and as often as it has drawn what it was sent.
+    It is sent what is new, the newest only, and as often as it has drawn what it was sent; each
+    request is answered. Nothing is gathered for one that does not read, which is sent home.
     """
 
-    def __init__(self, stage, socket_):
+    def __init__(self, stage, socket_, warn):
         self._stage = stage
         self._socket = socket_
+        self._warn = warn
         self._texts = {}
-        self._answers = deque()
-        self._feeds = {}
+        self._offered = set()
         self._looks = {}
         self._ready = True
         self._news = asyncio.Event()
-        self._tasks = set()
+        self._requests = asyncio.Queue(MOST_WAITING)
 
     def tell(self, key, message: dict):
         """Send a message; of those with one key the last is enough."""
@@ -178,90 +219,152 @@ class Visitor:
 
     def offer(self, feed):
         """Send what a feed has, when the browser is ready to draw it."""
-        self._feeds[id(feed)] = feed
+        self._offered.add(feed.topic)
         self._news.set()
 
     async def stay(self):
-        """Serve the browser until it leaves."""
+        """
+        Serve the browser until it leaves.
+
+        Raises
+        ------
+        ConnectionError, TimeoutError
+            If it leaves without a word, or does not read.
+
+        """
         self._stage.enter(self)
-        sending = asyncio.ensure_future(self._send())
+        tasks = [asyncio.ensure_future(doing)
+                 for doing in (self._hear(), self._answer(), self._send())]
         try:
-            async for message in self._socket:
-                self._hear(message)
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                task.result()
         finally:
-            for task in (sending, *self._tasks):
-                task.cancel()
             self._stage.leave(self)
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
 
     async def close(self):
         """Send the browser home."""
-        await self._socket.close(code=WSCloseCode.GOING_AWAY, message=b'the viewer ended')
+        with suppress(asyncio.TimeoutError):
+            await self._socket.close(
+                code=WSCloseCode.GOING_AWAY, message=b'the viewer ended')
 
-    def _hear(self, message):
-        try:
-            said = json.loads(message.data)
-            op = said['op']
-        except (TypeError, ValueError, KeyError):
-            return
-        if op == 'drawn':
-            self._ready = True
-            self._news.set()
-        elif len(self._tasks) < MOST_AT_ONCE:
-            task = asyncio.ensure_future(self._answer(op, said))
-            self._tasks.add(task)
-            task.add_done_callback(self._tasks.discard)
+    async def _hear(self):
+        async for message in self._socket:
+            # Others have their turn, however much comes.
+            await asyncio.sleep(0)
+            said = {}
+            try:
+                said = _parsed(message.data)
+                if said['op'] == 'drawn':
+                    self._ready = True
+                    self._news.set()
+                else:
+                    self._requests.put_nowait(said)
+            except ValueError as error:
+                await self._say(_answer(said, f'the request is not understood: {error}'))
+            except asyncio.QueueFull:
+                await self._say(_answer(said, f'{MOST_WAITING} requests wait already'))
 
-    async def _answer(self, op, said):
-        answer = {'op': 'answer', 'id': said.get('id'), 'reason': ''}
+    async def _answer(self):
+        while True:
+            said = await self._requests.get()
+            await self._say(_answer(said, **await self._done(said)))
+
+    async def _done(self, said) -> dict:
+        op = said['op']
         try:
             if op == 'set':
                 await self._stage.set(said['mechanism'], dict(said['values']))
-            elif op == 'drag':
-                answer.update(await self._stage.drag(said['mechanism'], float(said['angle'])))
-            else:
-                answer['reason'] = f'unknown request {op!r}'
+                return {}
+            if op == 'drag':
+                return await self._stage.drag(said['mechanism'], said['angle'])
+            return {'reason': f'unknown request {shortened(op)}'}
         except Refused as reason:
-            answer['reason'] = str(reason)
-        except (KeyError, TypeError, ValueError) as error:
-            answer['reason'] = f'{op} is not understood: {error!r}'
-        self._answers.append(answer)
-        self._news.set()
+            return {'reason': str(reason)}
+        except KeyError as error:
+            return {'reason': f'{op} is not understood: it lacks {error}'}
+        except (TypeError, ValueError) as error:
+            return {'reason': f'{op} is not understood: {error}'}
+        except Exception as error:
+            # The browser would wait for ever for what raised.
+            self._warn(f'{op}: {error!r}')
+            return {'reason': f'internal error: {error!r}'}
 
     async def _send(self):
-        try:
-            while True:
-                await self._news.wait()
-                self._news.clear()
-                await self._send_texts()
-                if self._ready and self._feeds:
-                    await self._send_picture()
-        except ConnectionError:
-            # It has left; whoever listens to it hears so too.
-            pass
+        while True:
+            await self._news.wait()
+            self._news.clear()
+            await self._send_texts()
+            if self._ready and self._offered:
+                await self._send_picture()
 
     async def _send_texts(self):
-        while self._texts or self._answers:
-            for key in list(self._texts):
-                await self._socket.send_json(self._texts.pop(key))
-            while self._answers:
-                await self._socket.send_json(self._answers.popleft())
+        while self._texts:
+            key = next(iter(self._texts))
+            if key == SCENE:
+                # The page forgets mechanisms that are not in it.
+                self._looks = {}
+            await self._say(self._texts.pop(key))
 
     async def _send_picture(self):
-        feeds, self._feeds = self._feeds, {}
-        drawn = [feed.drawn() for feed in feeds.values()]
+        offered, self._offered = self._offered, set()
+        drawn = [feed.drawn() for feed in self._stage.feeds() if feed.topic in offered]
         for looks, _ in drawn:
             for number, look in looks.items():
                 if self._looks.get(number) != look:
                     self._looks[number] = look
-                    await self._socket.send_json({'op': 'look', 'number': number, **look})
+                    await self._say({'op': 'look', 'number': number, **look})
         self._ready = False
-        await self._socket.send_bytes(b''.join(records for _, records in drawn))
+        await self._within(self._socket.send_bytes(b''.join(records for _, records in drawn)))
+
+    async def _say(self, message):
+        await self._within(self._socket.send_json(message))
+
+    async def _within(self, sending):
+        await asyncio.wait_for(sending, SECONDS_TO_READ)
+
+
+def _parsed(text) -> dict:
+    """Return a request; raise ValueError if it is none."""
+    if not isinstance(text, str):
+        raise ValueError('it must be a text')
+    try:
+        said = json.loads(text, parse_int=_number)
+    except RecursionError:
+        raise ValueError('it is nested too deeply') from None
+    if not isinstance(said, dict) or not isinstance(said.get('op'), str):
+        raise ValueError('it must be a JSON object with an "op"')
+    return said
+
+
+def _number(text):
+    return int(text) if len(text) <= MOST_FIGURES else float(text)
+
+
+def _answer(said, reason='', **more) -> dict:
+    id_ = said.get('id')
+    return {'op': 'answer', 'id': id_ if isinstance(id_, (int, str)) else None,
+            'reason': reason, **more}
+
+
+def _parts(url):
+    """Return the parts of an address, nothing of one that is none."""
+    try:
+        return urlsplit(url)
+    except ValueError:
+        return urlsplit('')
 
 
 async def _file(request):
     name = request.match_info.get('name', 'index.html')
     path = {file.name: file for file in PAGE.iterdir()}.get(name)
     if path is None:
-        raise web.HTTPNotFound(text=f'There is no {name}.\n')
-    return web.Response(body=path.read_bytes(), content_type=KINDS[name[name.rfind('.'):]],
-                        charset='utf-8')
+        raise web.HTTPNotFound(text=f'There is no {name!r}.\n')
+    response = web.Response(body=path.read_bytes(), charset='utf-8',
+                            content_type=KINDS[name[name.rfind('.'):]])
+    # What follows before the answer was read would be gathered without bound.
+    response.force_close()
+    return response

@@ -17,6 +17,8 @@
 import asyncio
 from dataclasses import dataclass
 import math
+import reprlib
+import sys
 
 from rcl_interfaces.srv import (
     DescribeParameters,
@@ -28,6 +30,9 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 
 SERVICES = {'list_parameters': ListParameters, 'describe_parameters': DescribeParameters,
             'get_parameters': GetParameters, 'set_parameters_atomically': SetParametersAtomically}
+
+# A text from JSON for a message: of a long one only its ends.
+shortened = reprlib.repr
 
 
 class RemoteNode:
@@ -68,24 +73,29 @@ class RemoteNode:
 
 @dataclass
 class Setting:
-    """A parameter that one or more nodes have; the first of them says what its value is."""
+    """
+    A parameter as the page shows it, on the node that it is set on.
+
+    Raises
+    ------
+    ValueError
+        If its type is none that there is.
+
+    """
 
     name: str
+    node: str
     descriptor: object
-    messages: dict
+    message: object
 
-    @property
-    def nodes(self):
-        """The nodes' names."""
-        return list(self.messages)
+    def __post_init__(self):
+        self._type = Parameter.Type(self.message.type)
 
     @property
     def value(self):
         """Its value, as JSON has it."""
-        value = parameter_value_to_python(next(iter(self.messages.values())))
-        if isinstance(value, float):
-            return _finite(value)
-        return value if isinstance(value, (bool, int, str, type(None))) else list(value)
+        value = parameter_value_to_python(self.message)
+        return list(map(_shown, value)) if isinstance(value, list) else _shown(value)
 
     def described(self) -> dict:
         """Return what the page needs to draw it."""
@@ -95,24 +105,33 @@ class Setting:
                            ranges[0].step) if ranges else (None, None, None)
         return {'name': self.name, 'value': self.value, 'kind': self._type.name.lower(),
                 'meaning': about.description, 'allowed': about.additional_constraints,
-                'fixed': about.read_only, 'low': _finite(low), 'high': _finite(high),
-                'step': _finite(step)}
+                'fixed': about.read_only, 'low': _shown(low), 'high': _shown(high),
+                'step': _shown(step)}
 
-    def message(self, full_name: str, value):
+    def asked(self, full_name: str, value):
         """Return a parameter message with a value from JSON; ValueError if it cannot hold it."""
-        wanted = {Parameter.Type.DOUBLE: (int, float), Parameter.Type.INTEGER: (int,),
-                  Parameter.Type.BOOL: (bool,)}.get(self._type, ())
-        if not isinstance(value, wanted) or isinstance(value, bool) != (wanted == (bool,)):
-            raise ValueError(f'{full_name} must be {self.descriptor.additional_constraints}, '
-                             f'not {value!r}')
+        if not HOLDS.get(self._type, lambda _: False)(value):
+            allowed = self.descriptor.additional_constraints or f'a {self._type.name.lower()}'
+            raise ValueError(f'{full_name} must be {allowed}, not {shortened(value)}')
         if self._type == Parameter.Type.DOUBLE:
             value = float(value)
         return Parameter(full_name, self._type, value).to_parameter_msg()
 
-    @property
-    def _type(self):
-        return Parameter.Type(next(iter(self.messages.values())).type)
+
+def is_number(value) -> bool:
+    """Return whether a value from JSON is a finite number that a double can hold."""
+    return type(value) in (int, float) and abs(value) <= sys.float_info.max
 
 
-def _finite(value):
-    return value if value is not None and math.isfinite(value) else None
+HOLDS = {
+    Parameter.Type.DOUBLE: is_number,
+    Parameter.Type.INTEGER: lambda value: type(value) is int and -1 << 63 <= value < 1 << 63,
+    Parameter.Type.BOOL: lambda value: type(value) is bool,
+}
+
+
+def _shown(value):
+    """Return a value as JSON can say it: None for a number that is not finite."""
+    if isinstance(value, bytes):
+        return value[0]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -15,9 +15,11 @@
 """The running scene as the page sees it: found in the graph, drawn, and set by services."""
 
 import asyncio
+from contextlib import suppress
 from dataclasses import dataclass
 import math
 
+import numpy as np
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.qos import (
     DurabilityPolicy,
@@ -29,7 +31,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from .bridge import NoAnswer
 from .feed import Feed
-from .settings import RemoteNode, Setting
+from .settings import is_number, RemoteNode, Setting, shortened
 
 try:
     from linkage_interfaces.srv import ServoInverse
@@ -43,6 +45,9 @@ LIST_TYPE = 'rcl_interfaces/srv/ListParameters'
 LEVER_TYPE = 'linkage_interfaces/srv/ServoInverse'
 SECONDS_BETWEEN_LOOKS = 1.0
 SECONDS_TO_LINGER = 1.0
+# How finely, and how often, it is looked for the end of a lever's reach.
+SAMPLES, CLOSER_LOOKS = 2001, 4
+SCENE = 'scene'
 
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -112,9 +117,7 @@ class Stage:
         if self._looking is None:
             self._looking = asyncio.ensure_future(self._look())
             return
-        visitor.tell('scene', self._scene())
-        for feed in self.feeds():
-            visitor.offer(feed)
+        self._show(visitor)
 
     def leave(self, visitor):
         """Let somebody go; after the last one the curtain falls, unless it was only a reload."""
@@ -135,7 +138,7 @@ class Stage:
 
     async def set(self, key: str, values: dict):
         """
-        Set parameters of a mechanism on every node that has them, or on none.
+        Set parameters of a mechanism, those of one node all or none.
 
         Raises
         ------
@@ -145,73 +148,103 @@ class Stage:
         """
         async with self._setting:
             cast = self._find(key)
-            new, old = {}, {}
+            asked = {}
             for name, value in values.items():
                 if name not in cast.settings:
-                    raise Refused(f'{cast.name} has no parameter {name!r}')
+                    raise Refused(f'{cast.name} has no parameter {shortened(name)}')
                 setting = cast.settings[name]
-                full = f'{cast.name}.{name}'
                 try:
-                    message = setting.message(full, value)
+                    parameter = setting.asked(f'{cast.name}.{name}', value)
                 except ValueError as error:
                     raise Refused(str(error)) from None
-                for node, present in setting.messages.items():
-                    new.setdefault(node, []).append(message)
-                    old.setdefault(node, []).append(type(message)(name=full, value=present))
-            await self._set_all(new, old)
+                asked.setdefault(setting.node, []).append(parameter)
+            for node, parameters in asked.items():
+                await self._set(node, parameters)
+
+    async def _set(self, node, parameters):
+        if node not in self._nodes:
+            raise Refused(f'{node} is gone')
+        try:
+            reason = await self._nodes[node].set(parameters)
+        except NoAnswer as error:
+            reason = str(error)
+        if reason:
+            raise Refused(reason)
 
     async def drag(self, key: str, angle: float) -> dict:
-        """Put a lever at an angle [rad] by its crank, and hold it; return the service's answer."""
+        """
+        Put a lever at an angle [rad], or as near as it gets, by its crank, and hold it there.
+
+        Returns
+        -------
+        dict
+            The service's answer, and why the lever is not at the angle, if it is not.
+
+        """
         cast = self._find(key)
         if cast.lever is None:
             raise Refused(f'{cast.name} has no lever that a servo_inverse node knows')
-        try:
-            answer = await self._bridge.call(cast.lever, ServoInverse.Request(
-                mechanism=cast.name, lever_angle=[float(angle)]))
-        except (NoAnswer, TypeError, ValueError) as error:
-            raise Refused(str(error)) from None
+        if not is_number(angle):
+            raise ValueError(f'angle must be a finite number, not {shortened(angle)}')
+        answer = await self._asked(cast, [angle])
+        reason = answer.message
         if not answer.success:
-            raise Refused(answer.message)
+            angle = await self._nearest(cast, angle)
+            answer = await self._asked(cast, [angle])
+        if not answer.success:
+            raise Refused(reason)
         servo, reduction = answer.servo_angle[0], answer.reduction[0]
         await self.set(key, {'crank.speed': 0.0, 'crank.start': servo})
-        return {'servo': servo, 'reduction': reduction if math.isfinite(reduction) else None}
+        return {'value': angle, 'servo': servo, 'reason': reason,
+                'reduction': reduction if math.isfinite(reduction) else None}
 
     def _find(self, key):
         if key not in self._cast:
-            raise Refused(f'there is no mechanism {key!r}; there are: {", ".join(self._cast)}')
+            raise Refused(f'there is no mechanism {shortened(key)}; '
+                          f'there are: {", ".join(self._cast)}')
         return self._cast[key]
 
-    async def _set_all(self, new, old):
-        done = []
-        for node, parameters in new.items():
-            reason = await self._set_one(node, parameters)
-            if reason:
-                for other in done:
-                    await self._set_one(other, old[other])
-                raise Refused(reason)
-            done.append(node)
-
-    async def _set_one(self, node, parameters):
+    async def _asked(self, cast, angles):
         try:
-            return await self._nodes[node].set(parameters)
-        except (NoAnswer, KeyError) as error:
-            return str(error)
+            return await self._bridge.call(cast.lever, ServoInverse.Request(
+                mechanism=cast.name, lever_angle=angles))
+        except NoAnswer as error:
+            raise Refused(str(error)) from None
 
-    def _scene(self):
-        return {'op': 'scene', 'mechanisms': [cast.described() for cast in self._cast.values()]}
+    async def _nearest(self, cast, angle):
+        """Return the nearest angle that a lever reaches, seen ever closer on a finer scale."""
+        low, high, nearest = -math.pi, math.pi, 0.0
+        for _ in range(CLOSER_LOOKS):
+            away = np.linspace(low, high, SAMPLES)
+            reached = away[(await self._asked(cast, (angle + away).tolist())).reachable]
+            if not len(reached):
+                break
+            nearest = float(min(reached, key=abs))
+            low, high = nearest, nearest - math.copysign((high - low) / (SAMPLES - 1), nearest)
+        return angle + nearest
 
-    def _tell(self, key, message):
-        for visitor in self.audience:
-            visitor.tell(key, message)
+    def _show(self, visitor):
+        visitor.tell(SCENE, {'op': 'scene', 'mechanisms': [
+            cast.described() for cast in self._cast.values()]})
+        for feed in self.feeds():
+            visitor.offer(feed)
 
     async def _look(self):
         await self._bridge.ask(self._listen)
         while True:
-            seen = await self._bridge.ask(self._survey)
-            if seen != self._seen:
-                self._seen = seen
-                await self._change(*seen)
+            try:
+                await self._look_once()
+            except Exception as error:
+                # What other nodes say of themselves is anything; the next look may find it well.
+                self._seen = None
+                self._bridge.warn(f'the scene cannot be read: {error!r}')
             await asyncio.sleep(SECONDS_BETWEEN_LOOKS)
+
+    async def _look_once(self):
+        seen = await self._bridge.ask(self._survey)
+        if seen != self._seen:
+            self._seen = seen
+            await self._change(*seen)
 
     def _survey(self):
         """Return what there is in the graph: marker topics, nodes with parameters, services."""
@@ -239,7 +272,8 @@ class Stage:
         found = dict(zip(nodes, await asyncio.gather(
             *(self._parameters(node, names) for node in nodes))))
         self._cast = {key: self._found(key, home, found) for key, home in homes.items()}
-        self._tell('scene', self._scene())
+        for visitor in self.audience:
+            self._show(visitor)
 
     async def _parameters(self, node, prefixes):
         try:
@@ -257,10 +291,10 @@ class Stage:
         near = [node for node in found if _space(node) in spaces]
         for node in sorted(near, key=lambda node: node not in home):
             for full, (descriptor, value) in found[node].items():
-                if full.startswith(prefix):
-                    name = full[len(prefix):]
-                    setting = cast.settings.setdefault(name, Setting(name, descriptor, {}))
-                    setting.messages[node] = value
+                name = full[len(prefix):]
+                if full.startswith(prefix) and name not in cast.settings:
+                    with suppress(ValueError):
+                        cast.settings[name] = Setting(name, node, descriptor, value)
         type_ = cast.settings.get('type')
         if type_ and type_.value == 'slotted_lever':
             cast.lever = next((client for name, client in self._levers.items()
@@ -286,8 +320,12 @@ class Stage:
             self._feeds[name] = self._fed(name, *topics[name])
 
     def _fed(self, name, key, type_, qos):
-        feed = Feed(key, type_, lambda *marker: self._numbers.setdefault(
-            (name, *marker), len(self._numbers)))
+        def number(i):
+            return self._numbers.setdefault((name, i), len(self._numbers))
+
+        # A logger of its own: what is throttled is the warnings of this topic alone.
+        logger = self._bridge.node.get_logger().get_child(name.strip('/'))
+        feed = Feed(name, key, type_, number, logger)
         return feed, self._bridge.node.create_subscription(
             type_, name, lambda raw: self._take(feed, raw), qos, raw=True)
 
@@ -326,14 +364,16 @@ class Stage:
 
     def _notice_one(self, cast, node, name, parameter):
         setting = cast.settings.get(name)
-        if setting is None or node not in setting.messages:
+        if setting is None or parameter.value.type != setting.message.type:
             if node in self._nodes:
                 self._seen = None
             return
-        setting.messages[node] = parameter.value
-        if node == setting.nodes[0]:
-            self._tell(('value', cast.key, name), {
-                'op': 'value', 'mechanism': cast.key, 'name': name, 'value': setting.value})
+        if node != setting.node:
+            return
+        setting.message = parameter.value
+        for visitor in self.audience:
+            visitor.tell((cast.key, name), {'op': 'value', 'mechanism': cast.key,
+                                            'name': name, 'value': setting.value})
 
 
 def _joined(space, name):

@@ -137,7 +137,7 @@ const wire = new Wire({
   look({ number, mechanism, ...look }) {
     const drawn = mechanisms.get(mechanism) ?? new Mechanism({ key: mechanism, settings: [] });
     mechanisms.set(mechanism, drawn);
-    drawn.markers.set(number, { look, points: new Float32Array() });
+    drawn.markers.set(number, { points: new Float32Array(), ...drawn.markers.get(number), look });
     picture.refit(mechanism);
   },
 

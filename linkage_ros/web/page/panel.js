@@ -17,6 +17,8 @@
 const STOPS = 1000;
 const STILL = 2000;
 const RIGHT_ANGLE = Math.PI / 2;
+const SETTLED = 500;
+const NUMBER = /^[+-]?(\d+[.,]?\d*|[.,]\d+)(e[+-]?\d+)?$/i;
 const CRANK = /\.(speed|start)$/;
 
 /** How a slider's place in [0, 1] becomes a value, and back. */
@@ -47,6 +49,9 @@ function law({ name, kind, low, high }) {
 
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
+/** The number that a text says, a decimal comma taken as a point; NaN if it says none. */
+const read = text => NUMBER.test(text) ? Number(text.replace(',', '.')) : NaN;
+
 function element(tag, properties = {}, ...children) {
   const made = Object.assign(document.createElement(tag), properties);
   made.append(...children);
@@ -73,6 +78,25 @@ class Newest {
   }
 }
 
+/** The line below a control that says why not all was done that was asked for. */
+class Reason {
+  constructor(id) {
+    this.line = element('p', { className: 'reason', id, hidden: true });
+    this.line.setAttribute('role', 'alert');
+  }
+
+  say(words) {
+    this.line.textContent = words;
+    this.line.hidden = !words;
+    this.since = performance.now();
+  }
+
+  /** Forget it, for what somebody else does; what one did oneself may be heard of late. */
+  fade() {
+    if (performance.now() - this.since > SETTLED) this.say('');
+  }
+}
+
 /** A number with a slider; what is refused springs back, with the reason below. */
 class Slider {
   constructor({ label, title, unit, low, high, kind, value, scale, step, digits = 6 }, request) {
@@ -82,18 +106,14 @@ class Slider {
     this.range.min = kind === 'integer' ? low : 0;
     this.range.max = kind === 'integer' ? high : STOPS;
     this.range.step = kind === 'integer' ? step || 1 : 1;
-    this.number = element('input', { type: 'number', step: 'any', ariaLabel: label });
-    this.reason = element('p', { className: 'reason', id: `${id}r`, hidden: true });
-    this.reason.setAttribute('role', 'alert');
+    this.number = element('input', { type: 'text', inputMode: 'decimal', autocomplete: 'off', ariaLabel: label });
+    this.reason = new Reason(`${id}r`);
     this.answer = element('p', { className: 'answer', hidden: true });
-    this.range.setAttribute('aria-describedby', this.reason.id);
+    for (const input of [this.range, this.number]) input.setAttribute('aria-describedby', `${id}r`);
     this.row = element('div', { className: 'row', title },
       element('label', { htmlFor: id, textContent: label }), this.range, this.number,
-      element('span', { className: 'unit', textContent: unit }), this.answer, this.reason);
-    this.asked = new Newest(async wanted => {
-      const answer = await request(wanted);
-      this.settle(answer.reason, answer.reason ? this.accepted : wanted, answer);
-    });
+      element('span', { className: 'unit', textContent: unit }), this.answer, this.reason.line);
+    this.asked = new Newest(async wanted => this.settle(wanted, await request(wanted)));
     this.range.oninput = () => {
       this.held = true;
       this.number.value = this.shortened(this.chosen());
@@ -102,8 +122,9 @@ class Slider {
     this.range.onchange = () => this.release();
     this.number.onfocus = () => { this.held = true; };
     this.number.onblur = () => this.release();
+    this.number.oninput = () => this.explain('');
     this.number.onchange = () => {
-      if (this.number.value !== '') this.offer(Number(this.number.value));
+      this.type(this.number.value.trim());
       this.number.blur();
     };
     this.render();
@@ -113,19 +134,30 @@ class Slider {
     this.asked.offer(value);
   }
 
+  type(text) {
+    const value = read(text);
+    if (Number.isFinite(value)) this.offer(value);
+    else if (text) this.explain(`Refused: ${text} is not a number that can be set`);
+  }
+
   chosen() {
     if (this.kind === 'integer') return Number(this.range.value);
     const value = this.scale.value(this.range.value / STOPS, this.low, this.high);
     return clamp(Number(value.toPrecision(4)), this.low, this.high);
   }
 
-  settle(reason, value, answer = {}) {
-    this.accepted = value;
-    this.reason.textContent = reason && `Refused: ${reason}`;
-    this.reason.hidden = !reason;
-    this.row.classList.toggle('refused', !!reason);
+  /** Show what came of it: all that was wanted, another value, or a refusal. */
+  settle(wanted, answer) {
+    const refused = answer.reason && answer.value === undefined;
+    if (!refused) this.accepted = answer.value ?? wanted;
+    this.explain(refused ? `Refused: ${answer.reason}` : answer.reason, refused);
     this.told?.(answer);
     if (!this.held && !this.asked.waiting) this.render();
+  }
+
+  explain(words, refused) {
+    this.reason.say(words);
+    this.row.classList.toggle('refused', !!refused);
   }
 
   release() {
@@ -135,6 +167,12 @@ class Slider {
 
   /** Show a value that somebody else has set. */
   update(value) {
+    if (value !== this.accepted) this.reason.fade();
+    this.follow(value);
+  }
+
+  /** Show a value that changes by itself. */
+  follow(value) {
     this.accepted = value;
     if (!this.held && !this.asked.busy) this.render();
   }
@@ -145,6 +183,7 @@ class Slider {
       : STOPS * clamp(this.scale.place(this.accepted, this.low, this.high), 0, 1);
     this.range.value = place;
     this.number.value = this.shortened(this.accepted);
+    this.row.classList.remove('refused');
   }
 
   shortened(value) {
@@ -157,19 +196,18 @@ class Switch {
   constructor({ label, title, value }, request) {
     const id = `s${Slider.made = (Slider.made ?? 0) + 1}`;
     this.box = element('input', { type: 'checkbox', id, checked: value });
-    this.reason = element('p', { className: 'reason', hidden: true });
-    this.reason.setAttribute('role', 'alert');
+    this.reason = new Reason(`${id}r`);
     this.row = element('div', { className: 'row', title },
-      element('label', { htmlFor: id, textContent: label }), this.box, this.reason);
+      element('label', { htmlFor: id, textContent: label }), this.box, this.reason.line);
     this.box.onchange = async () => {
       const { reason } = await request(this.box.checked);
-      this.reason.textContent = reason && `Refused: ${reason}`;
-      this.reason.hidden = !reason;
+      this.reason.say(reason && `Refused: ${reason}`);
       if (reason) this.box.checked = !this.box.checked;
     };
   }
 
   update(value) {
+    if (value !== this.box.checked) this.reason.fade();
     this.box.checked = value;
   }
 }
@@ -297,17 +335,17 @@ export class Panel {
     this.sections.get(key)?.update(name, value);
   }
 
-  /** Ask for a lever angle; return whether the last one was refused. */
+  /** Ask for a lever angle; return whether the last one could not be reached. */
   drag(key, angle) {
     const slider = this.sections.get(key)?.lever;
     if (!slider) return false;
     slider.offer(angle);
-    return !slider.reason.hidden;
+    return !slider.reason.line.hidden;
   }
 
   /** Let the lever sliders follow the levers. */
   follow(levers) {
-    for (const [key, angle] of levers) this.sections.get(key)?.lever?.update(angle);
+    for (const [key, angle] of levers) this.sections.get(key)?.lever?.follow(angle);
   }
 
   /** Say which mechanisms send nothing. */

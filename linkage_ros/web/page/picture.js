@@ -16,8 +16,10 @@
 
 const MARGIN = 44;
 const SLACK = 0.06;
+const SHRUNK = 10;
 const GRAB = 18;
 const LINE = 18;
+const MOST_LINES = 100;
 const FONT = "13px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
 const REFUSED = '#d55e00';
 
@@ -36,6 +38,13 @@ function axes([, , , x, y, z, w]) {
 function round(value) {
   const power = 10 ** Math.floor(Math.log10(value));
   return [1, 2, 5, 10].find(one => one * power >= value * 0.999) * power;
+}
+
+/** The multiples of a step between two ends; few, even so far out that adding one changes nothing. */
+function multiples(step, low, high) {
+  const first = Math.ceil(low / step);
+  const count = Math.max(0, Math.floor(high / step) - first + 1) || 0;
+  return Array.from({ length: Math.min(count, MOST_LINES) }, (_, i) => (first + i) * step);
 }
 
 /** A colour made lighter; lightness alone tells the pairs of legs apart. */
@@ -57,6 +66,10 @@ class Box {
     if (y > this.high[1]) this.high[1] = y;
   }
 
+  get size() {
+    return Math.max(...this.high.map((high, i) => high - this.low[i]));
+  }
+
   holds(other) {
     return [0, 1].every(i => this.low[i] <= other.low[i] && other.high[i] <= this.high[i]);
   }
@@ -66,7 +79,7 @@ class Box {
     const box = new Box();
     box.add(...this.low.map((low, i) => Math.min(low, other.low[i])));
     box.add(...this.high.map((high, i) => Math.max(high, other.high[i])));
-    const slack = SLACK * Math.max(...box.high.map((high, i) => high - box.low[i]));
+    const slack = SLACK * box.size;
     if (!Number.isFinite(slack)) return box;
     box.low = box.low.map(low => low - slack);
     box.high = box.high.map(high => high + slack);
@@ -153,7 +166,9 @@ export class Picture {
     }
     const all = new Box();
     for (const [key, box] of now) {
-      const known = this.boxes.get(key) ?? new Box();
+      let known = this.boxes.get(key) ?? new Box();
+      // It was never so large: something far off was drawn that is gone.
+      if (box.size > 0 && known.size > SHRUNK * box.size) known = new Box();
       if (!known.holds(box)) this.boxes.set(key, known.grown(box));
       const { low, high } = this.boxes.get(key) ?? box;
       all.add(...low);
@@ -185,17 +200,17 @@ export class Picture {
     context.fillStyle = '#5a6673';
     context.textAlign = 'center';
     context.textBaseline = 'bottom';
-    for (let i = Math.ceil(left / step); i * step <= right; i++) {
-      const [x] = this.at(i * step, 0);
+    for (const value of multiples(step, left, right)) {
+      const [x] = this.at(value, 0);
       this.line(x, 0, x, height);
-      if (x > 70 && x < width - 30) context.fillText((i * step).toFixed(digits), x, height - 5);
+      if (x > 70 && x < width - 30) context.fillText(value.toFixed(digits), x, height - 5);
     }
     context.textAlign = 'left';
     context.textBaseline = 'middle';
-    for (let i = Math.ceil(bottom / step); i * step <= top; i++) {
-      const [, y] = this.at(0, i * step);
+    for (const value of multiples(step, bottom, top)) {
+      const [, y] = this.at(0, value);
       this.line(0, y, width, y);
-      if (y < height - 30 && y > 12) context.fillText((i * step).toFixed(digits), 6, y);
+      if (y < height - 30 && y > 12) context.fillText(value.toFixed(digits), 6, y);
     }
     context.textBaseline = 'bottom';
     context.fillText('m', 6, height - 5);
