@@ -15,6 +15,7 @@
 """Node that turns the cranks of a scene."""
 
 import sys
+from time import monotonic_ns
 
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
@@ -22,6 +23,13 @@ from sensor_msgs.msg import JointState
 from . import node, scene
 from .messages import JointStates
 from .motion import Motion
+from .words import listed
+
+# By how much the clock may run ahead of steady time between two messages [ns]: a clock is slewed.
+JUMP = 10 ** 8
+
+# In thirty years [ns] nobody waits for the next message.
+LONGEST_PERIOD = 1e18
 
 
 class CrankDriver(node.SceneNode):
@@ -31,17 +39,17 @@ class CrankDriver(node.SceneNode):
         super().__init__(scene.DRIVER, **kwargs)
         self._motions = {}
         self._cranks = {}
-        self._now = None
+        self._now = self._steady = None
         self._messages = JointStates()
         self._publisher = self.create_publisher(JointState, 'crank_states', 10)
         self._timer = self.create_timer(1.0, self._tick)
         # On system time a timer sleeps until an old time comes round again, if that is set back.
         self.create_timer(1.0, self._wake, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self.adopt(self.prepare(self.scene))
+        self.begin()
 
     def adopt(self, new):
         """Let every crank go on as the scene says: from where it is, or from a new start."""
-        now = 0 if self._now is None else max(self._now, self._time().nanoseconds)
+        now = 0 if self._now is None else self._settled().nanoseconds
         cranks = {f'{name}_{link}': crank for name, machine in new.machines.items()
                   for link, crank in machine.cranks.items()}
         for name, crank in cranks.items():
@@ -57,7 +65,7 @@ class CrankDriver(node.SceneNode):
         if not rate:
             self._timer.cancel()
             return
-        period = round(1e9 / rate)
+        period = round(min(1e9 / rate, LONGEST_PERIOD))
         if self._timer.timer_period_ns != period or self._timer.is_canceled():
             self._timer.timer_period_ns = period
             self._timer.reset()
@@ -65,19 +73,32 @@ class CrankDriver(node.SceneNode):
     def _time(self):
         return self.get_clock().now()
 
+    def _settled(self):
+        """Return the time; where it jumps, every crank goes on from the angle that it reached."""
+        time, steady = self._time(), monotonic_ns()
+        now, simulated = time.nanoseconds, self.get_clock().ros_time_is_active
+        reached = 0
+        if self._now is not None:
+            reached = self._now if simulated else self._now + steady - self._steady
+        # A simulation may leap ahead as it likes: its time is the only one that there is.
+        leapt = now - reached > JUMP and not simulated
+        if self._now is None or now < self._now or leapt:
+            self._motions = {n: m.moved(reached, now) for n, m in self._motions.items()}
+        self._now, self._steady = now, steady
+        return time
+
     @node.until_the_end
     def _tick(self):
-        time = self._time()
+        time = self._settled()
         now = time.nanoseconds
-        if self._now is None or now < self._now:
-            # The first time there is, or one before the last: carry on from the angle reached.
-            before = self._now or 0
-            self._motions = {n: m.moved(before, now) for n, m in self._motions.items()}
-        self._now = now
         if self._publisher.get_subscription_count():
             angles, speeds = zip(*(motion.at(now) for motion in self._motions.values()))
             self._publisher.publish(
                 self._messages.message(time.to_msg(), list(self._motions), angles, speeds))
+
+    def serves(self):
+        """Say which cranks it turns, how often."""
+        return f'turns {listed(self._motions, 200)} on crank_states at {self.scene.rate:g} Hz'
 
     def _wake(self):
         set_back = self._now is not None and self._time().nanoseconds < self._now

@@ -27,6 +27,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from . import messages, node, reading, scene, urdf
 from .solution import Layout
 from .wire import unpack, Wire
+from .words import listed
 
 # Any source will do; what comes while the node is kept waiting, 50 ms at 1000 Hz, is not lost.
 ANY = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -42,8 +43,12 @@ class Kinematics(node.SceneNode):
         self._outlets = {name: Outlet(self, name) for name in self.scene.machines}
         self._names, self._routes = None, ()
         self._reader = reading.Reader()
-        self.adopt(self.prepare(self.scene))
+        self.begin()
         self.create_subscription(JointState, 'crank_states', self._turn, ANY, raw=True)
+
+    def serves(self):
+        """Say which mechanisms it moves."""
+        return f'moves {listed(self.scene.machines, 200)} by crank_states'
 
     def adopt(self, new):
         """Make anew what has changed."""

@@ -20,6 +20,7 @@ from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass
 import math
+import re
 from typing import Any, List, Optional, Tuple
 
 from .words import elided, MESSAGE, quoted
@@ -27,14 +28,17 @@ from .words import elided, MESSAGE, quoted
 KINDS = {
     'bool': (bool, 'true or false'),
     'integer': (int, 'a whole number'),
-    'double': (float, 'a finite number with a decimal point'),
-    'string': (str, 'a text'),
-    'double_array': (float, 'a list of finite numbers with a decimal point'),
-    'string_array': (str, 'a list of texts'),
+    'double': (float, 'a finite number'),
+    'string': (str, 'a text of up to 1000 letters'),
+    'double_array': (float, 'a list of finite numbers'),
+    'string_array': (str, 'a list of texts of up to 1000 letters'),
 }
 
 # How far, relatively, a value may be beyond an end of its range; the client library allows it.
 ROUNDED = 1e-6
+
+TEXT = re.compile(r'.{0,1000}', re.DOTALL)
+LONGEST_LIST = 10000
 
 
 class SceneError(ValueError):
@@ -56,11 +60,13 @@ class Field:
     meaning : str
         In words, with the unit.
     low, high : float, optional
-        The ends of its range, for a slider too.
+        The ends of its range.
     positive : bool
         Whether it must be above zero.
     rule : str
         What else is asked of it.
+    pattern : re.Pattern
+        What a text must match.
     readers : tuple of str
         The nodes that act on it.
     read_only : bool
@@ -74,8 +80,14 @@ class Field:
     high: Optional[float] = None
     positive: bool = False
     rule: str = ''
+    pattern: re.Pattern = TEXT
     readers: Tuple[str, ...] = ()
     read_only: bool = False
+
+    @property
+    def shared(self) -> bool:
+        """Whether more than one node acts on it."""
+        return len(self.readers) > 1
 
     @property
     def allowed(self) -> str:
@@ -84,28 +96,45 @@ class Field:
         if self.positive:
             words.append('above 0')
         if self.high is not None:
-            words.append(f'up to {self.high:g}' if self.positive
-                         else f'from {self.low:g} to {self.high:g}')
+            words.append(f'from {self.low:g} to {self.high:g}')
         return ' '.join(words) + (self.rule and f', {self.rule}')
 
     def checked(self, name: str, value: Any) -> Any:
-        """Return a value, a list as a tuple; raise SceneError if it cannot be."""
+        """
+        Return a value, a list as a tuple; raise SceneError if it cannot be.
+
+        A whole number is taken for the number that it is; an empty list may be of any kind.
+        """
         several = self.kind.endswith('_array')
         # The client library hands over an empty list as nothing at all.
         value = () if several and value is None else plain(value)
-        if isinstance(value, tuple) != several or not all(
-                map(self._holds, value if several else [value])):
+        if isinstance(value, tuple) != several:
             raise self.error(name, value)
-        return value
+        taken = [self._taken(one) for one in (value if several else [value])]
+        if len(taken) > LONGEST_LIST or not all(map(self._holds, taken)):
+            raise self.error(name, value)
+        return tuple(taken) if several else taken[0]
 
     def error(self, name: str, value: Any) -> SceneError:
         """Return the error that says what the parameter must be, and what it is."""
         shown = list(value) if isinstance(value, tuple) else value
-        return SceneError(f'{elided(name)} must be {self.allowed}, not {quoted(shown)}')
+        return SceneError(f'{elided(name, 100)} must be {self.allowed}, not {quoted(shown)}')
+
+    def _taken(self, value):
+        try:
+            return float(value) if type(value) is int and self._type is float else value
+        except OverflowError:
+            return value
+
+    @property
+    def _type(self):
+        return KINDS[self.kind][0]
 
     def _holds(self, value) -> bool:
-        if type(value) is not KINDS[self.kind][0]:
+        if type(value) is not self._type:
             return False
+        if isinstance(value, str):
+            return bool(self.pattern.fullmatch(value))
         if isinstance(value, float) and not math.isfinite(value) or self.positive and value <= 0:
             return False
         return self.high is None or self.low <= value <= self.high or any(
@@ -120,26 +149,11 @@ class Parameter:
     field: Field
     value: Any
 
-    @property
-    def range(self) -> Optional[Tuple[float, float]]:
-        """
-        The least and greatest value it can be changed to while a node runs.
-
-        A slider has a hundred stops, counted from zero: the ends are whole stops.
-        """
-        if self.field.high is not None:
-            return self.field.low, self.field.high
-        if self.field.positive:
-            return 0.1 * self.value, 10.1 * self.value
-        return None
-
 
 class Values:
     """The values that are given, by full parameter name, to be taken one by one."""
 
     def __init__(self, given: Mapping[str, Any]):
-        if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in given):
-            raise SceneError(f'a scene is values by the names of parameters, not {quoted(given)}')
         self._left = dict(given)
         self.parameters: List[Parameter] = []
 

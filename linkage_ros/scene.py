@@ -22,11 +22,12 @@ node declares. No ROS is needed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field as some, replace
 from functools import lru_cache
 import math
 import re
-from typing import Any, Mapping, Optional, Tuple
+from typing import Any, Dict, List, Optional, Tuple
 
 from . import mechanisms
 from .assembly import Assembly, is_full_turn
@@ -34,9 +35,12 @@ from .mechanism import Mechanism
 from .parameters import Field, Parameter, plain, SceneError, Values
 from .words import elided, listed, quoted
 
-__all__ = ['Crank', 'Machine', 'Scene', 'SceneError', 'in_words', 'load', 'plain', 'read']
+__all__ = ['Crank', 'Machine', 'Parameter', 'Scene', 'SceneError', 'in_words', 'load', 'plain',
+           'read']
 
 DRIVER, KINEMATICS, INVERSE = ALL = 'crank_driver', 'kinematics', 'servo_inverse'
+# Whose values of the parameters that several nodes act on count.
+OWNER = KINEMATICS
 
 # What a crank that swings by default leaves of its reach at each end, as a part of its width.
 MARGIN = 0.01
@@ -52,9 +56,11 @@ TYPES = (*mechanisms.TYPES, mechanisms.CUSTOM)
 
 MECHANISMS = Field(
     'string_array', 'Names of the mechanisms in the scene.', readers=ALL, read_only=True,
-    rule='at least one, each once, of up to 64 letters, digits and single underscores, a letter '
-         'first')
-FRAME_ID = Field('string', 'Frame that the poses are in.', readers=(KINEMATICS,))
+    rule='at least one, each once, of up to 64 letters, digits and single underscores, '
+         'a letter first', pattern=_NAME)
+FRAME_ID = Field('string', 'Frame that the poses are in.', readers=(KINEMATICS,),
+                 rule='1 to 100 letters, digits and _ . : - /, the first a letter, digit or _',
+                 pattern=re.compile(r'\w[\w.:/-]{0,99}'))
 RATE = Field('double', 'Crank messages in a second [Hz]; 0: none.', 0.0, 1000.0, readers=(DRIVER,))
 TYPE = Field('string', 'Type of the mechanism.', readers=ALL, read_only=True,
              rule=f'one of {", ".join(TYPES)}')
@@ -76,7 +82,7 @@ SPEED = Field('double', 'Speed of the crank [rad/s].', -100.0, 100.0, readers=(D
 START = Field('double', 'Crank angle at the start [rad]; a new one moves the crank there.',
               -4.0 * math.pi, 4.0 * math.pi, readers=(DRIVER,))
 SWEEP = Field('double_array', 'Crank angles [rad] between which the crank swings; '
-              'empty: it turns all round, or swings through its reach.', readers=(DRIVER,),
+              'empty: it turns all round, or swings through its reach.', readers=ALL,
               rule='the lower end and the higher end, or none')
 
 
@@ -102,6 +108,13 @@ class Machine:
     points: Tuple[str, ...]
     pose: Tuple[float, ...]
     cranks: Mapping[str, Crank]
+    given: Mapping[str, Any] = some(compare=False, repr=False)
+    parameters: Tuple[Parameter, ...] = some(compare=False, repr=False)
+
+    def is_of(self, given: Mapping[str, Any]) -> bool:
+        """Return whether it was read from these very values."""
+        return self.given.keys() == given.keys() and all(
+            self.given[key] is value for key, value in given.items())
 
     @property
     def crank(self) -> Crank:
@@ -125,7 +138,22 @@ class Scene:
     machines: Mapping[str, Machine]
     frame_id: str
     rate: float
-    parameters: Tuple[Parameter, ...]
+    general: Tuple[Parameter, ...]
+
+    @property
+    def parameters(self) -> Tuple[Parameter, ...]:
+        """All parameters, the general ones first."""
+        return (*self.general, *(parameter for machine in self.machines.values()
+                                 for parameter in machine.parameters))
+
+    def changed_from(self, old: 'Scene') -> List[Parameter]:
+        """Return the parameters that have not the value that they have in a scene before."""
+        parts = [(self.general, old.general), *(
+            (machine.parameters, old.machines[name].parameters)
+            for name, machine in self.machines.items() if machine is not old.machines[name])]
+        before = {parameter.name: parameter.value for _, part in parts for parameter in part}
+        return [parameter for part, _ in parts for parameter in part
+                if parameter.value != before.get(parameter.name)]
 
 
 def load(path: str) -> Scene:
@@ -143,9 +171,19 @@ def load(path: str) -> Scene:
     return read(given)
 
 
-def read(given: Mapping[str, Any]) -> Scene:
+def read(given: Mapping[str, Any], before: Optional[Scene] = None, strict: bool = True) -> Scene:
     """
     Read a scene from the values that are given, by full parameter name.
+
+    Parameters
+    ----------
+    given : mapping
+        Values by full parameter name.
+    before : Scene, optional
+        The scene that this one follows: what is given for a mechanism as before is not read again.
+    strict : bool
+        Whether a start must be where its crank moves. Where others change the sweep or the reach
+        of a crank that has long left its start, it need not.
 
     Raises
     ------
@@ -153,14 +191,19 @@ def read(given: Mapping[str, Any]) -> Scene:
         If a parameter is unknown or cannot be what it is.
 
     """
-    values = Values(given)
+    parts = _parted(given)
+    values = Values(parts.pop('', {}))
     names = values.take('mechanisms', MECHANISMS, mechanisms.CATALOGUE)
-    if not names or len(set(names)) < len(names) or not all(map(_NAME.fullmatch, names)):
+    if not names or len(set(names)) < len(names):
         raise MECHANISMS.error('mechanisms', names)
     frame_id = values.take('frame_id', FRAME_ID, 'world')
     rate = values.take('rate', RATE, 50.0)
-    machines = {name: _machine(name, values) for name in names}
-    _refuse_unknown(values, names)
+    known = before.machines if before else {}
+    machines = {name: _machine(name, parts.pop(name, {}), known.get(name), strict)
+                for name in names}
+    known = ['mechanisms', 'frame_id', 'rate', *(f'{name}.*' for name in names)]
+    for left in (values.left(), *parts.values()):
+        _refuse_unknown(left, known)
     return Scene(machines, frame_id, rate, tuple(values.parameters))
 
 
@@ -169,25 +212,42 @@ def in_words(arcs) -> str:
     return ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in arcs)
 
 
-def _refuse_unknown(values, names):
-    for name in values.left():
+def _parted(given) -> Dict[str, Dict[str, Any]]:
+    """Return the values by mechanism, those of none under an empty name."""
+    if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in given):
+        raise SceneError(f'a scene is values by the names of parameters, not {quoted(given)}')
+    parts = {}
+    for name, value in given.items():
+        mechanism, dot, _ = name.partition('.')
+        parts.setdefault(mechanism if dot else '', {})[name] = value
+    return parts
+
+
+def _refuse_unknown(names, known):
+    for name in names:
+        known = [f'{name}.type', *known] if f'{name}.*' in known else known
         if not _ROS.match(name):
-            mechanism = name.split('.')[0]
-            known = [p.name for p in values.parameters if p.name.startswith(f'{mechanism}.')]
-            known = known or ['mechanisms', 'frame_id', 'rate', *(f'{n}.*' for n in names)]
             raise SceneError(f'{elided(name)} is not a parameter of the scene; allowed: '
                              f'{listed(known, 180)}')
 
 
-def _machine(name: str, values: Values) -> Machine:
+def _machine(name: str, given: Mapping[str, Any], old: Optional[Machine], strict) -> Machine:
+    if old and old.is_of(given):
+        return old
+    values = Values(given)
     type_ = values.take(f'{name}.type', TYPE, name)
     if type_ not in TYPES:
         raise SceneError(f'{name}.type must be {TYPE.rule}, not {quoted(type_)}')
     linkage, reach = _linkage(name, type_, values)
     scale = values.take(f'{name}.scale', SCALE, 1.0)
-    return Machine(name, linkage, reach, scale, *_legs(name, linkage, values),
-                   _points(name, linkage, values), _pose(name, values),
-                   {crank: _crank(f'{name}.{crank}', reach, values) for crank in linkage.cranks})
+    legs = _legs(name, linkage, values)
+    points, pose = _points(name, linkage, values), _pose(name, values)
+    settled = old.cranks if old else {}
+    cranks = {crank: _crank(f'{name}.{crank}', reach, values, settled.get(crank), strict)
+              for crank in linkage.cranks}
+    _refuse_unknown(values.left(), [parameter.name for parameter in values.parameters])
+    return Machine(name, linkage, reach, scale, *legs, points, pose, cranks, given,
+                   tuple(values.parameters))
 
 
 def _linkage(name, type_, values):
@@ -220,11 +280,8 @@ def _design(name, type_, values):
 
 def _dimensions(name, design, values):
     taken = {}
-    for key in sorted(design.dimensions, key=lambda key: key in design.signed):
-        field = _about(DIMENSION, key, design.name)
-        if key in design.signed:
-            most = 10.0 * max(taken.values()) if design.name in mechanisms.TYPES else None
-            field = replace(field, positive=False, low=most and -most, high=most)
+    for key in design.dimensions:
+        field = replace(_about(DIMENSION, key, design.name), positive=key not in design.signed)
         taken[key] = values.take(f'{name}.dimensions.{key}', field, design.dimensions[key])
     return taken
 
@@ -286,7 +343,7 @@ def _pose(name, values):
     return pose
 
 
-def _crank(name, reach, values) -> Crank:
+def _crank(name, reach, values, old, strict) -> Crank:
     speed = values.take(f'{name}.speed', SPEED, 1.0)
     chosen = values.left(f'{name}.start')
     start = values.take(f'{name}.start', START, 0.0)
@@ -297,12 +354,14 @@ def _crank(name, reach, values) -> Crank:
         return Crank(speed, start, None)
     arcs = [sweep] if sweep else reach
     home = [arc for arc in arcs if _inside(start, start, arc)]
-    if chosen and not home:
-        raise SceneError(f'{name}.start must be inside the {"sweep" if sweep else "reach"} '
-                         f'{in_words(arcs)} rad, not {start}')
     low, high = (home or arcs)[0]
     trimmed = 0.0 if sweep else MARGIN * (high - low)
-    return Crank(speed, start, (low + trimmed, high - trimmed))
+    crank = Crank(speed, start, (low + trimmed, high - trimmed))
+    settled = not strict or old and (old.start, old.sweep) == (crank.start, crank.sweep)
+    if chosen and not home and not settled:
+        raise SceneError(f'{name}.start must be inside the {"sweep" if sweep else "reach"} '
+                         f'{in_words(arcs)} rad, not {start}')
+    return crank
 
 
 def _check_sweep(name, sweep, reach):
@@ -310,7 +369,7 @@ def _check_sweep(name, sweep, reach):
         raise SWEEP.error(name, sweep)
     if not is_full_turn(reach) and not any(_inside(*sweep, arc) for arc in reach):
         raise SceneError(f'{name} must be inside the reach {in_words(reach)} rad, '
-                         f'not {list(sweep)}')
+                         f'not {quoted(list(sweep))}')
 
 
 def _inside(low, high, arc) -> bool:

@@ -21,6 +21,7 @@ import sys
 import numpy as np
 
 from . import node, scene
+from .words import listed
 
 try:
     from linkage_interfaces.srv import ServoInverse as ServoInverseType
@@ -40,6 +41,11 @@ class ServoInverse(node.SceneNode):
         super().__init__(scene.INVERSE, **kwargs)
         self._known = {}
         self.create_service(ServoInverseType, 'servo_inverse', self.answer)
+        self.begin()
+
+    def serves(self):
+        """Say of which mechanisms it answers."""
+        return f'answers servo_inverse for {listed(self.scene.machines, 200)}'
 
     def adopt(self, new):
         """Forget what was asked about."""

@@ -144,8 +144,8 @@ def _stamp(message):
 class Process:
     """An executable of this package as users start it, with a parameter file."""
 
-    def __init__(self, name, parameter_file, *arguments):
-        self.domain = next(_domains)
+    def __init__(self, name, parameter_file, *arguments, domain=None):
+        self.domain = domain or next(_domains)
         self._process = subprocess.Popen(
             [sys.executable, '-m', f'linkage_ros.{name}', *arguments, '--ros-args',
              '--params-file', str(parameter_file)],

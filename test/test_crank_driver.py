@@ -152,11 +152,11 @@ def test_a_new_dimension_keeps_the_crank_in_its_new_reach(graph):
 
 @pytest.mark.parametrize('name, value, reason', [
     ('drop.crank.speed', 1000.0, 'drop.crank.speed .*100'),
-    ('drop.crank.speed', 1, 'drop.crank.speed must be .* decimal point'),
+    ('drop.crank.speed', True, 'drop.crank.speed must be'),
     ('drop.crank.speed', math.nan, 'drop.crank.speed .*100'),
     ('drop.crank.speed', 'fast', 'drop.crank.speed must be'),
     ('drop.crank.sweep', [2.0, 1.0], 'drop.crank.sweep must be .* lower end'),
-    ('drop.dimensions.a', -1.0, 'drop.dimensions.a .*0.1'),
+    ('drop.dimensions.a', -1.0, 'drop.dimensions.a must be .* above 0'),
     ('rate', -1.0, 'rate .*1000'),
     ('rate', 1e9, 'rate .*1000'),
     ('mechanisms', ['water_drop'], 'mechanisms'),
@@ -210,6 +210,47 @@ def test_time_that_goes_back_makes_no_jump(graph):
     driver.back_to(50 * SECOND)
     assert driver.at(51 * SECOND) == (2.0, 1.0)
     assert driver.at(52 * SECOND) == (3.0, 1.0)
+
+
+def test_simulated_time_may_leap_ahead(graph):
+    driver = Driver(graph, DROP)
+    driver.at(SECOND)
+    assert driver.at(3601 * SECOND) == (pytest.approx(3600.0 % math.tau, abs=1e-12), 1.0)
+
+
+def test_system_time_that_is_set_ahead_makes_no_jump(graph):
+    node = graph.start(CrankDriver, {'mechanisms': ['drop'], 'drop.type': 'water_drop'})
+    heard = graph.listen(JointState, 'crank_states')
+    graph.until(lambda: len(heard) > 2)
+    # What is left by time that was set ahead an hour: a last tick an hour ago.
+    hour = 3600 * SECOND
+    before = node._motions['drop_crank'].at(node._now)[0]
+    node._motions = {name: motion.moved(node._now, node._now - hour)
+                     for name, motion in node._motions.items()}
+    node._now -= hour
+    del heard[:]
+    graph.until(lambda: len(heard) > 2)
+    for message in heard:
+        assert 0.0 < (message.position[0] - before) % math.tau < 2.0
+
+
+def test_a_change_amid_a_leap_of_system_time_makes_no_jump_either(graph):
+    node = graph.start(CrankDriver, {'mechanisms': ['drop'], 'drop.type': 'water_drop'})
+    heard = graph.listen(JointState, 'crank_states')
+    graph.until(lambda: len(heard) > 2)
+    before = node._motions['drop_crank'].at(node._now)[0]
+    node._motions = {name: motion.moved(node._now, node._now - SECOND * 1000)
+                     for name, motion in node._motions.items()}
+    node._now -= 1000 * SECOND
+    assert node.set_parameters([Parameter('drop.crank.speed', value=0.5)])[0].successful
+    assert 0.0 < (node._motions['drop_crank'].at(node._now)[0] - before) % math.tau < 2.0
+
+
+@pytest.mark.parametrize('rate', [5e-324, 1e-300, 1e-9])
+def test_a_rate_may_be_as_low_as_one_likes(graph, rate):
+    driver = Driver(graph, {**DROP, 'rate': rate})
+    assert driver.set(rate=100.0).successful
+    assert driver.at(SECOND) == (0.0, 1.0)
 
 
 def test_a_timer_that_sleeps_since_system_time_went_back_is_woken(graph):

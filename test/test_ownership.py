@@ -1,0 +1,232 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Who owns what several nodes act on: kinematics, while it is there; the others follow it."""
+
+import signal
+
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('linkage_interfaces')
+
+from linkage_interfaces.srv import ServoInverse as Service  # noqa: E402
+from linkage_ros import scene  # noqa: E402
+from linkage_ros.crank_driver import CrankDriver  # noqa: E402
+from linkage_ros.kinematics import Kinematics  # noqa: E402
+from linkage_ros.ownership import LATCHED, TOPIC  # noqa: E402
+from linkage_ros.servo_inverse import ServoInverse  # noqa: E402
+from rcl_interfaces.msg import (  # noqa: E402
+    Parameter as ParameterMessage,  # noqa: E402
+    ParameterEvent,
+    ParameterValue,
+)
+from rclpy.impl.rcutils_logger import RcutilsLogger  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
+from ros_harness import Graph, Process  # noqa: E402
+
+SOON = 2.0
+LEVER = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}
+A = 'lever.dimensions.a'
+
+
+@pytest.fixture
+def warned(monkeypatch):
+    """Gather the warnings of all nodes."""
+    said = []
+    log = RcutilsLogger.log
+
+    def heard(self, message, severity, **kwargs):
+        if severity.name == 'WARN':
+            said.append(message)
+        return log(self, message, severity, **kwargs)
+
+    monkeypatch.setattr(RcutilsLogger, 'log', heard)
+    return said
+
+
+def of(node, name=A):
+    """Return a parameter's value, as the scene has it."""
+    found, = [p.value for p in node.scene.parameters if p.name == name]
+    assert scene.plain(node.get_parameter(name).value) == found
+    return found
+
+
+def stop(graph, node):
+    """End a node, and let the others notice."""
+    graph._executor.remove_node(node)
+    graph._nodes.remove(node)
+    node.destroy_node()
+    graph.until(lambda: not graph.node.count_publishers(TOPIC))
+
+
+@pytest.mark.parametrize('namespace', ['', 'left'])
+def test_a_dimension_set_on_the_owner_is_everybodys_within_half_a_second(graph, namespace):
+    owner, driver, service = (graph.start(kind, LEVER, namespace=namespace)
+                              for kind in (Kinematics, CrankDriver, ServoInverse))
+    graph.until(lambda: driver._follower._owned and service._follower._owned)
+    assert graph.set(owner, lever__dimensions__a=90.0).successful
+    graph.until(lambda: of(driver) == of(service) == 90.0, 0.5)
+    request = Service.Request(lever_angle=[0.3])
+    answer = service.answer(request, Service.Response()).servo_angle
+    alone = graph.start(ServoInverse, {**LEVER, A: 90.0}, namespace='other')
+    assert answer == alone.answer(request, Service.Response()).servo_angle
+
+
+def test_nodes_of_other_namespaces_are_none_of_its_business(graph):
+    owner = graph.start(Kinematics, LEVER, namespace='left')
+    other = graph.start(ServoInverse, LEVER, namespace='right')
+    same = graph.start(ServoInverse, LEVER, namespace='left')
+    assert graph.set(owner, lever__dimensions__a=90.0).successful
+    graph.until(lambda: of(same) == 90.0)
+    assert of(other) == 80.0 and graph.set(other, lever__dimensions__a=70.0).successful
+
+
+def test_what_only_one_node_acts_on_stays_its_own(graph):
+    owner, driver = graph.start(Kinematics, LEVER), graph.start(CrankDriver, LEVER)
+    graph.until(lambda: driver._follower._owned)
+    assert graph.set(driver, lever__crank__speed=2.0, rate=20.0).successful
+    assert graph.set(owner, frame_id='map').successful
+    names = {p.name for p in scene.read(LEVER).parameters if p.field.shared}
+    assert names & driver.fields.keys() >= {'lever.crank.sweep', A, 'lever.type'}
+    assert names <= owner.fields.keys() and not owner.has_parameter('lever.crank.speed')
+
+
+def test_a_set_on_a_follower_is_refused_with_the_command_that_works(graph):
+    owner = graph.start(Kinematics, LEVER, namespace='left')
+    service = graph.start(ServoInverse, LEVER, namespace='left')
+    graph.until(lambda: service._follower._owned)
+    refused = graph.set(service, lever__dimensions__a=90.0)
+    assert refused.reason == (f'{A} belongs to /left/kinematics while it runs: '
+                              f'ros2 param set /left/kinematics {A} 90.0')
+    assert not service.set_parameters([Parameter(A, value=90.0)])[0].successful
+    assert not refused.successful and of(service) == of(owner) == 80.0
+    swept = graph.set(service, lever__crank__sweep=[0.0, 1.0])
+    assert swept.reason.endswith("set /left/kinematics lever.crank.sweep '[0.0, 1.0]'")
+
+
+def test_after_the_owner_each_keeps_what_it_has_and_takes_what_it_is_told(graph):
+    owner, service = graph.start(Kinematics, LEVER), graph.start(ServoInverse, LEVER)
+    graph.until(lambda: service._follower._owned)
+    assert graph.set(owner, lever__dimensions__a=90.0).successful
+    graph.until(lambda: of(service) == 90.0)
+    stop(graph, owner)
+    assert of(service) == 90.0
+    assert graph.set(service, lever__dimensions__a=70.0).successful and of(service) == 70.0
+
+
+def test_other_values_at_the_start_of_either_are_said_once_and_followed(graph, warned):
+    service = graph.start(ServoInverse, {**LEVER, A: 81.0})
+    owner = graph.start(Kinematics, {**LEVER, A: 82.0})
+    graph.until(lambda: of(service) == 82.0)
+    said = f'/kinematics has other values, which are followed: {A} was 81.0 and is now 82.0'
+    assert warned == [said]
+    late = graph.start(CrankDriver, {**LEVER, A: 83.0})
+    graph.until(lambda: of(late) == 82.0)
+    assert warned == [said, said.replace('81.0', '83.0')]
+    # A change while all run is no news.
+    assert graph.set(owner, lever__dimensions__a=84.0).successful
+    graph.until(lambda: of(service) == of(late) == 84.0)
+    assert len(warned) == 2
+    stop(graph, owner)
+    graph.start(Kinematics, {**LEVER, A: 82.0})
+    graph.until(lambda: of(service) == of(late) == 82.0)
+    assert warned[2:] == [said.replace('81.0', '84.0')] * 2
+
+
+def test_other_mechanisms_are_said_and_the_rest_is_followed(graph, warned):
+    service = graph.start(ServoInverse, {
+        **LEVER, 'mechanisms': ['lever', 'leg', 'mine'], 'leg.type': 'jansen',
+        'mine.type': 'water_drop'})
+    owner = graph.start(Kinematics, {
+        **LEVER, 'mechanisms': ['lever', 'leg', 'yours'], 'leg.type': 'klann',
+        'yours.type': 'jansen', A: 90.0, 'leg.dimensions.a': 0.6})
+    graph.until(lambda: of(service) == 90.0)
+    assert of(service, 'leg.dimensions.a') == 38.0
+    assert warned[:2] == [
+        "/kinematics has another mechanism, which is not followed: leg.type is 'jansen' here and "
+        "'klann' there", '/kinematics has other mechanisms: mine, yours']
+    assert graph.set(owner, lever__dimensions__a=91.0).successful
+    graph.until(lambda: of(service) == 91.0)
+    assert len(warned) == 3
+    assert graph.set(service, mine__dimensions__a=2.0, leg__dimensions__a=38.1).successful
+
+
+def test_a_sweep_is_followed_though_the_crank_was_started_elsewhere(graph):
+    given = {**LEVER, 'lever.crank.sweep': [0.0, 1.0], 'lever.crank.start': 0.5}
+    owner, driver = graph.start(Kinematics, given), graph.start(CrankDriver, given)
+    graph.until(lambda: driver._follower._owned)
+    assert graph.set(owner, lever__crank__sweep=[2.0, 3.0]).successful
+    graph.until(lambda: of(driver, 'lever.crank.sweep') == (2.0, 3.0))
+    now = graph.until(lambda: driver._now)
+    assert 2.0 <= driver._motions['lever_crank'].at(now)[0] <= 3.0
+    assert graph.set(driver, lever__crank__speed=2.0).successful
+    assert not graph.set(driver, lever__crank__start=0.4).successful
+    assert graph.set(driver, lever__crank__start=2.5).successful
+
+
+def test_announcements_that_make_no_sense_are_passed_over(graph, warned):
+    service = graph.start(ServoInverse, LEVER)
+    publisher = graph.node.create_publisher(ParameterEvent, TOPIC, LATCHED)
+    good = [Parameter('mechanisms', value=['lever']), Parameter(A, value=90.0)]
+    nonsense = [Parameter(A, value='long'), Parameter('lever.scale', value=-1.0),
+                Parameter('lever.dimensions.b', value=float('nan')), Parameter('', value=1.0),
+                Parameter('x' * 10 ** 5, value=1.0), Parameter('lever.type', value=3)]
+    for values in ([], nonsense[:3], nonsense, [*good, *nonsense[1:5]]):
+        messages = [value.to_parameter_msg() for value in values]
+        messages.append(ParameterMessage(name=A if values == [] else 'b',
+                                         value=ParameterValue(type=200)))
+        publisher.publish(ParameterEvent(node='/odd', changed_parameters=messages))
+        graph.until(lambda: service._follower._owner == '/odd')
+    graph.until(lambda: of(service) == 90.0)
+    graph.until(lambda: any('lever.scale must be' in text for text in warned))
+    assert of(service, 'lever.scale') == 1.0
+    assert all(len(text) < 2000 for text in warned)
+
+
+def test_a_second_node_of_the_same_name_is_noticed_once(graph, warned):
+    graph.start(CrankDriver, LEVER)
+    graph.start(CrankDriver, LEVER, namespace='other')
+    for _ in range(2):
+        graph.until(lambda: graph.node.count_publishers('crank_states') == 1)
+    assert not warned
+    graph.start(CrankDriver, LEVER)
+    graph.until(lambda: len(warned) == 2)
+    assert all('there is another node /crank_driver' in text for text in warned)
+
+
+@pytest.mark.long
+def test_an_owner_that_was_killed_comes_back_with_its_file_and_is_followed(tmp_path):
+    path = tmp_path / 'scene.yaml'
+    path.write_text('/**:\n  ros__parameters:\n    mechanisms: [lever]\n'
+                    '    lever.type: slotted_lever\n    lever.dimensions.a: 82.0\n')
+    first = Process('kinematics', path)
+    with Graph(first.domain) as graph:
+        service = graph.start(ServoInverse, LEVER)
+        graph.until(lambda: of(service) == 82.0)
+        assert graph.set(_named('/kinematics'), lever__dimensions__a=90.0).successful
+        graph.until(lambda: of(service) == 90.0)
+        first.interrupt(signal.SIGKILL)
+        first.end()
+        second = Process('kinematics', path, domain=first.domain)
+        graph.until(lambda: of(service) == 82.0)
+        second.interrupt(signal.SIGINT)
+        assert second.end()[0] == 0
+
+
+def _named(name):
+    class Node:
+        def get_fully_qualified_name(self):
+            return name
+    return Node()

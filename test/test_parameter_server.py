@@ -1,0 +1,352 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Parameters that are set while nodes run: judged aside and together, answered one by one."""
+
+import math
+import threading
+import time
+
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('linkage_interfaces')
+
+from linkage_ros import (
+    node as nodes,  # noqa: E402
+    scene,  # noqa: E402
+)
+from linkage_ros.crank_driver import CrankDriver  # noqa: E402
+from linkage_ros.kinematics import Kinematics  # noqa: E402
+from linkage_ros.servo_inverse import ServoInverse  # noqa: E402
+from rcl_interfaces.msg import (
+    Parameter as ParameterMessage,  # noqa: E402
+    ParameterValue,  # noqa: E402
+)
+from rcl_interfaces.srv import (  # noqa: E402
+    DescribeParameters,
+    GetParameterTypes,
+    SetParameters,
+    SetParametersAtomically,
+)
+from rclpy.parameter import Parameter  # noqa: E402
+
+LEG = {'mechanisms': ['leg'], 'leg.type': 'jansen'}
+EVERYTHING = {
+    'mechanisms': ['leg', 'lever', 'own'], 'leg.type': 'jansen', 'lever.type': 'slotted_lever',
+    'own.type': 'custom', 'own.dimensions.h': -0.1, 'own.tracer': 'B',
+    'own.joints': ['O ground 0 0', 'Q ground 4.0 h', 'A crank O 1', 'B dyad A Q 3 3 left']}
+KINDS = (CrankDriver, Kinematics, ServoInverse)
+
+_long = 'x' * 10 ** 6
+HOSTILE = [
+    Parameter('', Parameter.Type.NOT_SET, None),
+    *[Parameter('', value=value) for value in (
+        True, False, 0, -1, 7, 2 ** 63 - 1, -2 ** 63, 0.0, -0.0, -1.0, 7.5, 5e-324, 1e308, -1e308,
+        math.nan, math.inf, -math.inf, '', ' ', 'no', '\0', 'a\nb', '/world', _long,
+        [b'\0', b'\xff'], [True, False], [1, 2, 3], [1.0, math.nan], [2.0, 1.0], [math.inf] * 6,
+        [1e308] * 6, [0.0] * 10 ** 5, ['no'], ['', ''], [_long], ['a'] * 10 ** 5)],
+    *[Parameter('', type_, []) for type_ in Parameter.Type if 'ARRAY' in type_.name],
+]
+
+
+class Client:
+    """The parameter services of a node, called from outside."""
+
+    def __init__(self, graph, node):
+        self._graph, self._node = graph, node
+        self._clients = {}
+
+    def ask(self, type_, **request):
+        """Call a service; return the future."""
+        name = {SetParameters: 'set_parameters', DescribeParameters: 'describe_parameters',
+                SetParametersAtomically: 'set_parameters_atomically',
+                GetParameterTypes: 'get_parameter_types'}[type_]
+        if type_ not in self._clients:
+            self._clients[type_] = self._graph.node.create_client(
+                type_, f'{self._node.get_fully_qualified_name()}/{name}')
+            self._graph.until(self._clients[type_].service_is_ready)
+        return self._clients[type_].call_async(type_.Request(**request))
+
+    def call(self, type_, **request):
+        """Call a service; return the response."""
+        future = self.ask(type_, **request)
+        self._graph.until(future.done, 60.0)
+        return future.result()
+
+    def set(self, *values):
+        """Set name after name to a value in one request; return the results."""
+        return self.call(SetParameters, parameters=[_message(*one) for one in values]).results
+
+    def about(self, names):
+        """Return descriptor and type of each parameter."""
+        return (self.call(DescribeParameters, names=names).descriptors,
+                self.call(GetParameterTypes, names=names).types)
+
+
+def _message(name, value):
+    if isinstance(value, ParameterMessage):
+        return ParameterMessage(name=name, value=value.value)
+    return Parameter(name, value=value).to_parameter_msg()
+
+
+def values_of(node):
+    """Return the values of all parameters by name."""
+    return {name: scene.plain(node.get_parameter(name).value) for name in node.fields}
+
+
+def refuse_all(graph, kind, names):
+    """Throw everything at some parameters of a node; what is taken is put back."""
+    node = graph.start(kind, EVERYTHING)
+    client = Client(graph, node)
+    names = [name for name in node.fields if names(name)]
+    before, about = values_of(node), client.about(names)
+    hostile = [parameter.to_parameter_msg() for parameter in HOSTILE]
+    for name in names:
+        for result in client.set(*[(name, value) for value in hostile]):
+            if not result.successful:
+                assert 20 < len(result.reason) < 300
+                assert all(part in result.reason for part in name.split('.')), result.reason
+        assert type(scene.plain(node.get_parameter(name).value)) is type(before[name])
+        back = Parameter(name, Parameter.Type[node.fields[name].kind.upper()], before[name])
+        assert node.fields[name].read_only or node.set_parameters([back])[0].successful
+        # A value that follows from others stays what it was set to.
+        assert values_of(node) == before, name
+    assert client.about(names) == about
+    return len(names) * len(hostile)
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_no_value_of_any_kind_ends_a_node_or_spoils_a_parameter(graph, kind):
+    assert refuse_all(graph, kind, lambda name: not name.startswith('leg.')) > 500
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('kind', KINDS)
+def test_no_value_of_any_kind_ends_a_node_or_spoils_a_parameter_of_a_leg(graph, kind):
+    assert refuse_all(graph, kind, lambda name: name.startswith('leg.')) > 500
+
+
+def test_names_and_types_that_there_are_not_are_refused(graph):
+    client = Client(graph, graph.start(Kinematics, LEG))
+    odd = ParameterMessage(name='leg.scale', value=ParameterValue(type=200))
+    results = client.call(SetParameters, parameters=[
+        odd, *[_message(name, 1.0) for name in ('', 'leg', 'leg.', '.', 'nobody', 'x' * 10 ** 6)],
+        _message('leg.crank.speed', 2.0), _message('leg.scale', 3.0)]).results
+    assert [r.successful for r in results] == [False] * 8 + [True]
+    assert all(0 < len(r.reason) < 300 for r in results[:8])
+    together = client.call(SetParametersAtomically, parameters=[
+        _message('leg.scale', 4.0), _message('nobody', 1.0)]).result
+    assert not together.successful
+    assert 'nobody is not a parameter of /kinematics' in together.reason
+    assert client.call(DescribeParameters, names=['leg.scale', 'nobody']).descriptors == []
+
+
+def test_an_empty_list_of_any_type_is_an_empty_list_of_the_right_one(graph):
+    node = graph.start(Kinematics, {**LEG, 'leg.crank.sweep': [0.0, 1.0]})
+    empty = Parameter('', Parameter.Type.BOOL_ARRAY, []).to_parameter_msg()
+    result, = Client(graph, node).set(('leg.crank.sweep', empty))
+    assert result.successful
+    assert node.get_parameter('leg.crank.sweep').type_ == Parameter.Type.DOUBLE_ARRAY
+
+
+def test_a_whole_number_is_taken_for_a_length_and_stays_a_double(graph):
+    node = graph.start(Kinematics, LEG)
+    result, = Client(graph, node).set(('leg.dimensions.m', 14))
+    found = node.get_parameter('leg.dimensions.m')
+    assert result.successful and (found.type_, found.value) == (Parameter.Type.DOUBLE, 14.0)
+
+
+def test_the_parameters_of_another_scene_can_be_loaded_in_one_request(graph):
+    """One by one most of these cannot be: a leg of mixed sizes cannot be assembled."""
+    node = graph.start(Kinematics, LEG)
+    values = [(name, 100.0 * parameter.value) for name, parameter in
+              node.get_parameters_by_prefix('').items() if '.dimensions.' in name]
+    alone = node.set_parameters([Parameter(values[0][0], value=values[0][1])])[0]
+    assert not alone.successful
+    results = Client(graph, node).set(*values, ('leg.crank.speed', 1.0), ('leg.scale', 0.01))
+    assert [r.successful for r in results] == [True] * 13 + [False, True]
+    assert node.scene.machines['leg'].linkage.dimensions['m'] == 1500.0
+
+
+def test_a_slider_moves_along_with_its_value_and_never_refuses(graph):
+    node = graph.start(Kinematics, LEG)
+    client = Client(graph, node)
+
+    def ends():
+        about, = client.call(DescribeParameters, names=['leg.scale']).descriptors
+        return about.floating_point_range[0].from_value, about.floating_point_range[0].to_value
+
+    low, high = ends()
+    assert client.set(('leg.scale', 1e3 * high))[0].successful
+    assert ends()[0] < 1e3 * high < ends()[1]
+    assert client.set(('leg.scale', low))[0].successful
+
+
+class Slow(nodes.SceneNode):
+    """A node whose scenes take their time, and that counts what it does."""
+
+    def __init__(self, **kwargs):
+        super().__init__(scene.KINEMATICS, **kwargs)
+        self.prepared, self.adopted, self.free = [], [], threading.Event()
+        self.free.set()
+        self.begin()
+
+    def prepare(self, new):
+        """Wait until it may go on; refuse a scale of 13."""
+        self.free.wait(20.0)
+        self.prepared.append((threading.current_thread(), new.machines['leg'].scale))
+        if new.machines['leg'].scale == 13.0:
+            raise scene.SceneError('leg.scale must not be 13')
+        return new
+
+    def adopt(self, new):
+        """Note what is adopted."""
+        self.adopted.append((threading.current_thread(), new.machines['leg'].scale))
+
+
+def test_a_scene_is_prepared_in_a_worker_and_adopted_by_the_executor(graph):
+    node = graph.start(Slow, LEG)
+    assert Client(graph, node).set(('leg.scale', 2.0))[0].successful
+    assert node.prepared[-1][0] is not threading.main_thread()
+    assert node.adopted[-1] == (threading.main_thread(), 2.0)
+
+
+def test_messages_are_handled_while_a_scene_is_prepared(graph):
+    node = graph.start(Slow, LEG)
+    client, ticks = Client(graph, node), []
+    node.create_timer(0.01, lambda: ticks.append(0))
+    client.about(['leg.scale'])
+    node.free.clear()
+    future = client.ask(SetParameters, parameters=[_message('leg.scale', 2.0)])
+    seen = len(ticks)
+    graph.until(lambda: len(ticks) > seen + 20)
+    assert not future.done() and node.scene.machines['leg'].scale == 1.0
+    node.free.set()
+    graph.until(future.done)
+    assert future.result().results[0].successful and node.scene.machines['leg'].scale == 2.0
+
+
+def test_a_hundred_sets_at_once_cost_as_much_as_the_last(graph):
+    node = graph.start(Slow, LEG)
+    client = Client(graph, node)
+    client.set(('leg.scale', 1.5))
+    node.free.clear()
+    answered = []
+    for number in range(100):
+        client.ask(SetParameters, parameters=[
+            _message('leg.scale', 2.0 + number)]).add_done_callback(
+                lambda future, number=number: answered.append(number))
+        if not number:
+            graph.until(lambda: node._worker._thread)
+    graph.until(lambda: len(node._worker._waiting) == 99)
+    node.free.set()
+    made = len(node.prepared)
+    graph.until(lambda: len(answered) == 100)
+    assert answered == list(range(100))
+    assert node.scene.machines['leg'].scale == 101.0
+    assert len(node.prepared) - made <= 10
+
+
+def test_a_change_of_a_walker_of_twelve_legs_takes_less_than_two_ticks_from_the_messages(graph):
+    """Four milliseconds, at 500 Hz; the processor's time is counted: other processes may run."""
+    node = graph.start(Kinematics, {**LEG, 'leg.leg_pairs': 6})
+    client, took, finish = Client(graph, node), [], node._finish
+
+    def timed(*args):
+        began = time.thread_time()
+        finish(*args)
+        took.append(time.thread_time() - began)
+
+    node._finish = timed
+    for value in (14.9, 14.8, 14.7, 14.6, 14.5):
+        assert client.set(('leg.dimensions.m', value))[0].successful
+    assert len(took) == 5 and sorted(took)[2] < 0.004
+
+
+def test_a_set_among_a_thousand_mechanisms_costs_what_it_changes():
+    names = [f'leg{i}' for i in range(1000)]
+    given = {'mechanisms': names, **{f'{name}.type': 'jansen' for name in names}}
+    before = scene.read(given)
+    began = time.thread_time()
+    after = scene.read({**given, 'leg7.dimensions.m': 14.9}, before)
+    assert time.thread_time() - began < 0.25
+    assert [p.name for p in after.changed_from(before)] == ['leg7.dimensions.m']
+
+
+def test_each_of_many_sets_gets_its_own_answer(graph):
+    node = graph.start(Slow, LEG)
+    wanted = [('leg.scale', 2.0), ('leg.scale', -1.0), ('leg.points', ['Z']),
+              ('leg.points', ['G']), ('leg.scale', 'wide'), ('leg.branches.C', 7),
+              ('frame_id', 'map'), ('leg.scale', 13.0)]
+    results = Client(graph, node).set(*wanted)
+    assert [r.successful for r in results] == [True, False, False, True, False, False, True, False]
+    for (name, _), result in zip(wanted, results):
+        assert result.successful or result.reason.startswith(f'{name} must')
+    machine = node.scene.machines['leg']
+    assert (machine.scale, machine.points, node.scene.frame_id) == (2.0, ('G',), 'map')
+
+
+def test_a_set_within_the_process_is_at_once_and_is_kept(graph):
+    node = graph.start(Slow, LEG)
+    client = Client(graph, node)
+    client.set(('leg.scale', 1.5))
+    node.free.clear()
+    future = client.ask(SetParameters, parameters=[_message('leg.pose', [1.0] * 6)])
+    graph.until(lambda: node._worker._thread)
+    node.free.set()
+    assert node.set_parameters([Parameter('leg.scale', value=3.0)])[0].successful
+    assert node.scene.machines['leg'].scale == 3.0
+    graph.until(future.done)
+    machine = node.scene.machines['leg']
+    assert (machine.scale, machine.pose) == (3.0, (1.0,) * 6)
+
+
+def test_a_mistake_while_a_scene_is_prepared_is_an_answer_not_the_end(graph, monkeypatch):
+    node = graph.start(Slow, LEG)
+    monkeypatch.setattr(node, 'prepare', lambda new: 1 // 0)
+    refused, = Client(graph, node).set(('leg.scale', 2.0))
+    assert not refused.successful and 'internal error: ZeroDivisionError' in refused.reason
+    monkeypatch.undo()
+    assert Client(graph, node).set(('leg.scale', 3.0))[0].successful
+
+
+def test_what_others_have_to_say_about_a_parameter_counts(graph):
+    from rcl_interfaces.msg import SetParametersResult
+
+    node = graph.start(Slow, LEG)
+    node.add_on_set_parameters_callback(lambda parameters: SetParametersResult(
+        successful=not any(p.name == 'leg.scale' for p in parameters), reason='not by me'))
+    results = Client(graph, node).set(('leg.scale', 2.0), ('leg.points', ['G']))
+    assert [r.successful for r in results] == [False, True] and results[0].reason == 'not by me'
+    assert node.scene.machines['leg'].scale == 1.0
+
+
+def test_the_time_to_be_used_can_be_set_as_ever(graph):
+    client = Client(graph, graph.start(Slow, LEG))
+    good, bad = client.set(('use_sim_time', True), ('use_sim_time', 3))
+    assert good.successful and not bad.successful and bad.reason
+
+
+def test_a_node_ends_while_its_worker_is_busy(graph):
+    node = graph.start(Slow, LEG)
+    client = Client(graph, node)
+    client.about(['leg.scale'])
+    node.free.clear()
+    client.ask(SetParameters, parameters=[_message('leg.scale', 2.0)])
+    graph.until(lambda: node._worker._thread)
+    began = time.monotonic()
+    node.destroy_node()
+    node.free.set()
+    assert time.monotonic() - began < 3.0
