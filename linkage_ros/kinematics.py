@@ -16,6 +16,7 @@
 
 import math
 import sys
+from threading import Lock
 from typing import NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -45,9 +46,10 @@ NEVER = bytes(8)
 class Kinematics(node.SceneNode):
     """Solves the mechanisms at the angles on `crank_states`, as far as anyone listens."""
 
-    _outlets = {}
-
     def __init__(self, **kwargs):
+        # A scene that cannot be read ends the node before there is anything to show.
+        self._outlets = {}
+        self._drawing, self._ended = Lock(), False
         super().__init__(scene.KINEMATICS, **kwargs)
         self._outlets = {name: Outlet(self, name, machine.linkage.cranks)
                          for name, machine in self.scene.machines.items()}
@@ -71,18 +73,31 @@ class Kinematics(node.SceneNode):
 
     def adopt(self, prepared):
         """Show the mechanisms so from now on."""
-        for name, model in prepared.items():
-            self._outlets[name].adopt(model)
+        with self._drawing:
+            for name, model in prepared.items():
+                if not self._ended:
+                    self._outlets[name].adopt(model)
 
-    def destroy_node(self):
-        """Take what is drawn out of the picture, and end."""
-        if self.context.ok():
+    def say_goodbye(self):
+        """Take what is drawn out of the picture, for good."""
+        with self._drawing:
+            self._ended = True
             for outlet in self._outlets.values():
                 outlet.clear()
+
+    def destroy_node(self):
+        """Say goodbye where that is still possible, and end."""
+        if self.context.ok():
+            self.say_goodbye()
         super().destroy_node()
 
     @node.until_the_end
     def _turn(self, text):
+        with self._drawing:
+            if not self._ended:
+                self._draw(text)
+
+    def _draw(self, text):
         try:
             stamp, routes, positions, speeds = self._reader.read(text)
         except reading.Unreadable as error:
