@@ -89,8 +89,8 @@ class Reader:
         turned = Turned(pack(message.header.stamp), self._understand(message),
                         tuple(message.position), tuple(message.velocity))
         self._missed += 1
-        if len(text) <= LONGEST and (
-                len(self._met) < SOURCES or self._missed % SAMPLED == 0):
+        crowded = len(self._used) == SOURCES or len(self._met) == 2 * SOURCES
+        if len(text) <= LONGEST and not (crowded and self._missed % SAMPLED):
             self._meet(text, message, turned)
         return turned
 
@@ -102,7 +102,7 @@ class Reader:
         if worth_it and self._learn(text, turned):
             return
         self._met[source] = worth_it is None
-        if len(self._met) > SOURCES:
+        if len(self._met) > 2 * SOURCES:
             self._met.popitem(last=False)
 
     def _learn(self, text, turned) -> bool:
