@@ -226,6 +226,8 @@ def outcome(read, text):
 
 def plainly(text):
     """Return what `Reader.read` is to return."""
+    if len(text) < reading.SHORTEST:
+        raise reading.Unreadable
     try:
         read = deserialize_message(text, JointState)
     except Exception:
@@ -275,6 +277,16 @@ def test_mutated_messages_read_as_they_do_when_they_are_deserialised(reader, see
         for tried in (text, text, mutated(random, text), text, base):
             assert outcome(reader.read, tried) == outcome(plainly, tried)
     assert reader.looked < 700 * 5 - 1000
+
+
+def test_nothing_shorter_than_joint_states_is_looked_at(reader):
+    whole = serialize_message(JointState())
+    for options in range(256):
+        for size in range(reading.SHORTEST):
+            with pytest.raises(reading.Unreadable):
+                reader.read((b'\0\1\0' + bytes([options]) + whole[4:])[:size])
+    assert reader.looked == 0
+    assert reader.read(whole[:reading.SHORTEST]).source == []
 
 
 @pytest.mark.parametrize('name', [b'a\0b\0', b'ab\0\0', b'abcd', b'\0\0\0\0', b'\xc3(\xff\0'])
