@@ -60,6 +60,10 @@ class Kinematics(node.SceneNode):
         self._patience = self.create_timer(
             PATIENCE, self._miss, clock=Clock(clock_type=ClockType.STEADY_TIME), autostart=False)
         self.begin()
+        try:
+            next(iter(self.scene.machines.values())).linkage.accelerated()
+        except ImportError as error:
+            self.get_logger().info(f'{error}; plain Python moves the legs, to the same places')
         self.create_subscription(JointState, 'crank_states', self._turn, ANY, raw=True)
 
     def serves(self):
