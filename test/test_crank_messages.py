@@ -14,6 +14,7 @@
 
 """What the kinematics node makes of crank messages, however they come and whatever they say."""
 
+import gc
 import math
 import struct
 import sys
@@ -41,6 +42,8 @@ class Hand:
     """A kinematics node, what it publishes and says, and a publisher of crank messages."""
 
     def __init__(self, graph, mechanism='jansen', parameters=None):
+        # What is left of another node would take its logger away from this one, of the same name.
+        gc.collect()
         self._graph = graph
         self.said = graph.listen(Log, '/rosout', 50)
         self.joints = graph.listen(JointState, f'{mechanism}/joint_states', 100)
