@@ -223,7 +223,8 @@ def main():
         Floor.ready = Ear.ready = ready(pickle.loads(options.ready.read_bytes()))
     times = Times() if options.times else None
     executor = SingleThreadedExecutor if options.single else node.Executor
-    code = node.run(KINDS[options.kind], options.kind, executor_class=executor)
+    own = len(remove_ros_args())
+    code = node.run(KINDS[options.kind], options.kind, sys.argv[:1] + sys.argv[own:], executor)
     if times:
         options.times.write_text(json.dumps(times.medians()))
     return code
