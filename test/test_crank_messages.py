@@ -271,3 +271,13 @@ def test_without_llvmlite_the_node_says_so(graph, monkeypatch):
     graph.start(Kinematics, {'mechanisms': ['jansen']})
     graph.until(lambda: [m for m in said
                          if m.level == LoggingSeverity.INFO and 'llvmlite' in m.msg])
+
+
+def test_a_crank_alone_is_no_exception(graph):
+    hand = Hand(graph, 'alone', {'mechanisms': ['alone'], 'alone.type': 'custom',
+                                 'alone.joints': ['O ground 0 0', 'A crank O 1']})
+    for value in (math.nan, math.inf):
+        hand.send(['alone_crank'], [value], [value])
+    graph.until(lambda: hand.warnings('cannot be assembled'))
+    assert list(hand.moved(['alone_crank'], [0.5], [math.nan]).position) == [0.5]
+    assert len(hand.joints) == 1 and not hand.joints[0].velocity
