@@ -140,8 +140,8 @@ class Kinematics(node.SceneNode):
             # Names may be long, and many.
             self._strangers.update(map(hash, new))
             self.get_logger().warning(
-                f'crank_states: nothing is called {_listed(new)}; the inputs are '
-                f'{_listed(self._inputs)}'
+                f'crank_states: nothing is called {listed(new, 150)}; the inputs are '
+                f'{listed(self._inputs, 150)}'
                 f'{"; no more will be named" if len(new) == room else ""}')
 
     def _miss(self):
@@ -150,15 +150,9 @@ class Kinematics(node.SceneNode):
         if self._unheard:
             waiting = [name for name in self._inputs if name in self._unheard]
             self.get_logger().warning(
-                f'crank_states: nothing was heard of {_listed(waiting)}, without which '
-                f'{_listed(dict.fromkeys(self._inputs[name][0].name for name in waiting))} '
+                f'crank_states: nothing was heard of {listed(waiting, 150)}, without which '
+                f'{listed(dict.fromkeys(self._inputs[name][0].name for name in waiting), 150)} '
                 'cannot move')
-
-
-def _listed(names) -> str:
-    """Return names as text that is not too long."""
-    shown = [repr(name if len(name) < 50 else f'{name[:47]}...') for name in [*names][:5]]
-    return ', '.join(shown) + (f' and {len(names) - 5} more' if len(names) > 5 else '')
 
 
 class Drive(NamedTuple):

@@ -172,7 +172,7 @@ def test_ten_thousand_joints_hold_nobody_up(graph):
         hand.send(names, [0.0] * 9999 + [theta])
         graph.until(lambda theta=theta: hand.joints and hand.joints[-1].position[0] == theta)
     said, = hand.warnings('nothing is called')
-    assert "'joint0', 'joint1'" in said and 'and 995 more' in said and len(said) < 400
+    assert 'joint0, joint1' in said and '... (1000)' in said and len(said) < 400
 
 
 @pytest.mark.parametrize('order', [(0, 1), (1, 0)])
@@ -222,9 +222,9 @@ def test_names_that_are_no_inputs_are_said_once(graph):
         hand.send(['jansen_krank', 'jansen_crank'], [0.1, 0.01 * seed])
     hand.send(['jansen_krank', 'wheel'], [0.1, 0.3])
     hand.moved(['jansen_crank'], [0.7])
-    graph.until(lambda: hand.warnings("called 'wheel'"))
-    assert len(hand.warnings("'jansen_krank'")) == 1
-    assert "the inputs are 'water_drop_crank', 'jansen_crank'" in hand.warnings('krank')[0]
+    graph.until(lambda: hand.warnings('called wheel'))
+    assert len(hand.warnings('jansen_krank')) == 1
+    assert 'the inputs are water_drop_crank, jansen_crank' in hand.warnings('krank')[0]
 
 
 def test_a_stream_of_new_names_is_said_within_bounds(graph, monkeypatch):
@@ -246,8 +246,8 @@ def test_inputs_that_nobody_sends_are_said_once(graph, monkeypatch):
     hand = Hand(graph, 'five_bar', FIVE_BAR)
     hand.send(['five_bar_crank'], [0.1])
     said = graph.until(lambda: hand.warnings('nothing was heard'))
-    assert said == ["crank_states: nothing was heard of 'five_bar_crank2', without which "
-                    "'five_bar' cannot move"]
+    assert said == ['crank_states: nothing was heard of five_bar_crank2, without which five_bar '
+                    'cannot move']
     hand.send(['five_bar_crank'], [0.2])
     hand.moved(['five_bar_crank2'], [0.3])
     with pytest.raises(AssertionError, match='in time'):
