@@ -23,7 +23,7 @@ condition on dimensions: the code for a pose has no branch for it.
 
 from __future__ import annotations
 
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
@@ -478,6 +478,11 @@ class Batch:
         self._plainly = plainly
         self._loop, self._constants = loop, constants
         self._run = None
+
+    def finish(self):
+        """Wait for the machine code, if there is to be any."""
+        if self._loop:
+            wait([self._loop])
 
     def solve(self):
         """Fill the rows: plainly until there is machine code, for which nobody waits."""

@@ -29,6 +29,7 @@ BLUE, ORANGE, GREEN = (0.0, 0.447, 0.698), (0.902, 0.624, 0.0), (0.0, 0.62, 0.45
 
 # Widths of what is drawn, as parts of the longest bar.
 LINK, JOINT, LOCUS = 1 / 40, 1 / 20, 1 / 100
+LINKS_ID, JOINTS_ID, LOCUS_ID = 0, 1, 2
 
 
 class JointStates:
@@ -63,14 +64,21 @@ class Markers:
     size : float
         The longest bar [m].
 
+    Attributes
+    ----------
+    ids : frozenset of int
+        Of the markers that there are.
+
     """
 
     def __init__(self, name: str, frame_id: str, pose, bars, size: float):
         self._ends = np.array(bars, int).reshape(-1)
-        self._links = _marker(name, 0, Marker.LINE_LIST, frame_id, pose, BLUE, LINK * size)
-        self._joints = _marker(name, 1, Marker.SPHERE_LIST, frame_id, pose, ORANGE, JOINT * size)
+        self._links = _marker(name, LINKS_ID, Marker.LINE_LIST, frame_id, pose, BLUE, LINK * size)
+        self._joints = _marker(
+            name, JOINTS_ID, Marker.SPHERE_LIST, frame_id, pose, ORANGE, JOINT * size)
         markers = [self._links, self._joints] if bars else [self._joints]
         self._message = MarkerArray(markers=markers)
+        self.ids = frozenset(marker.id for marker in markers)
         self._points = {}
 
     def message(self, stamp, places: np.ndarray) -> MarkerArray:
@@ -92,9 +100,14 @@ class Markers:
 
 def locus(name: str, frame_id: str, pose, places: np.ndarray, size: float) -> Marker:
     """Return the curve through places [m], shape (n, 2); without a stamp it holds at any time."""
-    marker = _marker(name, 2, Marker.LINE_STRIP, frame_id, pose, GREEN, LOCUS * size)
+    marker = _marker(name, LOCUS_ID, Marker.LINE_STRIP, frame_id, pose, GREEN, LOCUS * size)
     marker.points = [Point(x=x, y=y) for x, y in places.tolist()]
     return marker
+
+
+def deleted(name: str, id_: int) -> Marker:
+    """Return the marker that takes another out of the picture."""
+    return Marker(ns=name, id=id_, action=Marker.DELETE)
 
 
 def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:

@@ -20,7 +20,6 @@ from functools import partial, wraps
 import gc
 from itertools import groupby
 from shlex import quote
-import signal
 import sys
 from typing import Any, List, Mapping, NamedTuple
 
@@ -37,11 +36,13 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from . import scene, slider
 from .ownership import Announcer, Follower
 from .parameter_server import Asked, Change, ParameterServer, Worker
+from .signals import Goodbye
 from .words import elided, listed, quoted
 
 try:
@@ -321,11 +322,14 @@ def _typed(parameter):
 
 def run(node_class, name: str, args=None, executor_class=Executor) -> int:
     """Run a node until it is interrupted; return the exit code of the process."""
-    # An interrupt is to end the context, as it does, but not to raise amid a callback.
-    signal.signal(signal.SIGINT, lambda *_: None)
+    with Goodbye() as goodbye:
+        return _run(node_class, name, args, executor_class, goodbye)
+
+
+def _run(node_class, name, args, executor_class, goodbye):
     sys.setswitchinterval(SWITCH_INTERVAL)
     try:
-        rclpy.init(args=args)
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         _refuse_arguments(args)
     except (RuntimeError, scene.SceneError) as error:
         # What the client library makes of an argument may be as long as that.
@@ -333,7 +337,7 @@ def run(node_class, name: str, args=None, executor_class=Executor) -> int:
         return _failed(name, elided(f'bad arguments: {error}', 299))
     node = None
     try:
-        node = node_class()
+        node = goodbye.node = node_class()
         if isinstance(node, SceneNode):
             node.get_logger().info(f'ready: {node.serves()}')
         # What has been made so far stays: the collector need not look through it again and again.

@@ -15,114 +15,200 @@
 """
 Joint states read from their bytes.
 
-From one message of a source to its next only numbers change. Where they lie is found once, by
-serialising the same message with values that occur nowhere else; from then on they alone are
-taken from the bytes. A message that differs in anything else is deserialised.
+From one message of a source to its next only numbers change. Where they lie follows from the
+lengths that stand between them (CDR, as it is on the wire); from a source's second message on they
+alone are taken from the bytes. What is neither a number nor padding has to be the same, else the
+message is deserialised.
 """
 
 from array import array
-import struct
-from typing import NamedTuple, Optional, Sequence, Tuple
+from collections import OrderedDict
+from struct import error as TooShort, Struct
+from typing import Any, Callable, NamedTuple, Tuple
 
-from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
-from .wire import distinct, pack, places, SENTINEL
+from .wire import HEADER, pack
 
-# Of so many sources the layouts are kept.
-SOURCES = 8
+# So many sources are remembered, of messages that are no longer [bytes]; of those that are of one
+# length, so many arrangements of names. Where there are more sources, one in so many messages is
+# looked at to learn it, as that costs more than it saves if the source is soon forgotten.
+SOURCES, LONGEST, ARRANGEMENTS, SAMPLED = 256, 1 << 16, 4, 64
+LITTLE_ENDIAN = b'\0\1'
+# The bytes of joint states that say nothing. Where there are fewer, a middleware that takes the
+# sender's word for how many are padding looks beyond the end, and may end the process.
+SHORTEST = 36
+
+_COUNT = Struct('<I')
+
+
+class Unreadable(ValueError):
+    """A message that cannot be deserialised; the text says why."""
 
 
 class Turned(NamedTuple):
-    """Cranks by name, their positions and, where they are known, their velocities."""
+    """What a source was understood as, positions and, where they are known, velocities."""
 
     stamp: bytes
-    names: Sequence[str]
+    source: Any
     positions: Tuple[float, ...]
     velocities: Tuple[float, ...]
 
 
 class Reader:
-    """Reads serialised joint states; the names of one source are the same object each time."""
+    """
+    Reads serialised joint states.
 
-    def __init__(self):
+    Parameters
+    ----------
+    understand : callable
+        From a message to what is handed on with it and with all that differ in numbers alone.
+
+    """
+
+    def __init__(self, understand: Callable[[JointState], Any]):
+        self._understand = understand
+        # By length, then by the bytes that count: a mask, and the layouts by those bytes.
         self._layouts = {}
-        self._learning = True
+        # The layouts, and the sources that were met and whether they are worth learning: the
+        # latest last.
+        self._used, self._met = OrderedDict(), OrderedDict()
+        self._missed = 0
 
     def read(self, text: bytes) -> Turned:
-        """Return what a message says."""
-        for layout in self._layouts.values():
-            if turned := layout.take(text):
-                return turned
-        message = deserialize_message(text, JointState)
-        turned = Turned(pack(message.header.stamp), list(message.name), tuple(message.position),
-                        tuple(message.velocity))
-        if self._learning:
-            self._learn(text, message, turned)
+        """Return what a message says; raise Unreadable if that cannot be told."""
+        if alike := self._layouts.get(len(text)):
+            number = int.from_bytes(text, 'little')
+            for mask, layouts in alike.items():
+                if layout := layouts.get(number & mask):
+                    self._used.move_to_end(layout)
+                    return layout.take(text)
+        if len(text) < SHORTEST:
+            raise Unreadable(f'there must be {SHORTEST} at least')
+        try:
+            message = deserialize_message(text, JointState)
+        except Exception as error:
+            # Each middleware has errors of its own.
+            raise Unreadable(' '.join(str(error).split())[:200]) from None
+        turned = Turned(pack(message.header.stamp), self._understand(message),
+                        tuple(message.position), tuple(message.velocity))
+        self._missed += 1
+        crowded = len(self._used) == SOURCES or len(self._met) == 2 * SOURCES
+        if len(text) <= LONGEST and not (crowded and self._missed % SAMPLED):
+            self._meet(text, message, turned)
         return turned
 
-    def _learn(self, text, message, turned):
-        source = (message.header.frame_id, *turned.names, len(turned.positions),
-                  len(turned.velocities), len(message.effort))
-        layout = self._layouts.get(source) or Layout(turned.names, message, len(text))
-        # What comes from afar may be encoded otherwise than here.
-        self._learning = layout.admit(text, turned)
-        if self._learning:
-            self._layouts[source] = layout
-        if len(self._layouts) > SOURCES:
-            del self._layouts[next(iter(self._layouts))]
+    def _meet(self, text, message, turned):
+        """Learn a source that is met again."""
+        source = hash((len(text), text[:HEADER], message.header.frame_id, *message.name,
+                       len(turned.positions), len(turned.velocities), len(message.effort)))
+        worth_it = self._met.pop(source, None)
+        if worth_it and self._learn(text, turned):
+            return
+        self._met[source] = worth_it is None
+        if len(self._met) > 2 * SOURCES:
+            self._met.popitem(last=False)
+
+    def _learn(self, text, turned) -> bool:
+        layout = _layout(text, turned)
+        alike = self._layouts.get(len(text), {})
+        if not layout or layout.mask not in alike and len(alike) == ARRANGEMENTS:
+            return False
+        if len(self._used) == SOURCES:
+            self._forget(self._used.popitem(last=False)[0])
+        self._layouts.setdefault(layout.size, {}).setdefault(layout.mask, {})[layout.same] = layout
+        self._used[layout] = True
+        return True
+
+    def _forget(self, layout):
+        alike = self._layouts[layout.size]
+        del alike[layout.mask][layout.same]
+        if not alike[layout.mask]:
+            del alike[layout.mask]
+        if not alike:
+            del self._layouts[layout.size]
 
 
 class Layout:
-    """
-    Where the numbers are in a message with some names; that message's own are overwritten.
+    """Where the numbers are in a message of a source, and which other bytes count."""
 
-    What comes over the wire ends at `size`; what is serialised here may have a tail.
-    """
+    def __init__(self, text: bytes, source: Any):
+        walk = _Walk(text)
+        self.size, self.mask = len(text), int.from_bytes(walk.fixed, 'little')
+        self.same = int.from_bytes(text, 'little') & self.mask
+        self._source = source
+        (place, self._first), (then, count) = walk.numbers[:2]
+        end = place + 8 * self._first
+        self._unpack = Struct(f'<{HEADER}x8s{place - HEADER - 8}x{self._first}d'
+                              f'{then - end}x{count}d').unpack_from
 
-    def __init__(self, names: Sequence[str], message: JointState, size: int):
-        counts = [len(part) for part in (message.position, message.velocity, message.effort)]
-        values = distinct(sum(counts)).tolist()
-        self._first, self._last = counts[0], counts[0] + counts[1]
-        message.position = array('d', values[:self._first])
-        message.velocity = array('d', values[self._first:self._last])
-        message.effort = array('d', values[self._last:])
-        message.header.stamp = SENTINEL
-        text = serialize_message(message)[:size]
-        self._names = names
-        self._struct, fixed = _fields(text, values)
-        self._mask = int.from_bytes(fixed, 'little')
-        self._same = int.from_bytes(text, 'little') & self._mask
+    def take(self, text: bytes) -> Turned:
+        """Return what a message says that has the same bytes where they count."""
+        numbers, end = self._unpack(text), 1 + self._first
+        return Turned(numbers[0], self._source, numbers[1:end], numbers[end:])
 
-    def take(self, text: bytes) -> Optional[Turned]:
-        """Return what a message says, None where it differs in more than numbers."""
-        if (len(text) == self._struct.size
-                and int.from_bytes(text, 'little') & self._mask == self._same):
-            return self._taken(text)
+
+def _layout(text, turned):
+    """Return the layout of a message that was read, or None if it is encoded otherwise."""
+    try:
+        layout = Layout(text, turned.source)
+    except TooShort:
         return None
-
-    def admit(self, text: bytes, turned: Turned) -> bool:
-        """Ignore what is padding, as it differs in a message that says the same with numbers."""
-        if len(text) != self._struct.size or repr(self._taken(text)) != repr(turned):
-            return False
-        self._mask &= ~(int.from_bytes(text, 'little') ^ self._same)
-        self._same &= self._mask
-        return True
-
-    def _taken(self, text):
-        stamp, *numbers = self._struct.unpack(text)
-        return Turned(stamp, self._names, tuple(numbers[:self._first]),
-                      tuple(numbers[self._first:self._last]))
+    same = _bits(layout.take(text)) == _bits(turned)
+    return layout if same and text[:2] == LITTLE_ENDIAN else None
 
 
-def _fields(text: bytes, values: Sequence[float]) -> Tuple[struct.Struct, bytes]:
-    """Return a message as stamp and numbers, and a mask of the bytes between them."""
-    codes = dict.fromkeys(places(text, pack(SENTINEL)), '8s')
-    for value in values:
-        codes.update(dict.fromkeys(places(text, struct.pack('=d', value)), 'd'))
-    spelt, fixed, end = ['='], bytearray(b'\xff' * len(text)), 0
-    for place, code in sorted(codes.items()):
-        spelt += [f'{place - end}x', code]
-        end = place + 8
-        fixed[place:end] = bytes(8)
-    return struct.Struct(''.join(spelt) + f'{len(text) - end}x'), bytes(fixed)
+def _bits(turned):
+    """Return the numbers as bytes, in which what is no number is equal to itself."""
+    return turned.stamp, *(array('d', numbers).tobytes()
+                           for numbers in (turned.positions, turned.velocities))
+
+
+class _Walk:
+    """
+    A way through the bytes of joint states.
+
+    Attributes
+    ----------
+    fixed : bytearray
+        A mask of the bytes that are neither numbers nor padding.
+    numbers : list of (int, int)
+        Where the positions, the velocities and the efforts begin, and how many they are.
+
+    """
+
+    def __init__(self, text):
+        self._text, self._place = text, HEADER + 8
+        self.fixed = bytearray(len(text))
+        self._fix(0, HEADER)
+        self._strings(1)
+        self._strings(self._count())
+        self.numbers = [self._doubles() for _ in ('position', 'velocity', 'effort')]
+
+    def _strings(self, count):
+        for _ in range(count):
+            size = self._count()
+            self._place = self._fix(self._place, self._place + size)
+
+    def _count(self):
+        # Numbers lie at multiples of their size after the header.
+        place = self._place + (HEADER - self._place) % 4
+        self._place = self._fix(place, place + 4)
+        return _COUNT.unpack_from(self._text, place)[0]
+
+    def _fix(self, place, end):
+        if end > len(self.fixed):
+            raise TooShort
+        self.fixed[place:end] = b'\xff' * (end - place)
+        return end
+
+    def _doubles(self):
+        count = self._count()
+        if count:
+            self._place += (HEADER - self._place) % 8
+        place = self._place
+        self._place += 8 * count
+        if self._place > len(self._text):
+            raise TooShort
+        return place, count

@@ -81,6 +81,10 @@ class Solution:
         self._drive = layout.drive(values)
         self._pack = Struct(f'{self._drive.size}d').pack_into
 
+    def finish(self):
+        """Wait for what makes the first solution slower than the others."""
+        self._batch.finish()
+
     def solve(self, thetas: Sequence[float], speeds: Sequence[float] = ()):
         """Solve at crank angles [rad] and, if there are velocities, crank speeds [rad/s]."""
         if not self.layout.velocities:

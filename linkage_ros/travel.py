@@ -80,6 +80,8 @@ def travels(linkage: Mechanism, reach: Sequence[Arc]) -> Dict[str, Optional[Trav
 
     """
     kinds = {link.name: link.kind for link in linkage.links if link.name not in linkage.cranks}
+    if not kinds:
+        return {}
     if len(linkage.cranks) > 1:
         far = _farthest(linkage)
         return {name: (-far, far) if kind == 'prismatic' else None

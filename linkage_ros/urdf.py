@@ -53,6 +53,9 @@ COLOURS = {'orange': (0.902, 0.624, 0.0), 'blue': (0.0, 0.447, 0.698), 'green': 
 # Radii of bars and joints, as parts of the longest bar.
 BAR, JOINT = 1 / 80, 1 / 40
 
+# Sizes [m] between which nothing that is drawn is lost in single precision, as displays have it.
+SMALLEST, LARGEST = 1e-30, 1e30
+
 
 def describe(machines: Iterable[Machine], frame_id: str) -> str:
     """
@@ -73,27 +76,43 @@ def describe(machines: Iterable[Machine], frame_id: str) -> str:
     Raises
     ------
     SceneError
-        If two links or two joints would have the same name.
+        If two links or two joints would have the same name, or something is too large or small.
 
     """
     machines = list(machines)
     robot = _Robot(machines[0].name if len(machines) == 1 else 'linkages', frame_id)
     for machine in machines:
-        _Model(robot, machine).add_to(frame_id)
+        robot.owner = machine.name
+        try:
+            _Model(robot, machine).add_to(frame_id)
+        except OverflowError as error:
+            raise SceneError(f'{machine.name}.pose, {machine.name}.scale and {machine.name}'
+                             f'.dimensions must keep everything within {LARGEST:g} m, not at '
+                             f'{error}') from None
     return robot.text()
+
+
+def size(machine: Machine) -> float:
+    """Return the longest bar [m]; raise SceneError where it cannot be drawn."""
+    length = machine.scale * float(machine.linkage.longest)
+    if not SMALLEST <= length <= LARGEST:
+        raise SceneError(
+            f'{machine.name}.scale and {machine.name}.dimensions must make the longest bar from '
+            f'{SMALLEST:g} to {LARGEST:g} m long, not {length:g}')
+    return length
 
 
 class _Model:
     """A mechanism as links and joints of a robot."""
 
     def __init__(self, robot, machine: Machine):
+        self._size = size(machine)
         self._robot, self._machine, self._assembly = robot, machine, machine.assembly()
         self._links = machine.linkage.links
         self._bars = machine.linkage.bars
         self._frames = {GROUND: ground_frame(machine.linkage), **machine.linkage.frames}
         self._travels = {**travels(machine.linkage, machine.reach),
                          'crank': _crank_travel(machine, self._assembly)}
-        self._size = machine.scale * float(machine.linkage.longest)
 
     def add_to(self, root: str):
         """Add ground, crank and legs."""
@@ -182,7 +201,8 @@ class _Robot:
 
     def __init__(self, name: str, root: str):
         self._element = ElementTree.Element('robot', name=name)
-        self._names = set()
+        self._root, self.owner = root, None
+        self._owners = {}
         for colour, rgb in COLOURS.items():
             material = ElementTree.SubElement(self._element, 'material', name=colour)
             ElementTree.SubElement(material, 'color', rgba=_numbers(*rgb, 1.0))
@@ -218,11 +238,18 @@ class _Robot:
         return element
 
     def _named(self, tag, name, **attributes):
-        if (tag, name) in self._names:
-            raise SceneError(f'the robot model would have two {tag}s {name}: give a mechanism or '
-                             'a joint of it another name')
-        self._names.add((tag, name))
+        if (tag, name) in self._owners:
+            raise self._doubled(tag, name)
+        self._owners[tag, name] = self.owner
         return ElementTree.SubElement(self._element, tag, name=name, **attributes)
+
+    def _doubled(self, tag, name):
+        if (tag, name) == ('link', self._root):
+            return SceneError(f'frame_id must be no link of the robot model, not {name!r}')
+        own = self._owners[tag, name] == self.owner
+        whose = f'{self.owner}.joints' if own else 'mechanisms'
+        return SceneError(f'{whose} must be other names: the robot model would have two {tag}s '
+                          f'{name}')
 
 
 def _draw_rod(element, colour, radius, start, end):
@@ -248,4 +275,7 @@ def _origin(element, pose):
 
 def _numbers(*values: float) -> str:
     """Return numbers with all their digits; adding zero makes -0.0 plain."""
+    for value in values:
+        if not abs(value) <= LARGEST:
+            raise OverflowError(f'{value:g}')
     return ' '.join(repr(float(value) + 0.0) for value in values)

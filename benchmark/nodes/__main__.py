@@ -19,6 +19,7 @@ What the nodes cost, next to what any node costs, in the same run.
     python -m benchmark.nodes --quick     a look, within a minute or two
     python -m benchmark.nodes --soak      memory over a million messages
     python -m benchmark.nodes --hold      a minute at 1000 Hz
+    python -m benchmark.nodes --trouble   ten minutes of changes, bad bytes and stalled listeners
 
 Results go to benchmark/results/nodes.json, each mode into its own part; the tables are printed,
 and written into docs/performance.md where --document is given.
@@ -68,6 +69,7 @@ def arguments():
     mode.add_argument('--quick', action='store_true', help='one rate and fewer rounds')
     mode.add_argument('--soak', type=int, nargs='?', const=10 ** 6, metavar='MESSAGES')
     mode.add_argument('--hold', type=float, nargs='?', const=60.0, metavar='SECONDS')
+    mode.add_argument('--trouble', type=float, nargs='?', const=600.0, metavar='SECONDS')
     mode.add_argument('--tables', action='store_true', help='run nothing, show the last results')
     parser.add_argument('--document', action='store_true', help='write the tables to docs/')
     parser.add_argument('--rounds', type=int, help='bursts of each subject')
@@ -91,6 +93,8 @@ def run(options):
                 return {'soak': long.soak(bench, options.soak)}
             if options.hold:
                 return {'hold': long.hold(bench, 1000.0, options.hold)}
+            if options.trouble:
+                return {'trouble': long.trouble(bench, options.trouble)}
             rates = (1000.0,) if options.quick else campaign.RATES
             rows, bodies = [], []
             for scene in scenes.SCENES:

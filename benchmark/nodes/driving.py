@@ -62,6 +62,10 @@ class Process:
         """Return whether it has not ended."""
         return self._process.poll() is None
 
+    def signal(self, number):
+        """Send a signal."""
+        self._process.send_signal(number)
+
     def end(self):
         """End it as a user does."""
         self._process.send_signal(signal.SIGINT)

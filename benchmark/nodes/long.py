@@ -12,17 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What takes long: a million messages, and a minute at 1000 Hz."""
+"""What takes long: a million messages, a minute at 1000 Hz, and ten minutes of trouble."""
 
 import os
+import signal
 import time
 
 from linkage_ros.kinematics import Kinematics
 import numpy as np
+from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 
-from . import scenes
+from . import changes, scenes
 from .campaign import NODE, SUBJECT
 from .driving import Process, resident
 
@@ -74,3 +76,45 @@ def hold(bench, rate, seconds):
             'p50': float(np.percentile(found, 50)), 'p99': float(np.percentile(found, 99)),
             'max': float(max(found)), 'growth_mib': grown / MIB,
             'load': os.getloadavg()[0]}
+
+
+def trouble(bench, seconds):
+    """
+    Return what became of a node that turns 12 legs at 500 Hz for some seconds, in trouble.
+
+    Each second a parameter is changed, another is refused, and bytes come that are no message; a
+    subscriber and a client that never take what they are sent stand still all the time.
+    """
+    scene, kinds = '12 legs', [name for name in changes.CHANGES if name != 'none']
+    process = Process('troubled', *NODE, parameters=scenes.write(scene, bench.folder))
+    stalled = Process('troubled', *SUBJECT, 'ear', '--ready', str(bench.ready(scene)))
+    random, sizes, took = np.random.default_rng(0), [], []
+    try:
+        line = bench.driver.line(process, scene, scenes.topics(scene))
+        client, deaf = (node.create_client(SetParameters, '/troubled/kinematics/set_parameters')
+                        for node in (bench.driver.node, bench.driver._idle))
+        bench.driver.wait(2.0)
+        stalled.signal(signal.SIGSTOP)
+        with changes.turning(line):
+            for second in range(round(seconds)):
+                given = changes.CHANGES[kinds[second % len(kinds)]](second % 40)
+                took.append(1e3 * changes.change(bench.driver, client, given))
+                deaf.call_async(SetParameters.Request())
+                text = serialize_message(next(line._cranks))
+                line._publisher.publish(random.bytes(int(random.integers(1, 300))))
+                line._publisher.publish(text[:int(random.integers(1, len(text)))])
+                bench.driver.wait(max(0.0, 1.0 - 1e-3 * took[-1]))
+                for times in line._heard:
+                    assert times, f'nothing was published in second {second}'
+                    times.clear()
+                sizes.append(process.resident())
+                assert process.running(), f'the node ended in second {second}'
+    finally:
+        stalled.signal(signal.SIGCONT)
+        stalled.end()
+        process.end()
+    settled = sizes[len(sizes) // 10:]
+    return {'seconds': len(sizes), 'growth_mib': (settled[-1] - settled[0]) / MIB,
+            'span_mib': (max(settled) - min(settled)) / MIB,
+            'resident_mib': settled[-1] / MIB, 'answered_ms': float(np.median(took)),
+            'longest_answer_ms': max(took)}

@@ -41,7 +41,7 @@ def document(result):
             '### Where the time goes', layers(result),
             '### Body of the tick', bodies(result),
             '### Service', services(result['services'])]
-    if 'soak' in result or 'hold' in result:
+    if {'soak', 'hold', 'trouble'} & result.keys():
         parts += ['### At length', long(result)]
     return '\n\n'.join(parts) + '\n'
 
@@ -210,4 +210,11 @@ def long(result):
                       f'{hold["took"]:.1f} s): {hold["lost"]} lost, CPU {hold["cpu"]:.0f} us a '
                       f'message, latency p50 {hold["p50"]:.0f}, p99 {hold["p99"]:.0f}, longest '
                       f'{hold["max"]:.0f} us; load {hold["load"]:.1f}'])
+    if 'trouble' in result:
+        one = result['trouble']
+        lines.append(['trouble', f'{one["seconds"]} s with a change, bad bytes and listeners that '
+                      f'stall: {one["resident_mib"]:.0f} MiB, first to last '
+                      f'{one["growth_mib"]:+.2f} MiB, span {one["span_mib"]:.2f} MiB; a change is '
+                      f'answered after {one["answered_ms"]:.0f} ms, at most '
+                      f'{one["longest_answer_ms"]:.0f} ms'])
     return table(['run', 'result'], lines)

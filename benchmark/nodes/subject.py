@@ -81,17 +81,9 @@ class Raw(Deaf):
 class FreshOutlet(Outlet):
     """Builds ordinary messages, as one writes it: new ones each time."""
 
-    def follow(self, machine, frame_id):
-        """Remember how to make markers."""
-        super().follow(machine, frame_id)
-        place = {point: i for i, point in enumerate(machine.points)}
-        self._drawn = (self._name, frame_id, machine.pose,
-                       [(place[p], place[q]) for p, q in machine.linkage.bars],
-                       machine.scale * float(machine.linkage.longest))
-
-    def _send(self, what, publisher, build, stamp):
-        self._joint_state = messages.JointStates()
-        self._marker_array = messages.Markers(*self._drawn)
+    def _send(self, publisher, build, stamp):
+        self._model.joint_state = messages.JointStates()
+        self._model.marker_array = messages.Markers(*self._model.drawn)
         publisher.publish(build(self._pose, wire.unpack(stamp)))
 
 
@@ -174,7 +166,7 @@ KINDS = {'kinematics': Kinematics, 'fresh': Fresh, 'floor': Floor, 'relay': Rela
 # The parts of the work of a tick.
 PARTS = {'tick': [(Kinematics, '_turn'), (Floor, '_turn'), (Relay, '_turn')],
          'read': [(reading.Reader, 'read')],
-         'solve': [(Outlet, '_solve')], 'patch': [(wire.Template, 'patched')],
+         'solve': [(kinematics.Model, 'solve')], 'patch': [(wire.Template, 'patched')],
          'publish': [(Publisher, 'publish')],
          'ask who listens': [(Publisher, 'get_subscription_count')]}
 
@@ -231,7 +223,8 @@ def main():
         Floor.ready = Ear.ready = ready(pickle.loads(options.ready.read_bytes()))
     times = Times() if options.times else None
     executor = SingleThreadedExecutor if options.single else node.Executor
-    code = node.run(KINDS[options.kind], options.kind, executor_class=executor)
+    own = len(remove_ros_args())
+    code = node.run(KINDS[options.kind], options.kind, sys.argv[:1] + sys.argv[own:], executor)
     if times:
         options.times.write_text(json.dumps(times.medians()))
     return code

@@ -1,0 +1,130 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How long poses are held up by changes of parameters, at 500 Hz and 12 legs.
+
+    python -m benchmark.nodes.changes
+
+`kinematics` runs as a process; a thread publishes crank messages at equal times, the time between
+one joint state and the next is taken as it arrives here. What no change at all brings is printed
+beside: the machine's own part.
+"""
+
+from contextlib import contextmanager
+import itertools
+from pathlib import Path
+import tempfile
+import threading
+import time
+
+import numpy as np
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+
+from . import scenes
+from .driving import Driver, Process
+from .report import table
+
+SCENE, NODE, RATE = '12 legs', ('-m', 'linkage_ros.kinematics'), 500.0
+ROUNDS, BREAK = 12, 0.25
+CHANGES = {
+    'none': lambda i: {},
+    'dimension': lambda i: {'walker.dimensions.m': 14.0 + 0.02 * i},
+    'branch': lambda i: {'walker.branches.F': (-1) ** i},
+    'scale': lambda i: {'walker.scale': 0.01 + 1e-5 * i},
+    'legs': lambda i: {'walker.leg_pairs': 6 - i % 2},
+    'points': lambda i: {'walker.points': ['O', 'A', 'C', 'G'][i % 2:]},
+    'pose': lambda i: {'walker.pose': [0.01 * i, 0.0, 0.0, 0.0, 0.0, 0.0]},
+    'frame_id': lambda i: {'frame_id': f'frame{i}'},
+    'refused': lambda i: {'walker.dimensions.b': 1.0 + 0.01 * i},
+    '100 at once': lambda i: {'walker.dimensions.m': [14.0 + 0.01 * j + 1e-4 * i
+                                                      for j in range(100)]},
+}
+
+
+@contextmanager
+def turning(line, rate=RATE):
+    """Send crank messages at a rate [Hz] from a thread."""
+    over = threading.Event()
+
+    def run():
+        start = time.perf_counter()
+        for count in itertools.count(1):
+            left = start + count / rate - time.perf_counter()
+            if over.wait(max(left, 0.0)):
+                break
+            line.send()
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+def change(driver, client, values):
+    """Set parameters, those with a list of values to each in turn; return the seconds it took."""
+    asked = time.perf_counter()
+    spread = [{name: value} for name, each in values.items() if name == 'walker.dimensions.m'
+              and isinstance(each, list) for value in each] or [values]
+    futures = [client.call_async(SetParameters.Request(parameters=[
+        Parameter(name, value=value).to_parameter_msg() for name, value in one.items()]))
+        for one in spread]
+    driver.until(lambda: all(future.done() for future in futures), 5.0)
+    return time.perf_counter() - asked
+
+
+def gaps(driver, line, client, kind):
+    """Return the longest time between two poses [ms] around each change, and what each took."""
+    times, found, took = line._heard[0], [], []
+    for i in range(ROUNDS):
+        driver.wait(BREAK)
+        times.clear()
+        driver.wait(0.05)
+        took.append(1e3 * change(driver, client, CHANGES[kind](i)))
+        driver.wait(BREAK)
+        found.append(1e3 * np.diff(times).max())
+    return found, took
+
+
+def main():
+    """Measure and print."""
+    driver = Driver()
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            process = Process('changed', *NODE, parameters=scenes.write(SCENE, Path(folder)))
+            try:
+                line = driver.line(process, SCENE, scenes.topics(SCENE))
+                client = driver.node.create_client(
+                    SetParameters, '/changed/kinematics/set_parameters')
+                rows = []
+                with turning(line):
+                    driver.wait(2.0)
+                    for kind in CHANGES:
+                        found, took = gaps(driver, line, client, kind)
+                        rows.append([kind, *(f'{value:.1f}' for value in (
+                            np.median(found), max(found), np.median(took)))])
+                print(table(['change', 'gap, median [ms]', 'longest', 'answered after [ms]'],
+                            rows))
+            finally:
+                process.end()
+    finally:
+        driver.end()
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,283 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the kinematics node makes of crank messages, however they come and whatever they say."""
+
+import gc
+import math
+import struct
+import sys
+import warnings
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from linkage_ros import kinematics  # noqa: E402
+from linkage_ros.kinematics import Kinematics  # noqa: E402
+from rcl_interfaces.msg import Log  # noqa: E402
+from rclpy.logging import LoggingSeverity  # noqa: E402
+from rclpy.serialization import serialize_message  # noqa: E402
+from ros_harness import RETRY  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from test_reading import big_endian, mutated  # noqa: E402
+from visualization_msgs.msg import MarkerArray  # noqa: E402
+
+FIVE_BAR = {'mechanisms': ['five_bar']}
+
+
+class Hand:
+    """A kinematics node, what it publishes and says, and a publisher of crank messages."""
+
+    def __init__(self, graph, mechanism='jansen', parameters=None):
+        # What is left of another node would take its logger away from this one, of the same name.
+        gc.collect()
+        self._graph = graph
+        self.said = graph.listen(Log, '/rosout', 50)
+        self.joints = graph.listen(JointState, f'{mechanism}/joint_states', 100)
+        self.markers = graph.listen(MarkerArray, f'{mechanism}/markers', 100)
+        self.node = graph.start(Kinematics, parameters)
+        self._publisher = graph.node.create_publisher(JointState, 'crank_states', 100)
+        self._mechanism = mechanism
+        graph.until(lambda: self._publisher.get_subscription_count()
+                    and self.node.count_subscribers('/rosout')
+                    and self.node.count_subscribers(f'{mechanism}/joint_states')
+                    and self.node.count_subscribers(f'{mechanism}/markers'))
+
+    def send(self, names=(), positions=(), velocities=(), stamp=None, text=None):
+        """Publish a crank message, or bytes instead of one."""
+        message = JointState(name=list(names), position=positions, velocity=velocities)
+        message.header.stamp.sec = 1 if stamp is None else stamp
+        self._publisher.publish(text or message)
+
+    def warnings(self, words):
+        """Return the warnings with some words in them."""
+        return [m.msg for m in self.said if m.level == LoggingSeverity.WARN and words in m.msg]
+
+    def moved(self, names, positions, velocities=()):
+        """Return the joint states after a message: the first that have its first position."""
+        seen = len(self.joints)
+        self.send(names, positions, velocities)
+        return self._graph.until(lambda: [
+            m for m in self.joints[seen:] if positions[0] in m.position])[0]
+
+
+BAD = {
+    'a header alone': b'\0\1\0\0',
+    'padding that is not there': b'\0\1\0\3',
+    'one byte': b'\0',
+    'noise': np.random.default_rng(1).bytes(200),
+    'cut off': serialize_message(JointState(name=['jansen_crank'], position=[1.0]))[:30],
+    'an unknown encoding': b'\7\7' + serialize_message(JointState(name=['jansen_crank']))[2:],
+    'names without end': b'\0\1\0\0' + bytes(8) + struct.pack('<IxxxxI', 1, 2 ** 32 - 1) * 4,
+    'a name without end': (b'\0\1\0\0' + bytes(8)
+                           + struct.pack('<IxxxxII', 1, 1, 2 ** 32 - 9) + bytes(40)),
+}
+
+
+@pytest.mark.parametrize('text', BAD.values(), ids=BAD)
+def test_bytes_that_are_no_joint_states_are_passed_over_with_one_warning(graph, text):
+    hand = Hand(graph)
+    for _ in range(5):
+        hand.send(text=text)
+    said = graph.until(lambda: hand.warnings('no joint states'))
+    assert f'{len(text)} bytes' in said[0] and len(said[0]) < 400
+    assert hand.moved(['jansen_crank'], [0.5], [1.0]).velocity[0] == 1.0
+    assert len(hand.warnings('no joint states')) == 1
+
+
+def test_whatever_bytes_come_the_node_goes_on_and_publishes_finite_numbers(graph):
+    hand = Hand(graph)
+    random = np.random.default_rng(5)
+    bases = [serialize_message(JointState(name=['jansen_crank', 'water_drop_crank'],
+                                          position=[0.3, 0.4], velocity=[1.0, 2.0])),
+             big_endian(JointState(name=['jansen_crank'], position=[0.3]))]
+    for i in range(600):
+        hand.send(text=mutated(random, bases[i % 2]) or b'\0')
+        if i % 20 == 0:
+            hand.moved(['jansen_crank'], [0.001 * i])
+    for message in hand.joints:
+        assert np.isfinite(message.position).all() and np.isfinite(message.velocity).all()
+        assert len(message.name) == len(message.position)
+    for message in hand.markers:
+        for marker in message.markers:
+            assert np.isfinite([(p.x, p.y, p.z) for p in marker.points]).all()
+
+
+def test_the_other_byte_order_is_understood(graph):
+    hand = Hand(graph)
+    hand.send(text=big_endian(JointState(name=['a', 'jansen_crank'], position=[9.0, 0.25],
+                                         velocity=[1.0, 2.0])))
+    state = graph.until(lambda: hand.joints)[0]
+    assert (state.position[0], state.velocity[0]) == (0.25, 2.0)
+
+
+@pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
+def test_an_angle_that_is_no_number_is_said_once_and_never_published(graph, value):
+    parameters = {'mechanisms': ['m'], 'm.type': 'custom', 'm.points': ['O', 'Q'], 'm.joints': [
+        'O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'B dyad A Q 2 2 left']}
+    hand = Hand(graph, 'm', parameters)
+    for _ in range(3):
+        hand.send(['m_crank'], [value])
+    graph.until(lambda: hand.warnings('cannot be assembled'))
+    state = hand.moved(['m_crank'], [0.5])
+    assert len(hand.joints) == 1 and np.isfinite(state.position).all()
+    assert len(hand.markers) <= 1
+    assert len(hand.warnings('cannot be assembled')) == 1
+
+
+@pytest.mark.parametrize('speed', [1e200, 1e308, math.inf, math.nan, 5e-324])
+def test_any_speed_is_handled_without_a_warning_of_numpy(graph, speed):
+    hand = Hand(graph, 'm', {'mechanisms': ['m'], 'm.type': 'jansen', 'm.scale': 1e6,
+                             'm.leg_pairs': 2})
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        for theta in (0.5, 0.6, 1e200):
+            state = hand.moved(['m_crank'], [theta], [speed])
+            assert np.isfinite(state.velocity).all() and np.isfinite(state.position).all()
+
+
+def test_names_without_positions_and_positions_without_names_are_passed_over(graph):
+    hand = Hand(graph)
+    hand.send(['wheel', 'jansen_crank'], [1.0])
+    hand.send([], [1.0, 2.0])
+    hand.send(['jansen_crank'], [])
+    state = hand.moved(['jansen_crank'], [0.5, 7.0, 8.0], [1.0])
+    assert (state.position[0], state.velocity[0], len(hand.joints)) == (0.5, 1.0, 1)
+    assert not hand.moved(['jansen_crank'], [0.6], [1.0, 2.0]).velocity
+
+
+def test_a_crank_that_is_named_twice_stands_where_it_was_named_last(graph):
+    hand = Hand(graph)
+    hand.send(['jansen_crank'] * 3, [0.1, 0.2, 0.3])
+    assert graph.until(lambda: hand.joints)[0].position[0] == 0.3
+
+
+def test_ten_thousand_joints_hold_nobody_up(graph):
+    hand = Hand(graph)
+    names = [f'joint{i}' for i in range(9999)] + ['jansen_crank']
+    for theta in (0.1, 0.2, 0.3):
+        hand.send(names, [0.0] * 9999 + [theta])
+        graph.until(lambda theta=theta: hand.joints and hand.joints[-1].position[0] == theta)
+    said, = hand.warnings('nothing is called')
+    assert 'joint0, joint1' in said and '... (1000)' in said and len(said) < 400
+
+
+@pytest.mark.parametrize('order', [(0, 1), (1, 0)])
+def test_two_cranks_may_come_in_two_messages(graph, order):
+    hand = Hand(graph, 'five_bar', FIVE_BAR)
+    names, values = ['five_bar_crank', 'five_bar_crank2'], [0.1, 0.2]
+    hand.send([names[order[0]]], [values[order[0]]], [1.0])
+    state = hand.moved([names[order[1]]], [values[order[1]]], [2.0])
+    found = dict(zip(state.name, state.position))
+    assert [found[name] for name in names] == values
+    assert len(state.velocity) == len(state.name) and len(hand.joints) == 1
+
+
+def test_a_mechanism_moves_with_every_message_that_brings_one_of_its_inputs(graph):
+    hand = Hand(graph, 'five_bar', FIVE_BAR)
+    hand.moved(['five_bar_crank', 'five_bar_crank2'], [0.1, 0.2], [1.0, 2.0])
+    one = hand.moved(['five_bar_crank2'], [0.25], [2.5])
+    assert list(one.position[:2]) == [0.1, 0.25] and list(one.velocity[:2]) == [1.0, 2.5]
+    two = hand.moved(['five_bar_crank', 'wheel'], [0.15, 9.0], [1.5, 0.0])
+    assert list(two.position[:2]) == [0.15, 0.25] and list(two.velocity[:2]) == [1.5, 2.5]
+
+
+def test_velocities_are_published_only_while_every_inputs_is_known(graph):
+    hand = Hand(graph, 'five_bar', FIVE_BAR)
+    hand.send(['five_bar_crank'], [0.1])
+    assert not hand.moved(['five_bar_crank2'], [0.2], [2.0]).velocity
+    state = hand.moved(['five_bar_crank'], [0.11], [1.0])
+    assert list(state.velocity[:2]) == [1.0, 2.0]
+    assert not hand.moved(['five_bar_crank2'], [0.21]).velocity
+
+
+def test_a_message_without_a_stamp_is_stamped_with_the_nodes_time(graph):
+    hand = Hand(graph)
+    before = graph.node.get_clock().now().nanoseconds
+    hand.send(['jansen_crank'], [0.3], stamp=0)
+    state = graph.until(lambda: hand.joints)[0]
+    markers = graph.until(lambda: hand.markers)[0].markers
+    stamp = state.header.stamp
+    after = graph.node.get_clock().now().nanoseconds
+    assert before < stamp.sec * 10 ** 9 + stamp.nanosec < after
+    assert all(marker.header.stamp == stamp for marker in markers)
+
+
+def test_names_that_are_no_inputs_are_said_once(graph):
+    hand = Hand(graph)
+    for seed in range(5):
+        hand.send(['jansen_krank', 'jansen_crank'], [0.1, 0.01 * seed])
+    hand.send(['jansen_krank', 'wheel'], [0.1, 0.3])
+    hand.moved(['jansen_crank'], [0.7])
+    graph.until(lambda: hand.warnings('called wheel'))
+    assert len(hand.warnings('jansen_krank')) == 1
+    assert 'the inputs are water_drop_crank, jansen_crank' in hand.warnings('krank')[0]
+
+
+def test_a_stream_of_new_names_is_said_within_bounds(graph, monkeypatch):
+    monkeypatch.setattr(kinematics, 'STRANGERS', 20)
+    hand = Hand(graph)
+    for i in range(60):
+        hand.send([f'{i}' * 1000, '\n', f'w{i}'], [0.0] * 3)
+        if i % 10 == 0:
+            hand.moved(['jansen_crank'], [0.001 * i])
+    hand.moved(['jansen_crank'], [0.7])
+    said = hand.warnings('nothing is called')
+    assert len(said) <= 20 and 'no more will be named' in said[-1]
+    assert all(len(text) < 500 and '\n' not in text for text in said)
+    assert len(hand.node._strangers) == 20
+
+
+def test_inputs_that_nobody_sends_are_said_once(graph, monkeypatch):
+    monkeypatch.setattr(kinematics, 'PATIENCE', 0.3)
+    hand = Hand(graph, 'five_bar', FIVE_BAR)
+    hand.send(['five_bar_crank'], [0.1])
+    said = graph.until(lambda: hand.warnings('nothing was heard'))
+    assert said == ['crank_states: nothing was heard of five_bar_crank2, without which five_bar '
+                    'cannot move']
+    hand.send(['five_bar_crank'], [0.2])
+    hand.moved(['five_bar_crank2'], [0.3])
+    with pytest.raises(AssertionError, match='in time'):
+        graph.until(lambda: len(hand.warnings('nothing was heard')) > 1, 5 * RETRY)
+
+
+def test_nothing_is_missed_where_nothing_or_everything_was_heard(graph, monkeypatch):
+    monkeypatch.setattr(kinematics, 'PATIENCE', 0.2)
+    hand = Hand(graph, 'five_bar', FIVE_BAR)
+    with pytest.raises(AssertionError, match='in time'):
+        graph.until(lambda: hand.warnings('nothing was heard'), 0.5)
+    hand.send(['five_bar_crank'], [0.1])
+    hand.moved(['five_bar_crank2'], [0.2])
+    with pytest.raises(AssertionError, match='in time'):
+        graph.until(lambda: hand.warnings('nothing was heard'), 0.5)
+
+
+def test_without_llvmlite_the_node_says_so(graph, monkeypatch):
+    monkeypatch.setitem(sys.modules, 'llvmlite', None)
+    said = graph.listen(Log, '/rosout', 50)
+    graph.start(Kinematics, {'mechanisms': ['jansen']})
+    graph.until(lambda: [m for m in said
+                         if m.level == LoggingSeverity.INFO and 'llvmlite' in m.msg])
+
+
+def test_a_crank_alone_is_no_exception(graph):
+    hand = Hand(graph, 'alone', {'mechanisms': ['alone'], 'alone.type': 'custom',
+                                 'alone.joints': ['O ground 0 0', 'A crank O 1']})
+    for value in (math.nan, math.inf):
+        hand.send(['alone_crank'], [value], [value])
+    graph.until(lambda: hand.warnings('cannot be assembled'))
+    assert list(hand.moved(['alone_crank'], [0.5], [math.nan]).position) == [0.5]
+    assert len(hand.joints) == 1 and not hand.joints[0].velocity

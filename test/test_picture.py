@@ -1,0 +1,196 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is no longer shown is taken out of the picture, and what cannot be shown is refused."""
+
+import math
+import re
+import signal
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from linkage_ros import scene, urdf  # noqa: E402
+from linkage_ros.kinematics import Kinematics, LATCHED  # noqa: E402
+from ros_harness import Graph, Process  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from std_msgs.msg import String  # noqa: E402
+from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+
+CELL = {'mechanisms': ['cell'], 'cell.type': 'peaucellier'}
+
+
+class Picture:
+    """What somebody sees who draws every marker and deletes what he is told to."""
+
+    def __init__(self, graph, mechanism):
+        self._arrays = graph.listen(MarkerArray, f'{mechanism}/markers', 100)
+        self._loci = graph.listen(Marker, f'{mechanism}/locus', LATCHED)
+        self._mechanism = mechanism
+
+    def __call__(self):
+        """Return the number of points of each marker that is there, by its id."""
+        shown = {}
+        for marker in [*(m for array in self._arrays for m in array.markers), *self._loci]:
+            assert marker.ns == self._mechanism
+            if marker.action == Marker.DELETE:
+                shown.pop(marker.id, None)
+            else:
+                shown[marker.id] = len(marker.points)
+        return shown
+
+
+def test_links_go_when_the_points_that_they_join_are_no_longer_wanted(graph):
+    node = graph.start(Kinematics)
+    picture = Picture(graph, 'jansen')
+    graph.crank(['jansen_crank'])([0.3], graph.listen(MarkerArray, 'jansen/markers'))
+    graph.until(lambda: picture().keys() == {0, 1, 2})
+    # No crank message comes: the pose that there was is drawn anew.
+    assert graph.set(node, jansen__points=['G', 'C']).successful
+    graph.until(lambda: (picture().keys(), picture().get(1)) == ({1, 2}, 2))
+    assert graph.set(node, jansen__points=['O', 'A']).successful
+    graph.until(lambda: picture().keys() == {0, 1, 2})
+
+
+def test_a_leg_that_cannot_be_assembled_goes_once_and_comes_back(graph):
+    graph.start(Kinematics, CELL)
+    picture = Picture(graph, 'cell')
+    states, arrays = (graph.listen(type_, f'cell/{what}') for type_, what in (
+        (JointState, 'joint_states'), (MarkerArray, 'markers')))
+    turn = graph.crank(['cell_crank'])
+    turn([0.3], states)
+    graph.until(lambda: picture().keys() == {0, 1, 2})
+    with pytest.raises(AssertionError, match='in time'):
+        turn([2.0], states, seconds=0.5)
+    assert picture().keys() == {2}
+    assert sum(array.markers[0].action == Marker.DELETE for array in arrays) == 1
+    turn([0.4], states)
+    graph.until(lambda: picture().keys() == {0, 1, 2})
+
+
+def test_a_locus_that_is_no_curve_any_more_goes_for_whoever_comes_late_too(graph):
+    node = graph.start(Kinematics, CELL)
+    picture = Picture(graph, 'cell')
+    graph.until(lambda: picture().keys() == {2})
+    outlet = node._outlets['cell']
+    assembly = type(outlet._model.assembly)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(assembly, 'locus', lambda *_: np.zeros((1, 2)))
+        assert graph.set(node, cell__scale=0.9).successful
+    graph.until(lambda: not picture())
+    late = graph.listen(Marker, 'cell/locus', LATCHED)
+    assert graph.until(lambda: late)[0].action == Marker.DELETE
+    assert graph.set(node, cell__scale=1.0).successful
+    graph.until(lambda: picture().keys() == {2})
+
+
+def test_whoever_comes_late_sees_the_newest_locus_and_model(graph):
+    node = graph.start(Kinematics, CELL)
+    for scale in (2.0, 3.0, 4.0):
+        assert graph.set(node, cell__scale=scale).successful
+    locus = graph.listen(Marker, 'cell/locus', LATCHED)
+    model = graph.listen(String, 'cell/robot_description', LATCHED)
+    graph.until(lambda: locus and model)
+    wanted = scene.read({**CELL, 'cell.scale': 4.0}).machines['cell']
+    assert model[0].data == urdf.describe([wanted], 'world')
+    drawn = np.array([(p.x, p.y) for p in locus[0].points])
+    assert drawn == pytest.approx(wanted.assembly().locus(wanted.tracer))
+
+
+def test_nothing_is_left_of_a_node_that_is_destroyed(graph):
+    node = graph.start(Kinematics)
+    picture = Picture(graph, 'jansen')
+    graph.crank(['jansen_crank'])([0.3], graph.listen(MarkerArray, 'jansen/markers'))
+    graph.until(lambda: picture().keys() == {0, 1, 2})
+    node.destroy_node()
+    graph.until(lambda: not picture())
+
+
+@pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
+def test_nothing_is_left_of_a_process_that_is_told_to_end(tmp_path, stop):
+    path = tmp_path / 'scene.yaml'
+    path.write_text('/**:\n  ros__parameters:\n    mechanisms: [jansen]\n')
+    process = Process('kinematics', path)
+    with Graph(process.domain) as graph:
+        picture = Picture(graph, 'jansen')
+        graph.crank(['jansen_crank'])([0.3], graph.listen(MarkerArray, 'jansen/markers'))
+        graph.until(lambda: picture().keys() == {0, 1, 2})
+        process.interrupt(stop)
+        graph.until(lambda: not picture())
+        code, printed = process.end()
+    assert code == 0 and 'Traceback' not in printed
+
+
+def custom(*lines):
+    return {'mechanisms': ['jansen'], 'jansen.type': 'custom', 'jansen.joints': list(lines)}
+
+
+UNPUBLISHABLE = {
+    'frame of the model': ({}, {'frame_id': 'jansen_ground_link'}, 'frame_id'),
+    'joint of the model': ({}, {'frame_id': 'jansen_A'}, 'frame_id'),
+    'cut of the model': ({}, {'frame_id': 'jansen_C_cut'}, 'frame_id'),
+    'too large': ({}, {'jansen.scale': 1e308}, 'jansen.scale'),
+    'large': ({}, {'jansen.scale': 1e29}, 'jansen.scale'),
+    'too small': ({}, {'jansen.scale': 5e-324}, 'jansen.scale'),
+    'small': ({}, {'jansen.scale': 1e-36}, 'jansen.scale'),
+    'too far': ({}, {'jansen.pose': [1e308, 0.0, 0.0, 0.0, 0.0, 0.0]}, 'jansen.pose'),
+    'far': ({}, {'jansen.pose': [0.0, 0.0, -1e31, 0.0, 0.0, 0.0]}, 'jansen.pose'),
+}
+
+
+@pytest.mark.parametrize('given, bad, named', UNPUBLISHABLE.values(), ids=UNPUBLISHABLE)
+def test_what_cannot_be_published_is_refused_and_what_was_there_goes_on(graph, given, bad, named):
+    node = graph.start(Kinematics, given)
+    states = graph.listen(JointState, 'jansen/joint_states')
+    loci = graph.listen(Marker, 'jansen/locus', LATCHED)
+    models = graph.listen(String, 'jansen/robot_description', LATCHED)
+    turn = graph.crank(['jansen_crank'])
+    before = turn([0.5], states)
+    graph.until(lambda: loci and models)
+    for values in (bad, {**bad, 'jansen.dimensions.m': 14.0}):
+        refused = graph.set(node, **values)
+        assert not refused.successful and re.search(re.escape(named), refused.reason)
+        assert len(refused.reason) < 300
+    assert turn([0.5], states).position == before.position
+    assert len(loci) == len(models) == 1
+    for name in bad:
+        assert node.get_parameter(name).value != bad[name]
+    with pytest.raises(scene.SceneError, match=re.escape(named)):
+        graph.start(Kinematics, {**given, **bad})
+
+
+@pytest.mark.parametrize('lines, named', [
+    (('O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'crank_link dyad A Q 3 3 left'),
+     'jansen.joints'),
+    (('O ground 0 0', 'Q ground 1e65 0', 'A crank O 1', 'B dyad A Q 1e65 1e65 left'), 'jansen.'),
+    (('O ground 0 0', 'A crank O 1', 'P rigid O A 1e60 1e60 left'), 'jansen.'),
+])
+def test_a_linkage_that_cannot_be_published_is_refused_at_the_start(graph, lines, named):
+    with pytest.raises(scene.SceneError, match=re.escape(named)):
+        graph.start(Kinematics, custom(*lines))
+
+
+@pytest.mark.parametrize('scale', [1e-20, 1e-9, 1e9, 1e20])
+def test_what_can_be_published_is_finite_everywhere(graph, scale):
+    graph.start(Kinematics, {'jansen.scale': scale, 'jansen.leg_pairs': 2})
+    locus = graph.listen(Marker, 'jansen/locus', LATCHED)
+    model = graph.listen(String, 'jansen/robot_description', LATCHED)
+    drawn = graph.crank(['jansen_crank'])([0.3], graph.listen(MarkerArray, 'jansen/markers'))
+    graph.until(lambda: locus and model)
+    assert not re.search(r'\b(inf|nan)\b', model[0].data)
+    for marker in [*locus, *drawn.markers]:
+        assert 0.0 < np.float32(marker.scale.x) < math.inf
+        assert np.isfinite(np.float32([(p.x, p.y) for p in marker.points])).all()
