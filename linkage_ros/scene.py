@@ -76,17 +76,22 @@ SPEED = Field('double', 'Speed of the crank [rad/s].', -100.0, 100.0, readers=(D
 START = Field('double', 'Crank angle at the start [rad]; a new one moves the crank there.',
               -4.0 * math.pi, 4.0 * math.pi, readers=(DRIVER,))
 SWEEP = Field('double_array', 'Crank angles [rad] between which the crank swings; '
-              'empty: it turns all round, or swings through its reach.', readers=(DRIVER,),
+              'empty: it turns all round, or swings through its reach.', readers=ALL,
               rule='the lower end and the higher end, or none')
 
 
 @dataclass(frozen=True)
 class Crank:
-    """How a crank moves: speed [rad/s], start [rad], and the ends of its swing [rad] or None."""
+    """
+    How a crank moves: speed [rad/s], start [rad], and the ends of its swing [rad] or None.
+
+    `ends` are those that were set, beyond which no answer lies either; None: all its reach.
+    """
 
     speed: float
     start: float
     sweep: Optional[Tuple[float, float]]
+    ends: Optional[Tuple[float, float]] = None
 
 
 @dataclass(frozen=True)
@@ -302,7 +307,7 @@ def _crank(name, reach, values) -> Crank:
                          f'{in_words(arcs)} rad, not {start}')
     low, high = (home or arcs)[0]
     trimmed = 0.0 if sweep else MARGIN * (high - low)
-    return Crank(speed, start, (low + trimmed, high - trimmed))
+    return Crank(speed, start, (low + trimmed, high - trimmed), tuple(sweep) or None)
 
 
 def _check_sweep(name, sweep, reach):

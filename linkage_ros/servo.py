@@ -32,8 +32,9 @@ Of W and -W those are answers that leave the pin on the lever's half of its slot
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple
+from functools import lru_cache, reduce
+import math
+from typing import NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -47,91 +48,57 @@ from .expression import (
     derivative,
     exact_sum,
     gated,
+    nearest_integer,
     Real,
+    real,
     root,
     sine,
     square,
     where,
 )
+from .inverse import inside
 from .planar import GRAZE
 from .reach import NARROWEST
 from .sketch import GROUND
 
-TURN = 2.0 * np.pi
-# Rounding of an angle on its way through a closed form [rad].
-ROUNDED = 8 * 2.0 ** -52 * np.pi
+TURN = 2.0 * math.pi
 # Angles nearer than this [rad] may be one, if the output does not tell them apart.
 CLOSE = 1e-7
+# How much rounding takes an angle beyond the ends that it is to be between, as a part of them.
+ULPS = 4 * 2.0 ** -52
+
+# More than any angle.
+LARGE = 1e300
+
+Ends = Optional[Tuple[float, float]]
 
 
-class Answers(NamedTuple):
-    """
-    Crank angles [rad] that give an output its value, and d output / d crank there.
+class Answer(NamedTuple):
+    """A crank angle [rad] that an output allows if it is `held`, and d output / d crank there."""
 
-    Both have the answers on a last axis, filled up with NaN; `working` tells whether the first
-    is the one on the branch that a lever works on.
-    """
-
-    angles: np.ndarray
-    rates: np.ndarray
-    working: bool = False
-
-    def taken(self, near=None, ends: Optional[Sequence[float]] = None,
-              rounding: float = 0.0) -> Tuple[np.ndarray, np.ndarray]:
-        """
-        Return one answer to each value, and its rate; NaN where there is none.
-
-        Parameters
-        ----------
-        near : float or array-like, optional
-            The answer nearest to this angle [rad] is taken, whole turns included. Default: the
-            working branch or, if the answers know none, the least angle.
-        ends : (float, float), optional
-            The lowest and the highest angle [rad] that may be taken. Default: any with near,
-            otherwise those from -pi to pi.
-        rounding : float
-            How exactly the output is known; tells what still counts as at an end.
-
-        """
-        low, high = (-np.inf, np.inf) if ends is None else ends
-        with np.errstate(all='ignore'):
-            slack = np.fmin(rounding / np.abs(self.rates), CLOSE) + 4.0 * np.spacing(
-                np.pi if ends is None else max(np.pi, -low, high))
-            first = np.ceil((low - slack - self.angles) / TURN)
-            last = np.floor((high + slack - self.angles) / TURN)
-            if near is None:
-                turns = first if ends else np.zeros_like(first)
-                theta = self.angles + TURN * turns
-                away = np.arange(theta.shape[-1], dtype=float) if self.working else theta
-            else:
-                near = np.asarray(near, float)[..., None]
-                turns = np.clip(np.rint((near - self.angles) / TURN), first, last)
-                theta = self.angles + TURN * turns
-                away = np.abs(theta - near)
-            none = np.isnan(theta) | ~(first <= last)
-        theta = np.where(none, np.nan, np.clip(theta, low, high))
-        best = np.argmin(np.where(none, np.inf, away), axis=-1)[..., None]
-        return tuple(np.take_along_axis(np.broadcast_to(part, none.shape), best, -1)[..., 0][()]
-                     for part in (theta, np.where(none, np.nan, self.rates)))
+    theta: Real
+    rate: Real
+    held: Real
 
 
 class Mechanism(mechanism.Mechanism):
     """A linkage that is solved from its outputs, its levers by a closed form of their own."""
 
-    def crank_angle(self, output, value, near=None, others=()):
+    def crank_angle(self, output, value, near=None, others: Sequence[float] = ()):
         """Return the crank angles that give an output a value; see `Analysis.crank_angle`."""
-        if len(self.cranks) > 1 or others or not self._program(lever_inverse, output):
+        swept = any(np.ndim(length) for length in self.dimensions.values())
+        if swept or others or not self._has_lever(output):
             return super().crank_angle(output, value, near, others)
-        found = self.servos(output, value)
         if near is not None:
-            return found.taken(near)[0]
-        theta = np.sort(np.where(found.angles >= np.pi, -np.pi, found.angles), axis=-1)
+            return self.servo_for(output, np.asarray(value, float), near)[0][()]
+        theta, _ = self.servos(output, value)
+        theta = np.sort(np.where(theta >= math.pi, -math.pi, theta), axis=-1)
         theta[..., 1][np.diff(theta)[..., 0] <= NARROWEST] = np.nan
         return theta if np.isfinite(theta[..., 1]).any() else theta[..., :1]
 
-    def servos(self, output: str, value) -> Answers:
+    def servos(self, output: str, value) -> Tuple[np.ndarray, np.ndarray]:
         """
-        Return all servo angles for an output, with the reductions.
+        Return all crank angles that give an output a value, and d output / d crank there.
 
         Parameters
         ----------
@@ -140,21 +107,65 @@ class Mechanism(mechanism.Mechanism):
         value : float or array-like
             What the output is to be.
 
+        Returns
+        -------
+        (array, array)
+            Crank angles in [-pi, pi] and rates, on a last axis that is filled up with NaN; a
+            lever's answer on the working branch comes first, else they ascend.
+
         Raises
         ------
         ValueError
             As `crank_angle` does.
 
         """
-        lever = self._program(lever_inverse, output)
-        if not lever:
+        if not self._has_lever(output):
             theta = np.asarray(self.crank_angle(output, value))
-            return Answers(theta, self._rates_at(output, theta, np.asarray(value, float)))
-        found = np.moveaxis(lever.over(value), 0, -1)
-        theta, rates = found[..., :2], found[..., 2:]
-        if len(self._structure.sketch.limits) > 1:
-            theta = _inside(theta, self._arcs())
-        return Answers(theta, np.where(np.isnan(theta), np.nan, rates), working=True)
+            return theta, self._rates_at(output, theta, np.asarray(value, float))
+        found = np.moveaxis(self._solved_by(_lever_all, output).over(value), 0, -1)
+        theta, rates = found[..., ::2], found[..., 1::2]
+        theta = theta if self._is_free else inside(theta, self._arcs())
+        return theta, np.where(np.isnan(theta), np.nan, rates)
+
+    def servo_for(self, output: str, value, near=None, ends: Ends = None) -> Sequence:
+        """
+        Return one crank angle that gives an output a value, and d output / d crank there.
+
+        Parameters
+        ----------
+        output, value
+            As for `servos`.
+        near : float or array-like, optional
+            The answer nearest to this angle is taken, whole turns included. Default: of a lever
+            the one on the working branch, on which lever and crank turn the same way; of any
+            other output the least.
+        ends : (float, float), optional
+            The lowest and the highest angle [rad] that may be taken. Default: any with near,
+            otherwise those of one turn from -pi.
+
+        Returns
+        -------
+        (float or array, float or array)
+            In the shape of value and near broadcast; NaN where there is none.
+
+        """
+        lever, kind = self._has_lever(output), (near is not None, ends is not None)
+        limits = ((near,) if kind[0] else ()) + (ends or ())
+        if lever and self._is_free:
+            return self._solved_by(_lever_taken, output, *kind)(value, *limits)
+        theta, rates = self.servos(output, value)
+        rounding = GRAZE * (math.pi if self._structure.turns(output) else self.longest)
+        choice = _choice(theta.shape[-1], lever, *kind)
+        return choice.over(*np.moveaxis(theta, -1, 0), *np.moveaxis(rates, -1, 0), rounding,
+                           *limits)
+
+    def _has_lever(self, output) -> bool:
+        return len(self.cranks) == 1 and output in _levers(self._structure)
+
+    @property
+    def _is_free(self) -> bool:
+        """Whether nothing but its lever's slot limits the crank."""
+        return len(self._structure.sketch.limits) == 1
 
     def _arcs(self):
         """Return the reach, worked out once."""
@@ -162,58 +173,48 @@ class Mechanism(mechanism.Mechanism):
             self._poses['arcs'] = self.reach()
         return self._poses['arcs']
 
+    def _solved_by(self, draw, *args):
+        """Return the code that solves for an output in some way, None if there is none."""
+        key = draw, *args
+        if key not in self._poses:
+            program = draw(self._structure, *args)
+            self._poses[key] = program and program.bind(self._lengths, self._evaluated)
+        return self._poses[key]
+
     def _rates_at(self, output, theta, value):
         """Return d output / d crank at answers, from the side on which it is the smaller one."""
         joint, _, axis = output.rpartition('.')
         rates = (self.velocity(theta, (joint,))[joint][..., 'xy'.index(axis)] if joint
                  else self.joint_rates(theta, (output,))[output])
-        backward = self._program(backward_rates, output)
         steep = np.abs(rates) > (1.0 if self._structure.turns(output) else self.longest)
-        if not backward or not steep.any():
+        backward = steep.any() and self._solved_by(_backward_rates, output)
+        if not backward:
             return rates
         angles, inverse = np.split(backward.over(value)[..., None], 2)
-        away = np.abs(_wrapped(angles - theta))
+        away = np.abs(angles - theta - TURN * np.round((angles - theta) / TURN))
         away = np.where(np.isnan(away), np.inf, away)
         best = np.argmin(away, axis=0)[None]
         with np.errstate(all='ignore'):
             there = 1.0 / np.take_along_axis(np.broadcast_to(inverse, away.shape), best, 0)[0]
         return np.where(steep & (away.min(axis=0) < CLOSE), there, rates)
 
-    def _program(self, draw: Callable, output: str):
-        """Return the code that solves for an output in some way, None if there is none."""
-        if output not in self.joints and output.rpartition('.')[0] not in self.points:
-            return None
-        key = draw, output
-        if key not in self._poses:
-            program = _compiled(draw, self._structure, output)
-            self._poses[key] = program and program.bind(self._lengths, self._evaluated)
-        return self._poses[key]
 
-
-@lru_cache(maxsize=256)
-def _compiled(draw, structure, output):
-    outputs = draw(structure, output)
-    return outputs and Program(outputs)
-
-
-def lever_inverse(structure, name: str) -> Optional[List[Real]]:
-    """
-    Return both crank angles for a lever's angle, the working branch first, and the reductions.
-
-    None for what is no lever that the first crank's pin moves by its slot.
-    """
+@lru_cache(maxsize=64)
+def _levers(structure) -> dict:
+    """Return for each lever that the crank's pin moves both answers to its angle."""
     sketch = structure.sketch
     links = {link.name: link for link in sketch.links}
-    slide = next((link for link in sketch.links if link.kind == 'prismatic'
-                  and link.parent == name), None)
-    crank = slide and sketch.points[slide.tip].crank
-    if not crank or links[name].parent != GROUND or crank.angle.args[0]:
-        return None
-    half, e = structure.branches[links[name].tip], sketch.frames[slide.name][slide.tip].y
+    return {slide.parent: list(_lever(sketch, slide, structure.branches[links[slide.parent].tip]))
+            for slide in sketch.links if slide.kind == 'prismatic' and slide.parent != GROUND
+            and links[slide.parent].parent == GROUND and sketch.points[slide.tip].crank}
+
+
+def _lever(sketch, slide, half):
+    """Yield both crank angles for a lever's angle, that on the working branch first."""
+    crank, e = sketch.points[slide.tip].crank, sketch.frames[slide.name][slide.tip].y
     line = crank.centre - sketch.points[slide.joint].place
     a, b, along = crank.length, line.length(), line.direction()
-    upright = Complex(0.0, 1.0) * along.conjugate()
-    bar = Complex(cosine(angle(0)), sine(angle(0))) * upright
+    bar = Complex(cosine(angle(0)), sine(angle(0))) * (Complex(0.0, 1.0) * along.conjugate())
     cos, sin = bar.x, bar.y
     # Next to a limit at +-90 degrees the gap is small: it is formed from what is small.
     upper = where(0.7 < sin, exact_sum(a, -e, -b) + b * square(cos) / (1.0 + sin),
@@ -222,20 +223,77 @@ def lever_inverse(structure, name: str) -> Optional[List[Real]]:
                   exact_sum(a, e) + b * sin)
     grazed = GRAZE * (a + b + abs(e))
     height = root(upper, grazed) * root(lower, grazed)
-    turn, angles, rates = along * crank.zero.conjugate(), [], []
+    # With the pin on the pivot the lever points anywhere.
+    least = where(abs(e) <= grazed, grazed, -grazed)
     for share in (half * height, -half * height):
-        pin = bar * Complex(share, e + b * sin) * turn
-        t = half * (b * cos + share)
-        # On the pivot the slot's line is anywhere; at the slot's end the crank turns no further.
-        held = where(abs(e) <= grazed, t - grazed, t + grazed)
-        angles.append(gated(arctangent(pin.y, pin.x), held, 0.0))
-        rates.append(gated(half * share / where(0.0 < t, t, 0.0), held, 0.0))
-    return angles + rates
+        pin = bar * Complex(share, e + b * sin) * (along * crank.zero.conjugate())
+        slide_ = half * (b * cos + share)
+        yield Answer(arctangent(pin.y, pin.x), half * share / where(0.0 < slide_, slide_, 0.0),
+                     least <= slide_)
 
 
-def backward_rates(structure, output: str) -> Optional[List[Real]]:
-    """Return the crank angles that a value may have, and their rates, by its closed form."""
-    backward = structure.backward(output)
+@lru_cache(maxsize=64)
+def _lever_all(structure, name) -> Program:
+    """Return the code for both crank angles for a lever's angle, each with its rate."""
+    return Program([gated(part, where(answer.held, 1.0, -1.0), 0.0)
+                    for answer in _levers(structure)[name] for part in answer[:2]])
+
+
+@lru_cache(maxsize=256)
+def _lever_taken(structure, name, follows, ended) -> Program:
+    """Return the code for the crank angle that is taken for a lever's angle, and its rate."""
+    return _taken(_levers(structure)[name], True, real(GRAZE * math.pi), follows, ended, 1)
+
+
+@lru_cache(maxsize=256)
+def _choice(count, working, follows, ended):
+    """Return the code that takes one of some crank angles: from these, their rates, rounding."""
+    answers = [Answer(angle(i), angle(count + i), angle(i) <= angle(i)) for i in range(count)]
+    return _taken(answers, working, angle(2 * count), follows, ended, 2 * count + 1).bind({}, {})
+
+
+def _taken(answers, working, rounding, follows, ended, given) -> Program:
+    """
+    Return the code for the answer that is taken, and its rate.
+
+    With `follows` it is the nearest to an angle, with `ended` between two: these are given from
+    number `given` on. What is beyond an end by so little that the output, known up to `rounding`,
+    does not tell is at the end.
+    """
+    near, ends = angle(given), (angle(given + follows), angle(given + follows + 1))
+    choices = []
+    for rank, (theta, rate, held) in enumerate(answers):
+        place, misses = _turned(theta, near) if follows else theta, []
+        if ended:
+            speed = abs(rate)
+            slack = ULPS * (4.0 + abs(ends[0]) + abs(ends[1])) + where(
+                rounding < CLOSE * speed, rounding / speed, CLOSE)
+            low, high = ends[0] - slack, ends[1] + slack
+            first, last = (_turned(theta, end) for end in ends)
+            first = where(first < low, first + TURN, first)
+            last = where(high < last, last - TURN, last)
+            place = where(place < low, first, where(high < place, last, place)) \
+                if follows else first
+            misses = [place < low, high < place]
+            place = where(place < ends[0], ends[0], where(ends[1] < place, ends[1], place))
+        away = abs(place - near) if follows else real(rank) if working else place
+        away = reduce(lambda away, miss: where(miss, math.inf, away), misses, away)
+        choices.append((where(held, away, math.inf), place, rate))
+    away, *taken = reduce(lambda best, other: [
+        where(other[0] < best[0], mine, its) for mine, its in zip(other, best)], choices)
+    return Program([gated(part, LARGE - away, 0.0) for part in taken],
+                   given + follows + 2 * ended)
+
+
+def _turned(theta, near):
+    """Return an angle plus the whole turns that take it next to another."""
+    return theta + TURN * nearest_integer((near - theta) / TURN)
+
+
+@lru_cache(maxsize=256)
+def _backward_rates(structure, output) -> Optional[Program]:
+    """Return the code for the crank angles that a value may have, then for their rates."""
+    backward, known = structure.backward(output), {}
     if backward is None:
         return None
 
@@ -244,21 +302,4 @@ def backward_rates(structure, output: str) -> Optional[List[Real]]:
         dy, dx = (derivative(part, {0: 1.0}, known) for part in (y, x))
         return (x * dy - y * dx) / (square(x) + square(y))
 
-    known = {}
-    return [*backward.angles, *map(rate, backward.angles)]
-
-
-def _wrapped(theta):
-    """Return angles [rad] within half a turn of zero."""
-    return theta - TURN * np.round(theta / TURN)
-
-
-def _inside(theta, arcs):
-    """Return angles [rad] that lie on arcs, those beyond an end by rounding at it; NaN others."""
-    kept = np.full(theta.shape, np.nan)
-    for low, high in arcs:
-        turns = TURN * np.round((0.5 * (low + high) - theta) / TURN)
-        held = (theta + turns >= low - ROUNDED) & (theta + turns <= high + ROUNDED)
-        ended = np.clip(theta + turns, low, high)
-        kept = np.where(held, np.where(ended == theta + turns, theta, ended - turns), kept)
-    return kept
+    return Program([*backward.angles, *map(rate, backward.angles)])

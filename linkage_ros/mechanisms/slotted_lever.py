@@ -67,7 +67,7 @@ class Mechanism(servo.Mechanism):
 
     def servo(self, lever_angle, near=None) -> Sequence:
         """Return what `servo_angle` does, and d lever / d servo there."""
-        return self.servos('lever', lever_angle).taken(near)
+        return self.servo_for('lever', lever_angle, near)
 
     def reduction(self, servo_angle):
         """Return d lever / d servo at a crank angle [rad], in its shape."""
