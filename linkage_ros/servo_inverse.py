@@ -24,7 +24,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from . import node, reading, scene
-from .servo import TURN
+from .servo import CLOSE, TURN
 
 try:
     from linkage_interfaces.srv import ServoInverse as ServoInverseType
@@ -170,20 +170,16 @@ class Asked:
         return f'crank.sweep {scene.in_words([self._sweep])}' if self._sweep else 'the reach'
 
     def _out_of_range(self, value):
-        spans = self._spans
-        if not spans:
-            return f'{self._name} has no value in {self._where}'
-        gaps = [gap for (low, _), (high, _) in spans for gap in (low - value, value - high)]
+        gaps = [gap for (low, _), (high, _) in self._spans for gap in (low - value, value - high)]
         nearest = int(np.argmin([gap % TURN if self._turns else gap if gap > 0.0 else math.inf
                                  for gap in gaps]))
-        (_, theta), arc = spans[nearest // 2][nearest % 2], self._arcs[nearest // 2]
-        at_end = [end for end, angle in zip(('lower', 'upper'), arc)
-                  if abs(angle - theta) < 1e-6 and arc[1] - arc[0] < TURN]
-        end = f', the {at_end[0]} end of {self._where}' if at_end else ''
-        return (f'{self._name} lies within '
-                f'{scene.in_words((low, high) for (low, _), (high, _) in spans)} '
-                f'{"rad" if self._turns else "m"}, its {("least", "greatest")[nearest % 2]} at '
-                f'the crank angle {theta:.6g} rad{end}')
+        (_, theta), arc = self._spans[nearest // 2][nearest % 2], self._arcs[nearest // 2]
+        at = [end for end, limit in zip(('lower', 'upper'), arc)
+              if abs(limit - theta) < CLOSE and arc[1] - arc[0] < TURN]
+        end = f', the {at[0]} end of {self._where}' if at else ''
+        spans = scene.in_words((low, high) for (low, _), (high, _) in self._spans)
+        return (f'{self._name} lies within {spans} {"rad" if self._turns else "m"}, its '
+                f'{("least", "greatest")[nearest % 2]} at the crank angle {theta:.6g} rad{end}')
 
     @property
     def _arcs(self):
