@@ -16,13 +16,10 @@
 Servo angles: where the crank has to be for an output, at what reduction, and which is taken.
 
 The reduction, d output / d crank, grows without bound next to an end of the reach, where a crank
-angle that is rounded no longer tells it. There it is taken from the output's side, on which it is
-the reciprocal of a rate that vanishes: the closed form that leads from the output to the crank is
-differentiated.
-
-A lever that a crank pin moves by its slot has a closed form of its own, which keeps every digit
-next to its limits. About its pivot Q, seen along the ground line of length b from Q to the crank's
-centre O, with the crank a, the slot's distance e, the lever's angle phi and the crank's theta:
+angle that is rounded no longer tells it. A lever that a crank pin moves by its slot has a closed
+form for both that starts from the lever, and keeps every digit next to its limits. About its pivot
+Q, seen along the ground line of length b from Q to the crank's centre O, with the crank a, the
+slot's distance e, the lever's angle phi and the crank's theta:
 
     a e^(i theta) + b = e^(i phi) (t + i e),    a e^(i theta) = e^(i phi) (W + i (e + b sin phi)),
     W^2 = a^2 - (e + b sin phi)^2,    t = b cos phi + W,    d phi / d theta = W / t.
@@ -45,7 +42,6 @@ from .expression import (
     arctangent,
     Complex,
     cosine,
-    derivative,
     exact_sum,
     gated,
     nearest_integer,
@@ -56,9 +52,8 @@ from .expression import (
     square,
     where,
 )
-from .inverse import inside
+from .inverse import in_order
 from .planar import GRAZE
-from .reach import NARROWEST
 from .sketch import GROUND
 
 TURN = 2.0 * math.pi
@@ -66,7 +61,8 @@ TURN = 2.0 * math.pi
 CLOSE = 1e-7
 # How much rounding takes an angle beyond the ends that it is to be between, as a part of them.
 ULPS = 4 * 2.0 ** -52
-
+# Rounding of an angle on its way through a closed form [rad].
+ROUNDED = 8 * 2.0 ** -52 * math.pi
 # More than any angle.
 LARGE = 1e300
 
@@ -92,9 +88,7 @@ class Mechanism(mechanism.Mechanism):
         if near is not None:
             return self.servo_for(output, np.asarray(value, float), near)[0][()]
         theta, _ = self.servos(output, value)
-        theta = np.sort(np.where(theta >= math.pi, -math.pi, theta), axis=-1)
-        theta[..., 1][np.diff(theta)[..., 0] <= NARROWEST] = np.nan
-        return theta if np.isfinite(theta[..., 1]).any() else theta[..., :1]
+        return in_order(theta.reshape(-1, 2).T).reshape(*theta.shape[:-1], -1)
 
     def servos(self, output: str, value) -> Tuple[np.ndarray, np.ndarray]:
         """
@@ -120,11 +114,12 @@ class Mechanism(mechanism.Mechanism):
 
         """
         if not self._has_lever(output):
+            value = np.where(np.isfinite(value), value, np.nan)
             theta = np.asarray(self.crank_angle(output, value))
-            return theta, self._rates_at(output, theta, np.asarray(value, float))
+            return theta, self._rates_at(output, theta)
         found = np.moveaxis(self._solved_by(_lever_all, output).over(value), 0, -1)
         theta, rates = found[..., ::2], found[..., 1::2]
-        theta = theta if self._is_free else inside(theta, self._arcs())
+        theta = theta if self._is_free else _inside(theta, self.reach())
         return theta, np.where(np.isnan(theta), np.nan, rates)
 
     def servo_for(self, output: str, value, near=None, ends: Ends = None) -> Sequence:
@@ -167,36 +162,17 @@ class Mechanism(mechanism.Mechanism):
         """Whether nothing but its lever's slot limits the crank."""
         return len(self._structure.sketch.limits) == 1
 
-    def _arcs(self):
-        """Return the reach, worked out once."""
-        if 'arcs' not in self._poses:
-            self._poses['arcs'] = self.reach()
-        return self._poses['arcs']
-
     def _solved_by(self, draw, *args):
-        """Return the code that solves for an output in some way, None if there is none."""
-        key = draw, *args
-        if key not in self._poses:
-            program = draw(self._structure, *args)
-            self._poses[key] = program and program.bind(self._lengths, self._evaluated)
-        return self._poses[key]
+        """Return the code that solves for a lever in some way."""
+        return self._remembered(draw.__name__, args, lambda: draw(
+            self._structure, *args).bind(self._lengths, self._evaluated))
 
-    def _rates_at(self, output, theta, value):
-        """Return d output / d crank at answers, from the side on which it is the smaller one."""
+    def _rates_at(self, output, theta):
+        """Return d output / d crank."""
         joint, _, axis = output.rpartition('.')
-        rates = (self.velocity(theta, (joint,))[joint][..., 'xy'.index(axis)] if joint
-                 else self.joint_rates(theta, (output,))[output])
-        steep = np.abs(rates) > (1.0 if self._structure.turns(output) else self.longest)
-        backward = steep.any() and self._solved_by(_backward_rates, output)
-        if not backward:
-            return rates
-        angles, inverse = np.split(backward.over(value)[..., None], 2)
-        away = np.abs(angles - theta - TURN * np.round((angles - theta) / TURN))
-        away = np.where(np.isnan(away), np.inf, away)
-        best = np.argmin(away, axis=0)[None]
-        with np.errstate(all='ignore'):
-            there = 1.0 / np.take_along_axis(np.broadcast_to(inverse, away.shape), best, 0)[0]
-        return np.where(steep & (away.min(axis=0) < CLOSE), there, rates)
+        if joint:
+            return self.velocity(theta, (joint,))[joint][..., 'xy'.index(axis)]
+        return self.joint_rates(theta, (output,))[output]
 
 
 @lru_cache(maxsize=64)
@@ -290,16 +266,12 @@ def _turned(theta, near):
     return theta + TURN * nearest_integer((near - theta) / TURN)
 
 
-@lru_cache(maxsize=256)
-def _backward_rates(structure, output) -> Optional[Program]:
-    """Return the code for the crank angles that a value may have, then for their rates."""
-    backward, known = structure.backward(output), {}
-    if backward is None:
-        return None
-
-    def rate(theta):
-        y, x = theta.args
-        dy, dx = (derivative(part, {0: 1.0}, known) for part in (y, x))
-        return (x * dy - y * dx) / (square(x) + square(y))
-
-    return Program([*backward.angles, *map(rate, backward.angles)])
+def _inside(theta, arcs):
+    """Return angles [rad] that lie on arcs, those beyond an end by rounding at it; NaN others."""
+    kept = np.full(theta.shape, np.nan)
+    for low, high in arcs:
+        turns = TURN * np.round((0.5 * (low + high) - theta) / TURN)
+        beyond = np.maximum(low - (theta + turns), (theta + turns) - high)
+        at_end = np.clip(theta + turns, low, high) - turns
+        kept = np.where(beyond <= 0.0, theta, np.where(beyond <= ROUNDED, at_end, kept))
+    return kept
