@@ -51,11 +51,8 @@ def call(graph):
     def ask(parameters=None, **request):
         node = graph.start(ServoInverse, parameters)
         client = graph.node.create_client(Service, 'servo_inverse')
-        graph.until(client.service_is_ready)
-        future = client.call_async(Service.Request(**request))
-        graph.until(future.done)
         assert node.scene
-        return future.result()
+        return graph.call(client, Service.Request(**request))
 
     return ask
 
