@@ -25,6 +25,7 @@ from sensor_msgs.msg import JointState
 
 from . import node, reading, scene
 from .servo import CLOSE, TURN
+from .words import elided, listed, MESSAGE, quoted
 
 try:
     from linkage_interfaces.srv import ServoInverse as ServoInverseType
@@ -36,7 +37,8 @@ except ImportError as error:
 LEVER = 'lever'
 # An angle beyond this [rad] has lost digits that a servo needs.
 FARTHEST = 1e6
-MOST_NAMED, LONGEST = 5, 299
+# Values named, and letters of names allowed, in a message.
+MOST_NAMED, MOST = 5, 150
 # An extreme is looked for among so many samples, then so often next to the best of them.
 SAMPLES, ZOOMS = 721, 4
 ANY = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -77,11 +79,11 @@ class ServoInverse(node.SceneNode):
             solve(asked, request, response, self._turned.get(asked.crank, math.inf))
             self._known[key] = asked
         except ValueError as problem:
-            response.message = _cut(str(problem))
+            response.message = elided(str(problem), MESSAGE)
         except Exception as problem:
             # A client waits for ever for a service that raised.
-            self.get_logger().error(_cut(f'internal error: {problem!r}'))
-            response.message = _cut(f'internal error: {problem!r}')
+            response.message = elided(f'internal error: {problem!r}', MESSAGE)
+            self.get_logger().error(response.message)
         return response
 
 
@@ -110,8 +112,8 @@ def solve(asked, request, response, present=math.inf):
     response.servo_angle, response.reduction = map(_listed, found)
     response.reachable = list(map(math.isfinite, response.servo_angle))
     response.success = all(response.reachable)
-    response.message = '' if response.success else _cut(_complaint(asked, [
-        value for value, reached in zip(wanted, response.reachable) if not reached]))
+    response.message = '' if response.success else elided(_complaint(asked, [
+        value for value, reached in zip(wanted, response.reachable) if not reached]), MESSAGE)
 
 
 def _listed(found):
@@ -229,12 +231,12 @@ def _machine(scene_, name, output):
         for only in (machines, levers if output in ('', LEVER) else {}):
             if len(only) == 1:
                 return next(iter(only.values()))
-    allowed = ', '.join(machines) or 'none: the scene has no slotted_lever'
+    allowed = listed(machines, MOST) if machines else 'none: the scene has no slotted_lever'
     if name in scene_.machines:
         raise ValueError(f'{name} is a {scene_.machines[name].linkage.type}, not a slotted lever; '
                          f'name an output, or take one of: {allowed}')
     if name:
-        raise ValueError(f'there is no mechanism {_cut(repr(name), 60)}; allowed: {allowed}')
+        raise ValueError(f'there is no mechanism {quoted(name)}; allowed: {allowed}')
     what = '' if output else ' slotted lever'
     raise ValueError(f'mechanism may be empty only where there is one{what}; allowed: {allowed}')
 
@@ -245,10 +247,6 @@ def _complaint(asked, missed):
     # The reason is that of the first value that is one.
     first = next(filter(math.isfinite, missed), math.nan)
     return f'{asked.what} {named}{more} cannot be reached: {asked.reason(first)}'
-
-
-def _cut(text: str, most: int = LONGEST) -> str:
-    return text if len(text) <= most else f'{text[:most - 3]}...'
 
 
 def main(args=None):
