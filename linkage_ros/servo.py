@@ -155,7 +155,8 @@ class Mechanism(mechanism.Mechanism):
                            *limits)
 
     def _has_lever(self, output) -> bool:
-        return len(self.cranks) == 1 and output in _levers(self._structure)
+        return (len(self.cranks) == 1 and isinstance(output, str)
+                and output in _levers(self._structure))
 
     @property
     def _is_free(self) -> bool:

@@ -180,7 +180,8 @@ class Asked:
               if abs(limit - theta) < CLOSE and arc[1] - arc[0] < TURN]
         end = f', the {at[0]} end of {self._where}' if at else ''
         spans = scene.in_words((low, high) for (low, _), (high, _) in self._spans)
-        return (f'{self._name} lies within {spans} {"rad" if self._turns else "m"}, its '
+        what = 'the lever' if self._name == LEVER else self._name
+        return (f'{what} reaches {spans} {"rad" if self._turns else "m"}, its '
                 f'{("least", "greatest")[nearest % 2]} at the crank angle {theta:.6g} rad{end}')
 
     @property
@@ -246,7 +247,7 @@ def _complaint(asked, missed):
     more = f' and {len(missed) - MOST_NAMED} more' if len(missed) > MOST_NAMED else ''
     # The reason is that of the first value that is one.
     first = next(filter(math.isfinite, missed), math.nan)
-    return f'{asked.what} {named}{more} cannot be reached: {asked.reason(first)}'
+    return f'{asked.what} {named}{more} cannot be reached; {asked.reason(first)}'
 
 
 def main(args=None):

@@ -132,7 +132,7 @@ def test_any_output_of_any_mechanism_is_put_where_it_is_wanted(call):
         assert 0.1 * 65.0 / 6.0 * math.tan(servo / 2.0) == pytest.approx(y, abs=1e-15)
         assert slope == pytest.approx(0.1 * 65.0 / 12.0 / math.cos(servo / 2.0) ** 2)
     assert response.message == (
-        'values of C.y 5 cannot be reached: C.y lies within [-0.718602, 0.718602] m, its '
+        'values of C.y 5 cannot be reached; C.y reaches [-0.718602, 0.718602] m, its '
         'greatest at the crank angle 1.17137 rad, the upper end of the reach')
 
 
@@ -181,12 +181,12 @@ def test_an_answer_lies_in_the_sweep_or_the_reason_says_which_end_forbids(graph)
     beyond = ask(node, [0.2, 0.5, -0.5, math.nan])
     assert beyond.reachable == [True, False, False, False]
     assert beyond.message == (
-        'lever angles 0.5, -0.5, nan cannot be reached: 0.5 needs the crank at 1.6173 rad, '
+        'lever angles 0.5, -0.5, nan cannot be reached; 0.5 needs the crank at 1.6173 rad, '
         'outside crank.sweep [-1.3, 0.8]: beyond its upper end')
     assert 'needs the crank at -1.6173 rad' in ask(node, [-0.5]).message
     assert 'beyond its lower end' in ask(node, [-0.5]).message
     assert ask(node, [0.7]).message == (
-        'lever angles 0.7 cannot be reached: lever lies within [-0.422634, 0.272027] rad, its '
+        'lever angles 0.7 cannot be reached; the lever reaches [-0.422634, 0.272027] rad, its '
         'greatest at the crank angle 0.8 rad, the upper end of crank.sweep [-1.3, 0.8]')
 
 
@@ -255,8 +255,8 @@ def test_the_answer_nearest_to_the_present_crank_is_taken_where_it_is_known(grap
     ({'output': 'y' * 10 ** 6, 'mechanism': 'jansen'}, 'jansen has no output'),
     ({'output': '.x', 'mechanism': 'jansen'}, "jansen has no output '.x'"),
     ({'output': 'G.x.x', 'mechanism': 'jansen'}, "jansen has no output 'G.x.x'"),
-    ({'lever_angle': [1e308]}, 'lever lies within [-0.562536, 0.562536] rad'),
-    ({'lever_angle': [1e308], 'output': 'G.x', 'mechanism': 'jansen'}, 'G.x lies within [-71.52'),
+    ({'lever_angle': [1e308]}, 'the lever reaches [-0.562536, 0.562536] rad'),
+    ({'lever_angle': [1e308], 'output': 'G.x', 'mechanism': 'jansen'}, 'G.x reaches [-71.52'),
     ({'lever_angle': [-math.inf], 'output': 'BC', 'mechanism': 'jansen'}, 'must be finite'),
     ({'output': 'C.x', 'mechanism': 'peaucellier'}, 'C.x'),
 ])
