@@ -318,7 +318,7 @@ def check_random_scene(graph, rng):
         return found if turns else found * machine.scale
 
     arcs = [sweep] if sweep else machine.reach
-    theta = np.concatenate([np.linspace(*arc, 40001) for arc in arcs])
+    theta = np.concatenate([[*np.linspace(*arc, 40001), math.nan] for arc in arcs])
     curve = value(theta)
     if (output, linkage.type) in STILL or np.nanmax(curve) == np.nanmin(curve):
         return 0
