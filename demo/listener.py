@@ -27,6 +27,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 SECONDS_TO_APPEAR = 20.0
+SECONDS_TO_ANSWER, TRIES = 4.0, 5
 
 
 class Listener:
@@ -88,9 +89,13 @@ class Listener:
 
     def servo_angles(self, lever_angles) -> ServoInverse.Response:
         """Call the service for lever angles [rad]."""
-        future = self._inverse.call_async(ServoInverse.Request(lever_angle=lever_angles))
-        self._until(future.done, lambda: ['an answer of servo_inverse'])
-        return future.result()
+        request = ServoInverse.Request(lever_angle=lever_angles)
+        for _ in range(TRIES):
+            # A response may get lost on its way.
+            future = self._inverse.call_async(request)
+            if self._within(SECONDS_TO_ANSWER, future.done):
+                return future.result()
+        raise DemoError('servo_inverse did not answer')
 
     def _silent(self):
         topics = {'joint_states': self.joint_states, 'markers': self.markers, 'locus': self.locus}
@@ -98,12 +103,15 @@ class Listener:
                 for name, messages in gathered.items() if not messages]
 
     def _until(self, held, missing):
-        end = time.monotonic() + SECONDS_TO_APPEAR
-        while not held():
-            if time.monotonic() > end:
-                raise DemoError(f'nothing was heard of {", ".join(missing())} '
-                                f'within {SECONDS_TO_APPEAR:g} s')
+        if not self._within(SECONDS_TO_APPEAR, held):
+            raise DemoError(f'nothing was heard of {", ".join(missing())} '
+                            f'within {SECONDS_TO_APPEAR:g} s')
+
+    def _within(self, seconds, held) -> bool:
+        end = time.monotonic() + seconds
+        while not held() and time.monotonic() < end:
             self._turn()
+        return held()
 
     def _turn(self):
         self._watch()

@@ -88,11 +88,16 @@ SWEEP = Field('double_array', 'Crank angles [rad] between which the crank swings
 
 @dataclass(frozen=True)
 class Crank:
-    """How a crank moves: speed [rad/s], start [rad], and the ends of its swing [rad] or None."""
+    """
+    How a crank moves: speed [rad/s], start [rad], and the ends of its swing [rad] or None.
+
+    `ends` are those that were set, beyond which no answer lies either; None: all its reach.
+    """
 
     speed: float
     start: float
     sweep: Optional[Tuple[float, float]]
+    ends: Optional[Tuple[float, float]] = None
 
 
 @dataclass(frozen=True)
@@ -356,7 +361,7 @@ def _crank(name, reach, values, old, strict) -> Crank:
     home = [arc for arc in arcs if _inside(start, start, arc)]
     low, high = (home or arcs)[0]
     trimmed = 0.0 if sweep else MARGIN * (high - low)
-    crank = Crank(speed, start, (low + trimmed, high - trimmed))
+    crank = Crank(speed, start, (low + trimmed, high - trimmed), tuple(sweep) or None)
     settled = not strict or old and (old.start, old.sweep) == (crank.start, crank.sweep)
     if chosen and not home and not settled:
         raise SceneError(f'{name}.start must be inside the {"sweep" if sweep else "reach"} '

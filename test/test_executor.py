@@ -104,10 +104,8 @@ def test_a_service_and_a_parameter_are_answered(started):
     process = started('servo_inverse')
     with Graph(process.domain) as graph:
         client = graph.node.create_client(ServoInverse, 'servo_inverse')
-        graph.until(client.service_is_ready)
-        future = client.call_async(ServoInverse.Request(lever_angle=[0.0]))
-        graph.until(future.done)
-        assert future.result().success and future.result().servo_angle[0] == 0.0
+        answer = graph.call(client, ServoInverse.Request(lever_angle=[0.0]))
+        assert answer.success and answer.servo_angle[0] == 0.0
         refused = graph.set(named('servo_inverse'), slotted_lever__dimensions__a=-1.0)
         assert not refused.successful
 

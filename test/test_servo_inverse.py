@@ -14,6 +14,7 @@
 
 """The servo service: right answers, or the reason why there is none."""
 
+import array
 import math
 import re
 from types import SimpleNamespace
@@ -25,12 +26,23 @@ pytest.importorskip('rclpy')
 pytest.importorskip('linkage_interfaces')
 
 from linkage_interfaces.srv import ServoInverse as Service  # noqa: E402
-from linkage_ros import mechanisms  # noqa: E402
-from linkage_ros.servo_inverse import ServoInverse  # noqa: E402
+from linkage_ros import mechanisms, scene  # noqa: E402
+from linkage_ros.servo_inverse import FARTHEST, ServoInverse  # noqa: E402
+from rclpy.serialization import serialize_message  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
 
 TWO = {'mechanisms': ['left', 'right', 'drop'], 'left.type': 'slotted_lever',
        'right.type': 'slotted_lever', 'right.dimensions.a': 200.0, 'drop.type': 'water_drop'}
 LIMIT = math.asin(80.0 / 150.0)
+SWEPT = {'mechanisms': ['slotted_lever'], 'slotted_lever.crank.sweep': [-1.3, 0.8]}
+GRIPPER = {
+    'gripper.joints': ['O ground 0 0', 'Q ground base 0', 'A crank O drive',
+                       'B dyad A Q rod finger left', 'T rigid Q B 0.09 0.06 right'],
+    'gripper.dimensions.base': 0.04, 'gripper.dimensions.drive': 0.02,
+    'gripper.dimensions.rod': 0.045, 'gripper.dimensions.finger': 0.05}
+# Types with one crank, and what of them never moves.
+KINDS = [kind for kind in mechanisms.TYPES if kind != 'five_bar']
+STILL = ('C.x', 'peaucellier'), ('B.y', 'slider_crank')
 
 
 @pytest.fixture
@@ -39,11 +51,8 @@ def call(graph):
     def ask(parameters=None, **request):
         node = graph.start(ServoInverse, parameters)
         client = graph.node.create_client(Service, 'servo_inverse')
-        graph.until(client.service_is_ready)
-        future = client.call_async(Service.Request(**request))
-        graph.until(future.done)
         assert node.scene
-        return future.result()
+        return graph.call(client, Service.Request(**request))
 
     return ask
 
@@ -122,7 +131,9 @@ def test_any_output_of_any_mechanism_is_put_where_it_is_wanted(call):
     for y, servo, slope in zip([0.2, -0.5], response.servo_angle, response.reduction):
         assert 0.1 * 65.0 / 6.0 * math.tan(servo / 2.0) == pytest.approx(y, abs=1e-15)
         assert slope == pytest.approx(0.1 * 65.0 / 12.0 / math.cos(servo / 2.0) ** 2)
-    assert 'values of C.y 5 cannot be reached; C.y lies within about [-0.7' in response.message
+    assert response.message == (
+        'values of C.y 5 cannot be reached; C.y reaches [-0.718602, 0.718602] m, its '
+        'greatest at the crank angle 1.17137 rad, the upper end of the reach')
 
 
 def test_a_link_is_turned_to_an_angle_by_the_answer_nearest_to_a_servo(call):
@@ -145,6 +156,205 @@ def test_an_output_that_cannot_be_asked_for_gets_the_reason(
         call, parameters, request_, message):
     response = call(parameters, **request_)
     assert not response.success and message in response.message
+
+
+def ask(node, wanted, near=(), output='', mechanism=''):
+    """Return what a node answers, asked without the way over the wire."""
+    request = Service.Request(mechanism=mechanism, output=output, lever_angle=wanted,
+                              servo_near=near)
+    return node.answer(request, Service.Response())
+
+
+def test_the_lever_by_its_name_is_the_same_to_the_last_bit(graph):
+    node = graph.start(ServoInverse)
+    wanted, near = [0.1, 0.3, -0.5, 0.6], [0.0, 2.5, 9.0, -3.0]
+    for angles in ([], near):
+        unnamed, named = (ask(node, wanted, angles, output) for output in ('', 'lever'))
+        assert repr(unnamed) == repr(named) and named.reachable == [True, True, True, False]
+
+
+def test_an_answer_lies_in_the_sweep_or_the_reason_says_which_end_forbids(graph):
+    node = graph.start(ServoInverse, SWEPT)
+    other = ask(node, [0.2], [2.8])
+    assert other.success and lever_of(other.servo_angle[0]) == pytest.approx(0.2)
+    assert -1.3 <= other.servo_angle[0] <= 0.8
+    beyond = ask(node, [0.2, 0.5, -0.5, math.nan])
+    assert beyond.reachable == [True, False, False, False]
+    assert beyond.message == (
+        'lever angles 0.5, -0.5, nan cannot be reached; 0.5 needs the crank at 1.6173 rad, '
+        'outside crank.sweep [-1.3, 0.8]: beyond its upper end')
+    assert 'needs the crank at -1.6173 rad' in ask(node, [-0.5]).message
+    assert 'beyond its lower end' in ask(node, [-0.5]).message
+    assert ask(node, [0.7]).message == (
+        'lever angles 0.7 cannot be reached; the lever reaches [-0.422634, 0.272027] rad, its '
+        'greatest at the crank angle 0.8 rad, the upper end of crank.sweep [-1.3, 0.8]')
+
+
+def test_the_tutorial_s_gripper_is_answered_where_its_servo_can_stand(graph):
+    gripper = graph.start(ServoInverse, {
+        'mechanisms': ['gripper'], 'gripper.type': 'custom', 'gripper.tracer': 'T',
+        **GRIPPER, 'gripper.crank.sweep': [-1.3, 0.8]})
+    for near in ((), (-3.0,), (100.0,)):
+        answer = ask(gripper, [0.03], near, 'T.x')
+        assert answer.success and round(answer.servo_angle[0], 4) == -0.3894
+
+
+@pytest.mark.parametrize('sweep, servo', [
+    ((6.0, 9.0), 0.880514 + 2 * math.pi), ((0.0, 20.0), 0.880514), ((8.0, 20.0), 9.0)])
+def test_a_sweep_may_lie_anywhere_and_be_more_than_a_turn(graph, sweep, servo):
+    node = graph.start(ServoInverse, {**SWEPT, 'slotted_lever.crank.sweep': list(sweep)})
+    for near in ((), (-50.0,), (7.0,), (50.0,)):
+        answer = ask(node, [0.3], near)
+        assert answer.success and sweep[0] <= answer.servo_angle[0] <= sweep[1]
+        assert lever_of(answer.servo_angle[0]) == pytest.approx(0.3)
+
+
+def test_a_sweep_changes_while_the_node_runs(graph):
+    node = graph.start(ServoInverse, {'mechanisms': ['slotted_lever']})
+    assert ask(node, [0.5]).success
+    assert graph.set(node, slotted_lever__crank__sweep=[-1.3, 0.8]).successful
+    assert not ask(node, [0.5]).success
+
+
+def test_the_answer_nearest_to_the_present_crank_is_taken_where_it_is_known(graph):
+    node = graph.start(ServoInverse, {'mechanisms': ['slotted_lever', 'jansen']})
+    cranks = graph.node.create_publisher(JointState, 'crank_states', 10)
+    working = ask(node, [0.3]).servo_angle[0]
+
+    def follows(angle, **message):
+        def followed():
+            cranks.publish(JointState(name=['x', 'slotted_lever_crank'], position=[1.0, angle]))
+            found = ask(node, [0.3]).servo_angle[0]
+            return lever_of(found) == pytest.approx(0.3) and abs(found - angle) < math.pi / 2
+
+        return graph.until(followed)
+
+    assert follows(2.5) and follows(9.0) and follows(-3.0)
+    # Bytes that cannot be read, other cranks, and what is no angle for a servo change nothing.
+    for text in (b'', b'\0\1\0\0', bytes(range(200)), serialize_message(
+            JointState(name=['slotted_lever_crank'], position=[0.5]))[:-9]):
+        cranks.publish(text)
+    cranks.publish(JointState(name=['slotted_lever_crank', 'y'], position=[]))
+    cranks.publish(JointState(name=['jansen_crank'], position=[0.1]))
+
+    def known():
+        cranks.publish(JointState(name=['jansen_crank'], position=[0.2]))
+        return abs(ask(node, [0.2], output='crank', mechanism='jansen').servo_angle[0] - 0.2) < 1
+
+    assert graph.until(known)
+    assert lever_of(ask(node, [0.3]).servo_angle[0] + 0.0) == pytest.approx(0.3)
+    assert abs(ask(node, [0.3]).servo_angle[0] + 3.0) < math.pi / 2
+    assert ask(node, [0.3], [working]).servo_angle[0] == pytest.approx(working, abs=1e-15)
+    assert follows(0.5)
+
+
+@pytest.mark.parametrize('request_, message', [
+    ({'servo_near': [1e308]}, 'servo_near must be finite and within 1e+06 rad of zero'),
+    ({'servo_near': [-1.1 * FARTHEST]}, 'servo_near must be finite and within'),
+    ({'mechanism': 'x' * 10 ** 6}, "there is no mechanism 'xxx"),
+    ({'output': 'y' * 10 ** 6, 'mechanism': 'jansen'}, 'jansen has no output'),
+    ({'output': '.x', 'mechanism': 'jansen'}, "jansen has no output '.x'"),
+    ({'output': 'G.x.x', 'mechanism': 'jansen'}, "jansen has no output 'G.x.x'"),
+    ({'lever_angle': [1e308]}, 'the lever reaches [-0.562536, 0.562536] rad'),
+    ({'lever_angle': [1e308], 'output': 'G.x', 'mechanism': 'jansen'}, 'G.x reaches [-71.52'),
+    ({'lever_angle': [-math.inf], 'output': 'BC', 'mechanism': 'jansen'}, 'must be finite'),
+    ({'output': 'C.x', 'mechanism': 'peaucellier'}, 'C.x'),
+])
+def test_a_hostile_request_gets_the_reason_in_few_words(call, request_, message):
+    response = call(**{'lever_angle': [0.1], **request_})
+    assert not response.success and message in response.message
+    assert len(response.message) < 300
+
+
+@pytest.mark.long
+def test_a_million_angles_are_answered(graph):
+    node = graph.start(ServoInverse)
+    wanted = array.array('d', np.linspace(-1.0, 1.0, 10 ** 6))
+    response = ask(node, wanted)
+    assert sum(response.reachable) == pytest.approx(10 ** 6 * LIMIT, abs=2)
+    assert 'and 437459 more' in response.message or len(response.message) < 300
+
+
+def random_scene(rng):
+    """Return a random scene of one mechanism with one crank, often with a sweep; None if none."""
+    kind = str(rng.choice(KINDS))
+    given = {'mechanisms': ['m'], 'm.type': kind, 'm.scale': float(rng.choice([1.0, 0.01])),
+             **{f'm.dimensions.{name}': length * math.exp(rng.uniform(-0.1, 0.1))
+                for name, length in mechanisms.defaults(kind).items() if length}}
+    try:
+        reach = scene.read(given).machines['m'].reach
+    except scene.SceneError:
+        return None
+    if rng.random() < 0.7:
+        low, high = np.sort(rng.uniform(*reach[0], 2))
+        if reach[0] == (-math.pi, math.pi):
+            high += rng.choice([0.0, 5.0, 15.0])
+        turns = 2 * math.pi * int(rng.integers(-2, 3))
+        given['m.crank.sweep'] = [float(low + turns), float(max(high, low + 1e-3) + turns)]
+    try:
+        scene.read(given)
+    except scene.SceneError:
+        return None
+    return given
+
+
+def check_random_scene(graph, rng):
+    """Ask for values of a random output; compare with what a fine search finds."""
+    given = random_scene(rng)
+    if given is None:
+        return 0
+    node = graph.start(ServoInverse, given)
+    machine = node.scene.machines['m']
+    linkage, sweep = machine.linkage, given.get('m.crank.sweep')
+    output = str(rng.choice([*linkage.joints, *(f'{joint}.{axis}' for joint in linkage.points
+                                                for axis in 'xy')]))
+    joint, _, axis = output.rpartition('.')
+    slides = [link.name for link in linkage.links if link.kind == 'prismatic']
+    turns = not joint and output not in slides
+
+    def value(theta):
+        found = (linkage.solve(theta, (joint,))[joint][..., 'xy'.index(axis)] if joint
+                 else linkage.joint_angles(theta, (output,))[output])
+        return found if turns else found * machine.scale
+
+    arcs = [sweep] if sweep else machine.reach
+    theta = np.concatenate([[*np.linspace(*arc, 40001), math.nan] for arc in arcs])
+    curve = value(theta)
+    if (output, linkage.type) in STILL or np.nanmax(curve) == np.nanmin(curve):
+        return 0
+    wanted = value(np.concatenate([rng.uniform(*arcs[0], 2), rng.uniform(*machine.reach[0], 2)]))
+    near = rng.uniform(-12.0, 12.0, 4) if rng.random() < 0.7 else np.zeros(0)
+    response = ask(node, wanted.tolist(), near.tolist(), output, 'm')
+    assert all(response.reachable[:2]), (given, output, wanted, response)
+    for i, servo in enumerate(response.servo_angle):
+        gap = curve - wanted[i]
+        gap = gap - 2 * math.pi * np.round(gap / (2 * math.pi)) if turns else gap
+        crossed = (gap[:-1] * gap[1:] <= 0.0) & (np.abs(np.diff(gap)) < 1.0 + 9.0 * (not turns))
+        roots = theta[:-1][crossed]
+        case = given, output, wanted[i], near, servo, roots, response.message
+        assert math.isfinite(servo) or not roots.size, case
+        if math.isfinite(servo):
+            miss = float(value(servo)) - wanted[i]
+            miss -= 2 * math.pi * round(miss / (2 * math.pi)) if turns else 0.0
+            size = math.pi if turns else np.nanmax(np.abs(curve))
+            assert abs(miss) < 1e-12 * size + 4e-15 * abs(response.reduction[i]), case
+            assert not sweep or sweep[0] <= servo <= sweep[1], case
+            if near.size and roots.size:
+                roots = roots if sweep else roots + 2 * math.pi * np.round(
+                    (near[i] - roots) / (2 * math.pi))
+                assert abs(servo - near[i]) < np.abs(roots - near[i]).min() + 1e-3, case
+    return 1
+
+
+def test_random_outputs_in_random_sweeps_are_had_or_cannot_be(graph, scenes=30, seed=1):
+    rng = np.random.default_rng(seed)
+    assert sum(check_random_scene(graph, rng) for _ in range(scenes)) > scenes // 4
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('seed', range(2, 8))
+def test_many_random_outputs_in_random_sweeps_are_had_or_cannot_be(graph, seed):
+    test_random_outputs_in_random_sweeps_are_had_or_cannot_be(graph, 80, seed)
 
 
 def test_dimensions_change_while_the_node_runs(graph):

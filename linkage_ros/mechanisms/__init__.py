@@ -43,7 +43,8 @@ from . import (
     whitworth,
 )
 from ..arguments import checked_branches, checked_dimensions
-from ..mechanism import Design, Mechanism, Structure
+from ..mechanism import Design, Structure
+from ..servo import Mechanism
 from ..words import quoted
 
 # What a scene shows when it names no mechanism.

@@ -25,28 +25,11 @@ Sources: Norton, "Design of Machinery", sec. 4.8 (inverted slider-crank); the in
 same triangle: a e^(i theta) = e^(i phi) (W + i (e + b sin phi)), W^2 = a^2 - (e + b sin phi)^2.
 """
 
-from functools import lru_cache
 import math
 from typing import Sequence
 
-from .. import mechanism
-from ..compiler import Program
-from ..expression import (
-    angle,
-    arctangent,
-    cosine,
-    dimension,
-    exact_sum,
-    gated,
-    nearest_integer,
-    real,
-    root,
-    sine,
-    square,
-    where,
-)
+from .. import servo
 from ..mechanism import Design
-from ..planar import GRAZE
 from ..reach import reachable_arcs
 
 DESIGN = Design('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 0.0}, tracer='L',
@@ -57,41 +40,7 @@ DESIGN = Design('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 0.0}, tracer='L',
     'L slot Q A e out max(1.8*b,a+b)'))
 
 
-@lru_cache(maxsize=None)
-def _inverse(half: int, follows: bool) -> Program:
-    """
-    Return the code for the servo angle and the reduction on a half of the slot.
-
-    From the lever angle it takes the working branch or, if it follows, what is nearest to a
-    second angle.
-    """
-    a, b, e = dimension('a'), dimension('b'), dimension('e', positive=False)
-    phi = angle(0)
-    sin, cos = sine(phi), cosine(phi)
-    # Next to a limit at +-90 degrees the gap is small: it is formed from what is small.
-    upper = where(0.7 < sin, exact_sum(a, -e, -b) + b * square(cos) / (1.0 + sin),
-                  exact_sum(a, -e) - b * sin)
-    lower = where(sin < -0.7, exact_sum(a, e, -b) + b * square(cos) / (1.0 - sin),
-                  exact_sum(a, e) + b * sin)
-    grazed = GRAZE * (a + b + abs(e))
-    height = root(upper, grazed) * root(lower, grazed)
-    across, found = e + b * sin, []
-    for rank, along in enumerate((half * height, -half * height)):
-        theta = arctangent(sin * along + cos * across, cos * along - sin * across)
-        away = real(rank)
-        if follows:
-            theta = theta + math.tau * nearest_integer((angle(1) - theta) / math.tau)
-            away = abs(theta - angle(1))
-        slide = b * cos + along
-        held = half * slide - GRAZE * (a + b)
-        found.append((where(0.0 < held, away, math.inf),
-                      gated(theta, held, 0.0), gated(along / slide, held, 0.0)))
-    (here, *working), (there, *other) = found
-    return Program([where(there < here, x, y) for x, y in zip(other, working)],
-                   2 if follows else 1)
-
-
-class Mechanism(mechanism.Mechanism):
+class Mechanism(servo.Mechanism):
     """A slotted lever: also solved from the lever angle."""
 
     def servo_angle(self, lever_angle, near=None):
@@ -118,12 +67,7 @@ class Mechanism(mechanism.Mechanism):
 
     def servo(self, lever_angle, near=None) -> Sequence:
         """Return what `servo_angle` does, and d lever / d servo there."""
-        key = 'servo', near is not None
-        if key not in self._poses:
-            program = _inverse(self.branches['L'], near is not None)
-            self._poses[key] = program.bind(self._lengths, self._evaluated)
-        pose = self._poses[key]
-        return pose(lever_angle) if near is None else pose(lever_angle, near)
+        return self.servo_for('lever', lever_angle, near)
 
     def reduction(self, servo_angle):
         """Return d lever / d servo at a crank angle [rad], in its shape."""

@@ -1,0 +1,167 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A lever's servo angle and reduction: one closed form, right to the last digits everywhere."""
+
+import math
+
+import accuracy
+from accuracy import broken, Case, mp, STEP, summary
+from linkage_ros import mechanisms
+import numpy as np
+import pytest
+import stress
+
+# Levers: the lines, crank centre and pivot as complex numbers, and whether the crank's zero is up.
+PIVOT_BELOW = ('O ground 0 0', 'Q ground 0 -b', 'A crank O a up',
+               'L slot Q A e out max(1.8*b,a+b)')
+LEVERS = {
+    'slotted_lever': (None, lambda a, b, e: (0, mp.mpc(0, -b)), True),
+    'written': (PIVOT_BELOW, lambda a, b, e: (0, mp.mpc(0, -b)), True),
+    'with a ram': ((*PIVOT_BELOW, 'R slider L 50*a+50*b Q 0 out'),
+                   lambda a, b, e: (0, mp.mpc(0, -b)), True),
+    'turned': (('O ground 0 0', 'Q ground b 0', 'A crank O a', 'L slot Q A e out a'),
+               lambda a, b, e: (0, mp.mpc(b)), False),
+    'oblique': (('O ground x y', 'Q ground p q', 'A crank O a', 'L slot Q A e out a'),
+                lambda a, e, x, y, p, q: (mp.mpc(x, y), mp.mpc(p, q)), False),
+}
+
+
+def random_levers(kind, seed, count):
+    """Yield levers, some nearly degenerate, each with awkward lever angles."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        lengths, half = stress.dimensions('slotted_lever', rng), int(rng.choice((-1, 1)))
+        own = mechanisms.create('slotted_lever', branches={'L': half}, **lengths)
+        ends = [end for arc in own.reach() for end in arc]
+        limits = [end for arc in own.lever_reach() for end in arc]
+        limits += [x for x in own.joint_angles(np.array(ends))['lever'] if x == x]
+        turn = {'turned': math.pi / 2, 'oblique': rng.uniform(-3.0, 3.0)}.get(kind, 0.0)
+        if kind == 'oblique':
+            b, (x, y) = lengths.pop('b'), rng.uniform(-1.0, 1.0, 2)
+            lengths.update(x=x, y=y, p=x + b * math.sin(turn), q=y - b * math.cos(turn))
+        joints = LEVERS[kind][0]
+        made = own if joints is None else mechanisms.create(
+            'custom', joints=joints, branches={'L': half}, **lengths)
+        yield made, stress.angles(rng, 4, limits, turns=1.0) + turn
+
+
+def truth_of(kind, linkage, angle, cut):
+    """Return the truth of a lever's inverse on one cut of its slot with the crank circle."""
+    _, places, upright = LEVERS[kind]
+    half = linkage.branches['L']
+
+    def cut_at(length, angle):
+        centre, pivot = places(**length)
+        slot = mp.mpc(0, 1) * mp.expj(angle)
+        foot = pivot + mp.mpc(0, 1) * slot * length['e'] - centre
+        seen = foot * mp.conj(slot)
+        gap = length['a'] ** 2 - seen.imag ** 2
+        slide = cut * mp.sqrt(max(gap, mp.zero)) - seen.real
+        return (foot + slide * slot) / (mp.mpc(0, 1) if upright else 1), slide, gap
+
+    def evaluate(length, angle):
+        pin, slide, gap = cut_at(length, angle)
+        after, before = (cut_at(length, angle + step)[0] for step in (STEP, -STEP))
+        turned = mp.arg(after / before)
+        return ({'angle servo': pin / abs(pin),
+                 'rate servo': 2 * STEP / turned if turned else mp.zero},
+                {'servo': gap, 'slide': half * slide})
+
+    return accuracy._truth(evaluate, linkage.dimensions, float(angle))
+
+
+def rows_of(kind, linkage, angles):
+    """Return how right the servo angles and reductions are, each asked for as the nearest."""
+    rows, length = [], linkage.dimensions
+    case = Case('slotted_lever', length, angles, linkage.branches, kind)
+    top = {'rate servo': length['a'] / length.get('b', length['a'])}
+    for angle in angles:
+        cuts = [truth_of(kind, linkage, angle, cut) for cut in (1, -1)]
+        due = [accuracy._due_of(exact.closures.values()) for exact in cuts]
+        wanted = 'number' if 'number' in due else 'nan' if due == ['nan', 'nan'] else ''
+        for exact, state in zip(cuts, due):
+            if state == wanted:
+                near = float(mp.arg(exact.values['angle servo']))
+                found = linkage.servo_for('lever', float(angle), near)
+                rows += [accuracy._row(case, angle, name, result, exact, wanted, top)
+                         for name, result in zip(('angle servo', 'rate servo'), found)]
+    return rows
+
+
+@pytest.mark.parametrize('kind', LEVERS)
+def test_servo_angles_and_reductions_of_any_lever_are_right(kind, levers=12):
+    rows = []
+    for linkage, angles in random_levers(kind, 1, levers):
+        rows += rows_of(kind, linkage, angles)
+    assert len(rows) > 4 * levers
+    assert not broken(rows), summary(rows)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('kind', LEVERS)
+def test_servo_angles_and_reductions_of_many_levers_are_right(kind):
+    test_servo_angles_and_reductions_of_any_lever_are_right(kind, 250)
+
+
+@pytest.mark.parametrize('half', [1, -1])
+def test_a_lever_is_one_computation_whatever_it_is_asked_by(half):
+    rng = np.random.default_rng(4)
+    wanted, near = rng.uniform(-4.0, 4.0, 200), rng.uniform(-20.0, 20.0, 200)
+    for lengths in ({'a': 80.0, 'b': 150.0, 'e': 20.0}, {'a': 150.0, 'b': 80.0, 'e': -30.0}):
+        lever = mechanisms.create('slotted_lever', branches={'L': half}, **lengths)
+        for written in ('slotted_lever', 'written', 'with a ram'):
+            linkage = lever if written == 'slotted_lever' else mechanisms.create(
+                'custom', joints=LEVERS[written][0], branches={'L': half}, **lengths)
+            np.testing.assert_array_equal(linkage.crank_angle('lever', wanted, near),
+                                          lever.servo_angle(wanted, near))
+            np.testing.assert_array_equal(linkage.servo_for('lever', wanted, near),
+                                          lever.servo(wanted, near))
+            every, found = linkage.crank_angle('lever', wanted), lever.servo_angle(wanted)
+            assert ((every == found[:, None]).any(axis=1) == np.isfinite(found)).all()
+
+
+@pytest.mark.parametrize('near, ends, answer', [
+    (None, None, 0), (0.5, (0.0, 2.0), 0), (2.5, (0.0, 2.0), 0), (None, (2.0, 6.0), 1),
+    (0.0, (6.0, 9.0), 0), (9.0, (6.0, 9.5), 1), (None, (0.0, 20.0), 0), (19.0, (0.0, 20.0), 0),
+    (None, (-4.0, -2.0), 1), (-2.6, (-3.0, -1.0), None), (None, (1.0, 2.0), None)])
+def test_an_answer_is_taken_between_the_ends_whole_turns_included(near, ends, answer):
+    lever = mechanisms.create('slotted_lever')
+    both, rates = lever.servos('lever', 0.3)
+    theta, rate = lever.servo_for('lever', 0.3, near, ends)
+    if answer is None:
+        assert math.isnan(theta) and math.isnan(rate)
+        return
+    turns = (theta - both[answer]) / (2 * math.pi)
+    assert turns == pytest.approx(round(turns), abs=1e-15) and rate == rates[answer]
+    low, high = ends or (-math.pi, math.pi)
+    assert low <= theta <= high
+
+
+@pytest.mark.parametrize('kind, output', [('slotted_lever', 'lever'), ('four_bar', 'QB'),
+                                          ('jansen', 'G.x'), ('slider_crank', 'block')])
+def test_the_value_at_an_end_is_had_at_that_end(kind, output):
+    linkage, rng = mechanisms.create(kind), np.random.default_rng(5)
+    joint, _, axis = output.rpartition('.')
+
+    def value(theta):
+        return (linkage.solve(theta, (joint,))[joint][..., 'xy'.index(axis)] if joint
+                else linkage.joint_angles(theta, (output,))[output])
+
+    extremes = linkage.crank_angle(output, np.max(value(np.linspace(-3.1, 3.1, 20001))))
+    for low in (*rng.uniform(-9.0, 9.0, 20), *extremes[np.isfinite(extremes)]):
+        ends = float(low), float(low) + 0.1
+        for end in ends:
+            theta, _ = linkage.servo_for(output, float(value(end)), None, ends)
+            assert ends[0] <= theta <= ends[1]
