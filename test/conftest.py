@@ -16,10 +16,14 @@
 
 import os
 
+from domains import Domain
 import pytest
 
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+# Of whatever a test starts that is not told another.
+_domain = Domain()
+os.environ['ROS_DOMAIN_ID'] = str(_domain.id)
 
 
 @pytest.fixture
