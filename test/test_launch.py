@@ -19,6 +19,7 @@ from importlib.util import find_spec
 from pathlib import Path
 import re
 import runpy
+import sys
 
 from linkage_ros import rviz, scene
 import pytest
@@ -123,6 +124,7 @@ def test_the_launch_file_starts_executables_that_there_are(constants, monkeypatc
 
     handed = {}
     monkeypatch.chdir(ROOT)
+    monkeypatch.setattr(sys, 'argv', ['setup.py', 'install'])
     monkeypatch.setattr(setuptools, 'setup', handed.update)
     runpy.run_path('setup.py')
     installed = [line.split(' = ')[0] for line in handed['entry_points']['console_scripts']]

@@ -15,12 +15,16 @@
 """The package as colcon, pip and a reader of the changelog see it."""
 
 from importlib.metadata import EntryPoint
+import json
+import os
 from pathlib import Path
 import re
 import runpy
 import shutil
 import subprocess
+import sys
 import xml.etree.ElementTree as ElementTree
+import zipfile
 
 import pytest
 import setuptools
@@ -28,14 +32,20 @@ import setuptools
 ROOT = Path(__file__).parents[1]
 
 
+def handed(monkeypatch, *command):
+    """Return what setup.py hands to setup() in a command."""
+    found = {}
+    monkeypatch.chdir(ROOT)
+    monkeypatch.setattr(sys, 'argv', ['setup.py', *command])
+    monkeypatch.setattr(setuptools, 'setup', found.update)
+    runpy.run_path('setup.py')
+    return found
+
+
 @pytest.fixture
 def arguments(monkeypatch):
-    """Return what setup.py hands to setup()."""
-    handed = {}
-    monkeypatch.chdir(ROOT)
-    monkeypatch.setattr(setuptools, 'setup', handed.update)
-    runpy.run_path('setup.py')
-    return handed
+    """Return what setup.py hands to setup() where a ROS workspace is built."""
+    return handed(monkeypatch, 'install')
 
 
 def manifest(folder):
@@ -64,6 +74,68 @@ def test_every_executable_can_be_called(arguments):
     executables = [EntryPoint(*re.split(r'\s*=\s*', line), 'console_scripts') for line in lines]
     assert {'crank_driver', 'kinematics', 'servo_inverse'} <= {e.name for e in executables}
     assert all(callable(e.load()) for e in executables)
+
+
+@pytest.mark.parametrize('command', ['bdist_wheel', 'dist_info', 'editable_wheel'])
+def test_pip_puts_no_command_on_the_path(monkeypatch, command):
+    assert handed(monkeypatch, command)['entry_points'] == {'console_scripts': []}
+
+
+@pytest.fixture
+def copy(tmp_path):
+    """Return a copy of what git keeps, in the sources of a workspace."""
+    if not shutil.which('git') or not (ROOT / '.git').exists():
+        pytest.skip('no clone')
+    files = subprocess.run(['git', 'ls-files', '-co', '--exclude-standard'], cwd=ROOT, check=True,
+                           text=True, capture_output=True).stdout.split()
+    folder = tmp_path / 'src' / 'linkage_ros'
+    for name in files:
+        if (ROOT / name).is_file():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / name, folder / name)
+    return folder
+
+
+@pytest.mark.long
+def test_a_wheel_has_the_library_and_the_page_and_no_commands(copy, tmp_path):
+    subprocess.run([sys.executable, '-m', 'pip', 'wheel', '-q', '--no-build-isolation',
+                    '--no-deps', '-w', tmp_path, copy], check=True, timeout=120)
+    wheel, = tmp_path.glob('*.whl')
+    with zipfile.ZipFile(wheel) as packed:
+        names = packed.namelist()
+    assert 'linkage_ros/mechanisms/jansen.py' in names
+    assert any(name.startswith('linkage_ros/web/page/') for name in names)
+    assert not any(name.endswith('entry_points.txt') or 'scripts/' in name for name in names)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not shutil.which('colcon'), reason='colcon is not installed')
+@pytest.mark.parametrize('layout', ['', '--merge-install', '--symlink-install'])
+def test_the_ordinary_colcon_build_of_a_workspace_is_enough(copy, tmp_path, layout):
+    pytest.importorskip('rclpy')
+    # What building against wheels needs besides.
+    flags = [f'-DCMAKE_PREFIX_PATH={sys.prefix}', f'-DPython3_EXECUTABLE={sys.executable}',
+             f'-DCMAKE_PROJECT_INCLUDE={ROOT}/wheels/prefix.cmake', '-DBUILD_TESTING=OFF']
+    defaults = tmp_path / 'defaults.yaml'
+    defaults.write_text(json.dumps({'build': {'cmake-args': flags}}))
+    clean = {key: value for key, value in os.environ.items()
+             if not key.endswith('PREFIX_PATH') and key != 'PYTHONPATH'}
+    clean['COLCON_DEFAULTS_FILE'] = str(defaults)
+    script = f"""
+        colcon build {layout} >&2 && source install/setup.bash && cd / &&
+        python -c 'from linkage_ros import servo_inverse as node
+print(node.__file__, node.ServoInverseType.__module__)' && echo $AMENT_PREFIX_PATH
+        """
+    ended = subprocess.run(['bash', '-c', script], cwd=tmp_path, env=clean, timeout=300,
+                           text=True, capture_output=True)
+    assert ended.returncode == 0, ended.stderr
+    module, prefixes = ended.stdout.splitlines()
+    assert module.startswith(str(tmp_path))
+    assert module.endswith('linkage_interfaces.srv._servo_inverse')
+    executables = {file.name for prefix in prefixes.split(':')
+                   for file in Path(prefix, 'lib', 'linkage_ros').glob('*')}
+    assert executables == {'crank_driver', 'kinematics', 'render', 'servo_inverse', 'urdf',
+                           'viewer'}
 
 
 @pytest.mark.skipif(not shutil.which('colcon'), reason='colcon is not installed')
