@@ -68,6 +68,13 @@ def test_setup_names_the_package_of_the_manifest(arguments):
     assert all(name.split('.')[0] == 'linkage_ros' for name in arguments['packages'])
 
 
+def test_a_robot_without_a_screen_installs_nothing_to_look_at_it_with():
+    names = {element.text for element in manifest('.').getroot() if 'depend' in element.tag}
+    assert {'rclpy', 'linkage_interfaces', 'python3-numpy'} <= names
+    assert not any(re.search('rviz|matplotlib|aiohttp|tqdm|rqt|ament_(copy|flake|pep|xml)', name)
+                   for name in names)
+
+
 def test_every_executable_can_be_called(arguments):
     pytest.importorskip('rclpy')
     lines = arguments['entry_points']['console_scripts']
