@@ -98,29 +98,28 @@ $(install)/.built: $(venv)/.installed $(sources)
 	@touch $@
 
 $(venv)/.installed: $(requirements)
-	@echo 'Installing ROS 2 $(DISTRO) into $(venv): about a minute, once.'
-	@wheels/install.sh --to-compile '$(PYTHON)' $(venv) $(requirements)
+	@about='ROS 2 $(DISTRO) into $(venv): about a minute, once.' wheels/install.sh --to-compile \
+	  '$(PYTHON)' $(venv) $(requirements)
 	@touch $@
 
 $(venv)/.tools: $(venv)/.installed $(tools)
-	@echo 'Installing what the tests need.'
-	@wheels/install.sh '$(bin)/python' $(venv) $(requirements) $(tools)
+	@about='what the tests need.' wheels/install.sh '$(bin)/python' $(venv) $(requirements) $(tools)
 	@touch $@
 
 # What there is to compare with is large: some 2 GB. planegcs has no wheel, and is left out where it
 # does not build.
 .venv-bench/.installed: benchmark/requirements.txt
-	@echo 'Installing what there is to compare with: 2 GB, some minutes, once.'
-	@wheels/install.sh --to-compile '$(PYTHON)' .venv-bench $<
+	@about='what there is to compare with: 2 GB, some minutes, once.' wheels/install.sh \
+	  --to-compile '$(PYTHON)' .venv-bench $<
 	@CMAKE_PREFIX_PATH=$$(echo .venv-bench/lib/python*/site-packages/cmeel.prefix) \
 	  .venv-bench/bin/python -m pip install -qq planegcs==0.1.1 2>/dev/null \
 	  || echo 'planegcs cannot be built here, and is left out.'
 	@touch $@
 
 .venv-docs/.installed: docs/requirements.txt
-	@wheels/install.sh '$(PYTHON)' .venv-docs $<
+	@about='what draws and what makes the pages.' wheels/install.sh '$(PYTHON)' .venv-docs $<
 	@touch $@
 
 .venv-lint/.installed: wheels/lint.txt
-	@wheels/install.sh '$(PYTHON)' .venv-lint $<
+	@about='the linter.' wheels/install.sh '$(PYTHON)' .venv-lint $<
 	@touch $@

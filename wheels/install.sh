@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes a virtual environment of requirement files, or says in one sentence what is missing.
 #
-#   wheels/install.sh [--to-compile] PYTHON FOLDER REQUIREMENTS...
+#   about='what it is' wheels/install.sh [--to-compile] PYTHON FOLDER REQUIREMENTS...
 
 to_compile=
 if [ "$1" = --to-compile ]; then to_compile=yes; shift; fi
@@ -29,6 +29,7 @@ if [ "$to_compile" ]; then
   done
 fi
 
+echo "Installing $about"
 mkdir -p "$folder"
 "$folder/bin/python" -m pip --version >/dev/null 2>&1 \
   || "$python" -m venv "$folder" >"$log" 2>&1 \
