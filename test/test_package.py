@@ -152,3 +152,72 @@ def test_colcon_finds_both_packages_and_their_build_types():
     assert {tuple(line.split('\t')) for line in found.splitlines()} == {
         ('linkage_interfaces', 'linkage_interfaces', '(ros.ament_cmake)'),
         ('linkage_ros', '.', '(ros.ament_python)')}
+
+
+def wrapped(folder, *lines):
+    """Return a Python that is like this one, but for what shell lines do to its arguments."""
+    python = folder / 'python'
+    python.write_text('\n'.join(['#!/bin/bash', *lines, f'exec {sys.executable} "$@"']))
+    python.chmod(0o755)
+    return str(python)
+
+
+OLD = 'case "$*" in *version_info*) exit 1;; -V) echo Python 3.9.18; exit;; esac'
+
+
+@pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
+@pytest.mark.parametrize('target', ['lint', 'docs', 'pictures', 'build', 'demo', 'test', 'bench'])
+def test_each_target_says_in_one_line_that_python_is_too_old(copy, tmp_path, target):
+    python = wrapped(tmp_path, OLD)
+    said = only_line(['make', target, f'PYTHON={python}'], copy, os.environ)
+    assert 'is Python 3.9.18, but a Python from 3.10 to 3.14 is needed' in said
+
+
+def only_line(command, folder, environment):
+    """Return the one line that a command which fails prints, but for make's own."""
+    ended = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True,
+                           timeout=120)
+    assert ended.returncode
+    said, = (line for line in ended.stderr.splitlines() if not line.startswith('make'))
+    return said
+
+
+@pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
+@pytest.mark.parametrize('lines, settings, complaint', [
+    ([], {'PYTHON': 'nowhere'}, 'PYTHON=nowhere is no command'),
+    (['exit 1'], {}, 'is no Python that runs'),
+    (['case "$*" in *ensurepip*) exit 1; esac'], {}, 'lacks venv: install python3-venv'),
+    ([], {'CXX': 'nowhere'}, 'The compiler nowhere is missing: install gcc and g++'),
+    (['case "$*" in *Python.h*) exit 1; esac'], {}, 'lacks its headers: install python3-dev'),
+    pytest.param([], {'PIP_INDEX_URL': 'http://127.0.0.1:9'},
+                 'The Python package index cannot be reached', marks=pytest.mark.long)])
+def test_the_build_says_in_one_line_what_is_missing(copy, tmp_path, lines, settings, complaint):
+    usual = {'PYTHON': wrapped(tmp_path, *lines), 'PATH': os.environ['PATH'],
+             'PIP_CONFIG_FILE': os.devnull, 'PIP_RETRIES': '0'}
+    assert complaint in only_line(['make', 'build'], copy, {**usual, **settings})
+
+
+@pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
+def test_the_build_says_in_one_line_that_there_is_no_python(copy, tmp_path):
+    for command in ('bash', 'env', 'find', 'make'):
+        (tmp_path / command).symlink_to(shutil.which(command))
+    said = only_line(['make', 'build'], copy, {'PATH': str(tmp_path)})
+    assert 'No Python from 3.10 to 3.14 was found' in said
+
+
+@pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
+def test_clean_leaves_what_git_keeps(copy):
+    before = sorted(copy.rglob('*'))
+    for name in ('.venv-lint/bin/x', 'build/x', 'install-jazzy/x', 'log/x', 'demo/out/x',
+                 'pictures/out/x', 'docs/_build/x', 'docs/mechanisms/x', 'benchmark/.cache/x',
+                 '.hypothesis/x', '.pytest_cache/x', '.ruff_cache/x', 'linkage_ros.egg-info/x',
+                 'linkage_ros/web/__pycache__/x', '__pycache__/x'):
+        (copy / name).parent.mkdir(parents=True, exist_ok=True)
+        (copy / name).touch()
+    subprocess.run(['make', 'clean'], cwd=copy, check=True, capture_output=True, timeout=60)
+    assert sorted(copy.rglob('*')) == before
+
+
+def test_pictures_are_drawn_where_git_does_not_look():
+    for line in (ROOT / 'pictures' / 'pictures.txt').read_text().splitlines():
+        assert line == '' or line.startswith('#') or ' --out pictures/out/' in line

@@ -8,6 +8,7 @@ if [ "$1" = --to-compile ]; then to_compile=yes; shift; fi
 python=$1 folder=$2
 shift 2
 log=$folder/pip.log
+export PIP_RETRIES=${PIP_RETRIES-2}
 
 stop() { echo "$*" >&2; exit 1; }
 holds() { "$python" -c "import sys, sysconfig, os.path; sys.exit(not ($1))" 2>/dev/null; }
@@ -35,7 +36,7 @@ mkdir -p "$folder"
   || "$python" -m venv "$folder" >"$log" 2>&1 \
   || stop "The virtual environment $folder cannot be made: $(tail -n 1 "$log")"
 for file; do files+=(-r "$file"); done
-"$folder/bin/python" -m pip install -q --retries 2 "${files[@]}" >"$log" 2>&1 && exit
+"$folder/bin/python" -m pip install -q "${files[@]}" >"$log" 2>&1 && exit
 if grep -qiE 'connection (broken|refused|reset)|new connection|name resolution|timed out|proxy' \
     "$log"; then
   stop "The Python package index cannot be reached: is there a network? (All of it: $log)"
