@@ -26,8 +26,9 @@ try:
     from linkage_interfaces.srv import ServoInverse as ServoInverseType
 except ImportError as error:
     raise ImportError(
-        'servo_inverse needs the service type linkage_interfaces/srv/ServoInverse: run colcon build '
-        'in the workspace, which builds linkage_interfaces too, and source install/setup.bash') from error
+        'servo_inverse needs the service type linkage_interfaces/srv/ServoInverse: run colcon '
+        'build in the workspace, which builds linkage_interfaces too, and source '
+        'install/setup.bash') from error
 
 MOST_NAMED = 5
 SAMPLES = 721
