@@ -245,5 +245,5 @@ def test_the_original_formulas_are_the_same_pose_by_pose_and_in_arrays(kind):
     theta = np.linspace(-1.0, 1.0, 50)
     found = original_formulas.solve(kind, dimensions, theta)
     # The ground comes first and stands still.
-    assert np.hstack(list(found.values())[2:]) == pytest.approx(np.array([pose(t) for t in theta.tolist()]),
-                                              rel=1e-12, abs=1e-12)
+    rows = np.array([pose(angle) for angle in theta.tolist()])
+    assert np.hstack(list(found.values())[2:]) == pytest.approx(rows, rel=1e-12, abs=1e-12)
