@@ -111,7 +111,7 @@ $(venv)/.tools: $(venv)/.installed $(tools)
 .venv-bench/.installed: benchmark/requirements.txt
 	@about='what there is to compare with: 2 GB, some minutes, once.' wheels/install.sh \
 	  --to-compile '$(PYTHON)' .venv-bench $<
-	@CMAKE_PREFIX_PATH=$$(echo .venv-bench/lib/python*/site-packages/cmeel.prefix) \
+	@CMAKE_PREFIX_PATH=$$(echo $(CURDIR)/.venv-bench/lib/python*/site-packages/cmeel.prefix) \
 	  .venv-bench/bin/python -m pip install -qq planegcs==0.1.1 2>/dev/null \
 	  || echo 'planegcs cannot be built here, and is left out.'
 	@touch $@
