@@ -16,18 +16,23 @@ install := install$(suffix)
 log := log$(suffix)
 bin := $(CURDIR)/$(venv)/bin
 docs_python := $(CURDIR)/.venv-docs/bin/python
+lint_bin := .venv-lint/bin
 
 requirements := wheels/$(DISTRO).txt wheels/build.txt wheels/demo.txt
 tools := wheels/dev.txt $(wildcard wheels/dev-$(DISTRO).txt)
 sources := package.xml setup.py setup.cfg resource/linkage_ros wheels/prefix.cmake \
   $(shell find linkage_ros config launch linkage_interfaces -type f ! -name '*.pyc' 2>/dev/null)
 
-# The first Python that runs, is new enough for the wheels, and can build against itself.
-usable := import ensurepip, os, sys, sysconfig; sys.exit(not ((3, 10) <= sys.version_info < (3, 15) \
-  and os.path.exists(os.path.join(sysconfig.get_path('include'), 'Python.h'))))
-candidates := python3.12 python3.11 python3.13 python3.10 python3
-PYTHON ?= $(shell for python in $(candidates); do \
-  $$python -c "$(usable)" 2>/dev/null && echo $$python && break; done)
+# The first Python that is new enough for the wheels and can build against itself; without any, the
+# first that is new enough.
+ifndef PYTHON
+new := import ensurepip, sys; assert (3, 10) <= sys.version_info < (3, 15)
+whole := $(new); import os, sysconfig; \
+  assert os.path.exists(os.path.join(sysconfig.get_path('include'), 'Python.h'))
+PYTHON := $(shell for code in "$(whole)" "$(new)"; do \
+  for python in python3.12 python3.11 python3.13 python3.10 python3.14 python3; do \
+  $$python -c "$$code" 2>/dev/null && echo $$python && exit; done; done)
+endif
 
 # No other ROS than this one, and no talk with other machines.
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH
@@ -72,9 +77,9 @@ long: build $(venv)/.tools ## Run the long tests
 	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 -m long
 
 .PHONY: lint
-lint: $(venv)/.tools ## Check the style
-	@ruff check .
-	@python -c 'import sys; from xml.dom.minidom import parse; [parse(f) for f in sys.argv[1:]]' \
+lint: .venv-lint/.installed ## Check the style
+	@$(lint_bin)/ruff check .
+	@$(lint_bin)/python -c 'import sys; from xml.dom.minidom import parse; [parse(f) for f in sys.argv[1:]]' \
 	  package.xml linkage_interfaces/package.xml
 
 .PHONY: build
@@ -82,8 +87,9 @@ build: $(install)/.built ## Build both packages
 
 .PHONY: clean
 clean: ## Remove everything that was made
-	rm -rf .venv .venv-* build build-* install install-* log log-* demo/out \
-	  pictures/out docs/_build docs/mechanisms
+	rm -rf .venv .venv-* build build-* install install-* log log-* demo/out pictures/out \
+	  docs/_build docs/mechanisms benchmark/.cache .hypothesis .pytest_cache .ruff_cache *.egg-info
+	find . -name __pycache__ -prune -exec rm -rf {} +
 
 $(install)/.built: $(venv)/.installed $(sources)
 	@colcon --log-base $(log) build --build-base $(build) --install-base $(install) --cmake-args \
@@ -92,33 +98,28 @@ $(install)/.built: $(venv)/.installed $(sources)
 	@touch $@
 
 $(venv)/.installed: $(requirements)
-	@test -n '$(PYTHON)' || { echo 'No Python from 3.10 to 3.14 with its headers and venv was found' \
-	  'among $(candidates): install one or name it with PYTHON=.' >&2; exit 1; }
-	@$(PYTHON) -c "$(usable)" 2>/dev/null || { echo '$(PYTHON) does not run, is not from 3.10 to' \
-	  '3.14, or lacks its headers or venv.' >&2; exit 1; }
-	@command -v cmake >/dev/null || { echo 'cmake is missing: install it.' >&2; exit 1; }
-	@command -v $${CXX:-c++} >/dev/null && command -v $${CC:-cc} >/dev/null \
-	  || { echo 'A C and C++ compiler is missing: install gcc and g++.' >&2; exit 1; }
-	@echo 'Installing ROS 2 $(DISTRO) into $(venv): about a minute, once.'
-	@$(PYTHON) -m venv $(venv)
-	@python -m pip install -qq $(requirements:%=-r %)
+	@about='ROS 2 $(DISTRO) into $(venv): about a minute, once.' wheels/install.sh --to-compile \
+	  '$(PYTHON)' $(venv) $(requirements)
 	@touch $@
 
 $(venv)/.tools: $(venv)/.installed $(tools)
-	@echo 'Installing what the tests need.'
-	@python -m pip install -qq $(requirements:%=-r %) $(tools:%=-r %)
+	@about='what the tests need.' wheels/install.sh '$(bin)/python' $(venv) $(requirements) $(tools)
 	@touch $@
 
 # What there is to compare with is large: some 2 GB. planegcs has no wheel, and is left out where it
 # does not build.
 .venv-bench/.installed: benchmark/requirements.txt
-	@$(PYTHON) -m venv .venv-bench
-	@.venv-bench/bin/python -m pip install -qq -r $<
-	@CMAKE_PREFIX_PATH=$$(echo .venv-bench/lib/python*/site-packages/cmeel.prefix) \
-	  .venv-bench/bin/python -m pip install -qq planegcs==0.1.1 || true
+	@about='what there is to compare with: 2 GB, some minutes, once.' wheels/install.sh \
+	  --to-compile '$(PYTHON)' .venv-bench $<
+	@CMAKE_PREFIX_PATH=$$(echo $(CURDIR)/.venv-bench/lib/python*/site-packages/cmeel.prefix) \
+	  .venv-bench/bin/python -m pip install -qq planegcs==0.1.1 2>/dev/null \
+	  || echo 'planegcs cannot be built here, and is left out.'
 	@touch $@
 
 .venv-docs/.installed: docs/requirements.txt
-	@$(PYTHON) -m venv .venv-docs
-	@$(docs_python) -m pip install -qq -r $<
+	@about='what draws and what makes the pages.' wheels/install.sh '$(PYTHON)' .venv-docs $<
+	@touch $@
+
+.venv-lint/.installed: wheels/lint.txt
+	@about='the linter.' wheels/install.sh '$(PYTHON)' .venv-lint $<
 	@touch $@

@@ -12,11 +12,57 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+import filecmp
 from glob import glob
+import os
+from pathlib import Path
+import subprocess
+import sys
 
 from setuptools import find_packages, setup
 
 package_name = 'linkage_ros'
+interfaces = Path(__file__).resolve().with_name('linkage_interfaces')
+
+# colcon and bloom put commands where `ros2 run` looks for them; pip would put them on everybody's
+# PATH, where names like `render` have no business.
+for_ros = sys.argv[1:2] != ['--help'] and {'install', 'develop'} & set(sys.argv)
+commands = {name: name for name in (
+    'crank_driver', 'kinematics', 'render', 'servo_inverse', 'viewer')}
+commands['urdf'] = 'print_urdf'
+
+
+def build_interfaces():
+    """Have colcon build the nested package too: it does not look below a package it has found."""
+    paths = os.environ.get('PYTHONPATH', '').split(os.pathsep)
+    # How colcon tells setup.py where to install to; it is not for the colcon that is run here.
+    override = next((path for path in paths if Path(path).name == 'prefix_override'), None)
+    if override is None or '--uninstall' in sys.argv or built():
+        return
+    prefix, build = Path(sys.prefix), Path(override).parent.parent
+    layout = ['--install-base', prefix.parent]
+    if prefix.name != package_name:
+        layout = ['--merge-install', '--install-base', prefix]
+    colcon = [sys.executable, '-c', 'from colcon_core import command; exit(command.main())']
+    ended = subprocess.run(
+        [*colcon, '--log-base', os.devnull, 'build', '--base-paths', interfaces,
+         '--build-base', build, *layout], cwd=build,
+        env={**os.environ, 'PYTHONPATH': os.pathsep.join(p for p in paths if p != override)})
+    if ended.returncode:
+        sys.exit(f'{interfaces.name}, which is nested in {package_name}, could not be built; '
+                 f'rosdep installs what it needs: rosdep install --from-paths {interfaces}')
+
+
+def built():
+    """Return whether the nested package, as it is here, is there for this build already."""
+    service = 'srv/ServoInverse.srv'
+    there = (Path(prefix, 'share', interfaces.name, service)
+             for prefix in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))
+    return any(file.is_file() and filecmp.cmp(file, interfaces / service) for file in there)
+
+
+if for_ros:
+    build_interfaces()
 
 setup(
     name=package_name,
@@ -43,9 +89,7 @@ setup(
     description='Closed planar linkages moved exactly, in closed form.',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [
-            f'{name} = {package_name}.{name}:main'
-            for name in ('crank_driver', 'kinematics', 'render', 'servo_inverse', 'viewer')
-        ] + [f'urdf = {package_name}.print_urdf:main'],
+        'console_scripts': [f'{name} = {package_name}.{module}:main'
+                            for name, module in commands.items()] if for_ros else [],
     },
 )

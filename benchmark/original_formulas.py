@@ -17,14 +17,35 @@ The formulas of the original documents, to be measured beside the library.
 
 Written as they stand there (acos, sqrt(1 - cos^2), a plain atan, the sign rule for 0 to 180
 degrees), with slips of the pen set right where the documents' own programs are right: B.y of the
-water drop, d for b in Jansen's D. Angles are in radians throughout. Everything works on arrays of
-any shape and keeps the precision of `theta`, float32 or float64.
+water drop, d for b in Jansen's D. Angles are in radians throughout. Each formula is written once
+and given the functions that suit what it works on: those of `math` for one pose after the other,
+numpy's for arrays of any shape, whose precision they keep, float32 or float64.
 
 Sources: "Water drop linkage", "Jansen linkage", "Peaucellier-Lipkin linkage" (H. Shigeyoshi,
 gnuplot programs); two Processing sketches of the slotted lever.
 """
 
+import math
+from types import SimpleNamespace
+
 import numpy as np
+
+FLOATS = SimpleNamespace(
+    sin=math.sin, cos=math.cos, sqrt=math.sqrt, acos=math.acos, atan=math.atan, atan2=math.atan2,
+    sign=lambda theta: 1.0 if 0.0 <= theta <= math.pi else -1.0)
+ARRAYS = SimpleNamespace(
+    sin=np.sin, cos=np.cos, sqrt=np.sqrt, acos=np.arccos, atan=np.arctan, atan2=np.arctan2,
+    sign=lambda theta: np.where((0.0 <= theta) & (theta <= np.pi), 1.0, -1.0).astype(theta.dtype))
+
+
+def one_pose(kind, dimensions):
+    """
+    Return a function of a crank angle [rad] that returns x and y of each moving joint, as floats.
+
+    It raises ValueError where an acos or a root ends.
+    """
+    _, _, pose = _formulas(FLOATS, kind, dimensions)
+    return pose
 
 
 def solve(kind, dimensions, theta):
@@ -47,14 +68,15 @@ def solve(kind, dimensions, theta):
 
     """
     theta = np.asarray(theta)
-    lengths = {name: float(value) for name, value in dimensions.items()}
+    ground, moving, pose = _formulas(ARRAYS, kind, dimensions)
     with np.errstate(invalid='ignore', divide='ignore'):
-        joints = _SOLVE[kind](theta, **lengths)
+        found = pose(theta)
+    joints = {**ground, **dict(zip(moving, zip(found[::2], found[1::2])))}
     return {name: _stack(theta, *joint) for name, joint in joints.items()}
 
 
 def lever_angle(theta, a, b):
-    """Return the lever angle [rad] of the first sketch: atan of a quotient."""
+    """Return the lever angles [rad] of the first sketch: atan of a quotient."""
     return np.arctan(a * np.sin(theta) / (a * np.cos(theta) + b))
 
 
@@ -64,65 +86,90 @@ def servo_angle(lever, a, b):
         return lever + np.arcsin(b * np.sin(lever) / a)
 
 
+def _formulas(functions, kind, dimensions):
+    """Return the ground's joints, the names of those that move, and the function of a pose."""
+    lengths = {name: float(value) for name, value in dimensions.items()}
+    return _FORMULAS[kind](functions, **lengths)
+
+
 def _stack(theta, x, y):
     shaped = [np.broadcast_to(np.asarray(part, theta.dtype), theta.shape) for part in (x, y)]
     return np.stack(shaped, -1)
 
 
-def _water_drop(theta, a):
-    length = a * np.sqrt(5.0 + 4.0 * np.cos(theta))
-    cosine = (length ** 2 + 3.0 * a ** 2) / (4 * a * length)
-    sine = np.where((0.0 <= theta) & (theta <= np.pi), 1, -1) * np.sqrt(1.0 - cosine ** 2)
-    sine = sine.astype(theta.dtype)
-    ax, ay = -a * np.sin(theta), a * np.cos(theta)
-    bx, by = -4 * a * cosine * sine, -2.0 * a + 2 * a * (2 * cosine ** 2 - 1)
-    return {'O': (0.0, 0.0), 'C': (0.0, -2.0 * a), 'A': (ax, ay), 'B': (bx, by),
-            'P': (4 * ax - 3 * bx, 4 * ay - 3 * by)}
+def _water_drop(f, a):
+    sin, cos, sqrt, sign = f.sin, f.cos, f.sqrt, f.sign
+
+    square = 3.0 * a * a
+
+    def pose(theta):
+        cos_theta = cos(theta)
+        length = a * sqrt(5.0 + 4.0 * cos_theta)
+        cosine = (length * length + square) / (4 * a * length)
+        sine = sign(theta) * sqrt(1.0 - cosine * cosine)
+        ax, ay = -a * sin(theta), a * cos_theta
+        bx, by = -4 * a * cosine * sine, -2.0 * a + 2 * a * (2 * cosine * cosine - 1)
+        return ax, ay, bx, by, 4 * ax - 3 * bx, 4 * ay - 3 * by
+
+    return {'O': (0.0, 0.0), 'C': (0.0, -2.0 * a)}, 'ABP', pose
 
 
-def _jansen(theta, a, b, c, d, e, f, g, h, i, j, k, l, m):  # noqa: E741
-    ax, ay = m * np.cos(theta), m * np.sin(theta)
+def _jansen(function, a, b, c, d, e, f, g, h, i, j, k, l, m):  # noqa: E741
+    sin, cos, sqrt, acos, atan2 = (
+        function.sin, function.cos, function.sqrt, function.acos, function.atan2)
     bx, by = -a, -l
-    ab = np.sqrt((ax - bx) ** 2 + (ay - by) ** 2)
-    alpha = np.arctan2(ay - by, ax - bx)
-    beta = np.arccos((ab ** 2 + b ** 2 - j ** 2) / (2 * ab * b))
-    gamma = np.arccos((b ** 2 + d ** 2 - e ** 2) / (2 * b * d)).item()
-    delta = np.arccos((ab ** 2 + c ** 2 - k ** 2) / (2 * ab * c))
-    cx, cy = bx + b * np.cos(alpha + beta), by + b * np.sin(alpha + beta)
-    dx, dy = bx + d * np.cos(alpha + beta + gamma), by + d * np.sin(alpha + beta + gamma)
-    ex, ey = bx + c * np.cos(alpha - delta), by + c * np.sin(alpha - delta)
-    de = np.sqrt((dx - ex) ** 2 + (dy - ey) ** 2)
-    epsilon = np.arctan2(dy - ey, dx - ex)
-    zeta = np.arccos((de ** 2 + g ** 2 - f ** 2) / (2 * de * g))
-    eta = np.arccos((g ** 2 + i ** 2 - h ** 2) / (2 * g * i)).item()
-    fx, fy = ex + g * np.cos(epsilon + zeta), ey + g * np.sin(epsilon + zeta)
-    gx, gy = ex + i * np.cos(epsilon + zeta + eta), ey + i * np.sin(epsilon + zeta + eta)
-    return {'O': (0.0, 0.0), 'B': (bx, by), 'A': (ax, ay), 'C': (cx, cy), 'D': (dx, dy),
-            'E': (ex, ey), 'F': (fx, fy), 'G': (gx, gy)}
+    bb, cc, ff, gg, jj, kk = (length * length for length in (b, c, f, g, j, k))
+    gamma = math.acos((b ** 2 + d ** 2 - e ** 2) / (2 * b * d))
+    eta = math.acos((g ** 2 + i ** 2 - h ** 2) / (2 * g * i))
+
+    def pose(theta):
+        ax, ay = m * cos(theta), m * sin(theta)
+        x, y = ax - bx, ay - by
+        ab = sqrt(x * x + y * y)
+        alpha = atan2(y, x)
+        beta = alpha + acos((ab * ab + bb - jj) / (2 * ab * b))
+        delta = alpha - acos((ab * ab + cc - kk) / (2 * ab * c))
+        cx, cy = bx + b * cos(beta), by + b * sin(beta)
+        dx, dy = bx + d * cos(beta + gamma), by + d * sin(beta + gamma)
+        ex, ey = bx + c * cos(delta), by + c * sin(delta)
+        x, y = dx - ex, dy - ey
+        de = sqrt(x * x + y * y)
+        zeta = atan2(y, x) + acos((de * de + gg - ff) / (2 * de * g))
+        return (ax, ay, cx, cy, dx, dy, ex, ey, ex + g * cos(zeta), ey + g * sin(zeta),
+                ex + i * cos(zeta + eta), ey + i * sin(zeta + eta))
+
+    return {'O': (0.0, 0.0), 'B': (bx, by)}, 'ACDEFG', pose
 
 
-def _peaucellier(theta, r, a, b):
-    ax, ay = r * np.cos(theta), r * np.sin(theta)
-    px, py = -r - ax, -ay
-    ap = np.sqrt(px ** 2 + py ** 2)
-    alpha = np.arccos((ap ** 2 + b ** 2 - a ** 2) / (2 * ap * b))
-    bx, by = _rotated(b * px / ap, b * py / ap, alpha)
-    dx, dy = _rotated(b * px / ap, b * py / ap, -alpha)
-    return {'O': (0.0, 0.0), 'P': (-r, 0.0), 'A': (ax, ay), 'B': (ax + bx, ay + by),
-            'C': (ax + bx + dx, ay + by + dy), 'D': (ax + dx, ay + dy)}
+def _peaucellier(f, r, a, b):
+    sin, cos, sqrt, acos = f.sin, f.cos, f.sqrt, f.acos
+    aa, bb = a * a, b * b
+
+    def pose(theta):
+        ax, ay = r * cos(theta), r * sin(theta)
+        px, py = -r - ax, -ay
+        ap = sqrt(px * px + py * py)
+        alpha = acos((ap * ap + bb - aa) / (2 * ap * b))
+        x, y, cosine, sine = b * px / ap, b * py / ap, cos(alpha), sin(alpha)
+        bx, by = x * cosine - y * sine, x * sine + y * cosine
+        dx, dy = x * cosine + y * sine, y * cosine - x * sine
+        return ax, ay, ax + bx, ay + by, ax + bx + dx, ay + by + dy, ax + dx, ay + dy
+
+    return {'O': (0.0, 0.0), 'P': (-r, 0.0)}, 'ABCD', pose
 
 
-def _rotated(x, y, angle):
-    return x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle)
-
-
-def _slotted_lever(theta, a, b, e=0.0):
+def _slotted_lever(f, a, b, e=0.0):
     """Draw the lever as long as the catalogue's, 1.8 b in the sketches."""
-    lever = lever_angle(theta, a, b) + np.pi / 2
+    sin, cos, atan = f.sin, f.cos, f.atan
     length = max(1.8 * b, a + b)
-    return {'O': (0.0, 0.0), 'Q': (0.0, -b), 'A': (-a * np.sin(theta), a * np.cos(theta)),
-            'L': (length * np.cos(lever), -b + length * np.sin(lever))}
+
+    def pose(theta):
+        across, up = a * sin(theta), a * cos(theta)
+        lever = atan(across / (up + b)) + math.pi / 2
+        return -across, up, length * cos(lever), -b + length * sin(lever)
+
+    return {'O': (0.0, 0.0), 'Q': (0.0, -b)}, 'AL', pose
 
 
-_SOLVE = {'water_drop': _water_drop, 'jansen': _jansen, 'peaucellier': _peaucellier,
-          'slotted_lever': _slotted_lever}
+_FORMULAS = {'water_drop': _water_drop, 'jansen': _jansen, 'peaucellier': _peaucellier,
+             'slotted_lever': _slotted_lever}

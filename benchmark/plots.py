@@ -17,7 +17,7 @@
 import matplotlib
 from matplotlib.lines import Line2D
 
-from .report import failed, methods, TITLES
+from .report import any_of, failed, methods, TITLES
 
 matplotlib.use('Agg')
 from matplotlib import pyplot  # noqa: E402
@@ -47,14 +47,14 @@ def _lines(result, kind):
     """Return {method: [rows by batch, one a knob]}, without those for a part of the points."""
     found = {}
     for (name, _), rows in methods(result, kind).items():
-        if rows[1]['kind'] != 'part':
+        if any_of(rows)['kind'] != 'part':
             found.setdefault(name, []).append(rows)
     return found
 
 
 def _plot(title, lines, path):
     figure, axes = pyplot.subplots(1, 2, figsize=(13, 7), sharex=True)
-    looks = {name: _look(number, knobs[0][1]['kind'])
+    looks = {name: _look(number, any_of(knobs[0])['kind'])
              for number, (name, knobs) in enumerate(lines.items())}
     for axis, (batch, panel) in zip(axes, PANELS.items()):
         for name, knobs in lines.items():
@@ -99,7 +99,7 @@ def _line(axis, rows, look):
 
 
 def _entry(name, knobs, look):
-    rows = [rows[1] for rows in knobs]
+    rows = [any_of(rows) for rows in knobs]
     shares = sorted(100 * failed(row) / row['angles'] for row in rows)
     told = name if len(rows) == 1 else f'{name}\n{_range(rows)}'
     if shares[-1]:

@@ -64,10 +64,11 @@ def table(result, kind):
     lines = ['| method | knob | 1 | p95 | 12 | 1000 | 100000 | median uL | max uL | x sens '
              '| max uL, all angles | failures |', '|---|---' + '|--:' * 9 + '|---|']
     for rows in methods(result, kind).values():
-        one, many = rows[1], rows.get(1000, rows[1])
+        one, many = rows.get(1), rows.get(1000) or any_of(rows)
         lines.append('| ' + ' | '.join((
-            ('> ' if one['follows'] else '') + one['method'], one['knob'],
-            _time(one), _number(one['p95_us']), *(_time(rows.get(batch)) for batch in BATCHES[1:]),
+            ('> ' if many['follows'] else '') + many['method'], many['knob'],
+            _time(one), _number(one and one['p95_us']),
+            *(_time(rows.get(batch)) for batch in BATCHES[1:]),
             *(_number(many[name]) for name in ('median_uL', 'max_uL', 'max_sensitivity',
                                                'max_uL_all')),
             failures(many))) + ' |')
@@ -81,6 +82,11 @@ def methods(result, kind):
         if row['mechanism'] == kind:
             found.setdefault((row['method'], row['knob']), {})[row['batch']] = row
     return found
+
+
+def any_of(rows):
+    """Return one of the rows by batch of a method: of single poses where there is one."""
+    return next(iter(rows.values()))
 
 
 def failures(row):
@@ -165,8 +171,8 @@ def _against_peers(result):
     for kind, title in TITLES.items():
         found = methods(result, kind)
         for batch in BATCHES:
-            timed = [rows[batch] for rows in found.values()
-                     if rows[1]['kind'] == 'peer' and rows[batch]['median_us'] is not None]
+            timed = [rows[batch] for rows in found.values() if batch in rows
+                     and rows[batch]['kind'] == 'peer' and rows[batch]['median_us'] is not None]
             right = [row for row in timed
                      if failed(row) < RARE * row['angles'] and row['max_scaled_all'] < ACCURATE]
             ours = (found.get(key, {}).get(batch) for key in (FLOATS, OURS, FAST))

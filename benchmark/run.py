@@ -77,6 +77,8 @@ def run(options):
     started = time.time()
     families = options.families or (QUICK if options.quick else methods.FAMILIES)
     chosen, absent = methods.load(families)
+    # Once for all: nobody pays for it in what is timed.
+    np.seterr(all='ignore')
     for family, reason in absent.items():
         print(f'left out: {family}: {reason}', file=sys.stderr)
     rows = []

@@ -24,17 +24,20 @@ from pathlib import Path
 import signal
 import sys
 
+HERE = Path(__file__).parent
+sys.path.append(str(HERE.parent / 'test'))
+
 try:
+    from domains import Domain
     from linkage_ros import scene
     from listener import Listener
     from motion import lever_error, Motion
-    from nodes import DemoError, Nodes, unused_domain
+    from nodes import DemoError, Nodes
     import pictures
     from tqdm import tqdm
 except ImportError as error:
     sys.exit(f'demo: {error}; `make demo` installs and builds what is needed')
 
-HERE = Path(__file__).parent
 SCENE = HERE.parent / 'config' / 'all.yaml'
 OUT = HERE / 'out'
 SECONDS = 10.0
@@ -56,7 +59,7 @@ def main() -> int:
         report_motions(motions)
         report_answer(next(m for m in machines if m.linkage.type == 'slotted_lever'), answer)
         draw(motions)
-    except DemoError as error:
+    except (DemoError, RuntimeError) as error:
         print(f'demo: {error}', file=sys.stderr)
         return 1
     except KeyboardInterrupt:
@@ -66,10 +69,10 @@ def main() -> int:
 
 def observe(machines):
     """Return what the mechanisms sent, and what the service answered."""
-    domain = unused_domain()
-    print(f'Starting three nodes on {SCENE.name}, ROS_DOMAIN_ID {domain} ...', flush=True)
     names = [machine.name for machine in machines]
-    with Nodes(SCENE, domain) as nodes, Listener(names, domain, nodes.check) as listener:
+    with Domain() as domain, Nodes(SCENE, domain.id) as nodes, \
+            Listener(names, domain.id, nodes.check) as listener:
+        print(f'Running three nodes on {SCENE.name}, ROS_DOMAIN_ID {domain.id} ...', flush=True)
         listener.discover()
         print(f'Listening for {SECONDS:g} s ...', flush=True)
         listener.listen(SECONDS)

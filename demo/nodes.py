@@ -17,7 +17,6 @@
 import os
 from pathlib import Path
 import signal
-import socket
 import subprocess
 
 from ament_index_python.packages import get_package_prefix, PackageNotFoundError
@@ -25,26 +24,9 @@ from ament_index_python.packages import get_package_prefix, PackageNotFoundError
 EXECUTABLES = ('crank_driver', 'kinematics', 'servo_inverse')
 SECONDS_TO_END = 10.0
 
-# Where DDS listens: the first participant of each domain, and the domains below the ports that
-# Linux hands out to everybody.
-FIRST_PORT, PORTS_PER_DOMAIN, DOMAINS = 7410, 250, 101
-
 
 class DemoError(Exception):
     """What is missing or went wrong, in one sentence."""
-
-
-def unused_domain() -> int:
-    """Return a ROS_DOMAIN_ID that nobody on this machine uses."""
-    start = os.getpid()
-    for domain in (1 + (start + i) % DOMAINS for i in range(DOMAINS)):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            try:
-                probe.bind(('', FIRST_PORT + PORTS_PER_DOMAIN * domain))
-                return domain
-            except OSError:
-                continue
-    raise DemoError(f'every ROS_DOMAIN_ID from 1 to {DOMAINS} is in use on this machine')
 
 
 class Nodes:

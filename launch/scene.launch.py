@@ -18,11 +18,13 @@ Bring up a scene: its nodes, and what it is looked at with.
     ros2 launch linkage_ros scene.launch.py scene:=strandbeest rviz:=true
 """
 
+from importlib.util import find_spec
 from pathlib import Path
+import re
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
 from launch.logging import launch_config
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
@@ -33,59 +35,93 @@ import yaml
 PACKAGE = 'linkage_ros'
 NODES = ('crank_driver', 'kinematics', 'servo_inverse')
 VIEWER = 'viewer'
+NO_VIEWER = 'The viewer is left out: it needs aiohttp (apt install python3-aiohttp).'
 RVIZ_CONFIG = 'linkage.rviz'
-SWITCH = ('true', 'false')
+# Without a robot model nothing else publishes a transform, and RViz would know of no frame.
+FRAME = 'linkages'
+YES, NO = ('true', '1', 'yes', 'on'), ('false', '0', 'no', 'off')
+LARGEST_PORT = 65535
 
-# Name, default, what it may be besides, and what it does.
+# Name, default, and what it does.
 ARGUMENTS = (
-    ('scene', 'all', None, 'Scene: a name in config/ without its ending, or the path of a file.'),
-    ('namespace', '', None, 'Namespace of all nodes and topics.'),
-    ('viewer', 'true', SWITCH, 'Whether to serve the page with the picture and the sliders.'),
-    ('port', '8020', None, "Port of the viewer's page; 0: any that is free."),
-    ('rviz', 'false', SWITCH, 'Whether to start RViz.'),
-    ('robot_model', 'false', SWITCH,
+    ('scene', 'all', 'Scene: a name in config/ without its ending, or the path of a file.'),
+    ('namespace', '', 'Namespace of all nodes and topics.'),
+    ('viewer', 'true', 'Whether to serve the page with the picture and the sliders.'),
+    ('port', '8020', "Port of the viewer's page; 0: any that is free."),
+    ('rviz', 'false', 'Whether to start RViz.'),
+    ('robot_model', 'false',
      'Whether to start a robot_state_publisher for each mechanism, for frames and robot models.'),
-    ('use_sim_time', 'false', SWITCH, 'Whether time comes from the topic /clock.'),
+    ('frame_prefix', '', "Put before the names of the robot models' frames, as in left/."),
+    ('use_sim_time', 'false', 'Whether time comes from the topic /clock.'),
 )
 
 
 def generate_launch_description():
     """Return the arguments and what depends on them."""
     return LaunchDescription([
-        *(DeclareLaunchArgument(name, default_value=default, choices=choices,
-                                description=description)
-          for name, default, choices, description in ARGUMENTS),
+        *(DeclareLaunchArgument(name, default_value=default, description=description)
+          for name, default, description in ARGUMENTS),
         OpaqueFunction(function=_started),
     ])
 
 
 def _started(context):
     chosen = {name: LaunchConfiguration(name).perform(context) for name, *_ in ARGUMENTS}
-    wanted = {name for name, value in chosen.items() if value == 'true'}
+    viewer, rviz_wanted, robot_model, use_sim_time = (
+        switched(name, chosen[name]) for name in ('viewer', 'rviz', 'robot_model', 'use_sim_time'))
+    port = numbered('port', chosen['port'])
+    prefix = chosen['frame_prefix'].strip('/') and f'{chosen["frame_prefix"].strip("/")}/'
     share = Path(get_package_share_directory(PACKAGE))
     path = _scene_path(share, chosen['scene'])
     shown = scene.load(str(path))
     common = {'namespace': chosen['namespace'], 'output': 'screen'}
-    time = {'use_sim_time': 'use_sim_time' in wanted}
+    time = {'use_sim_time': use_sim_time}
     # First what may not be installed: then nothing is left running.
     nodes = []
-    if 'robot_model' in wanted:
-        nodes += [_robot(machine, shown.frame_id, chosen['namespace'], time)
+    if robot_model:
+        nodes += [_robot(machine, shown.frame_id, chosen['namespace'], prefix, time)
                   for machine in shown.machines.values()]
-    if 'rviz' in wanted:
+    if rviz_wanted:
         config = rviz.adapted(
             yaml.safe_load((share / 'config' / RVIZ_CONFIG).read_text()), shown.machines,
-            shown.frame_id, chosen['namespace'], 'robot_model' in wanted)
+            shown.frame_id, chosen['namespace'], robot_model, prefix)
         # Among the logs of this launch, so that nothing is left behind elsewhere.
         adapted = Path(launch_config.log_dir, RVIZ_CONFIG)
         adapted.write_text(yaml.safe_dump(config))
         nodes.append(Node(package='rviz2', executable='rviz2', arguments=['-d', str(adapted)],
                           parameters=[time], **common))
-    if 'viewer' in wanted:
-        nodes.append(Node(package=PACKAGE, executable=VIEWER,
-                          parameters=[{'port': int(chosen['port'])}], **common))
+    if robot_model and prefix:
+        nodes.append(_transform(shown.frame_id, prefix + shown.frame_id, time, common))
+    elif rviz_wanted and not robot_model:
+        nodes.append(_transform(shown.frame_id, FRAME, time, common))
+    if viewer and not find_spec('aiohttp'):
+        nodes.append(LogInfo(msg=NO_VIEWER))
+    elif viewer:
+        nodes.append(Node(package=PACKAGE, executable=VIEWER, parameters=[{'port': port}],
+                          **common))
     return nodes + [Node(package=PACKAGE, executable=name, parameters=[str(path), time], **common)
                     for name in NODES]
+
+
+def switched(name, text):
+    """Return whether an argument is true; raise RuntimeError if it is neither true nor false."""
+    word = text.strip().lower()
+    if word not in YES + NO:
+        raise RuntimeError(f'{name} must be true or false, not {text!r}')
+    return word in YES
+
+
+def numbered(name, text):
+    """Return the number of a port; raise RuntimeError if it is none."""
+    if not re.fullmatch(r'\s*[0-9]{1,5}\s*', text) or int(text) > LARGEST_PORT:
+        raise RuntimeError(f'{name} must be a whole number from 0 to {LARGEST_PORT}, not {text!r}')
+    return int(text)
+
+
+def _transform(frame, child, time, common):
+    """Return what says that a frame is where another is."""
+    return Node(package='tf2_ros', executable='static_transform_publisher', parameters=[time],
+                arguments=['--frame-id', frame, '--child-frame-id', child], **common)
 
 
 def _scene_path(share, name):
@@ -98,12 +134,13 @@ def _scene_path(share, name):
     return path
 
 
-def _robot(machine, frame_id, namespace, time):
+def _robot(machine, frame_id, namespace, prefix, time):
     """Return what moves the model of a mechanism by its joint states."""
     text = ParameterValue(urdf.describe([machine], frame_id), value_type=str)
     return Node(
         package='robot_state_publisher', executable='robot_state_publisher',
         namespace=f'{namespace}/{machine.name}', output='screen',
-        parameters=[{'robot_description': text, 'publish_frequency': 100.0}, time],
+        parameters=[{'robot_description': text, 'publish_frequency': 100.0,
+                     'frame_prefix': prefix}, time],
         # The model itself is offered by kinematics, which keeps it up to date.
         remappings=[('robot_description', '~/robot_description')])

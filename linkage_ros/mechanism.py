@@ -328,11 +328,11 @@ class Mechanism(Analysis):
         Raises
         ------
         ImportError
-            If llvmlite is not installed (`pip install linkage_ros[fast]`).
+            If llvmlite is not installed (`pip install llvmlite`).
 
         """
         if not find_spec('llvmlite'):
-            raise ImportError('accelerated() needs llvmlite: pip install linkage_ros[fast]')
+            raise ImportError('accelerated() needs llvmlite: pip install llvmlite')
         return type(self)(self._design, self._structure, self.dimensions, self.branches, True)
 
     def solve(self, theta, points: Optional[Sequence[str]] = None) -> dict:

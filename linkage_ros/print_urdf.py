@@ -12,55 +12,81 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Command that prints the robot model of a scene's mechanisms: `ros2 run linkage_ros urdf`."""
+"""Command that prints the robot model of a scene's mechanisms, with ROS or without it."""
 
-import argparse
+import re
 import sys
 
-import rclpy
-from rclpy.logging import get_logger
-from rclpy.utilities import remove_ros_args
-
-from . import node, scene, urdf
+from . import command, scene, urdf
 
 NAME = 'urdf'
-
-
-def read_scene(args=None) -> scene.Scene:
-    """Return the scene in the parameters that come with ROS arguments."""
-    rclpy.init(args=args)
-    try:
-        reader = node.SceneNode(NAME)
-        reader.destroy_node()
-        return reader.scene
-    finally:
-        rclpy.try_shutdown()
-
-
-def chosen(machines, names):
-    """Return the machines that are named, or all; raise SceneError for one that is not there."""
-    for name in names:
-        if name not in machines:
-            raise scene.SceneError(f'there is no mechanism {name!r}; '
-                                   f'allowed: {", ".join(machines)}')
-    return [machines[name] for name in names or machines]
+NEEDS = ('pip install pyyaml, or apt install python3-yaml; --ros-args needs a ROS 2 that is '
+         'installed and sourced')
 
 
 def main(args=None) -> int:
     """Print URDF; return the exit code."""
-    parser = argparse.ArgumentParser(
+    return command.run(NAME, _print, args, NEEDS)
+
+
+def _print(args):
+    args = sys.argv[1:] if args is None else args
+    from_ros = '--ros-args' in args
+    asked = parser().parse_args(without_ros(args) if from_ros else args)
+    if from_ros and asked.scene:
+        raise command.RequestError('the scene comes as SCENE or with --ros-args, not with both')
+    found = (read_scene(args) if from_ros else
+             scene.load(asked.scene) if asked.scene else scene.read({}))
+    print(urdf.describe(command.chosen(found.machines, asked.mechanism), found.frame_id))
+
+
+def parser() -> command.Parser:
+    """Return the parser of the command line."""
+    made = command.Parser(
         NAME, description='Print the robot model of a scene as URDF.',
-        epilog='The scene comes with: --ros-args --params-file SCENE')
-    parser.add_argument('--mechanism', nargs='+', default=[], metavar='NAME',
-                        help='only these mechanisms of the scene')
-    names = parser.parse_args(remove_ros_args(args)[1:]).mechanism
+        epilog='The scene may also come as for a node: --ros-args --params-file SCENE')
+    made.add_argument('scene', metavar='SCENE', nargs='?',
+                      help="the scene's parameter file (default: the catalogue's linkages)")
+    made.add_argument('--mechanism', nargs='+', default=[], metavar='NAME',
+                      help='only these mechanisms of the scene')
+    return made
+
+
+def without_ros(args):
+    """Return the arguments that are not for ROS; raise RequestError if others are wrong."""
+    from rclpy.utilities import remove_ros_args
+
     try:
-        found = read_scene(args)
-        print(urdf.describe(chosen(found.machines, names), found.frame_id))
-    except (scene.SceneError, node.RCLError) as error:
-        get_logger(NAME).fatal(str(error))
-        return 1
-    return 0
+        return remove_ros_args([NAME, *args])[1:]
+    except RuntimeError as error:
+        # Not where in its own source the client library found out.
+        why = re.sub(r'Failed to parse ROS arguments: |, at /\S+:\d+', '', str(error))
+        raise command.RequestError(f'the arguments for ROS are wrong: {why}') from None
+
+
+def read_scene(args) -> scene.Scene:
+    """Return the scene in the parameters that come with ROS arguments."""
+    import rclpy
+
+    from . import node
+
+    class Reader(node.SceneNode):
+        """A node that is told a scene, or says that it was not."""
+
+        def __init__(self):
+            super().__init__(NAME)
+            if '--params-file' in args and not self._parameter_overrides:
+                self.destroy_node()
+                raise command.RequestError("the parameter file must have '/**:' and below it "
+                                           "'ros__parameters:' with a scene")
+
+    rclpy.init(args=args)
+    try:
+        reader = Reader()
+        reader.destroy_node()
+        return reader.scene
+    finally:
+        rclpy.try_shutdown()
 
 
 if __name__ == '__main__':

@@ -23,7 +23,7 @@ NEEDS_TRANSFORMS = ('rviz_default_plugins/RobotModel', 'rviz_default_plugins/TF'
 
 
 def adapted(config: dict, names: Iterable[str], frame_id: str, namespace: str = '',
-            robot_model: bool = False) -> dict:
+            robot_model: bool = False, frame_prefix: str = '') -> dict:
     """
     Return a configuration that shows other mechanisms.
 
@@ -39,6 +39,8 @@ def adapted(config: dict, names: Iterable[str], frame_id: str, namespace: str = 
         What their topics begin with; empty: none.
     robot_model : bool
         Whether to show what needs a robot_state_publisher as well.
+    frame_prefix : str
+        What the robot_state_publishers put before the names of their frames.
 
     Returns
     -------
@@ -55,6 +57,8 @@ def adapted(config: dict, names: Iterable[str], frame_id: str, namespace: str = 
     for display in _all(displays):
         if display['Class'] in NEEDS_TRANSFORMS:
             display['Enabled'] = display['Value'] = robot_model
+        if 'TF Prefix' in display:
+            display['TF Prefix'] = frame_prefix.rstrip('/')
     return made
 
 

@@ -31,8 +31,9 @@ try:
     from linkage_interfaces.srv import ServoInverse as ServoInverseType
 except ImportError as error:
     raise ImportError(
-        'servo_inverse needs the service type linkage_interfaces/srv/ServoInverse; build it with '
-        '"colcon build" at the root of linkage_ros and source install/setup.bash') from error
+        'servo_inverse needs the service type linkage_interfaces/srv/ServoInverse: run colcon '
+        'build in the workspace, which builds linkage_interfaces too, and source '
+        'install/setup.bash') from error
 
 LEVER = 'lever'
 # An angle beyond this [rad] has lost digits that a servo needs.

@@ -25,8 +25,8 @@ from . import node, scene
 try:
     from .web.server import Server
 except ImportError as error:
-    raise ImportError('viewer needs aiohttp: install python3-aiohttp, or with pip '
-                      "'linkage_ros[viewer]'") from error
+    raise ImportError('viewer needs aiohttp: apt install python3-aiohttp, or pip install '
+                      'aiohttp') from error
 from .web.bridge import Bridge
 from .web.stage import Stage
 

@@ -14,12 +14,18 @@
 
 """Fixtures; message fields are checked, which is off by default."""
 
+import atexit
 import os
 
+from domains import Domain
 import pytest
 
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+# Of whatever a test starts that is not told another.
+_domain = Domain()
+atexit.register(_domain.release)
+os.environ['ROS_DOMAIN_ID'] = str(_domain.id)
 
 
 @pytest.fixture

@@ -21,6 +21,7 @@ import subprocess
 import sys
 import time
 
+from domains import Domain
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
@@ -33,9 +34,6 @@ DEADLINE = 20.0
 PATIENCE = 5.0
 # Between publishing once more what may have been lost because nobody was found yet [s].
 RETRY = 0.1
-# Tests that run side by side keep to domains of their own: even ones, odd ones.
-_worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])
-_domains = (1 + (2 * (7 * os.getpid() + i) + _worker % 2) % 100 for i in itertools.count())
 
 
 class Graph:
@@ -46,11 +44,12 @@ class Graph:
     """
 
     def __init__(self, domain=None):
-        self._domain = domain or next(_domains)
+        self._domain = domain
 
     def __enter__(self):
+        self._own = None if self._domain else Domain()
         self.context = rclpy.Context()
-        rclpy.init(context=self.context, domain_id=self._domain)
+        rclpy.init(context=self.context, domain_id=self._domain or self._own.id)
         self._executor = SingleThreadedExecutor(context=self.context)
         self._nodes = []
         self._stamps = itertools.count(1)
@@ -62,6 +61,8 @@ class Graph:
         for node in self._nodes:
             node.destroy_node()
         rclpy.try_shutdown(context=self.context)
+        if self._own:
+            self._own.release()
 
     def _add(self, node):
         self._nodes.append(node)
@@ -163,7 +164,8 @@ class Process:
     """An executable of this package as users start it, with a parameter file."""
 
     def __init__(self, name, parameter_file, *arguments, domain=None):
-        self.domain = domain or next(_domains)
+        self._domain = None if domain else Domain()
+        self.domain = domain or self._domain.id
         self._process = subprocess.Popen(
             [sys.executable, '-m', f'linkage_ros.{name}', *arguments, '--ros-args',
              '--params-file', str(parameter_file)],
@@ -180,4 +182,6 @@ class Process:
             printed, _ = self._process.communicate(timeout=seconds)
         finally:
             self._process.kill()
+            if self._domain:
+                self._domain.release()
         return self._process.returncode, printed

@@ -236,3 +236,14 @@ def test_the_original_formulas_are_right_where_nothing_is_awkward(kind, theta):
     dimensions = dict(stress.CATALOGUE[kind][0])
     worst = original(kind, dimensions, theta)
     assert all(row.problem != 'NaN' and row.error < 1e-12 for row in worst.values())
+
+
+@pytest.mark.parametrize('kind', ['water_drop', 'jansen', 'peaucellier', 'slotted_lever'])
+def test_the_original_formulas_are_the_same_pose_by_pose_and_in_arrays(kind):
+    dimensions = dict(stress.CATALOGUE[kind][0])
+    pose = original_formulas.one_pose(kind, dimensions)
+    theta = np.linspace(-1.0, 1.0, 50)
+    found = original_formulas.solve(kind, dimensions, theta)
+    # The ground comes first and stands still.
+    rows = np.array([pose(angle) for angle in theta.tolist()])
+    assert np.hstack(list(found.values())[2:]) == pytest.approx(rows, rel=1e-12, abs=1e-12)

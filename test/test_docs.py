@@ -59,6 +59,11 @@ def test_every_link_inside_the_repository_leads_somewhere(page):
             assert not place or target.suffix != '.md' or place in anchors(target), link
 
 
+def test_nobody_is_told_to_install_a_release_that_there_is_not():
+    for file in (*PAGES, *(ROOT / 'linkage_ros').rglob('*.py')):
+        assert not re.search(r"pip3? install[^\n]* '?linkage.ros", file.read_text()), file
+
+
 @pytest.mark.skipif(not shutil.which('git') or not (ROOT / '.git').exists(), reason='no clone')
 def test_no_page_shows_a_picture_that_is_not_kept():
     kept = set(subprocess.run(['git', 'ls-files'], cwd=ROOT, check=True, text=True,

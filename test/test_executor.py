@@ -16,7 +16,6 @@
 
 import itertools
 import math
-import os
 from pathlib import Path
 import signal
 import subprocess
@@ -190,8 +189,7 @@ def python(code):
     """Run code in a Python of its own."""
     return subprocess.run(
         [sys.executable, '-c', textwrap.dedent(code)], cwd=Path(__file__).parents[1],
-        capture_output=True, text=True, timeout=60,
-        env=dict(os.environ, ROS_DOMAIN_ID=str(101 + os.getpid() % 100)))
+        capture_output=True, text=True, timeout=60)
 
 
 def named(name):

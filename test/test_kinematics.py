@@ -473,3 +473,20 @@ def test_a_linkage_of_ones_own_is_shown_like_any_other(graph):
     assert distance(leg, 'AB') == pytest.approx(0.7) and distance(leg, 'QB') == pytest.approx(0.6)
     assert bench.set(rocker__dimensions__g=0.9).successful
     assert distance(bench.legs_at(0.3)[0], 'OQ') == pytest.approx(0.9)
+
+
+def test_what_comes_while_the_node_is_kept_waiting_is_not_lost(graph):
+    # 50 ms of a source at 1000 Hz, and not much more: old angles are of no use to anybody.
+    graph.start(Kinematics, {'mechanisms': ['water_drop']})
+    answers = graph.listen(JointState, 'water_drop/joint_states', 200)
+    crank = graph.crank(['water_drop_crank'])
+    crank([0.0], answers)
+    source = graph.node.create_publisher(JointState, 'crank_states', 200)
+    graph.until(lambda: source.get_subscription_count() == 1)
+    for number in range(1, 81):
+        message = JointState(name=['water_drop_crank'], position=[0.01 * number])
+        message.header.stamp.sec = 1000 + number
+        source.publish(message)
+    graph.until(lambda: answers and answers[-1].header.stamp.sec == 1080)
+    stamps = [message.header.stamp.sec for message in answers if message.header.stamp.sec > 1000]
+    assert stamps == list(range(1031, 1081))

@@ -19,6 +19,7 @@ from importlib.util import find_spec
 from pathlib import Path
 import re
 import runpy
+import sys
 
 from linkage_ros import rviz, scene
 import pytest
@@ -94,27 +95,23 @@ def test_rviz_looks_from_where_the_linkages_are_seen(shown):
 def test_rviz_shows_any_other_scene_too(shown):
     given = scene.load(str(CONFIG / 'all.yaml'))
     assert rviz.adapted(shown, given.machines, given.frame_id) == shown
-    other = rviz.adapted(shown, ['walker', 'jansen'], 'earth', 'left/side', robot_model=True)
+    other = rviz.adapted(shown, ['walker', 'jansen'], 'earth', 'left/side', True, 'left/')
     assert {name for name, *_ in topics(other)} == {
         f'/left/side/{name}/{topic}' for name in ('walker', 'jansen')
         for topic in ('markers', 'locus', 'robot_description')}
     assert other['Visualization Manager']['Global Options']['Fixed Frame'] == 'earth'
     assert all(d['Enabled'] and d['Value'] for d in displays(other))
+    assert [d['TF Prefix'] for d in displays(other) if 'TF Prefix' in d] == ['left', 'left']
     assert rviz.adapted(other, given.machines, given.frame_id)['Panels'] == shown['Panels']
 
 
 @pytest.fixture
 def constants():
-    """Return the launch file's constants, without importing what it imports."""
-    found = {}
-
-    class Filled(ast.NodeTransformer):
-        def visit_Name(self, node):
-            return ast.Constant(found[node.id])
-
-    for line in ast.parse(LAUNCH.read_text()).body:
-        if isinstance(line, ast.Assign):
-            found[line.targets[0].id] = ast.literal_eval(Filled().visit(line.value))
+    """Return the launch file's constants and functions, without importing what it imports."""
+    found = {'re': re}
+    lines = [line for line in ast.parse(LAUNCH.read_text()).body
+             if isinstance(line, (ast.Assign, ast.FunctionDef))]
+    exec(compile(ast.Module(lines, []), LAUNCH, 'exec'), found)
     return found
 
 
@@ -123,6 +120,7 @@ def test_the_launch_file_starts_executables_that_there_are(constants, monkeypatc
 
     handed = {}
     monkeypatch.chdir(ROOT)
+    monkeypatch.setattr(sys, 'argv', ['setup.py', 'install'])
     monkeypatch.setattr(setuptools, 'setup', handed.update)
     runpy.run_path('setup.py')
     installed = [line.split(' = ')[0] for line in handed['entry_points']['console_scripts']]
@@ -134,17 +132,36 @@ def test_the_launch_file_starts_executables_that_there_are(constants, monkeypatc
 
 
 def test_every_argument_of_the_launch_file_is_described(constants):
-    arguments = {name: (default, choices, about)
-                 for name, default, choices, about in constants['ARGUMENTS']}
+    arguments = {name: (default, about) for name, default, about in constants['ARGUMENTS']}
     assert {'scene', 'rviz', 'robot_model', 'viewer', 'namespace'} <= set(arguments)
-    for default, choices, about in arguments.values():
+    for _, about in arguments.values():
         assert about[0].isupper() and about.endswith('.')
-        assert choices is None or default in choices
     assert (CONFIG / f'{arguments["scene"][0]}.yaml').is_file()
     documented = (ROOT / 'docs' / 'viewer.md').read_text()
     assert all(f'`{name}`' in documented for name in arguments)
     viewer = (ROOT / 'linkage_ros' / 'viewer.py').read_text()
     assert re.search(rf'^PORT = {arguments["port"][0]}$', viewer, re.MULTILINE)
+
+
+@pytest.mark.parametrize('text, wanted', [
+    ('true', True), ('True', True), ('TRUE', True), ('1', True), ('yes', True), (' on ', True),
+    ('false', False), ('False', False), ('0', False), ('no', False), ('Off', False)])
+def test_a_switch_is_thrown_by_any_usual_word(constants, text, wanted):
+    assert constants['switched']('viewer', text) is wanted
+
+
+@pytest.mark.parametrize('text', ['', 'maybe', '2', 'truee', 'true false', 'None'])
+def test_another_word_is_refused_with_those_that_are_allowed(constants, text):
+    with pytest.raises(RuntimeError, match='^viewer must be true or false, not '):
+        constants['switched']('viewer', text)
+
+
+def test_a_port_is_a_number_that_ports_have(constants):
+    port = constants['numbered']
+    assert [port('port', text) for text in ('0', '8020', ' 80 ', '65535')] == [0, 8020, 80, 65535]
+    for text in ('abc', '', '-1', '65536', '80.5', '1e3', '0x50', '9' * 5000, '\u0665'):
+        with pytest.raises(RuntimeError, match='^port must be a whole number from 0 to 65535'):
+            port('port', text)
 
 
 @pytest.mark.parametrize('path', sorted(CONFIG.glob('*.yaml')), ids=lambda path: path.stem)
@@ -169,7 +186,7 @@ def started(**arguments):
             entity.execute(context)
         elif isinstance(entity, OpaqueFunction):
             nodes += entity.execute(context)
-    return [node.node_executable for node in nodes]
+    return nodes
 
 
 @needs_launch
@@ -178,14 +195,32 @@ def started(**arguments):
     ({'viewer': 'false', 'scene': 'strandbeest'}, []),
     ({'scene': str(CONFIG / 'all.yaml'), 'robot_model': 'true'},
      4 * ['robot_state_publisher'] + ['viewer']),
-    ({'rviz': 'true', 'namespace': 'left'}, ['rviz2', 'viewer']),
+    ({'scene': 'jansen', 'robot_model': '1', 'viewer': 'no', 'frame_prefix': 'left'},
+     ['robot_state_publisher', 'static_transform_publisher']),
+    ({'rviz': 'True', 'namespace': 'left'}, ['rviz2', 'static_transform_publisher', 'viewer']),
 ])
 def test_the_launch_file_starts_the_nodes_of_a_scene(arguments, besides, monkeypatch, tmp_path):
     monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path))
-    assert started(**arguments) == [*besides, 'crank_driver', 'kinematics', 'servo_inverse']
+    assert [node.node_executable for node in started(**arguments)] == [
+        *besides, 'crank_driver', 'kinematics', 'servo_inverse']
 
 
 @needs_launch
-def test_a_scene_that_there_is_not_is_refused_with_those_there_are():
-    with pytest.raises(RuntimeError, match='must be one of all, jansen, .*, not walker'):
-        started(scene='walker')
+def test_without_aiohttp_the_rest_is_started(monkeypatch):
+    from launch.actions import LogInfo
+
+    monkeypatch.setattr('importlib.util.find_spec', lambda name: None)
+    said, *nodes = started()
+    assert isinstance(said, LogInfo)
+    assert [node.node_executable for node in nodes] == [
+        'crank_driver', 'kinematics', 'servo_inverse']
+
+
+@needs_launch
+def test_what_cannot_be_is_refused_with_what_is_allowed():
+    for name, text, complaint in (
+            ('scene', 'walker', 'must be one of all, jansen, .*, not walker'),
+            ('port', 'abc', "port must be a whole number from 0 to 65535, not 'abc'"),
+            ('viewer', 'maybe', "viewer must be true or false, not 'maybe'")):
+        with pytest.raises(RuntimeError, match=complaint):
+            started(**{name: text})

@@ -19,7 +19,7 @@ import importlib
 import math
 import sys
 
-from linkage_ros import mechanisms
+from linkage_ros import compiler, expression, mechanisms
 from linkage_ros.assembly import Assembly
 import numpy as np
 import pytest
@@ -129,7 +129,7 @@ def test_an_llvmlite_that_is_too_old_is_named(monkeypatch):
 def test_without_llvmlite_only_accelerated_is_missing(monkeypatch):
     monkeypatch.setitem(sys.modules, 'llvmlite', None)
     linkage = mechanisms.create('water_drop')
-    with pytest.raises(ImportError, match=r'needs llvmlite: pip install linkage_ros\[fast\]'):
+    with pytest.raises(ImportError, match=r'needs llvmlite: pip install llvmlite'):
         linkage.accelerated()
     solution = Assembly(linkage).solution(('P',))
     solution.solve([0.3])
@@ -140,3 +140,13 @@ def test_it_is_compiled_once_for_all_mechanisms_of_a_type():
     loops = {id(mechanisms.create('hoeken').accelerated()._ready('points', None)[1]._variant.loop)
              for _ in range(3)}
     assert len(loops) == 1
+
+
+def test_a_chain_of_operations_may_be_as_long_as_one_likes():
+    # Each is used once, so that the code would nest them all, and Python stops at 200 parentheses.
+    end, value = expression.angle(0), 0.3
+    for _ in range(1000):
+        end, value = 1.5 * expression.sine(end) + 0.25, 1.5 * math.sin(value) + 0.25
+    pose = compiler.Program((end,)).bind({}, {})
+    assert pose(0.3) == (value,)
+    assert pose.over(np.full(100, 0.3)).ravel().tolist() == pytest.approx([value] * 100)

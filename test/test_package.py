@@ -15,12 +15,16 @@
 """The package as colcon, pip and a reader of the changelog see it."""
 
 from importlib.metadata import EntryPoint
+import json
+import os
 from pathlib import Path
 import re
 import runpy
 import shutil
 import subprocess
+import sys
 import xml.etree.ElementTree as ElementTree
+import zipfile
 
 import pytest
 import setuptools
@@ -28,14 +32,20 @@ import setuptools
 ROOT = Path(__file__).parents[1]
 
 
+def handed(monkeypatch, *command):
+    """Return what setup.py hands to setup() in a command."""
+    found = {}
+    monkeypatch.chdir(ROOT)
+    monkeypatch.setattr(sys, 'argv', ['setup.py', *command])
+    monkeypatch.setattr(setuptools, 'setup', found.update)
+    runpy.run_path('setup.py')
+    return found
+
+
 @pytest.fixture
 def arguments(monkeypatch):
-    """Return what setup.py hands to setup()."""
-    handed = {}
-    monkeypatch.chdir(ROOT)
-    monkeypatch.setattr(setuptools, 'setup', handed.update)
-    runpy.run_path('setup.py')
-    return handed
+    """Return what setup.py hands to setup() where a ROS workspace is built."""
+    return handed(monkeypatch, 'install')
 
 
 def manifest(folder):
@@ -58,12 +68,81 @@ def test_setup_names_the_package_of_the_manifest(arguments):
     assert all(name.split('.')[0] == 'linkage_ros' for name in arguments['packages'])
 
 
+def test_a_robot_without_a_screen_installs_nothing_to_look_at_it_with():
+    names = {element.text for element in manifest('.').getroot() if 'depend' in element.tag}
+    assert {'rclpy', 'linkage_interfaces', 'python3-numpy'} <= names
+    assert not any(re.search('rviz|matplotlib|aiohttp|tqdm|rqt|ament_(copy|flake|pep|xml)', name)
+                   for name in names)
+
+
 def test_every_executable_can_be_called(arguments):
     pytest.importorskip('rclpy')
     lines = arguments['entry_points']['console_scripts']
     executables = [EntryPoint(*re.split(r'\s*=\s*', line), 'console_scripts') for line in lines]
     assert {'crank_driver', 'kinematics', 'servo_inverse'} <= {e.name for e in executables}
     assert all(callable(e.load()) for e in executables)
+
+
+@pytest.mark.parametrize('command', ['bdist_wheel', 'dist_info', 'editable_wheel'])
+def test_pip_puts_no_command_on_the_path(monkeypatch, command):
+    assert handed(monkeypatch, command)['entry_points'] == {'console_scripts': []}
+
+
+@pytest.fixture
+def copy(tmp_path):
+    """Return a copy of what git keeps, in the sources of a workspace."""
+    if not shutil.which('git') or not (ROOT / '.git').exists():
+        pytest.skip('no clone')
+    files = subprocess.run(['git', 'ls-files', '-co', '--exclude-standard'], cwd=ROOT, check=True,
+                           text=True, capture_output=True).stdout.split()
+    folder = tmp_path / 'src' / 'linkage_ros'
+    for name in files:
+        if (ROOT / name).is_file():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / name, folder / name)
+    return folder
+
+
+@pytest.mark.long
+def test_a_wheel_has_the_library_and_the_page_and_no_commands(copy, tmp_path):
+    subprocess.run([sys.executable, '-m', 'pip', 'wheel', '-q', '--no-build-isolation',
+                    '--no-deps', '-w', tmp_path, copy], check=True, timeout=120)
+    wheel, = tmp_path.glob('*.whl')
+    with zipfile.ZipFile(wheel) as packed:
+        names = packed.namelist()
+    assert 'linkage_ros/mechanisms/jansen.py' in names
+    assert any(name.startswith('linkage_ros/web/page/') for name in names)
+    assert not any(name.endswith('entry_points.txt') or 'scripts/' in name for name in names)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not shutil.which('colcon'), reason='colcon is not installed')
+@pytest.mark.parametrize('layout', ['', '--merge-install', '--symlink-install'])
+def test_the_ordinary_colcon_build_of_a_workspace_is_enough(copy, tmp_path, layout):
+    pytest.importorskip('rclpy')
+    # What building against wheels needs besides.
+    flags = [f'-DCMAKE_PREFIX_PATH={sys.prefix}', f'-DPython3_EXECUTABLE={sys.executable}',
+             f'-DCMAKE_PROJECT_INCLUDE={ROOT}/wheels/prefix.cmake', '-DBUILD_TESTING=OFF']
+    defaults = tmp_path / 'defaults.yaml'
+    defaults.write_text(json.dumps({'build': {'cmake-args': flags}}))
+    clean = {key: value for key, value in os.environ.items()
+             if not key.endswith('PREFIX_PATH') and key != 'PYTHONPATH'}
+    clean['COLCON_DEFAULTS_FILE'] = str(defaults)
+    script = f"""
+        colcon build {layout} >&2 && source install/setup.bash && cd / &&
+        python -c 'from linkage_ros import servo_inverse as node
+print(node.__file__, node.ServoInverseType.__module__)' && echo $AMENT_PREFIX_PATH
+        """
+    ended = subprocess.run(['bash', '-c', script], cwd=tmp_path, env=clean, timeout=300,
+                           text=True, capture_output=True)
+    assert ended.returncode == 0, ended.stderr
+    module, prefixes = ended.stdout.splitlines()
+    assert module.startswith(str(tmp_path))
+    assert module.endswith('linkage_interfaces.srv._servo_inverse')
+    executables = {file.name for prefix in prefixes.split(':')
+                   for file in Path(prefix, 'lib', 'linkage_ros').glob('*')}
+    assert executables == {'crank_driver', 'kinematics', 'render', 'servo_inverse', 'urdf',
+                           'viewer'}
 
 
 @pytest.mark.skipif(not shutil.which('colcon'), reason='colcon is not installed')
@@ -73,3 +152,72 @@ def test_colcon_finds_both_packages_and_their_build_types():
     assert {tuple(line.split('\t')) for line in found.splitlines()} == {
         ('linkage_interfaces', 'linkage_interfaces', '(ros.ament_cmake)'),
         ('linkage_ros', '.', '(ros.ament_python)')}
+
+
+def wrapped(folder, *lines):
+    """Return a Python that is like this one, but for what shell lines do to its arguments."""
+    python = folder / 'python'
+    python.write_text('\n'.join(['#!/bin/bash', *lines, f'exec {sys.executable} "$@"']))
+    python.chmod(0o755)
+    return str(python)
+
+
+OLD = 'case "$*" in *version_info*) exit 1;; -V) echo Python 3.9.18; exit;; esac'
+
+
+@pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
+@pytest.mark.parametrize('target', ['lint', 'docs', 'pictures', 'build', 'demo', 'test', 'bench'])
+def test_each_target_says_in_one_line_that_python_is_too_old(copy, tmp_path, target):
+    python = wrapped(tmp_path, OLD)
+    said = only_line(['make', target, f'PYTHON={python}'], copy, os.environ)
+    assert 'is Python 3.9.18, but a Python from 3.10 to 3.14 is needed' in said
+
+
+def only_line(command, folder, environment):
+    """Return the one line that a command which fails prints, but for make's own."""
+    ended = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True,
+                           timeout=120)
+    assert ended.returncode
+    said, = (line for line in ended.stderr.splitlines() if not line.startswith('make'))
+    return said
+
+
+@pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
+@pytest.mark.parametrize('lines, settings, complaint', [
+    ([], {'PYTHON': 'nowhere'}, 'PYTHON=nowhere is no command'),
+    (['exit 1'], {}, 'is no Python that runs'),
+    (['case "$*" in *ensurepip*) exit 1; esac'], {}, 'lacks venv: install python3-venv'),
+    ([], {'CXX': 'nowhere'}, 'The compiler nowhere is missing: install gcc and g++'),
+    (['case "$*" in *Python.h*) exit 1; esac'], {}, 'lacks its headers: install python3-dev'),
+    pytest.param([], {'PIP_INDEX_URL': 'http://127.0.0.1:9'},
+                 'The Python package index cannot be reached', marks=pytest.mark.long)])
+def test_the_build_says_in_one_line_what_is_missing(copy, tmp_path, lines, settings, complaint):
+    usual = {'PYTHON': wrapped(tmp_path, *lines), 'PATH': os.environ['PATH'],
+             'PIP_CONFIG_FILE': os.devnull, 'PIP_RETRIES': '0'}
+    assert complaint in only_line(['make', 'build'], copy, {**usual, **settings})
+
+
+@pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
+def test_the_build_says_in_one_line_that_there_is_no_python(copy, tmp_path):
+    for command in ('bash', 'env', 'find', 'make'):
+        (tmp_path / command).symlink_to(shutil.which(command))
+    said = only_line(['make', 'build'], copy, {'PATH': str(tmp_path)})
+    assert 'No Python from 3.10 to 3.14 was found' in said
+
+
+@pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
+def test_clean_leaves_what_git_keeps(copy):
+    before = sorted(copy.rglob('*'))
+    for name in ('.venv-lint/bin/x', 'build/x', 'install-jazzy/x', 'log/x', 'demo/out/x',
+                 'pictures/out/x', 'docs/_build/x', 'docs/mechanisms/x', 'benchmark/.cache/x',
+                 '.hypothesis/x', '.pytest_cache/x', '.ruff_cache/x', 'linkage_ros.egg-info/x',
+                 'linkage_ros/web/__pycache__/x', '__pycache__/x'):
+        (copy / name).parent.mkdir(parents=True, exist_ok=True)
+        (copy / name).touch()
+    subprocess.run(['make', 'clean'], cwd=copy, check=True, capture_output=True, timeout=60)
+    assert sorted(copy.rglob('*')) == before
+
+
+def test_pictures_are_drawn_where_git_does_not_look():
+    for line in (ROOT / 'pictures' / 'pictures.txt').read_text().splitlines():
+        assert line == '' or line.startswith('#') or ' --out pictures/out/' in line

@@ -329,6 +329,12 @@ def test_several_cranks_turn_as_fast_as_they_were_told_to():
 
 @pytest.mark.parametrize('args, said', [
     (['nowhere.yaml', '--out', 'a.png'], 'nowhere.yaml: No such file'),
+    (['jansen.yaml', '--out', 'a.png', '--bogus'], 'unrecognized arguments: --bogus'),
+    (['jansen.yaml', 'all.yaml', '--out', 'a.png'], 'unrecognized arguments: all.yaml'),
+    (['foreign.yaml', '--out', 'a.png'], "foreign.yaml must be YAML with '/**:'"),
+    (['date.yaml', '--out', 'a.png'], "date.yaml must be YAML with '/**:'"),
+    (['itself.yaml', '--out', 'a.png'], "itself.yaml must be YAML with '/**:'"),
+    (['.', '--out', 'a.png'], '.: Is a directory'),
     (['jansen.yaml', '--out', 'a.bmp'], '--out must end in .png, .svg, .gif, .mp4, not a.bmp'),
     (['jansen.yaml'], '--out'),
     (['jansen.yaml', '--out', 'no/a.png'], 'there is no folder no'),
@@ -358,6 +364,9 @@ def test_what_cannot_be_is_said_in_one_line_and_no_file_is_left(
     start = '/**: {ros__parameters: {mechanisms: [leg], leg.type: '
     (tmp_path / 'bad.yaml').write_text(start + 'unknown}}')
     (tmp_path / 'still.yaml').write_text(start + 'jansen, leg.crank.speed: 0.0}}')
+    (tmp_path / 'foreign.yaml').write_text('/kinematics: {ros__parameters: {rate: 5.0}}')
+    (tmp_path / 'date.yaml').write_text('a: 2020-13-45')
+    (tmp_path / 'itself.yaml').write_text('/**: {ros__parameters: &a {b: *a}}')
     (tmp_path / 'picture.png').write_bytes(b'\x89PNG\r\n\xff')
     before = set(tmp_path.iterdir())
     assert main([str(scene_file) if scene_file.exists() else args[0], *args[1:]]) == 1

@@ -17,6 +17,8 @@
 import math
 from pathlib import Path
 import re
+import subprocess
+import sys
 from xml.etree import ElementTree
 
 import numpy as np
@@ -26,6 +28,7 @@ pytest.importorskip('rclpy')
 
 from linkage_ros import scene, urdf  # noqa: E402
 from linkage_ros.kinematics import Kinematics  # noqa: E402
+from linkage_ros.print_urdf import main  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from robots import LIBRARIES  # noqa: E402
 from ros_harness import Process  # noqa: E402
@@ -123,3 +126,64 @@ def test_the_command_says_in_one_line_what_is_wrong(tmp_path, arguments, lines, 
     code, printed = Process('print_urdf', file, *arguments).end()
     assert code == 1
     assert complaint in printed and len(printed.splitlines()) == 1
+
+
+NOWHERE, NO_SCENE, FOREIGN = 'nowhere.yaml', 'rate.yaml', 'foreign.yaml'
+FILES = {NO_SCENE: 'rate: 5.0\n', FOREIGN: '/kinematics:\n  ros__parameters:\n    rate: 5.0\n',
+         'date.yaml': 'a: 2020-13-45\n', 'itself.yaml': '/**: {ros__parameters: &a {b: *a}}\n',
+         'deep.yaml': '[' * 5000, 'empty.yaml': '', 'bytes.yaml': '\x00'}
+
+
+@pytest.fixture
+def files(tmp_path, monkeypatch):
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text)
+    monkeypatch.chdir(tmp_path)
+
+
+def test_the_scene_may_be_an_argument(capsys):
+    assert main([str(CATALOGUE), '--mechanism', 'jansen', 'water_drop']) == 0
+    found = scene.load(str(CATALOGUE))
+    machines = [found.machines[name] for name in ('jansen', 'water_drop')]
+    assert capsys.readouterr().out == urdf.describe(machines, found.frame_id) + '\n'
+
+
+def test_arguments_may_follow_those_for_ros(capsys):
+    assert main(['--ros-args', '-p', 'jansen.scale:=0.5', '--', '--mechanism', 'jansen']) == 0
+    assert '<robot name="jansen">' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('name', [NOWHERE, *FILES, '.'])
+@pytest.mark.parametrize('before', [[], ['--ros-args', '--params-file']])
+def test_a_file_that_holds_no_scene_is_named_in_one_line(files, capsys, before, name):
+    assert main([*before, name]) == 1
+    printed = capsys.readouterr()
+    assert printed.out == '' and printed.err.count('\n') == 1
+    assert printed.err.startswith('urdf: ')
+    assert name in printed.err or "must have '/**:'" in printed.err
+
+
+@pytest.mark.parametrize('arguments, complaint', [
+    (['--scene', 'a.yaml'], 'unrecognized arguments: --scene'),
+    ([str(CATALOGUE), 'b.yaml'], 'unrecognized arguments: b.yaml'),
+    ([str(CATALOGUE), '--mechanism', 'leg'], "there is no mechanism 'leg'; allowed: water_drop, "),
+    ([str(CATALOGUE), '--ros-args', '-p', 'rate:=1.0'], 'not with both'),
+    (['--ros-args', '--bogus'], '--bogus'),
+    (['--ros-args', '-p', 'x'], "'-p x'"),
+    (['--ros-args', '--params-file'], 'No file path provided'),
+    (['--ros-args', '-p', 'rate:=1.0', '--', '--bogus'], 'unrecognized arguments: --bogus'),
+])
+def test_what_is_not_understood_is_refused_in_one_line(capsys, arguments, complaint):
+    assert main(arguments) == 1
+    printed = capsys.readouterr()
+    assert printed.out == '' and printed.err.count('\n') == 1 and complaint in printed.err
+
+
+def test_a_scene_is_described_without_ros():
+    code = ('import sys; sys.modules["rclpy"] = None; '
+            'from linkage_ros.print_urdf import main; sys.exit(main(sys.argv[1:]))')
+    for arguments, ended in (([str(CATALOGUE)], 0), (['--ros-args'], 1)):
+        process = subprocess.run([sys.executable, '-c', code, *arguments], capture_output=True,
+                                 text=True, timeout=60, cwd=Path(__file__).parents[1])
+        assert process.returncode == ended, process.stderr
+        assert ended == 0 or process.stderr.startswith('urdf: rclpy is not installed: ')

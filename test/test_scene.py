@@ -412,3 +412,17 @@ def test_joint_rates_are_the_slopes_of_joint_angles():
               - solved(assembly, 0.7 - step, (), joints)) / (2.0 * step)
     rates = solved(assembly, 0.7, (), joints, joints)[:, len(joints):]
     assert rates == pytest.approx(slopes, abs=1e-7)
+
+
+def test_an_end_of_the_reach_is_within_it_any_turn_and_nothing_beyond_is():
+    legs = Assembly(mechanisms.create('jansen', m=30.0), 3, True)
+    assert legs.is_limited
+    # What wrapping rounds is some 1e-15 rad; what a leg is asked for is not.
+    for turn in (-math.tau, 0.0, math.tau):
+        for i, leg in enumerate(legs.legs):
+            for low, high in legs.reach:
+                for end, outwards in ((low, -1.0), (high, 1.0)):
+                    crank = leg.lag + leg.side * (end - leg.start) + turn
+                    beyond = leg.side * outwards * 2e-12
+                    assert legs.within_reach(crank)[i]
+                    assert not legs.within_reach(crank + beyond)[i]

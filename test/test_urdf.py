@@ -20,7 +20,7 @@ from xml.etree import ElementTree
 
 from linkage_ros import mechanisms, scene, urdf
 from linkage_ros.assembly import Assembly
-from linkage_ros.travel import crank_reach
+from linkage_ros.travel import crank_reach, travels
 import numpy as np
 import pytest
 from robots import LIBRARIES, Yourdfpy
@@ -234,3 +234,18 @@ def test_names_that_meet_are_refused():
                            'leg.leg_pairs': 2, 'leg_left0.type': 'jansen'}).machines
     with pytest.raises(scene.SceneError, match='two joints leg_left0_O_fixed'):
         urdf.describe(machines.values(), 'world')
+
+
+@pytest.mark.parametrize('kind', ['four_bar', 'slider_crank'])
+def test_a_limit_leaves_a_millionth_to_spare(kind):
+    linkage = mechanisms.create(kind)
+    found = travels(linkage, linkage.reach())
+    angles = linkage.joint_angles(np.linspace(-math.pi, math.pi, 200_001))
+    bounded = [name for name in found if found[name]]
+    assert bounded
+    for name in bounded:
+        link, = (link for link in linkage.links if link.name == name)
+        spare = 1e-6 * (linkage.longest if link.kind == 'prismatic' else 1.0)
+        low, high = found[name]
+        assert angles[name].min() - low == pytest.approx(spare, rel=0.01)
+        assert high - angles[name].max() == pytest.approx(spare, rel=0.01)

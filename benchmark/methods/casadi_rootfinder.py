@@ -43,22 +43,32 @@ class RootFinder(Follower):
         outputs = ca.vertcat(*(part for name in self._points for part in places[name]))
         left = ca.vertcat(*self._equations.residuals(unknowns, at))
         equations = ca.Function('equations', [x, pin], [left, outputs])
-        self._solve = ca.rootfinder('pose', self._plugin, equations)
+        # casadi's own way round the cost of its matrices: memory that both sides know.
+        self._buffer, self._solve = ca.rootfinder('pose', self._plugin, equations).buffer()
+        self._x, self._found, self._pin, self._row = (
+            np.zeros(size) for size in (count, count, 2, 2 * len(self._points)))
+        self._buffer.set_arg(0, memoryview(self._x))
+        self._buffer.set_arg(1, memoryview(self._pin))
+        self._buffer.set_res(0, memoryview(self._found))
+        self._buffer.set_res(1, memoryview(self._row))
 
     def start(self, theta, pose):
         """Take a pose as the one before."""
-        self._before = ca.DM([part for name in self._equations.unknown
-                              for part in (pose[name].real, pose[name].imag)])
+        self._x[:] = [part for name in self._equations.unknown
+                      for part in (pose[name].real, pose[name].imag)]
 
     def solve_one(self, theta):
         """Return one row of points."""
-        self._before, outputs = self._solve(self._before, self._equations.pin(theta))
-        return outputs
+        self._pin[:] = self._equations.pin(theta)
+        self._solve()
+        if self._buffer.ret():
+            raise ArithmeticError('no convergence')
+        self._x[:] = self._found
+        return self._row.tolist()
 
     def poses(self, answer):
         """Name the columns."""
-        answers = answer if isinstance(answer, list) else [answer]
-        return columns(self._points, [np.array(row).ravel() for row in answers])
+        return columns(self._points, answer)
 
 
 METHODS = [RootFinder('newton'), RootFinder('fast_newton')]

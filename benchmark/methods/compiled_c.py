@@ -25,6 +25,9 @@ import numpy as np
 
 from .method import columns, Method
 
+if not shutil.which('gcc'):
+    raise ImportError('gcc is not installed')
+
 SOURCE = Path(__file__).with_name('linkages.c')
 POINTS = {
     'water_drop': ('A', 'B', 'P'),
@@ -56,22 +59,28 @@ class CompiledC(Method):
         self._at = self._lengths.ctypes.data
         self._angle = ctypes.c_double()
         self._row = (ctypes.c_double * self._width)()
+        self._angle_at = ctypes.addressof(self._angle)
+        self._row_at = ctypes.addressof(self._row)
 
     def solve(self, theta):
         """Return rows of points."""
         out = np.empty((theta.size, self._width))
-        self._function(self._at, theta.ctypes.data, theta.size, out.ctypes.data)
+        self._function(self._at, _address(theta), theta.size, _address(out))
         return out
 
     def solve_one(self, theta):
         """Return one row of points as floats."""
         self._angle.value = theta
-        self._function(self._at, ctypes.byref(self._angle), 1, self._row)
+        self._function(self._at, self._angle_at, 1, self._row_at)
         return self._row[:]
 
     def poses(self, answer):
         """Name the columns."""
         return columns(self._points, answer)
+
+
+def _address(array):
+    return array.__array_interface__['data'][0]
 
 
 _built = {}

@@ -73,6 +73,7 @@ class Optimization(Follower):
             0.0, 0.0, self._q[self._places[0]]).evaluator()
         self._near = self._ik.prog().AddQuadraticErrorCost(
             np.eye(len(self._q)), np.zeros(len(self._q)), self._q).evaluator()
+        self._program, self._twice = self._ik.prog(), 2 * np.eye(len(self._q))
         self._solver, self._options = SnoptSolver(), SolverOptions()
         for option in ('Major feasibility tolerance', 'Major optimality tolerance'):
             self._options.SetOption(SnoptSolver.id(), option, self._tolerance)
@@ -102,8 +103,8 @@ class Optimization(Follower):
         self._crank.set_bounds([crank], [crank])
         self._before[self._places[0]] = crank
         before = self._before
-        self._near.UpdateCoefficients(2 * np.eye(before.size), -2 * before, before @ before)
-        result = self._solver.Solve(self._ik.prog(), self._before, self._options)
+        self._near.UpdateCoefficients(self._twice, -2 * before, before @ before)
+        result = self._solver.Solve(self._program, self._before, self._options)
         if not result.is_success():
             raise ArithmeticError(str(result.get_solution_result()))
         self._before = result.GetSolution(self._q)

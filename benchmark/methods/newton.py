@@ -23,72 +23,68 @@ import math
 
 import numpy as np
 
-from .method import Follower, Method
+from .method import columns, Follower, Method
 from .. import problems
 from ..assembly import assembly, Dyad, Ray, Rigid
 
 STORED = 72
 
 
-class Chain:
-    """The steps of an assembly with Newton in place of square roots, on floats or arrays."""
+def chain(kind, dimensions, iterations):
+    """
+    Return a function of cosine, sine and a guess that returns x and y of each point in turn.
 
-    def __init__(self, kind, dimensions, iterations):
-        self._assembly = assembly(kind, dimensions)
-        self._ground = {n: (z.real, z.imag) for n, z in self._assembly.ground.items()}
-        self._steps = [_MAKERS[type(step)](iterations, *step) for step in self._assembly.steps]
-
-    def solve(self, cosine, sine, guess):
-        """Return {point: (x, y)} from a guess of the same form."""
-        found = {**self._ground, 'A': self._assembly.pin(cosine, sine)}
-        for place in self._steps:
-            place(found, guess)
-        return found
-
-
-def _dyad(iterations, name, first, second, p, q, _):
-    p_square, q_square, turns = p * p, q * q, range(iterations)
-
-    def place(found, guess):
-        (px, py), (qx, qy), (x, y) = found[first], found[second], guess[name]
-        for _ in turns:
-            ax, ay, bx, by = x - px, y - py, x - qx, y - qy
-            f = ax * ax + ay * ay - p_square
-            g = bx * bx + by * by - q_square
-            twice = 2 * (ax * by - ay * bx)
-            x, y = x + (ay * g - by * f) / twice, y + (bx * f - ax * g) / twice
-        found[name] = x, y
-    return place
+    It is straight-line code for floats or arrays: Newton, where the exact way takes roots.
+    """
+    plan = assembly(kind, dimensions)
+    at = {name: (repr(z.real), repr(z.imag)) for name, z in plan.ground.items()}
+    at.update({name: (f'{name}_x', f'{name}_y') for name in plan.points})
+    everything = ', '.join(', '.join(at[name]) for name in problems.POINTS[kind])
+    across, up = f'{plan.crank!r} * cosine', f'{plan.crank!r} * sine'
+    lines = [f'{everything} = guess',
+             'A_x, A_y = ' + (f'-{up}, {across}' if plan.upright else f'{across}, {up}')]
+    for step in plan.steps:
+        lines += _WRITERS[type(step)](at, iterations, *step)
+    made = {}
+    exec('\n    '.join(['def solve(cosine, sine, guess):', *lines, f'return {everything}']), made)
+    return made['solve']
 
 
-def _rigid(_, name, base, end, factor):
+def _dyad(at, iterations, name, first, second, p, q, _):
+    (x, y), (px, py), (qx, qy) = at[name], at[first], at[second]
+    return iterations * [
+        f'ax, ay, bx, by = {x} - {px}, {y} - {py}, {x} - {qx}, {y} - {qy}',
+        f'f = ax * ax + ay * ay - {p * p!r}',
+        f'g = bx * bx + by * by - {q * q!r}',
+        'half = 0.5 / (ax * by - ay * bx)',
+        f'{x} += (ay * g - by * f) * half',
+        f'{y} += (bx * f - ax * g) * half']
+
+
+def _rigid(at, _, name, base, end, factor):
+    (x, y), (px, py), (qx, qy) = at[name], at[base], at[end]
     u, v = factor.real, factor.imag
-
-    def place(found, guess):
-        (px, py), (qx, qy) = found[base], found[end]
-        x, y = qx - px, qy - py
-        found[name] = px + x * u - y * v, py + x * v + y * u
-    return place
+    return [f'ax, ay = {qx} - {px}, {qy} - {py}',
+            f'{x}, {y} = {px} + ax * {u!r} - ay * {v!r}, {py} + ax * {v!r} + ay * {u!r}']
 
 
-def _ray(iterations, name, pivot, pin, length):
+def _ray(at, iterations, name, pivot, pin, length):
     """Place the tip: along the slot, and at its distance from the pivot."""
-    square, turns = length * length, range(iterations)
-
-    def place(found, guess):
-        (px, py), (qx, qy), (x, y) = found[pivot], found[pin], guess[name]
-        wx, wy = qx - px, qy - py
-        for _ in turns:
-            ax, ay = x - px, y - py
-            f = wx * ay - wy * ax
-            g = 0.5 * (ax * ax + ay * ay - square)
-            area = wx * ax + wy * ay
-            x, y = x + (ay * f - wx * g) / area, y - (ax * f + wy * g) / area
-        found[name] = x, y
-    return place
+    (x, y), (px, py), (qx, qy) = at[name], at[pivot], at[pin]
+    return [f'wx, wy = {qx} - {px}, {qy} - {py}', *iterations * [
+        f'ax, ay = {x} - {px}, {y} - {py}',
+        'f = wx * ay - wy * ax',
+        f'g = 0.5 * (ax * ax + ay * ay - {length * length!r})',
+        'area = wx * ax + wy * ay',
+        f'{x} += (ay * f - wx * g) / area',
+        f'{y} -= (ax * f + wy * g) / area']]
 
 
-_MAKERS = {Dyad: _dyad, Rigid: _rigid, Ray: _ray}
+_WRITERS = {Dyad: _dyad, Rigid: _rigid, Ray: _ray}
+
+
+def _flat(pose, points):
+    return tuple(part for name in points for part in (pose[name].real, pose[name].imag))
 
 
 class StoredPoses(Method):
@@ -102,32 +98,29 @@ class StoredPoses(Method):
 
     def prepare(self, kind, dimensions):
         """Store the true poses in the middle of equal arcs."""
-        self._chain = Chain(kind, dimensions, self._iterations)
+        self._solve = chain(kind, dimensions, self._iterations)
         self._points = problems.POINTS[kind]
         self._start = -problems.REACH[kind]
         self._arc = 2 * problems.REACH[kind] / STORED
         middle = self._start + (np.arange(STORED) + 0.5) * self._arc
-        poses = [problems.pose(kind, angle) for angle in middle.tolist()]
-        self._single = [{n: (z.real, z.imag) for n, z in pose.items()} for pose in poses]
-        self._table = {name: np.array([(p[name].real, p[name].imag) for p in poses]).T
-                       for name in self._points}
+        self._stored = [_flat(problems.pose(kind, angle), self._points)
+                        for angle in middle.tolist()]
+        self._table = np.array(self._stored).T
 
     def solve(self, theta):
-        """Return {point: (x, y)}."""
-        with np.errstate(all='ignore'):
-            turned = np.mod(theta - self._start, 2 * math.pi)
-            index = np.minimum((turned / self._arc).astype(int), STORED - 1)
-            guess = {name: (x[index], y[index]) for name, (x, y) in self._table.items()}
-            return self._chain.solve(np.cos(theta), np.sin(theta), guess)
+        """Return the columns."""
+        turned = np.mod(theta - self._start, 2 * math.pi)
+        index = np.minimum((turned / self._arc).astype(int), STORED - 1)
+        return self._solve(np.cos(theta), np.sin(theta), self._table.take(index, axis=1))
 
     def solve_one(self, theta):
-        """Return {point: (x, y)}, floats."""
-        index = min(int((theta - self._start) % (2 * math.pi) / self._arc), STORED - 1)
-        return self._chain.solve(math.cos(theta), math.sin(theta), self._single[index])
+        """Return one row of points."""
+        index = min(int((theta - self._start) % math.tau / self._arc), STORED - 1)
+        return self._solve(math.cos(theta), math.sin(theta), self._stored[index])
 
     def poses(self, answer):
-        """Stack x and y."""
-        return {name: np.stack(answer[name], -1).reshape(-1, 2) for name in self._points}
+        """Name the columns."""
+        return columns(self._points, np.stack(answer, -1))
 
 
 class PoseBefore(Follower):
@@ -140,25 +133,24 @@ class PoseBefore(Follower):
         self.knob = f'{iterations} iteration' + 's' * (iterations > 1)
 
     def prepare(self, kind, dimensions):
-        """Set up the chain."""
-        self._chain = Chain(kind, dimensions, self._iterations)
+        """Write the chain."""
+        self._solve = chain(kind, dimensions, self._iterations)
         self._points = problems.POINTS[kind]
 
     def start(self, theta, pose):
         """Take a pose as the one before."""
-        self._before = {name: (z.real, z.imag) for name, z in pose.items()}
+        self._before = _flat(pose, self._points)
 
     def solve_one(self, theta):
-        """Return {point: (x, y)}, floats."""
-        found = self._chain.solve(math.cos(theta), math.sin(theta), self._before)
-        if math.isfinite(sum(map(sum, found.values()))):
+        """Return one row of points."""
+        found = self._solve(math.cos(theta), math.sin(theta), self._before)
+        if math.isfinite(sum(found)):
             self._before = found
         return found
 
     def poses(self, answer):
-        """Stack x and y."""
-        answers = answer if isinstance(answer, list) else [answer]
-        return {name: np.array([found[name] for found in answers]) for name in self._points}
+        """Name the columns."""
+        return columns(self._points, answer)
 
 
 METHODS = [StoredPoses(n) for n in (1, 2, 3, 4, 5)] + [PoseBefore(n) for n in (1, 2, 3)]

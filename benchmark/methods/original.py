@@ -12,41 +12,44 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The formulas of the original documents in numpy, in double and in single precision."""
+"""The formulas of the original documents: by `math` for one pose, by numpy for many."""
 
 import numpy as np
 
-from .method import Method
+from .method import columns, Method
 from .. import original_formulas, problems
 
 
 class Original(Method):
-    """One precision; single poses go through arrays of one element, as numpy users have them."""
+    """Double precision."""
 
     name = 'original formulas'
-    kind = 'peer'
-
-    def __init__(self, precision):
-        self._precision = precision
-        self.knob = precision.__name__
+    knob = 'float64'
+    precision = np.float64
 
     def prepare(self, kind, dimensions):
-        """Keep the dimensions."""
+        """Keep the dimensions, and what they alone decide."""
         self._kind, self._dimensions = kind, dimensions
         self._points = problems.POINTS[kind]
+        self.solve_one = original_formulas.one_pose(kind, dimensions)
 
     def solve(self, theta):
         """Return {point: array (n, 2)}."""
-        return original_formulas.solve(self._kind, self._dimensions,
-                                       theta.astype(self._precision))
-
-    def solve_one(self, theta):
-        """Return {point: array (2,)}."""
-        return original_formulas.solve(self._kind, self._dimensions, self._precision(theta))
+        return original_formulas.solve(self._kind, self._dimensions, theta.astype(self.precision))
 
     def poses(self, answer):
-        """Leave the ground out."""
-        return {name: answer[name].reshape(-1, 2) for name in self._points}
+        """Name the floats, and leave the ground out of arrays."""
+        if isinstance(answer, tuple):
+            return columns(self._points, answer)
+        return {name: answer[name] for name in self._points}
 
 
-METHODS = [Original(np.float64), Original(np.float32)]
+class Single(Original):
+    """Single precision, for arrays: Python's floats have another."""
+
+    knob = 'float32'
+    precision = np.float32
+    batches = Method.batches[1:]
+
+
+METHODS = [Original(), Single()]

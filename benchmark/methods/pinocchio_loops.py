@@ -77,8 +77,7 @@ class Loops(Follower):
             for one, other in self._loops:
                 gaps.append((data.oMf[one].translation - data.oMf[other].translation)[:2])
                 slopes.append((self._slope(one) - self._slope(other))[:2, 1:])
-            move = np.linalg.lstsq(np.concatenate(slopes), np.concatenate(gaps), rcond=None)[0]
-            q[1:] -= move
+            q[1:] -= _solved(np.concatenate(slopes), np.concatenate(gaps))
         pin.framesForwardKinematics(model, data, q)
         if np.isfinite(q).all():
             self._q = q
@@ -91,6 +90,14 @@ class Loops(Follower):
     def poses(self, answer):
         """Name the columns."""
         return columns(self._points, answer)
+
+
+def _solved(slopes, gaps):
+    """Solve a square system; at a dead point, where it is singular, as well as can be."""
+    try:
+        return np.linalg.solve(slopes, gaps)
+    except np.linalg.LinAlgError:
+        return np.linalg.lstsq(slopes, gaps, rcond=None)[0]
 
 
 def _shift(place):

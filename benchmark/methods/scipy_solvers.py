@@ -18,6 +18,7 @@ import math
 
 import numpy as np
 from scipy.optimize import fsolve, least_squares
+import sympy as sp
 
 from .method import columns, Follower
 from .. import problems
@@ -70,23 +71,26 @@ class Equations:
                 left.append((x - u) * (q - v) - (y - v) * (p - u))
         return left
 
-    def slopes(self, unknowns, pin):
-        """
-        Return the Jacobian of the residuals, by complex steps: exact, as these are polynomials.
-
-        Left to themselves the solvers take differences over a share of each unknown, which is all
-        rounding where a coordinate is close to zero.
-        """
-        slopes = []
-        for index in range(len(unknowns)):
-            moved = [complex(part) for part in unknowns]
-            moved[index] += 1e-30j
-            slopes.append([1e30 * left.imag for left in self.residuals(moved, pin)])
-        return np.array(slopes).T
-
     def pin(self, theta):
         """Return the crank pin at a crank angle."""
         return self._assembly.pin(math.cos(theta), math.sin(theta))
+
+
+def compiled(equations):
+    """
+    Return functions (unknowns, pin) of the residuals and of their exact Jacobian.
+
+    sympy writes them out. Left to themselves the solvers take differences over a share of each
+    unknown, which is all rounding where a coordinate is close to zero.
+    """
+    unknowns = sp.symbols(f'u:{2 * len(equations.unknown)}')
+    pin = sp.symbols('x y')
+    left = sp.Matrix(equations.residuals(unknowns, pin))
+    residuals, slopes = (sp.lambdify((unknowns, pin), written, 'math', cse=True)
+                         for written in (list(left), left.jacobian(unknowns).tolist()))
+    # On Python's floats: numpy's scalars would take several times as long.
+    return (lambda guess, pin: residuals(guess.tolist(), pin),
+            lambda guess, pin: slopes(guess.tolist(), pin))
 
 
 class Scipy(Follower):
@@ -100,6 +104,7 @@ class Scipy(Follower):
     def prepare(self, kind, dimensions):
         """Set the equations up."""
         self._equations = Equations(kind, dimensions)
+        self._left, self._slopes = compiled(self._equations)
         self._points = problems.POINTS[kind]
 
     def start(self, theta, pose):
@@ -110,7 +115,7 @@ class Scipy(Follower):
     def solve_one(self, theta):
         """Return {point: (x, y)}."""
         pin = self._equations.pin(theta)
-        found = self._solver(self._equations, self._before, pin)
+        found = self._solver(self._left, self._slopes, self._before, pin)
         self._before = found.tolist()
         return self._equations.places(self._before, pin)
 
@@ -121,10 +126,9 @@ class Scipy(Follower):
 
 
 def _fsolve(tolerance):
-    def solve(equations, guess, pin):
+    def solve(left, slopes, guess, pin):
         found, info, flag, message = fsolve(
-            equations.residuals, guess, (pin,), fprime=equations.slopes, xtol=tolerance,
-            full_output=True)
+            left, guess, (pin,), fprime=slopes, xtol=tolerance, full_output=True)
         # Where there is no further progress, the last digits may well have been reached.
         size = np.abs(found).max()
         if flag != 1 and np.abs(info['fvec']).max() > CLOSED * size * size:
@@ -134,9 +138,10 @@ def _fsolve(tolerance):
 
 
 def _least_squares(tolerance):
-    def solve(equations, guess, pin):
-        found = least_squares(equations.residuals, guess, equations.slopes, args=(pin,),
-                              xtol=tolerance, ftol=tolerance, gtol=tolerance)
+    def solve(left, slopes, guess, pin):
+        # MINPACK's own method has by far the least to do beside the equations.
+        found = least_squares(left, guess, slopes, args=(pin,), method='lm', xtol=tolerance,
+                              ftol=tolerance, gtol=tolerance)
         if not found.success:
             raise ArithmeticError(found.message)
         return found.x

@@ -39,21 +39,16 @@ class Lambdified(Method):
         self._points = linkage.points
         theta = sp.Symbol('theta', real=True)
         outputs = [part for name in self._points for part in _places(linkage, theta)[name]]
-        self._single = sp.lambdify(theta, outputs, 'math', cse=True)
+        self.solve_one = sp.lambdify(theta, outputs, 'math', cse=True)
         self._batch = sp.lambdify(theta, outputs, 'numpy', cse=True)
 
     def solve(self, theta):
-        """Return the columns."""
-        with np.errstate(all='ignore'):
-            return np.stack(self._batch(theta), -1)
-
-    def solve_one(self, theta):
-        """Return one row of points."""
-        return self._single(theta)
+        """Return the columns, as the generated code does."""
+        return self._batch(theta)
 
     def poses(self, answer):
         """Name the columns."""
-        return columns(self._points, answer)
+        return columns(self._points, np.stack(np.broadcast_arrays(*answer), -1))
 
 
 def _places(linkage, theta):

@@ -57,8 +57,12 @@ class Table(Method):
         turned = np.mod(theta - self._start, 2 * math.pi)
         index = np.minimum((turned / self._step).astype(int), self._nodes - 1)
         t = (turned - index * self._step)[:, None]
-        c = self._cubics[index]
-        rows = ((c[:, 0] * t + c[:, 1]) * t + c[:, 2]) * t + c[:, 3]
+        c = self._cubics.take(index, axis=0)
+        rows = c[:, 0] * t
+        for power in (1, 2):
+            rows += c[:, power]
+            rows *= t
+        rows += c[:, 3]
         if self._reach < 2 * math.pi:
             rows[turned > self._reach] = np.nan
         return rows

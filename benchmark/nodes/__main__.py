@@ -36,6 +36,10 @@ from types import SimpleNamespace
 
 from . import report
 
+sys.path.insert(0, str(Path(__file__).parents[2] / 'test'))
+
+from domains import Domain  # noqa: E402
+
 ROS = [SimpleNamespace(package=name) for name in ('ros-rclpy', 'ros-rmw-fastrtps-cpp')]
 DOCUMENT = Path(__file__).parents[2] / 'docs' / 'performance.md'
 BEGIN, END = '<!-- measured -->', '<!-- end of what is measured -->'
@@ -46,7 +50,8 @@ def main():
     """Run, write and print."""
     # The processes find each other here and nobody else.
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
+    domain = Domain()
+    os.environ.setdefault('ROS_DOMAIN_ID', str(domain.id))
     os.environ['PYTHONPATH'] = os.pathsep.join(
         [str(Path(__file__).parents[2]), os.environ.get('PYTHONPATH', '')])
     options = arguments()

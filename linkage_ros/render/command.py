@@ -18,10 +18,10 @@ import argparse
 import math
 from pathlib import Path
 import shutil
-import sys
 
 from . import parts
 from .. import scene
+from ..command import chosen, Parser, RequestError, run
 
 STILL, MOVING = ('.png', '.svg'), ('.gif', '.mp4')
 FPS, FASTEST_GIF, FASTEST = 25.0, 50.0, 240.0
@@ -36,87 +36,51 @@ examples:
   render config/slotted_lever.yaml --out lever.svg --angle 40 --data joints.csv
 """
 
-
-class RenderError(Exception):
-    """What is wrong with a request, in one sentence."""
-
-
-class Parser(argparse.ArgumentParser):
-    """A parser whose errors are one sentence."""
-
-    def error(self, message):
-        """Raise RenderError."""
-        raise RenderError(message)
+NEEDS = ('pip install matplotlib pyyaml tqdm, or apt install python3-matplotlib python3-tqdm '
+         'python3-yaml')
 
 
 def main(args=None) -> int:
     """Draw what the command line asks for; return the exit code."""
-    try:
-        asked = parsed(args)
-        draw(asked, chosen(asked))
-    except (RenderError, scene.SceneError) as error:
-        return failed(error)
-    except ImportError as error:
-        return failed(f'{error.name} is not installed: pip install linkage_ros[render], or '
-                      'apt install python3-matplotlib python3-tqdm python3-yaml')
-    except OSError as error:
-        return failed(f'{error.filename}: {error.strerror}' if error.filename else error)
-    except KeyboardInterrupt:
-        return failed('interrupted')
-    return 0
+    return run('render', _draw, args, NEEDS)
 
 
-def failed(why) -> int:
-    """Say why there is no picture; return the exit code."""
-    print(f'render: {why}', file=sys.stderr)
-    return 1
+def _draw(args):
+    asked = parsed(args)
+    draw(asked, chosen(scene.load(asked.scene).machines, asked.mechanisms))
 
 
 def parsed(args):
-    """Return what the command line asks for; raise RenderError if it cannot be."""
+    """Return what the command line asks for; raise RequestError if it cannot be."""
     asked = parser().parse_args(args)
     ending = asked.out.suffix.lower()
     if ending not in STILL + MOVING:
-        raise RenderError(f'--out must end in {", ".join(STILL + MOVING)}, not {asked.out}')
+        raise RequestError(f'--out must end in {", ".join(STILL + MOVING)}, not {asked.out}')
     asked.moving = ending in MOVING
     for option in ('angle',) if asked.moving else ('turns', 'fps', 'frames', 'loop', 'colours'):
         if getattr(asked, option) is not None:
             allowed = ' and '.join(STILL if asked.moving else MOVING)
-            raise RenderError(f'--{option} is for {allowed} only, not for {ending}')
+            raise RequestError(f'--{option} is for {allowed} only, not for {ending}')
     if ending == '.mp4':
         check_mp4(asked)
     if ending == '.gif' and (asked.fps or FPS) > FASTEST_GIF:
-        raise RenderError(f'--fps must be at most {FASTEST_GIF:g} for .gif, not {asked.fps:g}')
+        raise RequestError(f'--fps must be at most {FASTEST_GIF:g} for .gif, not {asked.fps:g}')
     for file in filter(None, (asked.out, asked.data)):
         if not file.absolute().parent.is_dir():
-            raise RenderError(f'{file} cannot be written: there is no folder {file.parent}')
+            raise RequestError(f'{file} cannot be written: there is no folder {file.parent}')
     return asked
 
 
 def check_mp4(asked):
-    """Raise RenderError if there can be no MP4."""
+    """Raise RequestError if there can be no MP4."""
     for option in ('loop', 'colours'):
         if getattr(asked, option) is not None:
-            raise RenderError(f'--{option} is for .gif only, not for .mp4')
+            raise RequestError(f'--{option} is for .gif only, not for .mp4')
     if any(side % 2 for side in asked.size):
-        raise RenderError('--size must be two even numbers for .mp4')
+        raise RequestError('--size must be two even numbers for .mp4')
     if not shutil.which('ffmpeg'):
-        raise RenderError('ffmpeg, which writes .mp4, is not installed: apt install ffmpeg, or '
-                          'choose .gif')
-
-
-def chosen(asked):
-    """Return the machines to draw; raise SceneError or RenderError if there are none such."""
-    try:
-        machines = scene.load(asked.scene).machines
-    except UnicodeDecodeError:
-        raise RenderError(f'{asked.scene} is no text file') from None
-    names = asked.mechanisms or list(machines)
-    for name in names:
-        if name not in machines:
-            raise RenderError(f'{asked.scene} has no mechanism {name}; '
-                              f'allowed: {", ".join(machines)}')
-    return [machines[name] for name in names]
+        raise RequestError('ffmpeg, which writes .mp4, is not installed: apt install ffmpeg, or '
+                           'choose .gif')
 
 
 def draw(asked, machines):
@@ -132,7 +96,7 @@ def draw(asked, machines):
         try:
             picture.arrange(times)
         except PictureError as error:
-            raise RenderError(error) from None
+            raise RequestError(error) from None
         write(asked, picture, times)
 
 
@@ -164,12 +128,12 @@ def moments(asked, picture):
         crank = first.cycle.first
         return [0.0 if asked.angle is None else crank.turns_to(math.radians(asked.angle))]
     if not math.isfinite(picture.period):
-        raise RenderError(f'{first.machine.name}.crank.speed is 0: nothing moves')
+        raise RequestError(f'{first.machine.name}.crank.speed is 0: nothing moves')
     turns = asked.turns or 1.0
     frames = asked.frames or max(round(turns * picture.period * (asked.fps or FPS)), 1)
     if frames > MOST_FRAMES:
-        raise RenderError(f'this takes {frames} frames, more than {MOST_FRAMES}: choose --frames, '
-                          '--turns or --fps')
+        raise RequestError(f'this takes {frames} frames, more than {MOST_FRAMES}: choose '
+                           '--frames, --turns or --fps')
     return [turns * k / frames for k in range(frames)]
 
 
@@ -184,7 +148,7 @@ def parser() -> Parser:
     made.add_argument('--data', metavar='FILE', type=Path,
                       help='write what is drawn as CSV too: time [s], crank angles [rad] and '
                       'joints [m], every digit')
-    made.add_argument('--mechanisms', metavar='NAME,...', type=words,
+    made.add_argument('--mechanisms', metavar='NAME,...', type=words, default=[],
                       help='draw only these of the scene')
     made.add_argument('--trace', choices=parts.TRACES, default='whole',
                       help="the traced joint's curve: whole (default), growing in the first turn, "

@@ -1,0 +1,71 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the commands that are no nodes share: whatever is wrong is one sentence."""
+
+import argparse
+import sys
+
+from .scene import SceneError
+
+
+class RequestError(Exception):
+    """What is wrong with a request, in one sentence."""
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors are one sentence."""
+
+    def error(self, message):
+        """Raise RequestError."""
+        raise RequestError(message)
+
+
+def run(name, work, args, needs) -> int:
+    """
+    Do what a command line asks for; return the exit code.
+
+    Parameters
+    ----------
+    name : str
+        The command.
+    work : callable
+        Takes the arguments; raises RequestError, SceneError, OSError or ImportError if it cannot.
+    args : list of str
+        The arguments; None: those of this process.
+    needs : str
+        How to install what may not be installed.
+
+    """
+    try:
+        work(args)
+        return 0
+    except (RequestError, SceneError) as error:
+        why = error
+    except ImportError as error:
+        why = f'{(error.name or "").split(".")[0]} is not installed: {needs}'
+    except OSError as error:
+        why = f'{error.filename}: {error.strerror}' if error.filename else error
+    except KeyboardInterrupt:
+        why = 'interrupted'
+    print(f'{name}: {" ".join(str(why).split())}', file=sys.stderr)
+    return 1
+
+
+def chosen(machines, names):
+    """Return the machines that are named, or all; raise RequestError for one that is not there."""
+    for name in names:
+        if name not in machines:
+            raise RequestError(f'there is no mechanism {name!r}; allowed: {", ".join(machines)}')
+    return [machines[name] for name in names or machines]

@@ -1,0 +1,44 @@
+#!/usr/bin/env bash
+# Makes a virtual environment of requirement files, or says in one sentence what is missing.
+#
+#   about='what it is' wheels/install.sh [--to-compile] PYTHON FOLDER REQUIREMENTS...
+
+to_compile=
+if [ "$1" = --to-compile ]; then to_compile=yes; shift; fi
+python=$1 folder=$2
+shift 2
+log=$folder/pip.log
+export PIP_RETRIES=${PIP_RETRIES-2}
+
+stop() { echo "$*" >&2; exit 1; }
+holds() { "$python" -c "import sys, sysconfig, os.path; sys.exit(not ($1))" 2>/dev/null; }
+
+range='Python from 3.10 to 3.14'
+[ -n "$python" ] || stop "No $range was found: install one, or name it with PYTHON=."
+command -v "$python" >/dev/null || stop "PYTHON=$python is no command: name a $range."
+holds True || stop "PYTHON=$python is no Python that runs: name a $range."
+holds '(3, 10) <= sys.version_info < (3, 15)' \
+  || stop "$python is $("$python" -V 2>&1), but a $range is needed: name one with PYTHON=."
+"$python" -c 'import ensurepip, venv' 2>/dev/null \
+  || stop "$python lacks venv: install python3-venv, or name another with PYTHON=."
+if [ "$to_compile" ]; then
+  holds 'os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' \
+    || stop "$python lacks its headers: install python3-dev, or name another with PYTHON=."
+  for compiler in "${CC:-cc}" "${CXX:-c++}"; do
+    command -v ${compiler%% *} >/dev/null \
+      || stop "The compiler $compiler is missing: install gcc and g++."
+  done
+fi
+
+echo "Installing $about"
+mkdir -p "$folder"
+"$folder/bin/python" -m pip --version >/dev/null 2>&1 \
+  || "$python" -m venv "$folder" >"$log" 2>&1 \
+  || stop "The virtual environment $folder cannot be made: $(tail -n 1 "$log")"
+for file; do files+=(-r "$file"); done
+"$folder/bin/python" -m pip install -q "${files[@]}" >"$log" 2>&1 && exit
+if grep -qiE 'connection (broken|refused|reset)|new connection|name resolution|timed out|proxy' \
+    "$log"; then
+  stop "The Python package index cannot be reached: is there a network? (All of it: $log)"
+fi
+stop "pip cannot install what is in $*: $(grep -m 1 ERROR "$log") (All of it: $log)"
