@@ -38,6 +38,8 @@ import numpy as np
 
 RULE = 4.0
 GRAZE = 32.0
+# Where an arm has no length exactly, its direction is that of an angle 2^-NUDGE further on.
+NUDGE = 150
 with gmpy2.context(gmpy2.get_context(), precision=320):
     STEP = mpfr(2) ** -100
 
@@ -145,8 +147,8 @@ class Measure:
         """Return the `Truth` at crank angles."""
         thetas = [mpfr(theta) for theta in thetas]
         now = self._drawn(self._nominal, thetas)
-        if not all(now.arms.values()):
-            thetas = [theta + mpfr(2) ** -200 for theta in thetas]
+        if self._undirected(now):
+            thetas = [theta + mpfr(2) ** -NUDGE for theta in thetas]
             now = self._drawn(self._nominal, thetas)
         values = self._values(now, self._nominal, thetas, {}, {}, rates)
         closures = {**now.gaps}
@@ -165,7 +167,13 @@ class Measure:
             if all(abs(gap) > 100 * slack[name] for name, gap in closures.items()):
                 break  # far from a limit both sides are alike
         states = {name: _state(gap, slack[name]) for name, gap in closures.items()}
+        states.update(dict.fromkeys(self._undirected(now), 'slips'))
         return Truth(values, [float(x) for x in spread], states)
+
+    def _undirected(self, drawn):
+        """Return the joints that are hung on an arm of no length."""
+        least = self.linkage.longest / mpfr(2) ** (NUDGE + 40)
+        return [name for name, arm in drawn.arms.items() if arm < least]
 
     def _drawn(self, given, thetas, moved=None):
         return draw(DIGITS, self.linkage, given.rows, thetas, self._way, given.turns, moved)
@@ -241,7 +249,8 @@ class Measure:
     def due(self, output, states):
         """Tell what is due: 'number', 'nan', 'either', or 'any' next to a limit that is missed."""
         joints = [part for part in output.parts if isinstance(part, str)]
-        needs = {states[name] for joint in joints for name in self.linkage.closures[joint]}
+        needs = {states[name] for joint in joints for name in self.linkage.closures[joint]
+                 if name in states}
         if needs <= {'meets'}:
             return 'number'
         if 'fails' in needs:

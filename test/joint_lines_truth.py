@@ -372,7 +372,7 @@ class Linkage:
     def _stand(self):
         """Note the joints and the closures that each joint stands on, itself among them."""
         self.stands, self.closures = {}, {}
-        closed = ('dyad', 'inversor', 'slot', 'slider')
+        closed = ('dyad', 'inversor', 'slot', 'slider', 'mirror')
         for line in self.lines:
             below = set().union(*(self.stands[name] for name in line.joints), line.joints)
             needs = set().union(*(self.closures[name] for name in line.joints))
@@ -601,6 +601,8 @@ def draw(do, linkage, rows, thetas, way=None, turns=None, moved=None):
         for each in line.names:
             if each in moved:
                 points[each] = points[each] + moved[each]
+                if word == 'slider':
+                    slides[name] = ((points[each] - at[1]) * row[1].conjugate()).real
     return Drawing(points, gaps, slides, folds, arms)
 
 
