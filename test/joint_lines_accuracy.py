@@ -18,8 +18,8 @@ The measure of accuracy for linkages of the user's own, whose joints hang on eac
 A result is measured in units of its *sensitivity*: what moving each thing that is rounded by half
 an ulp does to the true result. Rounded are the inputs (crank angles, dimensions, numbers in the
 lines, what is calculated from them), and each joint on the way but ground joints and crank pins:
-half an ulp of the largest coordinate on its line. For velocities and rates also the velocity of
-each joint on the way. The rule is
+half an ulp of the largest coordinate on its line; a gap so small that it counts as a change point
+may be closed. For velocities and rates also the velocity of each joint on the way. The rule is
 
     error <= 4 x sensitivity + 1 ulp of the result,
 
@@ -135,7 +135,8 @@ class Measure:
                      for name, number in linkage.dimensions.items() if number]
             found += [linkage.values(literal={text: side * half_ulp(float(text))})
                       for text in linkage.literals()]
-            for i, k, slack in linkage.roundings():
+            passed = [(i, 0, passing.gap) for i, passing in self._way.items() if passing.gap]
+            for i, k, slack in [*linkage.roundings(), *passed]:
                 numbers = list(linkage.numbers)
                 numbers[i] = (*numbers[i][:k], numbers[i][k] + side * slack, *numbers[i][k + 1:])
                 found.append(numbers)
@@ -147,7 +148,8 @@ class Measure:
         """Return the `Truth` at crank angles."""
         thetas = [mpfr(theta) for theta in thetas]
         now = self._drawn(self._nominal, thetas)
-        if self._undirected(now):
+        grazed = self._undirected(now)
+        if grazed:
             thetas = [theta + mpfr(2) ** -NUDGE for theta in thetas]
             now = self._drawn(self._nominal, thetas)
         values = self._values(now, self._nominal, thetas, {}, {}, rates)
@@ -167,7 +169,8 @@ class Measure:
             if all(abs(gap) > 100 * slack[name] for name, gap in closures.items()):
                 break  # far from a limit both sides are alike
         states = {name: _state(gap, slack[name]) for name, gap in closures.items()}
-        states.update(dict.fromkeys(self._undirected(now), 'slips'))
+        states.update((name, 'grazes') for name in grazed if states.get(name) != 'fails')
+        states.update((name, 'slips') for name in self._undirected(now))
         return Truth(values, [float(x) for x in spread], states)
 
     def _undirected(self, drawn):

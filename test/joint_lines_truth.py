@@ -260,11 +260,16 @@ def literals(text):
 # --- drawing ------------------------------------------------------------------------------------
 
 class Passing(NamedTuple):
-    """How a dyad or block on a crank pin passes its change points, if it has any."""
+    """
+    How a dyad or block on a crank pin passes its change points, if it has any.
+
+    The gap is how much longer its first bar must be to have the change point exactly.
+    """
 
     stretched: bool = False
     folded: bool = False
     side: int = 1
+    gap: mpfr = 0
 
 
 class Drawing(NamedTuple):
@@ -477,8 +482,7 @@ class Linkage:
             m = self.numbers[self.lines.index(crank)][0]
             b, c = self.numbers[i]
             size = b + c + ground + m
-            stretched = _vanishes(ground + m - b - c, size)
-            folded = _vanishes(abs(ground - m) - abs(b - c), size)
+            gaps = ground + m - b - c, abs(ground - m) - abs(b - c)
             turn = self._turn(self.numbers, line)
             unsure = abs(gmpy2.sin(turn + gmpy2.const_pi() / 2)) < ROUNDING
         elif line.word == 'slider' and line.joints[0] in self.cranks:
@@ -490,17 +494,18 @@ class Linkage:
                     - self._fixed(self.numbers, line.joints[1]))
             height = (away * line_of.conjugate()).imag
             size = rod + abs(away) + m
-            stretched = _vanishes(rod + height - m, size)
-            folded = _vanishes(rod - height - m, size)
+            gaps = rod + height - m, rod - height - m
             turn = self._turn_on_line(crank, line_of)
             unsure = gmpy2.const_pi() - abs(turn) < ROUNDING
         else:
             return []
+        stretched, folded = (_vanishes(gap, size) for gap in gaps)
         if stretched == folded == [False]:
             return []
         sides = [1, -1] if unsure else [1]
-        return [Passing(s, f, side) for s in stretched for f in folded
-                for side in (sides if s or f else [1])]
+        return [Passing(s, f, side, max(abs(gap) for gap, passed in zip(gaps, (s, f)) if passed)
+                        if s or f else mpfr(0))
+                for s in stretched for f in folded for side in (sides if s or f else [1])]
 
     def _turn(self, numbers, line):
         """Return the angle of the crank's zero from the ground line, foot to centre."""
