@@ -164,6 +164,10 @@ class Measure:
                     one_side[i] += self._distance(i, old, new)
                 for name, gap in closures.items():
                     one_slack[name] += abs(drawn.gaps[name] - gap)
+            for moved in self._displaced(now.points, self._pinned, side):
+                drawn = self._drawn(self._nominal, thetas, moved)
+                for name, gap in closures.items():
+                    one_slack[name] += abs(drawn.gaps[name] - gap)
             spread = [max(pair) for pair in zip(spread, one_side)]
             slack = {name: max(slack[name], one_slack[name]) for name in slack}
             if all(abs(gap) > 100 * slack[name] for name, gap in closures.items()):
@@ -189,17 +193,22 @@ class Measure:
             if theta:
                 step = side * half_ulp(min(abs(float(theta)), math.pi))
                 yield (self._nominal, [*thetas[:i], theta + step, *thetas[i + 1:]], {}, {})
-        for name in self.linkage.placed:
-            size = self._largest(now.points, name)
-            if name not in self._pinned and size:
-                for step in (mpc(half_ulp(size)), mpc(0, half_ulp(size))):
-                    yield self._nominal, thetas, {name: side * step}, {}
+        hung = [name for name in self.linkage.placed if name not in self._pinned]
+        for moved in self._displaced(now.points, hung, side):
+            yield self._nominal, thetas, moved, {}
         for crank, speed in enumerate(speeds):
-            for name in self.linkage.placed:
-                size = self._largest(speed, name)
-                if name not in self.linkage.fixed and size:
-                    for step in (mpc(half_ulp(size)), mpc(0, half_ulp(size))):
-                        yield self._nominal, thetas, {}, {(name, crank): side * step}
+            turning = [name for name in self.linkage.placed if name not in self.linkage.fixed]
+            for moved in self._displaced(speed, turning, side):
+                yield (self._nominal, thetas, {},
+                       {(name, crank): step for name, step in moved.items()})
+
+    def _displaced(self, places, names, side):
+        """Yield joints, each with what half an ulp adds to its x or y."""
+        for name in names:
+            size = self._largest(places, name)
+            if size:
+                yield {name: mpc(side * half_ulp(size))}
+                yield {name: mpc(0, side * half_ulp(size))}
 
     def _largest(self, places, name):
         """Return the largest coordinate of a joint and of those that its line hangs it on."""

@@ -447,6 +447,20 @@ class Linkage:
             rows.append(row)
         return rows
 
+    @precisely
+    def in_floats(self, way):
+        """Return rows and turns for `FLOATS`, lengths in units of the longest, and that unit."""
+        unit, rows = self.longest, []
+        for line, row in zip(self.lines, self.prepared(self.numbers)):
+            if line.word in ('rigid', 'line'):
+                rows.append((complex(row[0]),))
+            elif line.word == 'slider':
+                rows.append((float(row[0] / unit), complex(row[1]), float(row[2])))
+            else:
+                rows.append(tuple(float(number / unit) for number in row))
+        turns = {i: float(turn) for i, turn in self.turns(self.numbers, way).items()}
+        return rows, turns, float(unit)
+
     # --- change points ---
 
     def arm_of_crank(self, line):
@@ -537,13 +551,17 @@ def _vanishes(gap, size):
 
 
 def meet(do, p, radius_p, q, radius_q, side):
-    """Return where two circles meet, on a side of p -> q, and how far they are from touching."""
+    """
+    Return where two circles meet, on a side of p -> q, and how far they are from touching.
+
+    That is the squared sine of the angle at which they meet; where they do not it is negative.
+    """
     arm = q - p
     across = arm.real * arm.real + arm.imag * arm.imag
-    along = do.divided(across + (radius_p * radius_p - radius_q * radius_q), 2 * across)
-    gap = do.divided(radius_p * radius_p, across) - along * along
-    height = side * do.root(gap)
-    return p + (arm * along + _turned(do, arm) * height), gap
+    along = (across + (radius_p * radius_p - radius_q * radius_q)) / 2
+    square = radius_p * radius_p * across - along * along
+    meeting = arm * along + _turned(do, arm) * (side * do.root(square))
+    return p + do.divided(meeting, across), square / (radius_p * radius_q) ** 2
 
 
 def _turned(do, vector):
@@ -619,8 +637,7 @@ def _slot(do, pivot, pin, row, side):
     slide = side * do.root(square - offset * offset)
     lean = do.direction(do.point(0, 1) * offset + slide)
     lever = do.divided(radius, abs(radius)) * do.turned(-lean)
-    gap = do.divided(square - offset * offset, square)
-    return pivot + lever * length, gap, slide, abs(radius)
+    return pivot + lever * length, square - offset * offset, slide, abs(radius)
 
 
 def _changes(do, count):
