@@ -24,6 +24,7 @@ A change point is passed as the language says in words: the side changes each ti
 passes the angle at which the dyad is stretched or folded, counted from a quarter turn.
 """
 
+import functools
 import math
 import re
 from typing import NamedTuple
@@ -45,6 +46,7 @@ _SIDES = {'left': 1, 'right': -1, 'out': 1, 'in': -1}
 
 def precisely(function):
     """Let a function compute with many digits."""
+    @functools.wraps(function)
     def in_digits(*args, **kwargs):
         with gmpy2.context(gmpy2.get_context(), precision=BITS):
             return function(*args, **kwargs)

@@ -53,15 +53,15 @@ class Subject:
         self.cranks = len(self.mechanism.cranks)
         self.held = tuple(float(x) for x in rng.uniform(-3.0, 3.0, self.cranks - 1))
         self.poses = accuracy.outputs(self.linkage, self.mechanism.links)
-        self.ways = self.linkage.passings()
         self.theta = np.linspace(-math.pi, math.pi, samples, endpoint=False) + 1e-3
+        self.ways = sorted(self.linkage.passings(), key=self._misfit)
 
     def __str__(self):
         held = f' others={self.held}' if self.held else ''
         return f'{self.design}{held}'
 
     def fitted(self, thetas, rates=False):
-        """Measure all answers; remember which way past the change points fits them."""
+        """Measure all answers, on the way past the change points that fits them best."""
         found = accuracy.answers(self.mechanism, thetas, self.poses, rates)
         best = None
         for way in self.ways:
@@ -69,12 +69,21 @@ class Subject:
             rows = accuracy.judge(measure, thetas, found, rates)
             count = sum(bool(row.problem) for row in rows)
             if best is None or count < best[0]:
-                best = count, rows, measure, way
+                best = count, rows
             if not count:
                 break
-        if best[0] == 0 and self.ways[0] is not best[3]:
-            self.ways = [best[3], *(way for way in self.ways if way is not best[3])]
         return best[1]
+
+    def _misfit(self, way):
+        """Return at how many angles the mechanism does not go this way past its change points."""
+        theta = self.rng.uniform(-math.pi, math.pi, (60, self.cranks))
+        rows, turns, unit = self.linkage.in_floats(way)
+        with np.errstate(all='ignore'):
+            points = draw(FLOATS, self.linkage, rows, list(theta.T), way, turns).points
+        found, count = self.mechanism.solve(_given(theta, (60,))), 0
+        for name, place in found.items():
+            count += np.sum(np.abs(place @ (1, 1j) / unit - points[name]) > 1e-6)
+        return count
 
     @property
     def two_turns(self):
