@@ -175,7 +175,7 @@ class Measure:
         states = {name: _state(gap, slack[name]) for name, gap in closures.items()}
         states.update((name, 'grazes') for name in grazed if states.get(name) != 'fails')
         states.update((name, 'slips') for name in self._undirected(now))
-        return Truth(values, [float(x) for x in spread], states)
+        return Truth(values, [float(x) for x in spread], states, closures, slack)
 
     def _undirected(self, drawn):
         """Return the joints that are hung on an arm of no length."""
@@ -271,11 +271,17 @@ class Measure:
 
 
 class Truth(NamedTuple):
-    """True outputs, poses first, what half an ulp does to them, and the state of closures."""
+    """
+    True outputs, poses first, and what half an ulp does to them; the same of the closures' gaps.
+
+    The state of a closure is 'meets', 'grazes', 'slips' or 'fails'.
+    """
 
     values: list
     sensitivity: list
     states: dict
+    gaps: dict
+    slack: dict
 
 
 def _state(gap, slack):

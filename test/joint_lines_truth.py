@@ -436,7 +436,7 @@ class Linkage:
     def prepared(self, numbers):
         """Return the numbers of every line, those of templates turned into what is laid on."""
         rows = []
-        for i, (line, row) in enumerate(zip(self.lines, numbers)):
+        for line, row in zip(self.lines, numbers):
             if line.word in ('rigid', 'line'):
                 base = self.base(numbers, *line.joints)
                 if line.word == 'line':

@@ -401,8 +401,9 @@ def _touching(subject, k, lo, hi):
     middle = 0.5 * (lo + hi)
     if abs(_closure(subject, k, middle)[0]) > 1e-13:
         return None
-    exact = subject.measure().at([float(middle), *subject.held]).states.values()
-    return float(middle) if set(exact) & {'grazes', 'slips'} else None
+    truth = subject.measure().at([float(middle), *subject.held])
+    touches = any(abs(truth.gaps[name]) <= truth.slack[name] for name in truth.gaps)
+    return float(middle) if touches else None
 
 
 def _on_reach(subject, theta):
@@ -435,9 +436,10 @@ def _asked_back(subject, output, drawing, unit, held):
     scale = 1.0 if turns else unit
     value = subject.place(output, drawing, unit) * np.ones(subject.theta.shape)
     good = held & np.isfinite(value)
-    spread = np.ptp(np.unwrap(value[good]) if turns else value[good]) / scale if good.any() else 0.0
-    wanted = ([float(value[i]) for i in rng.choice(np.flatnonzero(good), 2)] if good.any()
-              else [0.1 * scale])
+    wanted, spread = [0.1 * scale], 0.0
+    if good.any():
+        wanted = [float(value[i]) for i in rng.choice(np.flatnonzero(good), 2)]
+        spread = np.ptp(np.unwrap(value[good]) if turns else value[good]) / scale
     for limit, target in zip((FIRST, FURTHER), wanted):
         start = time.process_time()
         try:
