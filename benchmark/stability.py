@@ -22,7 +22,12 @@ NaN given exactly where nothing can be assembled (all samples, in float64); how 
 in units of the input's own uncertainty (a part of them, against multiprecision, on the catalogue's
 dimensions and on random and degenerate ones); is the reach what brute force finds. The formulas of
 the original documents go through the same check. The measure and the hard cases are those of
-the tests: test/accuracy.py, test/stress.py. Exits with 1 if the library breaks a rule.
+the tests: test/accuracy.py, test/stress.py.
+
+A fourth is asked of random linkages of every word: does all that test/linkage_checks.py checks
+hold, poses, velocities, reach, dead points and inverse among it, and how large is the error where
+joints hang on each other in chains (test/joint_lines_accuracy.py). Exits with 1 if the library
+breaks a rule.
 """
 
 import argparse
@@ -41,7 +46,9 @@ sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
 
 import accuracy  # noqa: E402
 import brute_force  # noqa: E402
+import linkage_checks  # noqa: E402
 from linkage_ros import mechanisms  # noqa: E402
+import random_linkages  # noqa: E402
 import reference  # noqa: E402
 import stress  # noqa: E402
 
@@ -52,6 +59,8 @@ from benchmark import original_formulas  # noqa: E402
 # costs more than the others, so that it is asked less often.
 EXACT, RATES, LEG = 25, 4, 4
 CHUNK = 50
+# Random linkages of a task, and how many of them also run in machine code, which is slow to make.
+LINKAGES, ACCELERATED = 20, 2
 UNIT = 2.0 ** -53
 
 
@@ -59,6 +68,8 @@ def main(args=None):
     """Run all tasks on all cores, print the tables and write them as JSON."""
     options = parse(args)
     tasks = [task for kind in options.mechanisms for task in plan(kind, options)]
+    tasks += [('linkages', options.grid, (options.seed, 5, i), LINKAGES, False)
+              for i in range(options.linkages // LINKAGES)]
     with multiprocessing.get_context('spawn').Pool(options.jobs) as pool:
         done = list(tqdm(pool.imap_unordered(run, tasks), total=len(tasks), unit='chunk'))
     report = {
@@ -67,12 +78,14 @@ def main(args=None):
         'accuracy': accuracy_table([result for name, result in done if name == 'accuracy']),
         'closure': closure_table([result for name, result in done if name == 'closure']),
         'reach': reach_table([result for name, result in done if name == 'reach']),
+        'linkages': linkages_table([result for name, result in done if name == 'linkages']),
     }
     options.output.parent.mkdir(parents=True, exist_ok=True)
     options.output.write_text(json.dumps(report, indent=1) + '\n')
     show(report)
     return int(any(row['broken'] for row in report['accuracy'] if row['method'] == 'library')
-               or any(row['wrong'] for row in report['closure'] + report['reach']))
+               or any(row['wrong'] for row in report['closure'] + report['reach'])
+               or bool(report['linkages']['problems']))
 
 
 def parse(args):
@@ -80,7 +93,10 @@ def parse(args):
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('--samples', type=int, default=100_000, help='angles a mechanism')
     parser.add_argument('--designs', type=int, default=10_000, help='reaches a mechanism')
-    parser.add_argument('--mechanisms', nargs='+', default=list(stress.CATALOGUE),
+    parser.add_argument('--linkages', type=int, default=10_000, help='random linkages')
+    parser.add_argument('--grid', type=int, default=8000,
+                        help='angles at which a random linkage is searched by brute force')
+    parser.add_argument('--mechanisms', nargs='*', default=list(stress.CATALOGUE),
                         choices=list(stress.CATALOGUE))
     parser.add_argument('--jobs', type=int, default=2)
     parser.add_argument('--seed', type=int, default=1)
@@ -176,8 +192,27 @@ def reach(kind, rng, count, _):
     return 'reach', (kind, count, full, partial, wrong)
 
 
+def linkages(grid, rng, count, _):
+    """Check random linkages of every word; returns counts, ratios by output, and problems."""
+    made, ratios, found = 0, {}, []
+    for i in range(count):
+        design = random_linkages.design(rng)
+        checks = linkage_checks.CHECKS
+        if i < ACCELERATED:
+            checks = *checks, linkage_checks.accelerated
+        told = linkage_checks.problems(design, rng, checks, grid)
+        if told:
+            made += 1
+            found += [tuple(problem) for problem in told[0]]
+            for row in told[1]:
+                output = row.output.what + (' rate' if row.output.crank is not None else '')
+                if row.sensitivity and math.isfinite(row.ratio):
+                    ratios.setdefault(output, []).append(row.ratio)
+    return 'linkages', (count, made, ratios, found)
+
+
 TASKS = {'closure': closure, 'catalogue': catalogue, 'random': random, 'servo': servo,
-         'reach': reach}
+         'reach': reach, 'linkages': linkages}
 
 
 def measured(mechanism, rng, count, rates, label):
@@ -275,6 +310,25 @@ def reach_table(results):
             for kind, rows in grouped(results)]
 
 
+def linkages_table(results):
+    """Return counts of random linkages, a row an output, and a row a kind of problem."""
+    ratios, problems = {}, {}
+    for _, _, by_output, found in results:
+        for output, values in by_output.items():
+            ratios.setdefault(output, []).extend(values)
+        for kind, text in found:
+            problems.setdefault(kind, []).append(text)
+    return {
+        'designs': sum(result[0] for result in results),
+        'linkages': sum(result[1] for result in results),
+        'outputs': [{'output': output, 'samples': len(values), 'max': float(np.max(values)),
+                     'p99.9': float(np.quantile(values, 0.999)),
+                     'median': float(np.median(values))}
+                    for output, values in sorted(ratios.items())],
+        'problems': [{'kind': kind, 'count': len(texts), 'examples': texts[:3]}
+                     for kind, texts in sorted(problems.items(), key=lambda item: -len(item[1]))]}
+
+
 def grouped(results):
     """Return results by their first entry, the mechanism."""
     groups = {}
@@ -308,6 +362,14 @@ def show(report):
               f'{row["partial"]} partial  {row["wrong"]} disagreements')
         for example in row['examples']:
             print(' ' * 14, *example)
+    table = report['linkages']
+    print(f'\n{table["linkages"]} random linkages of {table["designs"]} designs: '
+          'error / sensitivity (rule: <= 4, after 1 ulp of the result)')
+    for row in table['outputs']:
+        print(f'{row["output"]:14}{row["samples"]:8}{row["max"]:9.2g}{row["p99.9"]:9.2g}'
+              f'{row["median"]:9.2g}')
+    for row in table['problems']:
+        print(f'{row["count"]} x {row["kind"]}: {row["examples"][0]}')
 
 
 if __name__ == '__main__':

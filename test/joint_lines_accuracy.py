@@ -1,0 +1,360 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The measure of accuracy for linkages of the user's own, whose joints hang on each other in chains.
+
+A result is measured in units of its *sensitivity*: what moving each thing that is rounded by half
+an ulp does to the true result. Rounded are the inputs (crank angles, dimensions, numbers in the
+lines, what is calculated from them), and each joint on the way but ground joints and crank pins:
+half an ulp of the largest coordinate on its line; a gap so small that it counts as a change point
+may be closed. For velocities and rates also the velocity of each joint on the way. The rule is
+
+    error <= 4 x sensitivity + 1 ulp of the result,
+
+with a number wherever everything that the joint stands on can be assembled and NaN wherever it
+cannot; within `GRAZE` sensitivities of a limit either will do. Angles are compared modulo a turn,
+so that their ulp is that of pi.
+"""
+
+import math
+from typing import NamedTuple
+
+import gmpy2
+from gmpy2 import mpc, mpfr
+from joint_lines_truth import DIGITS, draw, half_ulp, Linkage, precisely
+import numpy as np
+
+RULE = 4.0
+GRAZE = 32.0
+# Where an arm has no length exactly, its direction is that of an angle 2^-NUDGE further on.
+NUDGE = 150
+with gmpy2.context(gmpy2.get_context(), precision=320):
+    STEP = mpfr(2) ** -100
+
+
+class Output(NamedTuple):
+    """
+    One thing that a mechanism answers, and the joints that it stands on.
+
+    `what` is 'point', 'angle' or 'slide'; `parts` are the joints of the bar (and of its parent's
+    bar, and the quarter turns of the zero) or the joint whose line has the slide. `crank` is the
+    number of the crank by which it is differentiated, None for a pose.
+    """
+
+    what: str
+    name: str
+    parts: tuple
+    crank: object = None
+
+    def __str__(self):
+        rate = '' if self.crank is None else f' by crank {self.crank}'
+        return f'{self.what} {self.name}{rate}'
+
+
+class Row(NamedTuple):
+    """One output at one pose: `problem` is '', 'NaN', 'missed NaN' or 'rule'."""
+
+    output: Output
+    thetas: tuple
+    problem: str
+    ratio: float
+    error: float
+    sensitivity: float
+    result: object
+    value: object
+
+
+def outputs(linkage, links):
+    """Return all outputs of a pose, given a mechanism's links."""
+    found = [Output('point', name, (name,)) for name in linkage.placed]
+    by_name = {link.name: link for link in links}
+    slides = iter(line.names[0] for line in linkage.lines if line.word in ('slot', 'slider'))
+    for link in links:
+        if link.kind == 'prismatic':
+            found.append(Output('slide', link.name, (next(slides),)))
+        else:
+            parent = by_name.get(link.parent)
+            quarters = round(link.zero / (math.pi / 2))
+            found.append(Output('angle', link.name, (
+                link.joint, link.tip, *((parent.joint, parent.tip) if parent else ()),
+                quarters)))
+    return found
+
+
+def answers(mechanism, thetas, poses, rates):
+    """Return {output: array} of a mechanism at crank angles, shape (n, cranks)."""
+    given = thetas.T if len(mechanism.cranks) > 1 else thetas[:, 0]
+    points, angles = mechanism.solve(given), mechanism.joint_angles(given)
+    found = {out: (points if out.what == 'point' else angles)[out.name] for out in poses}
+    for crank in range(len(mechanism.cranks) if rates else 0):
+        points = mechanism.velocity(given, crank=crank)
+        angles = mechanism.joint_rates(given, crank=crank)
+        found.update((out._replace(crank=crank),
+                      (points if out.what == 'point' else angles)[out.name]) for out in poses)
+    return found
+
+
+class _Moved(NamedTuple):
+    """The numbers of a linkage, one of which is moved, and where its change points are."""
+
+    rows: list
+    turns: dict
+
+
+class Measure:
+    """The truth of a linkage, one way past its change points, and what rounding does to it."""
+
+    @precisely
+    def __init__(self, linkage: Linkage, poses, way=None):
+        self.linkage, self.poses, self._way = linkage, poses, way or {}
+        self._nominal = self._given(linkage.numbers)
+        self._moved = {}
+        self._pinned = linkage.fixed | set(linkage.cranks)
+        self._lines = {name: line for line in linkage.lines for name in line.names}
+
+    def _given(self, numbers):
+        return _Moved(self.linkage.prepared(numbers), self.linkage.turns(numbers, self._way))
+
+    def _sides(self, side):
+        """Return the linkage with each of its numbers moved to one side."""
+        if side not in self._moved:
+            linkage = self.linkage
+            found = [linkage.values({name: side * half_ulp(number)})
+                     for name, number in linkage.dimensions.items() if number]
+            found += [linkage.values(literal={text: side * half_ulp(float(text))})
+                      for text in linkage.literals()]
+            passed = [(i, 0, passing.gap) for i, passing in self._way.items() if passing.gap]
+            for i, k, slack in [*linkage.roundings(), *passed]:
+                numbers = list(linkage.numbers)
+                numbers[i] = (*numbers[i][:k], numbers[i][k] + side * slack, *numbers[i][k + 1:])
+                found.append(numbers)
+            self._moved[side] = [self._given(numbers) for numbers in found]
+        return self._moved[side]
+
+    @precisely
+    def at(self, thetas, rates=False):
+        """Return the `Truth` at crank angles."""
+        thetas = [mpfr(theta) for theta in thetas]
+        now = self._drawn(self._nominal, thetas)
+        grazed = self._undirected(now)
+        if grazed:
+            thetas = [theta + mpfr(2) ** -NUDGE for theta in thetas]
+            now = self._drawn(self._nominal, thetas)
+        values = self._values(now, self._nominal, thetas, {}, {}, rates)
+        closures = {**now.gaps}
+        spread, slack = [mpfr(0)] * len(values), dict.fromkeys(closures, mpfr(0))
+        speeds = self._speeds(thetas) if rates else []
+        for side in (1, -1):
+            one_side, one_slack = [mpfr(0)] * len(values), dict.fromkeys(closures, mpfr(0))
+            for moved in self._moves(now, thetas, speeds, side):
+                drawn = self._drawn(*moved[:3])
+                for i, (old, new) in enumerate(zip(values, self._values(drawn, *moved, rates))):
+                    one_side[i] += self._distance(i, old, new)
+                for name, gap in closures.items():
+                    one_slack[name] += abs(drawn.gaps[name] - gap)
+            for moved in self._displaced(now.points, self._pinned, side):
+                drawn = self._drawn(self._nominal, thetas, moved)
+                for name, gap in closures.items():
+                    one_slack[name] += abs(drawn.gaps[name] - gap)
+            spread = [max(pair) for pair in zip(spread, one_side)]
+            slack = {name: max(slack[name], one_slack[name]) for name in slack}
+            if all(abs(gap) > 100 * slack[name] for name, gap in closures.items()):
+                break  # far from a limit both sides are alike
+        states = {name: _state(gap, slack[name]) for name, gap in closures.items()}
+        states.update((name, 'grazes') for name in grazed if states.get(name) != 'fails')
+        states.update((name, 'slips') for name in self._undirected(now))
+        return Truth(values, [float(x) for x in spread], states, closures, slack)
+
+    def _undirected(self, drawn):
+        """Return the joints that are hung on an arm of no length."""
+        least = self.linkage.longest / mpfr(2) ** (NUDGE + 40)
+        return [name for name, arm in drawn.arms.items() if arm < least]
+
+    def _drawn(self, given, thetas, moved=None):
+        return draw(DIGITS, self.linkage, given.rows, thetas, self._way, given.turns, moved)
+
+    def _moves(self, now, thetas, speeds, side):
+        """Yield what is drawn when one thing is moved: numbers, angles, joints, velocities."""
+        for given in self._sides(side):
+            yield given, thetas, {}, {}
+        for i, theta in enumerate(thetas):
+            if theta:
+                step = side * half_ulp(min(abs(float(theta)), math.pi))
+                yield (self._nominal, [*thetas[:i], theta + step, *thetas[i + 1:]], {}, {})
+        hung = [name for name in self.linkage.placed if name not in self._pinned]
+        for moved in self._displaced(now.points, hung, side):
+            yield self._nominal, thetas, moved, {}
+        for crank, speed in enumerate(speeds):
+            turning = [name for name in self.linkage.placed if name not in self.linkage.fixed]
+            for moved in self._displaced(speed, turning, side):
+                yield (self._nominal, thetas, {},
+                       {(name, crank): step for name, step in moved.items()})
+
+    def _displaced(self, places, names, side):
+        """Yield joints, each with what half an ulp adds to its x or y."""
+        for name in names:
+            size = self._largest(places, name)
+            if size:
+                yield {name: mpc(side * half_ulp(size))}
+                yield {name: mpc(0, side * half_ulp(size))}
+
+    def _largest(self, places, name):
+        """Return the largest coordinate of a joint and of those that its line hangs it on."""
+        return max(abs(part) for each in (name, *self._lines[name].joints)
+                   for part in (places[each].real, places[each].imag))
+
+    def _speeds(self, thetas):
+        """Return the velocities of the joints by each crank."""
+        found = []
+        for crank in range(len(thetas)):
+            before, after = (self._drawn(self._nominal, self._turned(thetas, crank, step)).points
+                             for step in (-STEP, STEP))
+            found.append({name: (after[name] - before[name]) / (2 * STEP) for name in after})
+        return found
+
+    def _turned(self, thetas, crank, step):
+        return [theta + step if i == crank else theta for i, theta in enumerate(thetas)]
+
+    def _values(self, drawn, given, thetas, moved, moving, rates):
+        values = self._poses(drawn)
+        for crank in range(len(thetas) if rates else 0):
+            before, after = (self._poses(self._drawn(
+                given, self._turned(thetas, crank, step),
+                {**moved, **{name: velocity * step for (name, by), velocity in moving.items()
+                             if by == crank}})) for step in (-STEP, STEP))
+            values += [_difference(out, x, y) / (2 * STEP)
+                       for out, x, y in zip(self.poses, before, after)]
+        return values
+
+    def _poses(self, drawn):
+        points, found = drawn.points, []
+        for out in self.poses:
+            if out.what == 'point':
+                found.append(points[out.name])
+            elif out.what == 'slide':
+                found.append(drawn.slides[out.parts[0]])
+            else:
+                *ends, quarters = out.parts
+                bar = points[ends[1]] - points[ends[0]]
+                if len(ends) > 2:
+                    bar *= (points[ends[3]] - points[ends[2]]).conjugate()
+                found.append(bar * mpc(0, -1) ** quarters)
+        return found
+
+    def _distance(self, i, old, new):
+        if i < len(self.poses) and self.poses[i].what == 'angle':
+            return abs(_turned(old, new))
+        return abs(new - old)
+
+    def due(self, output, states):
+        """Tell what is due: 'number', 'nan', 'either', or 'any' next to a limit that is missed."""
+        joints = [part for part in output.parts if isinstance(part, str)]
+        needs = {states[name] for joint in joints for name in self.linkage.closures[joint]
+                 if name in states}
+        if needs <= {'meets'}:
+            return 'number'
+        if 'fails' in needs:
+            return 'nan' if 'slips' not in needs else 'any'
+        return 'any' if 'slips' in needs else 'either'
+
+
+class Truth(NamedTuple):
+    """
+    True outputs, poses first, and what half an ulp does to them; the same of the closures' gaps.
+
+    The state of a closure is 'meets', 'grazes', 'slips' or 'fails'.
+    """
+
+    values: list
+    sensitivity: list
+    states: dict
+    gaps: dict
+    slack: dict
+
+
+def _state(gap, slack):
+    if abs(gap) <= GRAZE * slack:
+        return 'grazes' if gap >= 0 else 'slips'
+    return 'meets' if gap > 0 else 'fails'
+
+
+def _turned(old, new):
+    turned = new * old.conjugate()
+    if abs(turned.imag) < abs(turned.real) / 2 ** 40 and turned.real > 0:
+        return turned.imag / turned.real
+    return DIGITS.direction(turned)
+
+
+def _difference(out, before, after):
+    return _turned(before, after) if out.what == 'angle' else after - before
+
+
+@precisely
+def judge(measure, thetas, found, rates=False, exact=None):
+    """Return the `Row` of each output at crank angles, shape (n, cranks)."""
+    rows = []
+    for index, row in enumerate(thetas):
+        truth = exact[index] if exact else measure.at(row, rates)
+        outs = list(measure.poses)
+        for crank in range(len(row) if rates else 0):
+            outs += [out._replace(crank=crank) for out in measure.poses]
+        for i, out in enumerate(outs):
+            rows.append(_row(out, row, found[out][index], truth.values[i],
+                             truth.sensitivity[i], measure.due(out, truth.states)))
+    return rows
+
+
+def _row(out, thetas, result, value, spread, due):
+    error, ratio, problem, rate = math.nan, 0.0, '', out.crank is not None
+    if np.any(np.isnan(result)) or (rate and due != 'number' and np.any(np.isinf(result))):
+        problem = 'NaN' if due == 'number' else ''
+    elif due == 'nan':
+        problem = 'missed NaN'
+    elif due == 'number' or due == 'either' and not rate:
+        error = float(_error(out, result, value))
+        ulp = np.spacing(math.pi if out.what == 'angle' and not rate else np.max(np.abs(result)))
+        excess = max(0.0, error - float(ulp))
+        ratio = 0.0 if not excess else excess / spread if spread else math.inf
+        problem = 'rule' if not ratio <= RULE else ''
+    return Row(out, tuple(map(float, thetas)), problem, math.inf if 'NaN' in problem else ratio,
+               error, spread, result, value)
+
+
+def _error(out, result, value):
+    if np.ndim(result):
+        return abs(mpc(*map(float, result)) - value)
+    if out.what == 'angle' and out.crank is None:
+        return abs(DIGITS.direction(value * DIGITS.turned(-mpfr(float(result)))))
+    return abs(mpfr(float(result)) - value)
+
+
+def measured(mechanism, linkage, thetas, rates=False):
+    """Return the rows of all answers, on the way past change points that fits them best."""
+    poses = outputs(linkage, mechanism.links)
+    found = answers(mechanism, thetas, poses, rates)
+    best = None
+    for way in linkage.passings():
+        rows = judge(Measure(linkage, poses, way), thetas, found, rates)
+        count = sum(bool(row.problem) for row in rows)
+        if best is None or count < best[0]:
+            best = count, rows
+        if not count:
+            break
+    return best[1]
+
+
+def broken(rows):
+    """Return the rows that break the rule, worst first."""
+    return sorted((row for row in rows if row.problem), key=lambda row: -row.ratio)

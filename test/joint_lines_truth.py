@@ -1,0 +1,668 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The truth of any linkage that the language can write, placed as with ruler and compasses.
+
+Nothing here comes from the library and no formula is shared with it. A joint is where two circles,
+or a circle and a line, meet on the side that is written; a rigid link is drawn once on a template
+and laid on its bar. The same drawing is done in 96 digits (`DIGITS`), where such formulas cancel
+as badly as they like, and with numpy's complex numbers for thousands of angles at once (`FLOATS`).
+
+A change point is passed as the language says in words: the side changes each time that the crank
+passes the angle at which the dyad is stretched or folded, counted from a quarter turn.
+"""
+
+import functools
+import math
+import re
+from typing import NamedTuple
+
+import gmpy2
+from gmpy2 import mpc, mpfr
+import numpy as np
+
+BITS = 320
+# A gap of the four bars that is smaller than this part of them may count as a change point.
+ROUNDING = 64 * 2.0 ** -53
+
+_FORMS = {
+    'ground': 'nn', 'crank': 'jn', 'dyad': 'jjnns', 'rigid': 'jjnns', 'line': 'jjn',
+    'mirror': 'jjj', 'parallelogram': 'jjj', 'inversor': 'jjnn', 'slot': 'jjnsn',
+    'slider': 'jnjas'}
+_SIDES = {'left': 1, 'right': -1, 'out': 1, 'in': -1}
+
+
+def precisely(function):
+    """Let a function compute with many digits."""
+    @functools.wraps(function)
+    def in_digits(*args, **kwargs):
+        with gmpy2.context(gmpy2.get_context(), precision=BITS):
+            return function(*args, **kwargs)
+    return in_digits
+
+
+class Digits:
+    """Arithmetic in many digits."""
+
+    point = staticmethod(mpc)
+    number = staticmethod(mpfr)
+    floor = staticmethod(gmpy2.floor)
+
+    @staticmethod
+    def turned(angle):
+        """Return the unit vector at an angle."""
+        return mpc(gmpy2.cos(angle), gmpy2.sin(angle))
+
+    @staticmethod
+    def root(square):
+        """Return the root of a square, zero where it is negative."""
+        return gmpy2.sqrt(square) if square > 0 else mpfr(0)
+
+    @staticmethod
+    def direction(vector):
+        """Return the angle of a vector."""
+        return gmpy2.atan2(vector.imag, vector.real)
+
+    @staticmethod
+    def divided(x, y):
+        """Return a quotient; one by nothing is nothing."""
+        return x / y if y else x * 0
+
+    @staticmethod
+    def pi():
+        """Return half a turn."""
+        return gmpy2.const_pi()
+
+
+class Floats:
+    """Arithmetic on arrays of float64."""
+
+    number = staticmethod(float)
+    floor = staticmethod(np.floor)
+    direction = staticmethod(np.angle)
+
+    @staticmethod
+    def point(x, y=0.0):
+        """Return a point."""
+        return float(x) + 1j * float(y)
+
+    @staticmethod
+    def turned(angle):
+        """Return the unit vector at an angle."""
+        return np.exp(1j * np.asarray(angle))
+
+    @staticmethod
+    def root(square):
+        """Return the root of a square, zero where it is negative."""
+        return np.sqrt(np.maximum(square, 0.0))
+
+    @staticmethod
+    def divided(x, y):
+        """Return a quotient; one by nothing is not a number."""
+        with np.errstate(all='ignore'):
+            return x / y
+
+    @staticmethod
+    def pi():
+        """Return half a turn."""
+        return math.pi
+
+
+DIGITS, FLOATS = Digits(), Floats()
+
+
+# --- reading ------------------------------------------------------------------------------------
+
+class Line(NamedTuple):
+    """A line: the joints it places, its word, the joints it stands on, its numbers, its side."""
+
+    names: tuple
+    word: str
+    joints: tuple
+    numbers: tuple
+    side: int
+    up: bool
+
+
+def read(text):
+    """Return a `Line` of the language."""
+    parts = text.split()
+    at = next(i for i, part in enumerate(parts) if part in _FORMS and i)
+    word, rest = parts[at], parts[at + 1:]
+    given = {kind: [] for kind in 'jnas'}
+    for kind, part in zip(_FORMS[word], rest):
+        given['n' if kind == 'a' else kind].append(part)
+    side = _SIDES[given['s'][0]] if given['s'] else 1
+    return Line(tuple(parts[:at]), word, tuple(given['j']), tuple(given['n']), side,
+                rest[-1] == 'up')
+
+
+class Value(NamedTuple):
+    """A number in many digits and what rounding its arithmetic to float64 may do to it."""
+
+    number: mpfr
+    slack: mpfr
+
+
+_TOKEN = re.compile(r'\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)'
+                    r'|(?P<name>[A-Za-z_]\w*)|(?P<sign>[-+*/(),]))')
+
+
+class Arithmetic:
+    """
+    Sums, differences, products, quotients, max() and sqrt() of numbers and dimensions.
+
+    `moved` are literals, by their text, with what is added to them.
+    """
+
+    def __init__(self, dimensions, moved=None):
+        self._dimensions = dimensions
+        self._moved = moved or {}
+
+    def value(self, text):
+        """Return the `Value` of a text."""
+        self._tokens = [(match.lastgroup, match.group(match.lastgroup))
+                        for match in _TOKEN.finditer(text)]
+        self._at = 0
+        return self._sum()
+
+    def _next(self):
+        return self._tokens[self._at][1] if self._at < len(self._tokens) else ''
+
+    def _take(self):
+        self._at += 1
+        return self._tokens[self._at - 1]
+
+    def _sum(self):
+        total = self._product()
+        while self._next() in ('+', '-'):
+            _, sign = self._take()
+            other = self._product()
+            number = total.number + other.number if sign == '+' else total.number - other.number
+            total = _rounded(number, total.slack + other.slack)
+        return total
+
+    def _product(self):
+        total = self._factor()
+        while self._next() in ('*', '/'):
+            _, sign = self._take()
+            other = self._factor()
+            x, y = total.number, other.number
+            if sign == '*':
+                total = _rounded(x * y, abs(x) * other.slack + abs(y) * total.slack)
+            else:
+                total = _rounded(x / y, total.slack / abs(y) + abs(x / y / y) * other.slack)
+        return total
+
+    def _factor(self):
+        kind, text = self._take()
+        if kind == 'number':
+            return self._literal(text)
+        if text == '-':
+            inner = self._factor()
+            return Value(-inner.number, inner.slack)
+        if text == '(':
+            return self._closed(self._sum())
+        if text in ('max', 'sqrt'):
+            return self._function(text)
+        if text == 'pi':
+            return _rounded(gmpy2.const_pi(), mpfr(0))
+        return Value(self._dimensions[text], mpfr(0))
+
+    def _literal(self, text):
+        number = mpfr(float(text)) + self._moved.get(text, 0)
+        if self._next() == 'deg':
+            self._take()
+            return _rounded(number * gmpy2.const_pi() / 180, mpfr(0))
+        return Value(number, mpfr(0))
+
+    def _function(self, name):
+        self._take()
+        first = self._sum()
+        if name == 'sqrt':
+            root = gmpy2.sqrt(first.number)
+            return self._closed(_rounded(root, first.slack / (2 * root)))
+        self._take()
+        second = self._sum()
+        return self._closed(first if first.number >= second.number else second)
+
+    def _closed(self, value):
+        self._take()
+        return value
+
+
+def _rounded(number, slack):
+    rounding = half_ulp(number) if float(number) != number else mpfr(0)
+    return Value(number, slack + rounding)
+
+
+def half_ulp(number):
+    """Return half the distance to the next float64."""
+    return mpfr(float(np.spacing(abs(float(number))))) / 2
+
+
+def literals(text):
+    """Return the numbers other than zero that are written in a text."""
+    return {match['number'] for match in _TOKEN.finditer(text)
+            if match['number'] and float(match['number'])}
+
+
+# --- drawing ------------------------------------------------------------------------------------
+
+class Passing(NamedTuple):
+    """
+    How a dyad or block on a crank pin passes its change points, if it has any.
+
+    The gap is how much longer its first bar must be to have the change point exactly.
+    """
+
+    stretched: bool = False
+    folded: bool = False
+    side: int = 1
+    gap: mpfr = 0
+
+
+class Drawing(NamedTuple):
+    """
+    Points by name; gaps and slides by the joint that a line places first.
+
+    A gap is negative where the line cannot be drawn. Folds vanish where a kite or a parallelogram
+    is flat; arms are the distances on which a dyad, kite, slot or cell stands.
+    """
+
+    points: dict
+    gaps: dict
+    slides: dict
+    folds: dict
+    arms: dict
+
+
+class Linkage:
+    """
+    The joint lines of a linkage, with its dimensions.
+
+    Parameters
+    ----------
+    joints : sequence of str
+        The lines.
+    dimensions : mapping
+        The float64 numbers of its dimensions.
+    branches : mapping, optional
+        Sides by joint, where they are not those written.
+
+    """
+
+    @precisely
+    def __init__(self, joints, dimensions, branches=None):
+        self.joints = tuple(joints)
+        self.dimensions = dict(dimensions)
+        self.lines = [read(text) for text in joints]
+        self.lines = [line._replace(side=(branches or {}).get(line.names[0], line.side))
+                      for line in self.lines]
+        self.cranks = [line.names[0] for line in self.lines if line.word == 'crank']
+        self.fixed = {line.names[0] for line in self.lines if line.word == 'ground'}
+        self.placed = [name for line in self.lines for name in line.names]
+        self.numbers = self.values()
+        self.longest = max((abs(number) for line, row in zip(self.lines, self.numbers)
+                            for number in (row[:1] if line.word == 'slider' else row)),
+                           default=mpfr(1))
+        self._links()
+        self._stand()
+        self._templates = {}
+
+    def values(self, moved=None, literal=None):
+        """Return the numbers of every line, with dimensions or literals moved."""
+        exact = {name: mpfr(number) for name, number in self.dimensions.items()}
+        for name, step in (moved or {}).items():
+            exact[name] += step
+        arithmetic = Arithmetic(exact, literal)
+        return [tuple(arithmetic.value(text).number for text in line.numbers)
+                for line in self.lines]
+
+    @precisely
+    def roundings(self):
+        """Return (line, place, slack) of the numbers whose arithmetic is rounded."""
+        arithmetic = Arithmetic({name: mpfr(x) for name, x in self.dimensions.items()})
+        return [(i, k, slack) for i, line in enumerate(self.lines)
+                for k, text in enumerate(line.numbers)
+                for slack in [arithmetic.value(text).slack] if slack]
+
+    def literals(self):
+        """Return the texts of numbers that are written in the lines."""
+        return sorted({found for line in self.lines for text in line.numbers
+                       for found in literals(text)})
+
+    def _links(self):
+        """Note which joints are on one moving link: a line each, from bar to bar."""
+        self.bodies = []
+        for i, line in enumerate(self.lines):
+            names, joints = line.names, line.joints
+            if line.word == 'crank':
+                self._body(i, joints[0], names[0])
+            elif line.word == 'dyad':
+                self._body(i, joints[0], names[0])
+                self._body(i, joints[1], names[0])
+            elif line.word in ('mirror', 'parallelogram'):
+                for joint in joints[1:]:
+                    self._body(i, joint, names[0])
+            elif line.word == 'inversor':
+                right, corner, left = names
+                for pair in ((joints[0], right), (joints[1], right), (right, corner),
+                             (joints[0], left), (joints[1], left), (left, corner)):
+                    self._body(i, *pair)
+            elif line.word == 'slot':
+                self._body(i, joints[0], names[0])
+            elif line.word == 'slider':
+                self._body(i, joints[0], names[0])
+            elif line.word in ('rigid', 'line'):
+                self.body_of(*joints).append(names[0])
+
+    def _body(self, _, first, second):
+        self.bodies.append([first, second])
+
+    def body_of(self, first, second):
+        """Return the joints of the moving link that has both joints, None if there is none."""
+        return next((body for body in self.bodies if first in body and second in body), None)
+
+    def _stand(self):
+        """Note the joints and the closures that each joint stands on, itself among them."""
+        self.stands, self.closures = {}, {}
+        closed = ('dyad', 'inversor', 'slot', 'slider', 'mirror')
+        for line in self.lines:
+            below = set().union(*(self.stands[name] for name in line.joints), line.joints)
+            needs = set().union(*(self.closures[name] for name in line.joints))
+            if line.word in closed:
+                needs = needs | {line.names[0]}
+            for name in line.names:
+                self.stands[name] = below | {name}
+                self.closures[name] = needs
+
+    def base(self, numbers, first, second):
+        """Return the length of a bar between two joints of one moving link, from its template."""
+        body = self.body_of(first, second)
+        return abs(self._template(numbers, body, first) - self._template(numbers, body, second))
+
+    def _template(self, numbers, body, name):
+        """Return where a joint lies on the drawing of a link: the first joint at zero, along x."""
+        if name == body[0]:
+            return mpc(0)
+        if name == body[1]:
+            return mpc(self._bar(numbers, body[0], name))
+        i = next(i for i, line in enumerate(self.lines) if name in line.names)
+        first, second = (self._template(numbers, body, joint) for joint in self.lines[i].joints)
+        if self.lines[i].word == 'line':
+            return first + (second - first) / abs(second - first) * numbers[i][0]
+        return meet(DIGITS, first, numbers[i][0], second, numbers[i][1], self.lines[i].side)[0]
+
+    def _bar(self, numbers, first, second):
+        """Return the length that is written, or follows, for a bar."""
+        i = next(i for i, line in enumerate(self.lines) if second in line.names)
+        line = self.lines[i]
+        if line.word in ('crank', 'slider'):
+            return numbers[i][0]
+        if line.word == 'slot':
+            return numbers[i][1]
+        if line.word == 'dyad':
+            return numbers[i][line.joints.index(first)]
+        if line.word == 'inversor':
+            return numbers[i][0 if first == line.joints[0] else 1]
+        if line.word == 'mirror':
+            return self._distance(numbers, line.joints[0], first)
+        corner, one, other = line.joints
+        return self._distance(numbers, corner, other if first == one else one)
+
+    def _distance(self, numbers, first, second):
+        """Return the constant distance of two joints of one link or of the ground."""
+        if self.fixed >= {first, second}:
+            return abs(self._fixed(numbers, first) - self._fixed(numbers, second))
+        return self.base(numbers, first, second)
+
+    def _fixed(self, numbers, name):
+        i = next(i for i, line in enumerate(self.lines) if name in line.names)
+        return mpc(*numbers[i])
+
+    def prepared(self, numbers):
+        """Return the numbers of every line, those of templates turned into what is laid on."""
+        rows = []
+        for line, row in zip(self.lines, numbers):
+            if line.word in ('rigid', 'line'):
+                base = self.base(numbers, *line.joints)
+                if line.word == 'line':
+                    row = (mpc(row[0] / base),)
+                else:
+                    corner, gap = meet(DIGITS, mpc(0), row[0], mpc(base), row[1], line.side)
+                    row = (corner / base, gap)
+            elif line.word == 'slider':
+                row = (row[0], DIGITS.turned(row[1]), row[1])
+            rows.append(row)
+        return rows
+
+    @precisely
+    def in_floats(self, way):
+        """Return rows and turns for `FLOATS`, lengths in units of the longest, and that unit."""
+        unit, rows = self.longest, []
+        for line, row in zip(self.lines, self.prepared(self.numbers)):
+            if line.word in ('rigid', 'line'):
+                rows.append((complex(row[0]),))
+            elif line.word == 'slider':
+                rows.append((float(row[0] / unit), complex(row[1]), float(row[2])))
+            else:
+                rows.append(tuple(float(number / unit) for number in row))
+        turns = {i: float(turn) for i, turn in self.turns(self.numbers, way).items()}
+        return rows, turns, float(unit)
+
+    # --- change points ---
+
+    def arm_of_crank(self, line):
+        """Return (ground joint, crank pin) if a dyad hangs between these, else None."""
+        for foot, pin in (line.joints, line.joints[::-1]):
+            if pin in self.cranks and foot in self.fixed and foot != self._crank(pin).joints[0]:
+                return foot, pin
+        return None
+
+    def _crank(self, pin):
+        return next(line for line in self.lines if pin in line.names)
+
+    @precisely
+    def passings(self):
+        """
+        Return the ways, {line: `Passing`}, in which the linkage may pass its change points.
+
+        There is one, unless rounding decides whether there is a change point.
+        """
+        ways = [{}]
+        for i, line in enumerate(self.lines):
+            choices = self._passing(i, line)
+            if choices:
+                ways = [{**way, i: choice} for way in ways for choice in choices]
+        return ways[:16]
+
+    def _passing(self, i, line):
+        if line.word == 'dyad' and self.arm_of_crank(line):
+            foot, pin = self.arm_of_crank(line)
+            crank = self._crank(pin)
+            ground = abs(self._fixed(self.numbers, crank.joints[0])
+                         - self._fixed(self.numbers, foot))
+            m = self.numbers[self.lines.index(crank)][0]
+            b, c = self.numbers[i]
+            size = b + c + ground + m
+            gaps = ground + m - b - c, abs(ground - m) - abs(b - c)
+            turn = self._turn(self.numbers, line)
+            unsure = abs(gmpy2.sin(turn + gmpy2.const_pi() / 2)) < ROUNDING
+        elif line.word == 'slider' and line.joints[0] in self.cranks:
+            crank = self._crank(line.joints[0])
+            m = self.numbers[self.lines.index(crank)][0]
+            rod, angle = self.numbers[i]
+            line_of = DIGITS.turned(angle)
+            away = (self._fixed(self.numbers, crank.joints[0])
+                    - self._fixed(self.numbers, line.joints[1]))
+            height = (away * line_of.conjugate()).imag
+            size = rod + abs(away) + m
+            gaps = rod + height - m, rod - height - m
+            turn = self._turn_on_line(crank, line_of)
+            unsure = gmpy2.const_pi() - abs(turn) < ROUNDING
+        else:
+            return []
+        stretched, folded = (_vanishes(gap, size) for gap in gaps)
+        if stretched == folded == [False]:
+            return []
+        sides = [1, -1] if unsure else [1]
+        return [Passing(s, f, side, max(abs(gap) for gap, passed in zip(gaps, (s, f)) if passed)
+                        if s or f else mpfr(0))
+                for s in stretched for f in folded for side in (sides if s or f else [1])]
+
+    def _turn(self, numbers, line):
+        """Return the angle of the crank's zero from the ground line, foot to centre."""
+        foot, pin = self.arm_of_crank(line)
+        crank = self._crank(pin)
+        along = self._fixed(numbers, crank.joints[0]) - self._fixed(numbers, foot)
+        zero = mpc(0, 1) if crank.up else mpc(1)
+        return DIGITS.direction(zero * along.conjugate())
+
+    def _turn_on_line(self, crank, line_of):
+        zero = mpc(0, 1) if crank.up else mpc(1)
+        return DIGITS.direction(zero * line_of.conjugate())
+
+    def turns(self, numbers, way):
+        """Return the angles from which the passes of change points are counted."""
+        found = {}
+        for i in way:
+            line = self.lines[i]
+            found[i] = (self._turn(numbers, line) if line.word == 'dyad' else
+                        self._turn_on_line(self._crank(line.joints[0]),
+                                           DIGITS.turned(numbers[i][1])))
+        return found
+
+
+def _vanishes(gap, size):
+    if gap == 0:
+        return [True]
+    return [True, False] if abs(gap) < ROUNDING * size else [False]
+
+
+def meet(do, p, radius_p, q, radius_q, side):
+    """
+    Return where two circles meet, on a side of p -> q, and how far they are from touching.
+
+    That is the squared sine of the angle at which they meet; where they do not it is negative.
+    """
+    arm = q - p
+    across = arm.real * arm.real + arm.imag * arm.imag
+    along = (across + (radius_p * radius_p - radius_q * radius_q)) / 2
+    square = radius_p * radius_p * across - along * along
+    meeting = arm * along + _turned(do, arm) * (side * do.root(square))
+    return p + do.divided(meeting, across), square / (radius_p * radius_q) ** 2
+
+
+def _turned(do, vector):
+    return vector * do.point(0, 1)
+
+
+def draw(do, linkage, rows, thetas, way=None, turns=None, moved=None):
+    """
+    Return the `Drawing` of a linkage.
+
+    `rows` are its numbers as `prepared`, `thetas` its crank angles, `way` how it passes its change
+    points, `moved` what is added to joints.
+    """
+    way, moved = way or {}, moved or {}
+    points, gaps, slides, folds, arms = {}, {}, {}, {}, {}
+    cranks = iter(thetas)
+    angle_of = {}
+    for i, (line, row) in enumerate(zip(linkage.lines, rows)):
+        word, name, at = line.word, line.names[0], [points[joint] for joint in line.joints]
+        side = line.side
+        if word == 'ground':
+            points[name] = do.point(*row)
+        elif word == 'crank':
+            angle_of[name] = theta = next(cranks)
+            bar = do.turned(theta) * row[0]
+            points[name] = at[0] + (_turned(do, bar) if line.up else bar)
+        elif word == 'dyad':
+            if i in way:
+                pin = linkage.arm_of_crank(line)[1]
+                side = side * _dyad_passes(do, way[i], angle_of[pin], turns[i])
+            points[name], gaps[name] = meet(do, at[0], row[0], at[1], row[1], side)
+            arms[name] = abs(at[1] - at[0])
+        elif word in ('rigid', 'line'):
+            points[name] = at[0] + (at[1] - at[0]) * row[0]
+        elif word == 'mirror':
+            arm, spoke = at[2] - at[1], at[0] - at[1]
+            ratio = do.divided(spoke, arm)
+            points[name] = at[1] + arm * ratio.conjugate()
+            folds[name] = ratio.imag
+            arms[name] = abs(arm)
+        elif word == 'parallelogram':
+            points[name] = at[1] + (at[2] - at[0])
+            folds[name] = ((at[1] - at[0]).conjugate() * (at[2] - at[0])).imag
+        elif word == 'inversor':
+            right, corner, left = line.names
+            points[right], gaps[name] = meet(do, at[0], row[0], at[1], row[1], -1)
+            points[left], _ = meet(do, at[0], row[0], at[1], row[1], 1)
+            points[corner] = points[right] + (points[left] - at[1])
+            arms[name] = abs(at[1] - at[0])
+        elif word == 'slot':
+            points[name], gaps[name], slides[name], arms[name] = _slot(do, *at, row, side)
+        else:
+            if i in way:
+                side = side * _block_passes(do, way[i], angle_of[line.joints[0]], turns[i])
+            seen = (at[0] - at[1]) * row[1].conjugate()
+            square = row[0] * row[0] - seen.imag * seen.imag
+            gaps[name] = square / (row[0] * row[0])
+            slides[name] = seen.real + side * do.root(square)
+            points[name] = at[1] + row[1] * slides[name]
+        for each in line.names:
+            if each in moved:
+                points[each] = points[each] + moved[each]
+                if word == 'slider':
+                    slides[name] = ((points[each] - at[1]) * row[1].conjugate()).real
+    return Drawing(points, gaps, slides, folds, arms)
+
+
+def _slot(do, pivot, pin, row, side):
+    """Turn the radius to the pin back by the angle at which the slot leans on it."""
+    offset, length = row
+    radius = pin - pivot
+    square = radius.real * radius.real + radius.imag * radius.imag
+    slide = side * do.root(square - offset * offset)
+    lean = do.direction(do.point(0, 1) * offset + slide)
+    lever = do.divided(radius, abs(radius)) * do.turned(-lean)
+    return pivot + lever * length, square - offset * offset, slide, abs(radius)
+
+
+def _changes(do, count):
+    """Return -1 for an odd number of passes, 1 for an even one."""
+    return 1 - 2 * (count - 2 * do.floor(count / 2))
+
+
+def _dyad_passes(do, passing, theta, turn):
+    half, side = do.pi(), passing.side
+    now, then = theta + turn, half / 2 + turn
+    if passing.stretched:
+        side = side * _changes(do, do.floor(now / (2 * half)) - do.floor(then / (2 * half)))
+    if passing.folded:
+        side = side * _changes(do, do.floor((now - half) / (2 * half))
+                               - do.floor((then - half) / (2 * half)))
+    return side
+
+
+def _block_passes(do, passing, theta, turn):
+    half, side = do.pi(), passing.side
+    now = theta + turn
+    if passing.stretched:
+        side = side * _changes(do, do.floor((now + half / 2) / (2 * half)))
+    if passing.folded:
+        side = side * _changes(do, do.floor((now - half / 2) / (2 * half)) + 1)
+    return side

@@ -1,0 +1,517 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What any linkage must hold, asked of a mechanism and compared with its drawing.
+
+Each check yields `Problem`s. What float64 finds by brute force is believed only where the drawing
+in many digits says the same, so that nothing here is a false alarm next to a limit.
+"""
+
+import math
+import time
+from typing import NamedTuple
+import warnings
+
+import joint_lines_accuracy as accuracy
+from joint_lines_truth import draw, FLOATS, Linkage
+from linkage_ros import mechanisms
+import numpy as np
+import random_linkages
+
+TURN = 2 * math.pi
+# Seconds that a question about the inverse may take: the first of its output, and any further.
+FIRST, FURTHER = 1.0, 0.05
+
+
+class Problem(NamedTuple):
+    """What does not hold: the kind of it, and the numbers that reproduce it."""
+
+    kind: str
+    text: str
+
+
+class Subject:
+    """A mechanism and its drawing, further cranks held at an angle each."""
+
+    def __init__(self, design, rng, samples=4000):
+        self.design, self.rng = design, rng
+        self.mechanism = mechanisms.create('custom', joints=design.joints,
+                                           branches=design.branches, **design.dimensions)
+        self.linkage = Linkage(design.joints, design.dimensions, design.branches)
+        self.cranks = len(self.mechanism.cranks)
+        self.held = tuple(float(x) for x in rng.uniform(-3.0, 3.0, self.cranks - 1))
+        self.poses = accuracy.outputs(self.linkage, self.mechanism.links)
+        self.theta = np.linspace(-math.pi, math.pi, samples, endpoint=False) + 1e-3
+        self.ways = sorted(self.linkage.passings(), key=self._misfit)
+
+    def __str__(self):
+        held = f' others={self.held}' if self.held else ''
+        return f'{self.design}{held}'
+
+    def fitted(self, thetas, rates=False):
+        """Measure all answers, on the way past the change points that fits them best."""
+        found = accuracy.answers(self.mechanism, thetas, self.poses, rates)
+        best = None
+        for way in self.ways:
+            measure = accuracy.Measure(self.linkage, self.poses, way)
+            rows = accuracy.judge(measure, thetas, found, rates)
+            count = sum(bool(row.problem) for row in rows)
+            if best is None or count < best[0]:
+                best = count, rows
+            if not count:
+                break
+        return best[1]
+
+    def _misfit(self, way):
+        """Return at how many angles the mechanism does not go this way past its change points."""
+        theta = self.rng.uniform(-math.pi, math.pi, (60, self.cranks))
+        rows, turns, unit = self.linkage.in_floats(way)
+        with np.errstate(all='ignore'):
+            points = draw(FLOATS, self.linkage, rows, list(theta.T), way, turns).points
+        found, count = self.mechanism.solve(_given(theta, (60,))), 0
+        for name, place in found.items():
+            count += np.sum(np.abs(place @ (1, 1j) / unit - points[name]) > 1e-6)
+        return count
+
+    @property
+    def two_turns(self):
+        """Whether the linkage is the same again only after two turns."""
+        return any(passing.stretched != passing.folded
+                   for way in self.ways for passing in way.values())
+
+    def drawn(self, theta):
+        """Return the drawing in float64 at angles of the first crank, and the unit of length."""
+        rows, turns, unit = self.linkage.in_floats(self.ways[0])
+        with np.errstate(all='ignore'):
+            return draw(FLOATS, self.linkage, rows, [np.asarray(theta, float), *self.held],
+                        self.ways[0], turns), unit
+
+    def measure(self):
+        """Return the measure in many digits."""
+        return accuracy.Measure(self.linkage, self.poses, self.ways[0])
+
+    def states(self, theta):
+        """Return the states of all closures at an angle of the first crank, in many digits."""
+        return set(self.measure().at([theta, *self.held]).states.values())
+
+    def place(self, output, drawing, unit):
+        """Return an output of a drawing, in metres or radians."""
+        name, _, axis = output.rpartition('.')
+        if name:
+            place = drawing.points[name]
+            return unit * (place.real if axis == 'x' else place.imag) * np.ones(1)
+        pose = next(pose for pose in self.poses if pose.what != 'point' and pose.name == output)
+        if pose.what == 'slide':
+            return unit * drawing.slides[pose.parts[0]] * np.ones(1)
+        *ends, quarters = pose.parts
+        points = drawing.points
+        bar = points[ends[1]] - points[ends[0]]
+        if len(ends) > 2:
+            bar = bar * np.conj(points[ends[3]] - points[ends[2]])
+        return np.angle(bar * (-1j) ** quarters) * np.ones(1)
+
+    def reachable(self, drawing):
+        """Tell for every sample whether all closures are met."""
+        held = np.ones(self.theta.shape, bool)
+        for gap in drawing.gaps.values():
+            held &= gap * np.ones(self.theta.shape) >= 0.0
+        return held
+
+
+def checked(kind):
+    """Make an exception that escapes from a check a problem of that kind."""
+    def around(check):
+        def guarded(subject, *args):
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter('error', RuntimeWarning)
+                    return [Problem(found, f'{text}: {subject}')
+                            for found, text in check(subject, *args)]
+            except Exception as error:  # noqa: B902
+                return [Problem(f'{kind}: {type(error).__name__}',
+                                f'{str(error)[:200]}: {subject}')]
+        guarded.__name__ = check.__name__
+        return guarded
+    return around
+
+
+# --- poses and rates ----------------------------------------------------------------------------
+
+def spots(subject):
+    """Return dead points and reach ends, as far as they can be had."""
+    found = []
+    for ask in (subject.mechanism.reach, subject.mechanism.dead_points):
+        try:
+            found += np.ravel(ask(*subject.held)).tolist()
+        except Exception:  # noqa: B902
+            continue  # `reach` and `dead_points` have a check of their own
+    return found
+
+
+def asked(subject, count):
+    """Return crank angles to ask for; further cranks are held for half of them."""
+    thetas = random_linkages.angles(subject.rng, count, spots(subject), subject.cranks)
+    if subject.held:
+        thetas[::2, 1:] = subject.held
+    return thetas
+
+
+@checked('poses')
+def poses(subject, count=4):
+    """Compare places, angles and slides with the drawing."""
+    yield from _broken(subject, asked(subject, count), False)
+
+
+@checked('rates')
+def rates(subject, count=1):
+    """Compare velocities and rates with the drawing."""
+    yield from _broken(subject, asked(subject, count), True)
+
+
+def _broken(subject, thetas, with_rates):
+    rows = subject.fitted(thetas, with_rates)
+    subject.rows = getattr(subject, 'rows', []) + rows
+    for row in accuracy.broken(rows)[:2]:
+        what = f'{row.output.what} {"rate " * (row.output.crank is not None)}{row.problem}'
+        yield what, (f'{row.output} at {row.thetas}: got {row.result}, true is '
+                     f'{complex(row.value)}, ratio {row.ratio:.3g}, error {row.error:.3g}, '
+                     f'sensitivity {row.sensitivity:.3g}')
+
+
+# --- one answer in many forms -------------------------------------------------------------------
+
+@checked('forms')
+def forms(subject):
+    """Ask for arrays of every shape and in one function what is asked for one pose."""
+    mechanism, theta = subject.mechanism, asked(subject, 6)
+    whole = _all(mechanism, _given(theta, (3, 2)))
+    for name, value in whole.items():
+        if value.shape[:2] != (3, 2):
+            yield 'shape', f'{name} has shape {value.shape}'
+    for name, value in _all(mechanism, _given(theta[:0], (0,))).items():
+        if value.shape[:1] != (0,):
+            yield 'shape', f'{name} has shape {value.shape} for no angles'
+    for index in ((0, 0), (2, 1)):
+        row = theta[index[0] * 2 + index[1]]
+        for shape, pick in (((), ()), ((1,), 0)):
+            for name, value in _all(mechanism, _given(row[None], shape)).items():
+                if not _same(name, value[pick], whole[name][index]):
+                    yield 'forms differ', (f'{name} at {row.tolist()} is {value[pick]} in shape '
+                                           f'{shape}, {whole[name][index]} in an array')
+        joints = mechanism.joints
+        wanted = [*(part for name in mechanism.points for part in whole[f'solve {name}'][index]),
+                  *(whole[f'joint_angles {name}'][index] for name in joints),
+                  *(whole[f'joint_rates {name} {crank}'][index]
+                    for crank in range(subject.cranks) for name in joints)]
+        names = [*(f'solve {name}' for name in mechanism.points for _ in 'xy'),
+                 *(f'joint_angles {name}' for name in joints),
+                 *(f'joint_rates {name}' for _ in range(subject.cranks) for name in joints)]
+        found = mechanism.function(None, joints, joints)(*map(float, row))
+        for name, one, other in zip(names, found, wanted):
+            if not _same(name, one, other):
+                yield 'function() differs', f'{name} at {row.tolist()} is {one}, not {other}'
+                break
+
+
+@checked('accelerated')
+def accelerated(subject):
+    """Compare machine code with plain code."""
+    theta = _given(asked(subject, 4), (4,))
+    plain, quick = _all(subject.mechanism, theta), _all(subject.mechanism.accelerated(), theta)
+    for name, value in plain.items():
+        if not _same(name, quick[name], value):
+            yield 'accelerated() differs', f'{name} is {quick[name]}, not {value}'
+
+
+def _given(thetas, shape):
+    """Return crank angles, shape (n, cranks), as a mechanism takes them."""
+    columns = [column.reshape(shape)[()] for column in thetas.T]
+    columns = [float(column) if shape == () else column for column in columns]
+    return columns[0] if len(columns) == 1 else columns
+
+
+def _all(mechanism, theta):
+    found = {}
+    for ask in ('solve', 'joint_angles', 'transmission_angles'):
+        answers = getattr(mechanism, ask)(theta)
+        found.update((f'{ask} {name}', np.asarray(value)) for name, value in answers.items())
+    for crank in range(len(mechanism.cranks)):
+        for ask in ('velocity', 'joint_rates'):
+            answers = getattr(mechanism, ask)(theta, crank=crank)
+            found.update((f'{ask} {name} {crank}', np.asarray(value))
+                         for name, value in answers.items())
+    return found
+
+
+def _same(name, one, other):
+    """Tell whether two answers have the same bits; an arctangent may differ by an ulp."""
+    one, other = np.asarray(one), np.asarray(other)
+    if one.shape != other.shape:
+        return False
+    with np.errstate(invalid='ignore'):
+        away = np.abs(one - other)
+    ulp = np.spacing(np.abs(other)) if name.startswith(('joint_angles', 'transmission')) else 0.0
+    return bool(np.all((one == other) | (np.isnan(one) & np.isnan(other)) | (away <= ulp)))
+
+
+# --- reach and dead points ----------------------------------------------------------------------
+
+@checked('reach')
+def reach(subject):
+    """Compare the reach with brute force; its ends and what lies on it must have a pose."""
+    arcs = subject.mechanism.reach(*subject.held)
+    drawing, _ = subject.drawn(subject.theta)
+    held = subject.reachable(drawing)
+    inside = _inside(arcs, subject.theta)
+    if subject.two_turns:
+        past = _inside(arcs, subject.theta + TURN) & ~_inside(arcs, subject.theta, 0.0)
+        inside, held = inside & ~past, held & ~past
+    for i in _some(np.flatnonzero(held != inside)):
+        theta = float(subject.theta[i])
+        states = subject.states(theta)
+        if held[i] and states <= {'meets'}:
+            yield 'reach misses', f'{theta!r} can be assembled, reach {arcs}'
+        if inside[i] and 'fails' in states and 'slips' not in states:
+            yield 'reach too far', f'{theta!r} cannot be assembled, reach {arcs}'
+    for lo, hi in arcs:
+        if not -math.pi <= lo < math.pi or not lo < hi <= lo + TURN:
+            yield 'reach arcs', f'{arcs}'
+        for theta in (lo, hi, *subject.rng.uniform(lo, hi, 3)):
+            missing = [name for name, place in subject.mechanism.solve(
+                _with(subject, float(theta))).items() if np.any(np.isnan(place))]
+            if missing and subject.states(float(theta)) & {'meets', 'grazes', 'fails'}:
+                where = 'end' if theta in (lo, hi) else 'inside'
+                yield f'reach {where} is NaN', f'{missing} at {float(theta)!r}, reach {arcs}'
+
+
+def _with(subject, theta):
+    return [theta, *subject.held] if subject.held else theta
+
+
+def _inside(arcs, theta, turns=TURN):
+    held = np.zeros(np.shape(theta), bool)
+    for lo, hi in arcs:
+        away = np.mod(theta - lo, turns) if turns else theta - lo
+        held |= (away >= 0.0) & (away <= hi - lo)
+    return held
+
+
+def _some(indices, most=4):
+    """Return a few of many."""
+    return indices[np.unique(np.linspace(0, len(indices) - 1, most).astype(int))] \
+        if len(indices) > most else indices
+
+
+@checked('dead points')
+def dead_points(subject):
+    """Compare the dead points with where closures vanish; transmission angles lie in [0, pi]."""
+    mechanism = subject.mechanism
+    dead = mechanism.dead_points(*subject.held)
+    if dead != sorted(dead) or not all(-math.pi <= theta < math.pi for theta in dead):
+        yield 'dead points out of order', f'{dead}'
+    if any(theta != 0.0 and abs(theta) < 1e-300 for theta in dead):
+        yield 'dead point not quite zero', f'{dead}'
+    for theta in dead:
+        if not _is_dead(subject, theta):
+            yield 'dead point false', f'{theta!r} of {dead}'
+    for theta in _vanishing(subject):
+        if _away(theta, dead) > 1e-5:
+            yield 'dead point missed', f'{theta!r} is not in {dead}'
+    away = mechanism.distance_to_dead_point(subject.theta[::400], *subject.held)
+    true = np.min([np.full(away.shape, np.inf), *(
+        abs(np.mod(subject.theta[::400] - theta + math.pi, TURN) - math.pi) for theta in dead)],
+        axis=0)
+    if not np.allclose(away, true, atol=1e-9):
+        yield 'distance to dead point', f'{away} is not {true}'
+
+
+def _away(theta, others):
+    return min((abs((theta - other + math.pi) % TURN - math.pi) for other in others),
+               default=math.inf)
+
+
+def _closures(drawing, size):
+    """Return everything that vanishes at a dead point, as rows."""
+    return np.array([value * np.ones(size)
+                     for value in (*drawing.gaps.values(), *drawing.folds.values())])
+
+
+def _is_dead(subject, theta):
+    """Tell whether a closure vanishes within 1e-6 rad of an angle."""
+    steps = np.array([-1e-6, -1e-9, 0.0, 1e-9, 1e-6])
+    values = np.abs(_closures(subject.drawn(theta + steps)[0], steps.shape))
+    return any(np.min(row) <= max(2e-3 * np.max(row), 1e-10) for row in values)
+
+
+def _vanishing(subject):
+    """Return the angles on the reach where a closure changes its sign or touches zero."""
+    drawing, _ = subject.drawn(subject.theta)
+    held, theta = subject.reachable(drawing), subject.theta
+    found = []
+    for k, row in enumerate(_closures(drawing, theta.shape)):
+        if not np.all(np.isfinite(row)) or np.max(np.abs(row)) < 1e-12:
+            continue
+        changes = np.flatnonzero((row[:-1] < 0.0) != (row[1:] < 0.0))
+        for i in changes[held[changes] | held[changes + 1]][:20]:
+            found.append(_crossing(subject, k, theta[i], theta[i + 1]))
+        inner = np.abs(row[1:-1])
+        dips = np.flatnonzero((inner <= np.abs(row[:-2])) & (inner <= np.abs(row[2:]))
+                              & (inner < 1e-4) & held[1:-1]) + 1
+        for i in dips[:20]:
+            found.append(_touching(subject, k, theta[i - 1], theta[i + 1]))
+    return [each for each in found if each is not None and _on_reach(subject, each)]
+
+
+def _closure(subject, k, theta):
+    theta = np.atleast_1d(theta)
+    return _closures(subject.drawn(theta)[0], theta.shape)[k]
+
+
+def _crossing(subject, k, lo, hi):
+    """Return where a closure changes its sign, None where it jumps."""
+    left = _closure(subject, k, lo)[0] < 0.0
+    for _ in range(12):
+        grid = np.linspace(lo, hi, 17)
+        at = int(np.argmax((_closure(subject, k, grid) < 0.0) != left))
+        lo, hi = grid[max(at - 1, 0)], grid[max(at, 1)]
+    return float(hi) if abs(_closure(subject, k, hi)[0]) < 1e-6 else None
+
+
+def _touching(subject, k, lo, hi):
+    """Return where a closure touches zero, None where it does not or rounding decides."""
+    for _ in range(10):
+        grid = np.linspace(lo, hi, 17)
+        row = np.abs(_closure(subject, k, grid))
+        at = int(np.argmin(row))
+        if not np.isfinite(row[at]):
+            return None
+        lo, hi = grid[max(at - 1, 0)], grid[min(at + 1, 16)]
+    middle = 0.5 * (lo + hi)
+    if abs(_closure(subject, k, middle)[0]) > 1e-13:
+        return None
+    truth = subject.measure().at([float(middle), *subject.held])
+    touches = any(abs(truth.gaps[name]) <= truth.slack[name] for name in truth.gaps)
+    return float(middle) if touches else None
+
+
+def _on_reach(subject, theta):
+    """Tell whether an angle is on the reach, by more than a graze of its other closures."""
+    beside = subject.drawn(np.array([theta - 1e-6, theta + 1e-6]))[0]
+    gaps = [value * np.ones(2) for value in beside.gaps.values()]
+    return not gaps or bool(np.any(np.min(gaps, axis=0) > 0.0))
+
+
+# --- the inverse --------------------------------------------------------------------------------
+
+@checked('inverse')
+def inverse(subject, count=2):
+    """Ask which crank angles give values that outputs have."""
+    mechanism, rng = subject.mechanism, subject.rng
+    drawing, unit = subject.drawn(subject.theta)
+    held = subject.reachable(drawing)
+    moving = [name for name in mechanism.points if name not in subject.linkage.fixed]
+    outputs = [*(f'{name}.{axis}' for name in moving for axis in 'xy'), *mechanism.joints]
+    for output in rng.choice(outputs, min(count, len(outputs)), replace=False):
+        yield from _asked_back(subject, str(output), drawing, unit, held)
+
+
+def _asked_back(subject, output, drawing, unit, held):
+    mechanism, rng = subject.mechanism, subject.rng
+    if output in mechanism.cranks:
+        return
+    turns = '.' not in output and not any(
+        pose.what == 'slide' and pose.name == output for pose in subject.poses)
+    scale = 1.0 if turns else unit
+    value = subject.place(output, drawing, unit) * np.ones(subject.theta.shape)
+    good = held & np.isfinite(value)
+    wanted, spread = [0.1 * scale], 0.0
+    if good.any():
+        wanted = [float(value[i]) for i in rng.choice(np.flatnonzero(good), 2)]
+        spread = np.ptp(np.unwrap(value[good]) if turns else value[good]) / scale
+    for limit, target in zip((FIRST, FURTHER), wanted):
+        start = time.process_time()
+        try:
+            answers = mechanism.crank_angle(output, target, others=subject.held)
+        except ValueError:
+            if spread > 1e-9:
+                yield 'inverse refused', f'{output} moves by {spread:.3g}'
+            return
+        took = time.process_time() - start
+        if took > limit:
+            yield 'inverse slow', f'{output} = {target!r}: {took:.3f} s'
+        answers = np.asarray(answers)
+        answers = answers[np.isfinite(answers)]
+        if spread < 1e-9:
+            continue
+        if spread < 1e-6:
+            return
+        if len(answers) > 40:
+            yield 'inverse too many', f'{output} = {target!r}: {len(answers)} answers'
+        yield from _false(subject, output, target, answers, turns, scale)
+        yield from _lost(subject, output, target, answers, turns, scale, value, good)
+
+
+def _gap(value, target, turns):
+    gap = value - target
+    return np.mod(gap + math.pi, TURN) - math.pi if turns else gap
+
+
+def _false(subject, output, target, answers, turns, scale):
+    """Yield answers that do not give the value back."""
+    for answer in answers[:10]:
+        steps = float(answer) + np.array([0.0, -1e-9, 1e-9])
+        drawing, unit = subject.drawn(steps)
+        gap = np.abs(_gap(subject.place(output, drawing, unit) * np.ones(3), target, turns))
+        if np.min(gap) > 1e-7 * scale + 2 * np.ptp(gap):
+            yield 'inverse false', (f'{output} = {target!r}: at {float(answer)!r} it is off by '
+                                    f'{gap[0]:.3g} of {scale:.3g}; answers {answers.tolist()}')
+            return
+
+
+def _lost(subject, output, target, answers, turns, scale, value, good):
+    """Yield crossings of the value that are not among the answers."""
+    gap = _gap(value, target, turns)
+    change = (gap[:-1] < 0.0) != (gap[1:] < 0.0)
+    change &= good[:-1] & good[1:] & (np.abs(np.diff(gap)) < 0.2 * scale)
+    for i in np.flatnonzero(change)[:20]:
+        lo, hi = subject.theta[i], subject.theta[i + 1]
+        below = gap[i] < 0.0
+        for _ in range(12):
+            grid = np.linspace(lo, hi, 17)
+            drawing, unit = subject.drawn(grid)
+            row = _gap(subject.place(output, drawing, unit) * np.ones(17), target, turns)
+            at = max(1, int(np.argmax((row < 0.0) != below)))
+            lo, hi = grid[at - 1], grid[at]
+        if not abs(row[at]) < 1e-7 * scale:
+            continue  # a jump
+        if _away(hi, answers) > 1e-5 + 1e3 * abs(row[at]) / scale:
+            slope = abs(value[i + 1] - value[i]) / scale
+            if slope > 1e-9:
+                yield 'inverse lost', (f'{output} = {target!r}: {hi!r} is not among '
+                                       f'{answers.tolist()}')
+                return
+
+
+CHECKS = (poses, rates, forms, reach, dead_points, inverse)
+
+
+def problems(design, rng, checks=CHECKS, samples=4000):
+    """Return the problems of a design and the measured rows, None if it cannot be made."""
+    try:
+        subject = Subject(design, rng, samples)
+    except ValueError:
+        return None
+    found = [problem for check in checks for problem in check(subject)]
+    return found, getattr(subject, 'rows', [])

@@ -1,0 +1,443 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Random linkages of every word of the language, a third of them nearly degenerate.
+
+A linkage is drawn joint by joint from a pose that it has: a joint is put somewhere, and the
+lengths that are written are the distances found there. So nearly all can be assembled at some
+angle. What is degenerate is made on purpose: equal bars by one name or one number, change points,
+kites over arms of no length, pins that pass the pivot, offsets of zero, flat triangles, guides.
+"""
+
+import cmath
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+DEGENERATE = 0.35
+# How far from exactly degenerate.
+NEAR = (0.0, 0.0, 0.0, 1e-16, 1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9)
+WORDS = ('dyad', 'rigid', 'line', 'mirror', 'parallelogram', 'inversor', 'slot', 'slider')
+LIKELY = np.array((6, 2, 2, 2, 1, 1, 2, 2), float)
+
+
+class Design(NamedTuple):
+    """A linkage written down: its lines, the numbers of its dimensions, its sides by joint."""
+
+    joints: tuple
+    dimensions: dict
+    branches: dict
+
+    def __str__(self):
+        lines = ', '.join(map(repr, self.joints))
+        given = ''.join(f', {name}={number!r}' for name, number in self.dimensions.items())
+        sides = f', branches={self.branches!r}' if self.branches else ''
+        return f'C({lines}{given}{sides})'
+
+
+def design(rng):
+    """Return a random `Design`."""
+    return _Writer(rng).written()
+
+
+def angles(rng, count, spots=(), cranks=1):
+    """Return crank angles, (count, cranks): uniform, at spots, near them, after many turns."""
+    spots = [0.0, math.pi, -math.pi, math.pi / 2, -math.pi / 2, *spots]
+    return np.array([[_angle(rng, spots if crank == 0 else spots[:5]) for crank in range(cranks)]
+                     for _ in range(count)])
+
+
+def _angle(rng, spots):
+    kind = rng.random()
+    if kind < 0.4:
+        return rng.uniform(-math.pi, math.pi)
+    if kind < 0.95:
+        spot = spots[rng.integers(len(spots))] if rng.random() < 0.5 else spots[-1]
+        if kind < 0.55:
+            return spot
+        return spot + rng.choice((-1.0, 1.0)) * 10.0 ** rng.integers(-15, 0)
+    return rng.uniform(-math.pi, math.pi) + 2 * math.pi * rng.choice((1, -3, 1e3, 1e6, 1e9, -1e9))
+
+
+def _log_uniform(rng, low, high):
+    return math.exp(rng.uniform(math.log(low), math.log(high)))
+
+
+class _Writer:
+    """A linkage that is being written."""
+
+    def __init__(self, rng):
+        self._rng = rng
+        self._lines, self._dimensions = [], {}
+        self._names = iter('ABCDEFGHJKLMNPQRSTUVWXYZ')
+        self._place, self._kind, self._crank_of = {}, {}, {}
+        self._bodies, self._texts = [], {}
+        self._arms = []
+        self._degenerate = rng.random() < DEGENERATE
+        self._literal = rng.choice((0.0, 0.0, 0.3, 1.0))
+        self._size = 1.0
+        if rng.random() < 0.15:
+            self._size = 10.0 ** int(rng.choice((-150, -20, -6, 6, 20, 150)))
+            if abs(math.log10(self._size)) > 10:
+                self._literal = 0.0
+
+    def written(self):
+        """Return the `Design`."""
+        rng = self._rng
+        self._ground()
+        cranks = int(rng.choice((1, 1, 1, 1, 2, 3)))
+        for _ in range(int(rng.integers(1, 3)) + cranks - 1):
+            self._ground()
+        if self._degenerate and rng.random() < 0.5:
+            self._special_start()
+        else:
+            self._crank()
+        while sum(line.split()[1] == 'crank' for line in self._lines) < cranks:
+            self._crank()
+        moving = int(rng.integers(2, 10))
+        for _ in range(10 * moving):
+            if len(self._place) - len(self._fixed) >= moving + cranks:
+                break
+            word = rng.choice(WORDS, p=LIKELY / LIKELY.sum())
+            getattr(self, f'_{word}')()
+        branches = {}
+        for line in self._lines:
+            parts = line.split()
+            if parts[1] in ('dyad', 'slot', 'slider') and rng.random() < 0.1:
+                branches[parts[0]] = int(rng.choice((-1, 1)))
+        return Design(tuple(self._lines), self._dimensions, branches)
+
+    # --- numbers ---
+
+    @property
+    def _fixed(self):
+        return [name for name, kind in self._kind.items() if kind == 'ground']
+
+    @property
+    def _pins(self):
+        return [name for name, kind in self._kind.items() if kind == 'crank']
+
+    @property
+    def _moving(self):
+        return [name for name, kind in self._kind.items() if kind != 'ground']
+
+    def _number(self, value, positive=True):
+        """Return a text for a number in units of the size; positive unless it may be negative."""
+        rng, value = self._rng, float(value)
+        if value == 0.0:
+            return '0'
+        if not positive and value < 0.0 and rng.random() < 0.5:
+            return '-' + self._number(-value)
+        if rng.random() < self._literal:
+            text = repr(round(value * self._size, int(rng.integers(1, 17))
+                              - math.floor(math.log10(abs(value * self._size)))))
+            return self._known(text, float(text) / self._size)
+        if positive and value > 0.0 and self._dimensions and rng.random() < 0.15:
+            name = str(rng.choice(list(self._dimensions)))
+            factor = float(f'{value * self._size / self._dimensions[name]:.3g}')
+            if factor > 0.0:
+                form = rng.choice((f'{factor!r}*{name}', f'{name}*{factor!r}',
+                                   f'{name}/{1 / factor!r}'))
+                return self._known(str(form), factor * self._dimensions[name] / self._size)
+        name = f'd{len(self._dimensions)}'
+        self._dimensions[name] = float(value * self._size)
+        return self._known(name, value)
+
+    def _known(self, text, value):
+        self._texts[text] = value
+        return text
+
+    def _nudged(self, text, value):
+        """Return a text for the same number, or one very near it."""
+        step = self._rng.choice(NEAR)
+        if step == 0.0:
+            return text
+        near = value * (1.0 + self._rng.choice((-1, 1)) * step)
+        literal, self._literal = self._literal, 0.0
+        name = f'd{len(self._dimensions)}'
+        self._dimensions[name] = float(near * self._size)
+        self._literal = literal
+        return name
+
+    def _name(self):
+        name = next(self._names)
+        return name if self._rng.random() < 0.8 else f'{name}_{name.lower()}1'
+
+    def _put(self, name, place, kind):
+        self._place[name], self._kind[name] = place, kind
+
+    def _somewhere(self, centre=0.0, radius=1.0):
+        return centre + radius * (self._rng.normal() + 1j * self._rng.normal())
+
+    def _pick(self, names):
+        return str(self._rng.choice(names))
+
+    def _two(self):
+        """Return two joints for an arm: often from the ground to a pin, or one used before."""
+        rng, names = self._rng, list(self._place)
+        kind = rng.random()
+        if self._arms and kind < 0.15:
+            pair = self._arms[rng.integers(len(self._arms))]
+            return pair if rng.random() < 0.5 else pair[::-1]
+        if kind < 0.5:
+            pair = self._pick(self._fixed), self._pick(self._pins)
+            pair = pair if rng.random() < 0.5 else pair[::-1]
+        else:
+            pair = tuple(map(str, rng.choice(names, 2, replace=False)))
+        if not any(name in self._moving for name in pair):
+            return self._two()
+        self._arms.append(pair)
+        return pair
+
+    def _distance(self, *names):
+        return abs(self._place[names[0]] - self._place[names[1]])
+
+    def _body(self, first, second):
+        self._bodies.append([first, second])
+
+    # --- words ---
+
+    def _ground(self):
+        rng = self._rng
+        place = complex(*(0.0 if zero else x for zero, x in zip(
+            rng.random(2) < (0.9 if not self._place else 0.35), rng.normal(size=2) * 1.5)))
+        if place in self._place.values():
+            place = self._somewhere(radius=1.5)
+        name = self._name()
+        x, y = (self._number(value, False) for value in (place.real, place.imag))
+        self._lines.append(f'{name} ground {x} {y}')
+        self._put(name, complex(self._worth(x), self._worth(y)), 'ground')
+
+    def _worth(self, text):
+        if text.startswith('-') and text not in self._texts:
+            return -self._worth(text[1:])
+        return 0.0 if text == '0' else self._texts[text]
+
+    def _turn_crank(self, name, centre, length, text, up):
+        angle = self._rng.uniform(-math.pi, math.pi)
+        self._lines.append(f'{name} crank {centre} {text}' + (' up' if up else ''))
+        self._put(name, self._place[centre] + length * cmath.exp(1j * angle), 'crank')
+        self._crank_of[name] = centre
+        self._body(centre, name)
+
+    def _crank(self):
+        length = _log_uniform(self._rng, 0.2, 2.0)
+        text = self._number(length)
+        self._turn_crank(self._name(), self._pick(self._fixed), self._texts[text], text,
+                         self._rng.random() < 0.25)
+
+    def _special_start(self):
+        """Hang on the first crank what has a change point, or an arm of no length at times."""
+        rng = self._rng
+        centre = self._fixed[0]
+        g, m = _log_uniform(rng, 0.3, 3.0), _log_uniform(rng, 0.3, 3.0)
+        literal, self._literal = self._literal, 0.0 if self._literal < 1.0 else 1.0
+        ground = self._number(g)
+        g = self._texts[ground]
+        foot, pin = self._name(), self._name()
+        x, y = self._lines[0].split()[2:]
+        where = rng.choice(('right', 'left', 'up', 'down'))
+        sign = '+' if where in ('right', 'up') else '-'
+        moved = f'{x if where in ("right", "left") else y}{sign}{ground}'
+        moved = moved.replace('+-', '-').replace('--', '+')
+        if moved.startswith('0'):
+            moved = moved[2:] if sign == '+' else moved[1:]
+        at = (moved, y) if where in ('right', 'left') else (x, moved)
+        self._lines.append(f'{foot} ground {at[0]} {at[1]}')
+        step = {'right': g, 'left': -g, 'up': 1j * g, 'down': -1j * g}[where]
+        self._put(foot, self._place[centre] + step, 'ground')
+        kind = rng.choice(('isosceles', 'parallelogram', 'sum', 'kite', 'difference'))
+        if kind in ('isosceles', 'kite'):
+            crank, m = self._nudged(ground, g), g
+        else:
+            crank = self._number(m)
+            m = self._texts[crank]
+        self._turn_crank(pin, centre, m, crank, rng.random() < 0.25)
+        pair = (pin, foot) if rng.random() < 0.5 else (foot, pin)
+        side = rng.choice(('left', 'right'))
+        name = self._name()
+        b = rng.uniform(0.15, 0.85) * (g + m)
+        if kind == 'isosceles':
+            self._arms += [pair, pair]
+        elif kind == 'parallelogram':
+            to_pin, to_foot = self._nudged(ground, g), self._nudged(crank, m)
+            bars = (to_pin, to_foot) if pair[0] == pin else (to_foot, to_pin)
+            self._finish_dyad(name, *pair, *bars, side)
+        elif kind == 'kite':
+            bar = self._number(abs(b))
+            self._finish_dyad(name, *pair, bar, self._nudged(bar, self._texts[bar]), side)
+        else:
+            bar = self._number(b)
+            b = self._texts[bar]
+            other = g + m - b if kind == 'sum' else b + abs(g - m)
+            text = (f'{ground}+{crank}-{bar}' if kind == 'sum' else
+                    f'{bar}+{ground}-{crank}' if g > m else f'{bar}+{crank}-{ground}')
+            if other > 0.05 * b:
+                self._finish_dyad(name, *pair, bar, self._nudged(text, other), side)
+        self._literal = literal
+
+    def _finish_dyad(self, name, first, second, one, other, side):
+        self._lines.append(f'{name} dyad {first} {second} {one} {other} {side}')
+        self._put(name, self._somewhere(self._place[second]), 'dyad')
+        self._body(first, name)
+        self._body(second, name)
+
+    def _dyad(self):
+        rng = self._rng
+        first, second = self._two()
+        p, q = self._place[first], self._place[second]
+        equal = rng.random() < (0.6 if self._degenerate else 0.1)
+        height = rng.normal() * max(abs(q - p), 0.3)
+        place = ((p + q) / 2 + 1j * (q - p) / max(abs(q - p), 1e-3) * height if equal
+                 else self._somewhere((p + q) / 2))
+        one = self._number(abs(place - p) or 1.0)
+        other = self._nudged(one, self._texts[one]) if equal \
+            else self._number(abs(place - q) or 1.0)
+        side = 'left' if ((q - p).conjugate() * (place - p)).imag > 0 else 'right'
+        name = self._name()
+        self._finish_dyad(name, first, second, one, other, side)
+        self._place[name] = place
+
+    def _pair_of_link(self):
+        body = self._bodies[self._rng.integers(len(self._bodies))]
+        return body, *map(str, self._rng.choice(body, 2, replace=False))
+
+    def _rigid(self):
+        rng = self._rng
+        body, first, second = self._pair_of_link()
+        p, q = self._place[first], self._place[second]
+        base = abs(q - p)
+        if base < 1e-3:
+            return
+        shape = rng.random() if self._degenerate else 0.0
+        if shape > 0.8:
+            place = p + (q - p) * rng.uniform(0.2, 0.8)
+        elif shape > 0.4:
+            place = (p + q) / 2 + 1j * (q - p) * rng.uniform(0.1, 2.0)
+        else:
+            place = self._somewhere((p + q) / 2)
+        one = self._number(abs(place - p))
+        other = self._nudged(one, self._texts[one]) if 0.4 < shape <= 0.8 \
+            else self._number(abs(place - q))
+        name = self._name()
+        self._lines.append(f'{name} rigid {first} {second} {one} {other} '
+                           f'{rng.choice(("left", "right"))}')
+        self._put(name, place, 'rigid')
+        body.append(name)
+
+    def _line(self):
+        rng = self._rng
+        body, first, second = self._pair_of_link()
+        p, q = self._place[first], self._place[second]
+        if abs(q - p) < 1e-3:
+            return
+        if self._degenerate and rng.random() < 0.3:
+            text = str(rng.choice(list(self._texts) + ['0']))
+            text = text if rng.random() < 0.5 or text == '0' or text[0] == '-' else f'2*{text}'
+        else:
+            text = self._number(rng.normal() * abs(q - p), False)
+        name = self._name()
+        self._lines.append(f'{name} line {first} {second} {text}')
+        self._put(name, self._somewhere(p), 'line')
+        body.append(name)
+
+    def _corners(self):
+        """Return joints with two others, each on a link with it or all of the ground."""
+        bodies = [*self._bodies, self._fixed]
+        found = []
+        for name in self._place:
+            near = sorted({other for body in bodies if name in body for other in body} - {name})
+            for i, one in enumerate(near):
+                found += [(name, one, other) for other in near[i + 1:]
+                          if not {one, other} <= set(self._fixed)
+                          and not any({one, other} <= set(body) and name in body
+                                      for body in self._bodies)]
+        return found
+
+    def _mirror(self):
+        self._reflected('mirror')
+
+    def _parallelogram(self):
+        self._reflected('parallelogram')
+
+    def _reflected(self, word):
+        corners = self._corners()
+        if not corners:
+            return
+        point, first, second = corners[self._rng.integers(len(corners))]
+        if self._rng.random() < 0.5:
+            first, second = second, first
+        o, p, q = (self._place[name] for name in (point, first, second))
+        name = self._name()
+        self._lines.append(f'{name} {word} {point} {first} {second}')
+        self._put(name, p + q - o if word == 'parallelogram' or abs(q - p) < 1e-9
+                  else p + (q - p) * ((o - p) / (q - p)).conjugate(), word)
+        self._body(first, name)
+        self._body(second, name)
+
+    def _inversor(self):
+        rng = self._rng
+        pole, pin = self._two()
+        p, q = self._place[pole], self._place[pin]
+        place = self._somewhere((p + q) / 2)
+        long = self._number(abs(place - p) or 1.0)
+        short = self._nudged(long, self._texts[long]) \
+            if self._degenerate and rng.random() < 0.3 else self._number(abs(place - q) or 1.0)
+        right, corner, left = self._name(), self._name(), self._name()
+        self._lines.append(f'{right} {corner} {left} inversor {pole} {pin} {long} {short}')
+        for name in (right, corner, left):
+            self._put(name, self._somewhere((p + q) / 2), 'inversor')
+        for pair in ((pole, right), (pin, right), (pole, left), (pin, left), (right, corner),
+                     (left, corner)):
+            self._body(*pair)
+
+    def _slot(self):
+        rng = self._rng
+        pivot, pin = self._pick(self._fixed), self._pick(self._moving)
+        away = self._distance(pivot, pin)
+        kind = rng.random()
+        if kind < (0.5 if self._degenerate else 0.2):
+            offset = '0'
+        else:
+            offset = self._number(rng.uniform(-1.0, 1.0) * max(away, 0.1), False)
+        name = self._name()
+        length = self._number(_log_uniform(rng, 0.3, 3.0))
+        self._lines.append(f'{name} slot {pivot} {pin} {offset} {rng.choice(("out", "in"))} '
+                           f'{length}')
+        self._put(name, self._somewhere(self._place[pivot]), 'slot')
+        self._body(pivot, name)
+
+    def _slider(self):
+        rng = self._rng
+        pin, origin = self._pick(self._moving), self._pick(self._fixed)
+        angle = rng.choice((0.0, 1.5707963267948966, 3.141592653589793, -1.5707963267948966,
+                            rng.uniform(-4.0, 4.0)))
+        along = cmath.exp(1j * angle)
+        seen = (self._place[pin] - self._place[origin]) * along.conjugate()
+        if self._degenerate and rng.random() < 0.5 and pin in self._pins:
+            text = self._lines[[line.split()[0] for line in self._lines].index(pin)].split()[3]
+            rod = self._nudged(text, self._texts.get(text, 1.0))
+        else:
+            rod = self._number(abs(seen.imag) + abs(rng.normal()))
+        name = self._name()
+        turn = '0' if angle == 0.0 else repr(float(angle))
+        if angle and rng.random() < 0.3:
+            turn = f'd{len(self._dimensions)}'
+            self._dimensions[turn] = float(angle)
+        self._lines.append(f'{name} slider {pin} {rod} {origin} {turn} '
+                           f'{rng.choice(("out", "in"))}')
+        self._put(name, self._place[origin] + along * seen.real, 'slider')
+        self._body(pin, name)

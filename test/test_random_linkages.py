@@ -1,0 +1,181 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Random linkages of every word: right to the last digits, and no exception, lost or false answer.
+
+The linkages come from `random_linkages`, the truth from `joint_lines_truth`, the rule and the
+measure from `joint_lines_accuracy`, what is asked from `linkage_checks`.
+"""
+
+from collections import Counter
+import math
+
+import gmpy2
+import joint_lines_accuracy as accuracy
+from joint_lines_truth import Arithmetic, DIGITS, draw, FLOATS, Linkage, precisely, read
+import linkage_checks as checks
+from linkage_ros import mechanisms
+import numpy as np
+import pytest
+import random_linkages
+import reference
+import reference_wider
+import stress
+
+WORDS = {'ground', 'crank', *random_linkages.WORDS}
+LONG, BATCH = 1000, 25
+
+
+def problems(seeds, asked):
+    """Return what does not hold for random linkages, with the seed of each."""
+    found = []
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        told = checks.problems(random_linkages.design(rng), rng, asked(seed))
+        found += [(seed, *problem) for problem in (told[0] if told else ())]
+    return found
+
+
+def report(found):
+    """Return problems as text: how many of each kind, and one of each."""
+    kinds = Counter(kind for _, kind, _ in found)
+    first = {kind: f'seed {seed}: {text}' for seed, kind, text in reversed(found)}
+    return '\n'.join(f'{count} x {kind}, {first[kind]}' for kind, count in kinds.most_common())
+
+
+def a_few(seed):
+    """Return poses and, in turn, one of the other checks."""
+    others = checks.CHECKS[1:]
+    return lambda subject: checks.poses(subject, 1), others[seed % len(others)]
+
+
+def all_of_them(seed):
+    """Return all checks; machine code takes a while to make and is asked for now and then."""
+    return (*checks.CHECKS, *((checks.accelerated,) if seed % 10 == 0 else ()))
+
+
+def test_random_linkages_hold():
+    found = problems(range(25), a_few)
+    assert not found, report(found)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('batch', range(LONG // BATCH))
+def test_a_thousand_random_linkages_hold(batch):
+    first = 1000 + batch * BATCH
+    found = problems(range(first, first + BATCH), all_of_them)
+    assert not found, report(found)
+
+
+# --- that the check is a check ------------------------------------------------------------------
+
+def test_every_word_comes_up_and_a_third_is_degenerate():
+    words, refused, count = Counter(), 0, 120
+    for seed in range(count):
+        design = random_linkages.design(np.random.default_rng(seed))
+        words.update(read(text).word for text in design.joints)
+        try:
+            mechanisms.create('custom', joints=design.joints, branches=design.branches,
+                              **design.dimensions)
+        except ValueError:
+            refused += 1
+    assert words.keys() == WORDS
+    assert min(words.values()) > 20
+    assert refused < 0.1 * count
+
+
+@pytest.mark.parametrize('kind', [*stress.CATALOGUE, *reference_wider.PLACE])
+@precisely
+def test_the_drawing_agrees_with_the_other_reference(kind):
+    if kind == 'custom':
+        joints = reference_wider.MOVING
+        lengths = {'a': 1.0, 'b': 3.0, 'c': 2.5, 'd': 3.2, 'e': 1.5, 'f': 2.0, 'g': 3.5, 'h': 4.0}
+    else:
+        design = mechanisms.design(kind)
+        joints, lengths = design.joints, mechanisms.create(kind).dimensions
+    linkage = Linkage(joints, lengths)
+    way = linkage.passings()[0]
+    turns = linkage.turns(linkage.numbers, way)
+    rows = linkage.prepared(linkage.numbers)
+    for theta in (0.3, -0.4, 1.2):
+        held = [theta, reference_wider.HELD][:len(linkage.cranks)]
+        found = draw(DIGITS, linkage, rows, list(map(gmpy2.mpfr, held)), way, turns)
+        true = reference.place(kind, reference.exact(lengths), reference.mp.mpf(theta))
+        for name, place in true.points.items():
+            away = found.points[name] - gmpy2.mpc(*(
+                    gmpy2.mpfr(reference.mp.nstr(part, 80)) for part in (place.real, place.imag)))
+            assert abs(away) < 1e-50 * linkage.longest, name
+
+
+@precisely
+def test_the_arithmetic_is_that_of_the_language():
+    value = Arithmetic({'a': gmpy2.mpfr(3), 'b2': gmpy2.mpfr(0.5)}).value
+    assert value('a*b2-1/4').number == 1.25
+    assert value('-(a-2*b2)+max(a,4)').number == 2
+    assert value('2-1-1').number == 0
+    assert value('.5e1/2/2').number == 1.25
+    assert value('a/b2').slack == 0 < value('1/a').slack < 1e-16
+
+
+@precisely
+def test_the_drawing_passes_a_change_point_as_the_language_says():
+    joints = ('O ground 0 0', 'Q ground d 0', 'A crank O a', 'B dyad A Q b c left')
+    linkage = Linkage(joints, {'a': 1.0, 'b': 2.0, 'c': 3.0, 'd': 4.0})
+    (way,) = linkage.passings()
+    turns, rows = linkage.turns(linkage.numbers, way), linkage.prepared(linkage.numbers)
+
+    def side(theta):
+        points = draw(DIGITS, linkage, rows, [gmpy2.mpfr(theta)], way, turns).points
+        return ((points['B'] - points['A']) / (points['Q'] - points['A'])).imag > 0
+
+    quarter, turn = math.pi / 2, 2 * math.pi
+    assert [side(quarter + k * turn) for k in range(-2, 3)] == [True, False, True, False, True]
+    assert side(0.1) and side(math.pi - 0.1) and side(math.pi + 0.1) != side(-math.pi + 0.1)
+
+
+def test_floats_and_digits_draw_the_same():
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        try:
+            subject = checks.Subject(random_linkages.design(rng), rng, 7)
+        except ValueError:
+            continue
+        rows, turns, unit = subject.linkage.in_floats(subject.ways[0])
+        held = [subject.theta[3], *subject.held]
+        rough = draw(FLOATS, subject.linkage, rows, held, subject.ways[0], turns)
+        truth = subject.measure().at(held)
+        if set(truth.states.values()) <= {'meets'}:
+            for pose, value in zip(subject.poses, truth.values):
+                if pose.what == 'point':
+                    away = rough.points[pose.name] - complex(value / subject.linkage.longest)
+                    assert abs(away) < 1e-6, (seed, pose)
+
+
+def test_the_measure_sees_a_flaw_in_the_last_digits_and_a_wrong_nan():
+    rng = np.random.default_rng(9)
+    subject = checks.Subject(random_linkages.design(rng), rng)
+    thetas = np.array([[0.7, *subject.held]])
+    found = accuracy.answers(subject.mechanism, thetas, subject.poses, True)
+    measure = subject.measure()
+    assert not accuracy.broken(accuracy.judge(measure, thetas, found, True))
+    truth = measure.at(thetas[0], True)
+    moving = [output for output in found if measure.due(output, truth.states) == 'number'
+              and output.name not in (*subject.linkage.fixed, *subject.mechanism.cranks)]
+    assert len(moving) > 10
+    for output, value in ((output, found[output]) for output in moving):
+        for flawed in (value * (1.0 + 1e-12) + 1e-12, np.full_like(value, np.nan)):
+            rows = accuracy.judge(measure, thetas, {**found, output: flawed}, True,
+                                  [truth])
+            assert {row.output for row in accuracy.broken(rows)} == {output}
