@@ -193,7 +193,7 @@ def only_line(command, folder, environment):
                  'The Python package index cannot be reached', marks=pytest.mark.long)])
 def test_the_build_says_in_one_line_what_is_missing(copy, tmp_path, lines, settings, complaint):
     usual = {'PYTHON': wrapped(tmp_path, *lines), 'PATH': os.environ['PATH'],
-             'PIP_CONFIG_FILE': os.devnull, 'PIP_RETRIES': '0'}
+             'PIP_CONFIG_FILE': os.devnull, 'PIP_RETRIES': '1'}
     assert complaint in only_line(['make', 'build'], copy, {**usual, **settings})
 
 
