@@ -17,10 +17,12 @@
 import math
 import sys
 from threading import Lock
+import time
 from typing import NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -39,6 +41,8 @@ SECONDS_BETWEEN_WARNINGS = 5.0
 # remembered so that each is said once.
 PATIENCE = 5.0
 STRANGERS = 1000
+# How long the end may wait for what takes the mechanisms out of the picture [s].
+FAREWELL = 0.1
 # A message without a stamp.
 NEVER = bytes(8)
 
@@ -88,6 +92,10 @@ class Kinematics(node.SceneNode):
             self._ended = True
             for outlet in self._outlets.values():
                 outlet.clear()
+        # What has not arrived when a process ends is lost.
+        until = time.monotonic() + FAREWELL
+        for outlet in self._outlets.values():
+            outlet.let_arrive(until)
 
     def destroy_node(self):
         """Say goodbye where that is still possible, and end."""
@@ -331,6 +339,11 @@ class Outlet:
         if self._curved:
             self._curved = False
             self._locus.publish(messages.deleted(self.name, messages.LOCUS_ID))
+
+    def let_arrive(self, until: float):
+        """Wait until a time on the steady clock [s] for the picture's topics to be heard."""
+        for publisher in (self._markers, self._locus):
+            publisher.wait_for_all_acked(Duration(seconds=max(0.0, until - time.monotonic())))
 
     def _delete(self, ids):
         if ids:
