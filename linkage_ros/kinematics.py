@@ -30,7 +30,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from . import messages, node, reading, scene, urdf
 from .solution import Layout
-from .wire import pack, unpack, Wire
+from .wire import pack, unpack, Unreadable, Wire
 from .words import listed
 
 # Any source will do; what comes while the node is kept waiting, 50 ms at 1000 Hz, is not lost.
@@ -112,7 +112,7 @@ class Kinematics(node.SceneNode):
     def _draw(self, text):
         try:
             stamp, routes, positions, speeds = self._reader.read(text)
-        except reading.Unreadable as error:
+        except Unreadable as error:
             self.get_logger().warning(
                 f'crank_states: {len(text)} bytes that are no joint states are passed over: '
                 f'{error}', throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)

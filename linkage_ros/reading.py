@@ -26,25 +26,17 @@ from collections import OrderedDict
 from struct import error as TooShort, Struct
 from typing import Any, Callable, NamedTuple, Tuple
 
-from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
-from .wire import HEADER, pack
+from .wire import deserialized, HEADER, pack
 
 # So many sources are remembered, of messages that are no longer [bytes]; of those that are of one
 # length, so many arrangements of names. Where there are more sources, one in so many messages is
 # looked at to learn it, as that costs more than it saves if the source is soon forgotten.
 SOURCES, LONGEST, ARRANGEMENTS, SAMPLED = 256, 1 << 16, 4, 64
 LITTLE_ENDIAN = b'\0\1'
-# The bytes of joint states that say nothing. Where there are fewer, a middleware that takes the
-# sender's word for how many are padding looks beyond the end, and may end the process.
-SHORTEST = 36
 
 _COUNT = Struct('<I')
-
-
-class Unreadable(ValueError):
-    """A message that cannot be deserialised; the text says why."""
 
 
 class Turned(NamedTuple):
@@ -84,13 +76,7 @@ class Reader:
                 if layout := layouts.get(number & mask):
                     self._used.move_to_end(layout)
                     return layout.take(text)
-        if len(text) < SHORTEST:
-            raise Unreadable(f'there must be {SHORTEST} at least')
-        try:
-            message = deserialize_message(text, JointState)
-        except Exception as error:
-            # Each middleware has errors of its own.
-            raise Unreadable(' '.join(str(error).split())[:200]) from None
+        message = deserialized(text, JointState)
         turned = Turned(pack(message.header.stamp), self._understand(message),
                         tuple(message.position), tuple(message.velocity))
         self._missed += 1

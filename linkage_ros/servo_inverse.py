@@ -25,6 +25,7 @@ from sensor_msgs.msg import JointState
 
 from . import node, reading, scene
 from .servo import CLOSE, TURN
+from .wire import Unreadable
 from .words import elided, listed, MESSAGE, quoted
 
 try:
@@ -38,6 +39,8 @@ except ImportError as error:
 LEVER = 'lever'
 # An angle beyond this [rad] has lost digits that a servo needs.
 FARTHEST = 1e6
+# More values than this at once would keep other callers waiting.
+MOST_VALUES = 1_000_000
 # Values named, and letters of names allowed, in a message.
 MOST_NAMED, MOST = 5, 150
 # An extreme is looked for among so many samples, then so often next to the best of them.
@@ -74,7 +77,7 @@ class ServoInverse(node.SceneNode):
     def _turn(self, text):
         try:
             turned = self._reader.read(text)
-        except reading.Unreadable:
+        except Unreadable:
             # `kinematics` says so.
             return
         self._turned.update((name, turned.positions[place]) for name, place in turned.source)
@@ -109,6 +112,8 @@ def solve(asked, request, response, present=math.inf):
     wanted, near = request.lever_angle, request.servo_near
     if not wanted:
         raise ValueError('lever_angle is empty; give at least one value')
+    if len(wanted) > MOST_VALUES:
+        raise ValueError(f'lever_angle has {len(wanted)} values; give up to {MOST_VALUES} at once')
     if near and len(near) != len(wanted):
         raise ValueError(f'servo_near must be empty or have one angle for each of the '
                          f'{len(wanted)} in lever_angle, not {len(near)}')

@@ -30,6 +30,9 @@ from rclpy.serialization import deserialize_message, serialize_message
 # The bytes that say how a message is encoded; what follows is aligned from its end.
 HEADER = 4
 LEAD = bytes(8 - HEADER)
+# Of fewer bytes no message is made. A middleware that takes the sender's word for how many of them
+# are padding looks beyond the end, and may end the process.
+SHORTEST = 8
 
 _STAMP = struct.Struct('=iI')
 SENTINEL = Time(sec=0x5EC0_1234, nanosec=0x2A0C_4321)
@@ -44,6 +47,21 @@ def unpack(stamp: bytes) -> Time:
     """Return the stamp that some bytes of a message are."""
     sec, nanosec = _STAMP.unpack(stamp)
     return Time(sec=sec, nanosec=nanosec)
+
+
+class Unreadable(ValueError):
+    """A message that cannot be deserialised; the text says why."""
+
+
+def deserialized(text: bytes, kind: type):
+    """Return a message from its bytes; raise Unreadable if they are none of its kind."""
+    if len(text) < SHORTEST:
+        raise Unreadable(f'there must be {SHORTEST} at least')
+    try:
+        return deserialize_message(text, kind)
+    except Exception as error:
+        # Each middleware has errors of its own.
+        raise Unreadable(' '.join(str(error).split())[:200]) from None
 
 
 class NoTemplate(Exception):

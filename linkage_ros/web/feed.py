@@ -17,7 +17,7 @@
 import struct
 
 import numpy as np
-from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.serialization import serialize_message
 from visualization_msgs.msg import Marker
 
 from .. import wire
@@ -92,7 +92,7 @@ class Feed:
             self._records = _recorded(self._counts, _shown(places))
 
     def _unpack(self, text):
-        message = deserialize_message(text, self._type)
+        message = wire.deserialized(text, self._type)
         markers = [marker for marker in _markers(message)
                    if marker.type in KINDS and marker.action == Marker.ADD]
         numbers = [self._number(i) for i in range(len(markers))]
