@@ -24,8 +24,8 @@ may be closed. For velocities and rates also the velocity of each joint on the w
     error <= 4 x sensitivity + 1 ulp of the result,
 
 for velocities and rates 8 x, with a number wherever everything that the joint stands on can be
-assembled and NaN wherever it cannot; within `GRAZE` sensitivities of a limit either will do. Angles
-are compared modulo a turn, so that their ulp is that of pi.
+assembled and NaN wherever it cannot; within `GRAZE` sensitivities of a limit either will do.
+Angles are compared modulo a turn, so that their ulp is that of pi.
 """
 
 import math
