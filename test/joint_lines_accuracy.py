@@ -19,7 +19,7 @@ A result is measured in units of its *sensitivity*: what moving each thing that 
 an ulp does to the true result. Rounded are the inputs (crank angles, dimensions, numbers in the
 lines, what is calculated from them), and each joint on the way but ground joints and crank pins:
 half an ulp of the largest coordinate on its line; a gap so small that it counts as a change point
-may be closed. For velocities and rates also the velocity of each joint on the way. The rule is
+may be closed. For velocities and rates also the velocity of each of those joints. The rule is
 
     error <= 4 x sensitivity + 1 ulp of the result,
 
@@ -202,8 +202,7 @@ class Measure:
         for moved in self._displaced(now.points, hung, side):
             yield self._nominal, thetas, moved, {}
         for crank, speed in enumerate(speeds):
-            turning = [name for name in self.linkage.placed if name not in self.linkage.fixed]
-            for moved in self._displaced(speed, turning, side):
+            for moved in self._displaced(speed, hung, side):
                 yield (self._nominal, thetas, {},
                        {(name, crank): step for name, step in moved.items()})
 

@@ -456,6 +456,8 @@ def _asked_back(subject, output, drawing, unit, held):
         answers = np.asarray(answers)
         answers = answers[np.isfinite(answers)]
         if spread < 1e-9:
+            if spread < 1e-13 and len(answers):
+                yield 'inverse of what stands still', f'{output} = {target!r}: {answers.tolist()}'
             continue
         if spread < 1e-6:
             return
