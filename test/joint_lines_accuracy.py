@@ -19,13 +19,13 @@ A result is measured in units of its *sensitivity*: what moving each thing that 
 an ulp does to the true result. Rounded are the inputs (crank angles, dimensions, numbers in the
 lines, what is calculated from them), and each joint on the way but ground joints and crank pins:
 half an ulp of the largest coordinate on its line; a gap so small that it counts as a change point
-may be closed. For velocities and rates also the velocity of each joint on the way. The rule is
+may be closed. For velocities and rates also the velocity of each of those joints. The rule is
 
     error <= 4 x sensitivity + 1 ulp of the result,
 
-with a number wherever everything that the joint stands on can be assembled and NaN wherever it
-cannot; within `GRAZE` sensitivities of a limit either will do. Angles are compared modulo a turn,
-so that their ulp is that of pi.
+for velocities and rates 8 x, with a number wherever everything that the joint stands on can be
+assembled and NaN wherever it cannot; within `GRAZE` sensitivities of a limit either will do.
+Angles are compared modulo a turn, so that their ulp is that of pi.
 """
 
 import math
@@ -36,7 +36,7 @@ from gmpy2 import mpc, mpfr
 from joint_lines_truth import DIGITS, draw, half_ulp, Linkage, precisely
 import numpy as np
 
-RULE = 4.0
+RULE, RATE_RULE = 4.0, 8.0
 GRAZE = 32.0
 # Where an arm has no length exactly, its direction is that of an angle 2^-NUDGE further on.
 NUDGE = 150
@@ -153,7 +153,8 @@ class Measure:
             thetas = [theta + mpfr(2) ** -NUDGE for theta in thetas]
             now = self._drawn(self._nominal, thetas)
         values = self._values(now, self._nominal, thetas, {}, {}, rates)
-        closures = {**now.gaps}
+        closures, arms = {**now.gaps}, now.arms
+        bent = dict.fromkeys(arms, mpfr(0))
         spread, slack = [mpfr(0)] * len(values), dict.fromkeys(closures, mpfr(0))
         speeds = self._speeds(thetas) if rates else []
         for side in (1, -1):
@@ -164,6 +165,8 @@ class Measure:
                     one_side[i] += self._distance(i, old, new)
                 for name, gap in closures.items():
                     one_slack[name] += abs(drawn.gaps[name] - gap)
+                for name, arm in arms.items():
+                    bent[name] += abs(drawn.arms[name] - arm)
             for moved in self._displaced(now.points, self._pinned, side):
                 drawn = self._drawn(self._nominal, thetas, moved)
                 for name, gap in closures.items():
@@ -173,6 +176,8 @@ class Measure:
             if all(abs(gap) > 100 * slack[name] for name, gap in closures.items()):
                 break  # far from a limit both sides are alike
         states = {name: _state(gap, slack[name]) for name, gap in closures.items()}
+        states.update((name, 'undirected') for name, arm in arms.items()
+                      if states.get(name, 'meets') == 'meets' and arm <= GRAZE * bent[name])
         states.update((name, 'grazes') for name in grazed if states.get(name) != 'fails')
         states.update((name, 'slips') for name in self._undirected(now))
         return Truth(values, [float(x) for x in spread], states, closures, slack)
@@ -197,8 +202,7 @@ class Measure:
         for moved in self._displaced(now.points, hung, side):
             yield self._nominal, thetas, moved, {}
         for crank, speed in enumerate(speeds):
-            turning = [name for name in self.linkage.placed if name not in self.linkage.fixed]
-            for moved in self._displaced(speed, turning, side):
+            for moved in self._displaced(speed, hung, side):
                 yield (self._nominal, thetas, {},
                        {(name, crank): step for name, step in moved.items()})
 
@@ -259,7 +263,12 @@ class Measure:
         return abs(new - old)
 
     def due(self, output, states):
-        """Tell what is due: 'number', 'nan', 'either', or 'any' next to a limit that is missed."""
+        """
+        Tell what is due: 'number', 'nan', 'any' next to a limit that is missed.
+
+        At a limit that is reached it is 'either', and on an arm whose direction is all rounding
+        'maybe' a number, which then is to be right.
+        """
         joints = [part for part in output.parts if isinstance(part, str)]
         needs = {states[name] for joint in joints for name in self.linkage.closures[joint]
                  if name in states}
@@ -267,14 +276,16 @@ class Measure:
             return 'number'
         if 'fails' in needs:
             return 'nan' if 'slips' not in needs else 'any'
-        return 'any' if 'slips' in needs else 'either'
+        if 'slips' in needs:
+            return 'any'
+        return 'either' if 'grazes' in needs else 'maybe'
 
 
 class Truth(NamedTuple):
     """
     True outputs, poses first, and what half an ulp does to them; the same of the closures' gaps.
 
-    The state of a closure is 'meets', 'grazes', 'slips' or 'fails'.
+    The state of a closure is 'meets', 'undirected', 'grazes', 'slips' or 'fails'.
     """
 
     values: list
@@ -322,12 +333,12 @@ def _row(out, thetas, result, value, spread, due):
         problem = 'NaN' if due == 'number' else ''
     elif due == 'nan':
         problem = 'missed NaN'
-    elif due == 'number' or due == 'either' and not rate:
+    elif due in ('number', 'maybe') or due == 'either' and not rate:
         error = float(_error(out, result, value))
         ulp = np.spacing(math.pi if out.what == 'angle' and not rate else np.max(np.abs(result)))
         excess = max(0.0, error - float(ulp))
         ratio = 0.0 if not excess else excess / spread if spread else math.inf
-        problem = 'rule' if not ratio <= RULE else ''
+        problem = 'rule' if not ratio <= (RATE_RULE if rate else RULE) else ''
     return Row(out, tuple(map(float, thetas)), problem, math.inf if 'NaN' in problem else ratio,
                error, spread, result, value)
 

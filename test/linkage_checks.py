@@ -31,6 +31,8 @@ import numpy as np
 import random_linkages
 
 TURN = 2 * math.pi
+# Arcs below this width [rad] are the rounding of an angle or two.
+NARROWEST = 1e-12
 # Seconds that a question about the inverse may take: the first of its output, and any further.
 FIRST, FURTHER = 1.0, 0.05
 
@@ -281,7 +283,7 @@ def reach(subject):
     for i in _some(np.flatnonzero(held != inside)):
         theta = float(subject.theta[i])
         states = subject.states(theta)
-        if held[i] and states <= {'meets'}:
+        if held[i] and states <= {'meets', 'undirected'}:
             yield 'reach misses', f'{theta!r} can be assembled, reach {arcs}'
         if inside[i] and 'fails' in states and 'slips' not in states:
             yield 'reach too far', f'{theta!r} cannot be assembled, reach {arcs}'
@@ -291,7 +293,7 @@ def reach(subject):
         for theta in (lo, hi, *subject.rng.uniform(lo, hi, 3)):
             missing = [name for name, place in subject.mechanism.solve(
                 _with(subject, float(theta))).items() if np.any(np.isnan(place))]
-            if missing and subject.states(float(theta)) & {'meets', 'grazes', 'fails'}:
+            if missing and hi - lo > NARROWEST:
                 where = 'end' if theta in (lo, hi) else 'inside'
                 yield f'reach {where} is NaN', f'{missing} at {float(theta)!r}, reach {arcs}'
 
@@ -454,6 +456,8 @@ def _asked_back(subject, output, drawing, unit, held):
         answers = np.asarray(answers)
         answers = answers[np.isfinite(answers)]
         if spread < 1e-9:
+            if spread < 1e-13 and len(answers):
+                yield 'inverse of what stands still', f'{output} = {target!r}: {answers.tolist()}'
             continue
         if spread < 1e-6:
             return

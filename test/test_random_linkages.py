@@ -109,6 +109,7 @@ def test_the_drawing_agrees_with_the_other_reference(kind):
     way = linkage.passings()[0]
     turns = linkage.turns(linkage.numbers, way)
     rows = linkage.prepared(linkage.numbers)
+    within = 1e-15 if '1.8' in linkage.literals() else 1e-50  # which is not quite nine fifths
     for theta in (0.3, -0.4, 1.2):
         held = [theta, reference_wider.HELD][:len(linkage.cranks)]
         found = draw(DIGITS, linkage, rows, list(map(gmpy2.mpfr, held)), way, turns)
@@ -116,7 +117,7 @@ def test_the_drawing_agrees_with_the_other_reference(kind):
         for name, place in true.points.items():
             away = found.points[name] - gmpy2.mpc(*(
                     gmpy2.mpfr(reference.mp.nstr(part, 80)) for part in (place.real, place.imag)))
-            assert abs(away) < 1e-50 * linkage.longest, name
+            assert abs(away) < within * linkage.longest, name
 
 
 @precisely
