@@ -55,7 +55,7 @@ class Subject:
         self.cranks = len(self.mechanism.cranks)
         self.held = tuple(float(x) for x in rng.uniform(-3.0, 3.0, self.cranks - 1))
         self.poses = accuracy.outputs(self.linkage, self.mechanism.links)
-        self.theta = np.linspace(-math.pi, math.pi, samples, endpoint=False) + 1e-3
+        self.theta = np.linspace(-math.pi, math.pi, 2 * samples + 1)[1::2]
         self.ways = sorted(self.linkage.passings(), key=self._misfit)
 
     def __str__(self):
@@ -368,6 +368,8 @@ def _vanishing(subject):
         changes = np.flatnonzero((row[:-1] < 0.0) != (row[1:] < 0.0))
         for i in changes[held[changes] | held[changes + 1]][:20]:
             found.append(_crossing(subject, k, theta[i], theta[i + 1]))
+        if k >= len(drawing.gaps):
+            continue  # a fold that only touches zero is no more than a doubt
         inner = np.abs(row[1:-1])
         dips = np.flatnonzero((inner <= np.abs(row[:-2])) & (inner <= np.abs(row[2:]))
                               & (inner < 1e-4) & held[1:-1]) + 1
@@ -404,8 +406,8 @@ def _touching(subject, k, lo, hi):
     if abs(_closure(subject, k, middle)[0]) > 1e-13:
         return None
     truth = subject.measure().at([float(middle), *subject.held])
-    touches = any(abs(truth.gaps[name]) <= truth.slack[name] for name in truth.gaps)
-    return float(middle) if touches else None
+    name = list(truth.gaps)[k]
+    return float(middle) if abs(truth.gaps[name]) <= truth.slack[name] else None
 
 
 def _on_reach(subject, theta):
