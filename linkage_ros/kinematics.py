@@ -99,7 +99,7 @@ class Kinematics(node.SceneNode):
 
     def destroy_node(self):
         """Say goodbye where that is still possible, and end."""
-        if self.context.ok():
+        if self.context.ok() and not self._ended:
             self.say_goodbye()
         super().destroy_node()
 

@@ -416,7 +416,10 @@ def slot(arm: Arm, offset: Real, half: float) -> Slot:
     central, aside = abs(offset) <= 0.0, arm.vector * Complex(slide, -offset)
     along = Complex(where(central, arm.vector.x * half, aside.x),
                     where(central, arm.vector.y * half, aside.y))
-    return Slot(along.direction(), slide, limit)
+    turning = spin(arm.vector)
+    return Slot(with_spin(along.direction(), Rate(
+        (slide, *turning.of), lambda rate, *rates: turning.formula(*rates) + where(
+            central, 0.0, offset * rate / arm.square))), slide, limit)
 
 
 class Rail:
