@@ -188,6 +188,8 @@ class Analysis:
         theta = sampled(lo, hi)
         values, rates = self._split(pose.over(theta, *others))
         size = np.fmax.reduce(np.abs(values), axis=1, initial=0.0)
+        # An arm vanishes where it is as short as rounding makes it.
+        rounding = np.array(rounding) + GRAZE ** 2 * size
         for place in (0, -1):
             if abs(theta[place]) == math.pi:
                 yield from zip(repeat(theta[place]), abs(values[:, place]), rounding, size)

@@ -337,7 +337,9 @@ def _row(out, thetas, result, value, spread, due):
         error = float(_error(out, result, value))
         ulp = np.spacing(math.pi if out.what == 'angle' and not rate else np.max(np.abs(result)))
         excess = max(0.0, error - float(ulp))
-        ratio = 0.0 if not excess else excess / spread if spread else math.inf
+        # What the differencing leaves of a rate of zero is no error.
+        still = rate and not spread and not np.any(result)
+        ratio = 0.0 if not excess or still else excess / spread if spread else math.inf
         problem = 'rule' if not ratio <= (RATE_RULE if rate else RULE) else ''
     return Row(out, tuple(map(float, thetas)), problem, math.inf if 'NaN' in problem else ratio,
                error, spread, result, value)

@@ -369,7 +369,7 @@ def test_what_cannot_be_is_said_in_one_line_and_no_file_is_left(
     (tmp_path / 'itself.yaml').write_text('/**: {ros__parameters: &a {b: *a}}')
     (tmp_path / 'picture.png').write_bytes(b'\x89PNG\r\n\xff')
     before = set(tmp_path.iterdir())
-    assert main([str(scene_file) if scene_file.exists() else args[0], *args[1:]]) == 1
+    assert main([str(scene_file) if scene_file.is_file() else args[0], *args[1:]]) == 1
     error = capsys.readouterr().err
     assert error.startswith('render: ') and error.count('\n') == 1 and said in error
     assert set(tmp_path.iterdir()) == before
