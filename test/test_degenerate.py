@@ -172,6 +172,7 @@ def test_what_hangs_on_a_joint_that_is_not_there_has_no_angle_either(last, lines
         assert (np.isnan(rates[link.name]) >= off).all(), link
 
 
+@pytest.mark.long
 def test_a_long_chain_is_no_matter_of_recursion():
     chain = linkage(*FOUR_BAR[:3], 'B0 dyad A Q 3.5 3 left', *(
         f'B{i} dyad B{i - 1} Q 3 3 left' for i in range(1, 120)))
@@ -182,6 +183,7 @@ def test_a_long_chain_is_no_matter_of_recursion():
     assert chain.reach() == [(-math.pi, math.pi)]
 
 
+@pytest.mark.long
 def test_what_is_asked_again_and_again_does_not_pile_up():
     five_bar = mechanisms.create('five_bar')
 
