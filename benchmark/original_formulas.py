@@ -89,7 +89,8 @@ def servo_angle(lever, a, b):
 def _formulas(functions, kind, dimensions):
     """Return the ground's joints, the names of those that move, and the function of a pose."""
     lengths = {name: float(value) for name, value in dimensions.items()}
-    return _FORMULAS[kind](functions, **lengths)
+    with np.errstate(invalid='ignore'):
+        return _FORMULAS[kind](functions, **lengths)
 
 
 def _stack(theta, x, y):
@@ -119,8 +120,8 @@ def _jansen(function, a, b, c, d, e, f, g, h, i, j, k, l, m):  # noqa: E741
         function.sin, function.cos, function.sqrt, function.acos, function.atan2)
     bx, by = -a, -l
     bb, cc, ff, gg, jj, kk = (length * length for length in (b, c, f, g, j, k))
-    gamma = math.acos((b ** 2 + d ** 2 - e ** 2) / (2 * b * d))
-    eta = math.acos((g ** 2 + i ** 2 - h ** 2) / (2 * g * i))
+    gamma, eta = np.arccos([(b ** 2 + d ** 2 - e ** 2) / (2 * b * d),
+                            (g ** 2 + i ** 2 - h ** 2) / (2 * g * i)]).tolist()
 
     def pose(theta):
         ax, ay = m * cos(theta), m * sin(theta)

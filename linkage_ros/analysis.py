@@ -186,7 +186,7 @@ class Analysis:
         if not rounding:
             return
         theta = sampled(lo, hi)
-        values, rates = self._split(pose.over(theta, *others))
+        values, rates = self._split(pose.searched(theta, *others))
         size = np.fmax.reduce(np.abs(values), axis=1, initial=0.0)
         # An arm vanishes where it is as short as rounding makes it.
         rounding = np.array(rounding) + GRAZE ** 2 * size
@@ -198,12 +198,12 @@ class Analysis:
                     (_approaches(theta, values, rates, NEAR * size[:, None]), rates))
         for kind, ((row, place), sampled_) in enumerate(searched):
             def unchanged(angles, kind=kind, row=row, start=sampled_[row, place] >= 0.0):
-                now = self._split(pose.over(angles.ravel(), *others))[kind]
+                now = self._split(pose.searched(angles.ravel(), *others))[kind]
                 now = now.reshape(-1, *angles.shape)[row, np.arange(len(row))]
                 return (now >= 0.0) == start[:, None]
 
             found, _ = refined(unchanged, theta[place], theta[place + 1])
-            gaps = np.abs(self._split(pose.over(found, *others))[0][row, np.arange(len(row))])
+            gaps = np.abs(self._split(pose.searched(found, *others))[0][row, np.arange(len(row))])
             # A fold that changes sign vanishes between two neighbouring angles.
             yield from ((angle, gap if kind else 0.0, rounding[i], size[i])
                         for angle, gap, i in zip(found.tolist(), gaps.tolist(), row.tolist()))
@@ -215,7 +215,7 @@ class Analysis:
 
     def _curve(self, kind, name, others):
         pose = self._bound(kind, name)
-        return lambda theta: pose.over(theta, *others)
+        return lambda theta: pose.searched(theta, *others)
 
     def _inverse(self, output: str, others: Tuple[float, ...]) -> Callable:
         """Return the function from values of an output, shape (n,), to candidates (k, n)."""

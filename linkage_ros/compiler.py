@@ -293,7 +293,6 @@ class _Variant:
         self._listing = _Listing(outputs, decided, replaced)
         self.angles, self.outputs = angles, len(outputs)
         self.constants = [self._listing.entries[n][0] for n in self._listing.constants]
-        self.float = _python(self._listing, _FLOAT, angles)
         self._placing = {}
 
     def placing(self, names: tuple) -> Callable:
@@ -301,6 +300,10 @@ class _Variant:
         if names not in self._placing:
             self._placing[names] = _python(self._listing, _FLOAT, self.angles, names)
         return self._placing[names]
+
+    @cached_property
+    def float(self):
+        return _python(self._listing, _FLOAT, self.angles)
 
     @cached_property
     def array(self):
@@ -388,8 +391,11 @@ class Pose:
         self._constants = constants
         self._accelerate = accelerate
         self.shape = shape
-        if not shape:
-            self.at = variant.float(*constants, self._by_arrays)
+
+    @cached_property
+    def at(self) -> Callable:
+        """The function from the angles, floats, to the outputs of one set of dimensions."""
+        return self._variant.float(*self._constants, self._by_arrays)
 
     @cached_property
     def _given(self):
@@ -428,6 +434,12 @@ class Pose:
         else:
             out = self._plainly(flat, size)
         return out.reshape(self._variant.outputs, *shape)
+
+    def searched(self, *angles) -> np.ndarray:
+        """Return what `over` does for one set of dimensions, without code for single poses."""
+        angles = np.broadcast_arrays(*angles)
+        flat = [a.ravel() for a in angles]
+        return self._blocks(flat, angles[0].size).reshape(self._variant.outputs, *angles[0].shape)
 
     def batch(self, rows: np.ndarray) -> Batch:
         """Return poses to be solved again and again, into rows (poses, outputs)."""

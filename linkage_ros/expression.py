@@ -49,7 +49,7 @@ class Real:
     @property
     def operands(self) -> tuple:
         """The expressions that the operation is done on."""
-        return tuple(a for a in self.args if isinstance(a, Real))
+        return () if self.op in _LEAVES else self.args
 
     @property
     def value(self):
@@ -140,6 +140,8 @@ class Real:
 
 
 Number = Union[Real, float, int]
+
+_LEAVES = frozenset({'constant', 'dimension', 'angle'})
 
 _FOLDED = {
     'add': lambda x, y: x + y,

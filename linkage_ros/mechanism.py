@@ -439,7 +439,7 @@ class Mechanism(Analysis):
         if len(others) != len(self.cranks) - 1:
             raise ValueError(f'{self.type} has {len(self.cranks)} cranks: the angle of each but '
                              f'the first is needed, got {len(others)}')
-        return arcs(lambda theta: margins.over(theta, *others),
+        return arcs(lambda theta: margins.searched(theta, *others),
                     self._structure.sketch.limits, self._value)
 
     def _remembered(self, what: str, about: tuple, find: Callable):

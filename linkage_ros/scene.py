@@ -303,7 +303,7 @@ def _about(field, *words):
     return replace(field, meaning=field.meaning.format(*words))
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=16)
 def _built(design, dimensions, branches):
     """Return a linkage and its reach; the same ones for the same dimensions."""
     own = {} if design.name in mechanisms.TYPES else {

@@ -176,7 +176,7 @@ class Mechanism(mechanism.Mechanism):
         return self.joint_rates(theta, (output,))[output]
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=32)
 def _levers(structure) -> dict:
     """Return for each lever that the crank's pin moves both answers to its angle."""
     sketch = structure.sketch
@@ -209,14 +209,14 @@ def _lever(sketch, slide, half):
                      least <= slide_)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=32)
 def _lever_all(structure, name) -> Program:
     """Return the code for both crank angles for a lever's angle, each with its rate."""
     return Program([gated(part, where(answer.held, 1.0, -1.0), 0.0)
                     for answer in _levers(structure)[name] for part in answer[:2]])
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)
 def _lever_taken(structure, name, follows, ended) -> Program:
     """Return the code for the crank angle that is taken for a lever's angle, and its rate."""
     return _taken(_levers(structure)[name], True, real(GRAZE * math.pi), follows, ended, 1)

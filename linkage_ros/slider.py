@@ -62,7 +62,7 @@ def _used(machine: Machine) -> Optional[Tuple[float, float]]:
     return machine.crank.sweep or machine.reach[0]
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=16)
 def _length(linkage, key, positive, used):
     """Return how far a length may be moved with the linkage still assembled."""
     value = float(linkage.dimensions[key])
