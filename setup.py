@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 import filecmp
 from glob import glob
@@ -27,9 +16,10 @@ interfaces = Path(__file__).resolve().with_name('linkage_interfaces')
 # colcon and bloom put commands where `ros2 run` looks for them; pip would put them on everybody's
 # PATH, where names like `render` have no business.
 for_ros = sys.argv[1:2] != ['--help'] and {'install', 'develop'} & set(sys.argv)
-commands = {name: name for name in (
-    'crank_driver', 'kinematics', 'render', 'servo_inverse', 'viewer')}
-commands['urdf'] = 'print_urdf'
+commands = {
+    'crank_driver': 'nodes.crank_driver', 'kinematics': 'nodes.kinematics', 'render': 'render',
+    'servo_inverse': 'nodes.servo_inverse', 'urdf': 'robot_model.command',
+    'viewer': 'web.viewer'}
 
 
 def build_interfaces():

@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """
 The pages of the catalogue: one a mechanism, from its docstring, its lines and what it does.
@@ -25,7 +14,8 @@ import re
 import sys
 import textwrap
 
-from linkage_ros import language, mechanisms, planar, scene
+from linkage_ros import mechanisms, scene
+from linkage_ros.linkage import joint_lines, planar
 from linkage_ros.render import files, layers
 from linkage_ros.render.command import parser
 from linkage_ros.render.cycle import Cycle
@@ -207,7 +197,7 @@ def constructions(design):
 
 def construction_page() -> str:
     """Return the page of the constructions: the words for them, and their formulas."""
-    words, rules = re.split(r'\n\n(?=A joint)', language.__doc__.split('\n\n', 1)[1])
+    words, rules = re.split(r'\n\n(?=A joint)', joint_lines.__doc__.split('\n\n', 1)[1])
     intro = '\n\n'.join(doc_blocks(planar.__doc__))
     sections = '\n\n'.join(f'### {word}\n\n' + '\n\n'.join(doc_blocks(function.__doc__))
                            for word, function in FORMULAS.items())

@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """Real nodes on real topics: in this process, or as the processes that users start."""
 
@@ -160,6 +149,12 @@ def _stamp(message):
     return header.stamp.sec
 
 
+def module(name):
+    """Return the module of an executable."""
+    rooms = {'render': 'render', 'urdf': 'robot_model', 'viewer': 'web.viewer'}
+    return f'linkage_ros.{rooms.get(name, f"nodes.{name}")}'
+
+
 class Process:
     """An executable of this package as users start it, with a parameter file."""
 
@@ -167,7 +162,7 @@ class Process:
         self._domain = None if domain else Domain()
         self.domain = domain or self._domain.id
         self._process = subprocess.Popen(
-            [sys.executable, '-m', f'linkage_ros.{name}', *arguments, '--ros-args',
+            [sys.executable, '-m', module(name), *arguments, '--ros-args',
              '--params-file', str(parameter_file)],
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
             env=dict(os.environ, ROS_DOMAIN_ID=str(self.domain)))

@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """The executables as users start them: how they end, and what they say of a bad scene."""
 
@@ -64,7 +53,7 @@ def test_a_signal_ends_a_node_quietly(harness, name, stop):
 ])
 @pytest.mark.parametrize('name', NODES)
 def test_arguments_that_there_are_not_end_in_one_sentence(harness, name, arguments, said):
-    done = subprocess.run([sys.executable, '-m', f'linkage_ros.{name}', *arguments], cwd=ROOT,
+    done = subprocess.run([sys.executable, '-m', harness.module(name), *arguments], cwd=ROOT,
                           capture_output=True, text=True, timeout=60)
     printed = done.stdout + done.stderr
     fatal = [line for line in printed.splitlines() if '[FATAL]' in line]
@@ -73,7 +62,7 @@ def test_arguments_that_there_are_not_end_in_one_sentence(harness, name, argumen
 
 
 def test_a_signal_while_a_message_is_published_is_no_failure(harness):
-    from linkage_ros.node import run
+    from linkage_ros.nodes.scene_node import run
     import rclpy
     from sensor_msgs.msg import JointState
 
@@ -133,12 +122,13 @@ def without(module, code):
 
 def test_the_library_works_where_there_is_no_ros():
     done = without('rclpy', """
-        from linkage_ros import motion, scene
+        from linkage_ros import scene
+        from linkage_ros.scene import crank_motion
         machine = scene.read({}).machines['jansen']
         assert machine.assembly().solution(('G',)).rows.shape == (1, 2)
-        assert motion.Motion(1.0).at(10 ** 9) == (1.0, 1.0)
+        assert crank_motion.Motion(1.0).at(10 ** 9) == (1.0, 1.0)
         try:
-            import linkage_ros.kinematics
+            import linkage_ros.nodes.kinematics
         except ImportError as error:
             print(error)
         """)
@@ -146,8 +136,9 @@ def test_the_library_works_where_there_is_no_ros():
 
 
 def test_without_the_interfaces_the_service_says_how_to_build_them(harness):
-    done = without('linkage_interfaces', 'import linkage_ros.servo_inverse')
+    done = without('linkage_interfaces', 'import linkage_ros.nodes.servo_inverse')
     assert 'run colcon build in the workspace, which builds linkage_interfaces too' in \
         done.stderr.splitlines()[-1]
-    others = without('linkage_interfaces', 'from linkage_ros import crank_driver, kinematics')
+    others = without('linkage_interfaces',
+                     'from linkage_ros.nodes import crank_driver, kinematics')
     assert others.returncode == 0, others.stderr

@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """What nodes do on the executor that runs them: timers, simulated time, services, and its end."""
 
@@ -29,7 +18,7 @@ rclpy = pytest.importorskip('rclpy')
 pytest.importorskip('linkage_interfaces')
 
 from linkage_interfaces.srv import ServoInverse  # noqa: E402
-from linkage_ros import node  # noqa: E402
+from linkage_ros.nodes import scene_node  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from ros_harness import Graph, Process  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
@@ -64,7 +53,7 @@ def started(tmp_path):
 
 def test_the_executor_that_waits_for_events_is_used_where_there_is_one():
     experimental = pytest.importorskip('rclpy.experimental')
-    assert node.Executor is experimental.EventsExecutor
+    assert scene_node.Executor is experimental.EventsExecutor
 
 
 def test_timers_run_on_simulated_time_and_follow_it_back(started):
@@ -116,7 +105,7 @@ def test_where_there_is_no_such_executor_the_plain_one_is_used_and_ends_as_quiet
         sys.modules['rclpy.experimental'] = None
         from linkage_ros import node
         from rclpy.executors import SingleThreadedExecutor
-        assert node.Executor is SingleThreadedExecutor
+        assert scene_node.Executor is SingleThreadedExecutor
         """ + ENDS_ITSELF.format(stop=int(stop)))
     assert done.returncode == 0
     assert [line for line in done.stderr.splitlines() if ': ready: ' not in line] == ['turned']
@@ -128,7 +117,7 @@ def test_a_signal_amid_a_callback_ends_a_node_quietly(stop, plain):
     done = python(f"""
         import signal, sys
         from linkage_ros import node
-        from linkage_ros.crank_driver import CrankDriver
+        from linkage_ros.nodes.crank_driver import CrankDriver
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
         from sensor_msgs.msg import JointState
@@ -145,14 +134,14 @@ def test_a_signal_amid_a_callback_ends_a_node_quietly(stop, plain):
                         pass
                 return super()._time()
 
-        executor = SingleThreadedExecutor if {plain} else node.Executor
-        sys.exit(node.run(Ended, 'ended', [], executor))
+        executor = SingleThreadedExecutor if {plain} else scene_node.Executor
+        sys.exit(scene_node.run(Ended, 'ended', [], executor))
         """)
     assert (done.returncode, done.stdout) == (0, '')
     assert done.stderr.count('\n') == 1 and ': ready: ' in done.stderr
 
 
-@pytest.mark.parametrize('executor', [node.Executor, SingleThreadedExecutor])
+@pytest.mark.parametrize('executor', [scene_node.Executor, SingleThreadedExecutor])
 def test_a_programming_error_ends_a_node_loudly(executor):
     done = python(f"""
         from linkage_ros import node
@@ -163,16 +152,16 @@ def test_a_programming_error_ends_a_node_loudly(executor):
                 super().__init__('wrong')
                 self.create_timer(0.01, lambda: 1 // 0)
 
-        executor = node.Executor if {executor is node.Executor} else \\
+        executor = scene_node.Executor if {executor is scene_node.Executor} else \\
             executors.SingleThreadedExecutor
-        node.run(Wrong, 'wrong', executor_class=executor)
+        scene_node.run(Wrong, 'wrong', executor_class=executor)
         """)
     assert done.returncode == 1 and 'ZeroDivisionError' in done.stderr
 
 
 ENDS_ITSELF = """
         import signal
-        from linkage_ros.crank_driver import CrankDriver
+        from linkage_ros.nodes.crank_driver import CrankDriver
 
         class Ended(CrankDriver):
             def _tick(self):
@@ -181,7 +170,7 @@ ENDS_ITSELF = """
                 self._timer.cancel()
                 signal.raise_signal({stop})
 
-        sys.exit(node.run(Ended, 'ended', []))
+        sys.exit(scene_node.run(Ended, 'ended', []))
         """
 
 

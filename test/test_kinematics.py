@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """The kinematics node: what arrives on its topics is the linkage."""
 
@@ -23,8 +12,8 @@ import pytest
 pytest.importorskip('rclpy')
 
 from linkage_ros import mechanisms  # noqa: E402
-from linkage_ros.crank_driver import CrankDriver  # noqa: E402
-from linkage_ros.kinematics import Kinematics  # noqa: E402
+from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
+from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from rcl_interfaces.msg import Log  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
@@ -301,7 +290,7 @@ def test_the_pose_of_the_plane_is_the_pose_of_the_markers(graph):
 
 
 def test_roll_pitch_and_yaw_turn_about_fixed_axes():
-    from linkage_ros.messages import quaternion
+    from linkage_ros.nodes.messages import quaternion
 
     def about(axis, angle):
         turn = np.eye(3)

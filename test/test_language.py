@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """The words in which linkages are written, and what is said about a slip of the pen."""
 
@@ -21,7 +10,8 @@ import re
 import time
 
 from hostile_texts import LEGAL, mutations, TEXTS
-from linkage_ros import language, mechanisms, scene
+from linkage_ros import mechanisms, scene
+from linkage_ros.linkage import joint_lines
 import numpy as np
 import pytest
 
@@ -310,8 +300,8 @@ def test_any_other_name_is_for_a_dimension():
 
 
 def test_every_construction_says_what_follows_it_in_the_module_s_text():
-    for word in language._FORMS:
-        assert re.search(rf'^    [A-Z][A-Z ]* {word} ', language.__doc__, re.MULTILINE), word
+    for word in joint_lines._FORMS:
+        assert re.search(rf'^    [A-Z][A-Z ]* {word} ', joint_lines.__doc__, re.MULTILINE), word
 
 
 def test_a_dimension_is_positive_only_where_it_is_the_length_of_a_bar():

@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """RViz's configuration and the launch file: they name what there is."""
 
@@ -21,7 +10,8 @@ import re
 import runpy
 import sys
 
-from linkage_ros import rviz, scene
+from linkage_ros import scene
+from linkage_ros.robot_model import rviz
 import pytest
 
 yaml = pytest.importorskip('yaml')
@@ -62,7 +52,7 @@ def topics(config):
 
 
 def test_rviz_shows_what_the_nodes_of_the_scene_publish(graph, shown):
-    from linkage_ros.kinematics import Kinematics
+    from linkage_ros.nodes.kinematics import Kinematics
 
     given = scene.load(str(CONFIG / 'all.yaml'))
     node = graph.start(Kinematics, {p.name: p.value for p in given.parameters
@@ -139,7 +129,7 @@ def test_every_argument_of_the_launch_file_is_described(constants):
     assert (CONFIG / f'{arguments["scene"][0]}.yaml').is_file()
     documented = (ROOT / 'docs' / 'viewer.md').read_text()
     assert all(f'`{name}`' in documented for name in arguments)
-    viewer = (ROOT / 'linkage_ros' / 'viewer.py').read_text()
+    viewer = (ROOT / 'linkage_ros' / 'web' / 'viewer.py').read_text()
     assert re.search(rf'^PORT = {arguments["port"][0]}$', viewer, re.MULTILINE)
 
 

@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """Machine code says what plain Python says, and is done without where there is none."""
 
@@ -19,13 +8,14 @@ import importlib
 import math
 import sys
 
-from linkage_ros import compiler, expression, mechanisms
-from linkage_ros.assembly import Assembly
+from linkage_ros import mechanisms
+from linkage_ros.formula import expression, program
+from linkage_ros.linkage.walker import Assembly
 import numpy as np
 import pytest
 import stress
 
-native = pytest.importorskip('linkage_ros.native')
+native = pytest.importorskip('linkage_ros.formula.llvm_code')
 
 TYPES = [kind for kind in mechanisms.TYPES if kind != 'five_bar']
 
@@ -147,6 +137,6 @@ def test_a_chain_of_operations_may_be_as_long_as_one_likes():
     end, value = expression.angle(0), 0.3
     for _ in range(1000):
         end, value = 1.5 * expression.sine(end) + 0.25, 1.5 * math.sin(value) + 0.25
-    pose = compiler.Program((end,)).bind({}, {})
+    pose = program.Program((end,)).bind({}, {})
     assert pose(0.3) == (value,)
     assert pose.over(np.full(100, 0.3)).ravel().tolist() == pytest.approx([value] * 100)

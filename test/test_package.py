@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """The package as colcon, pip and a reader of the changelog see it."""
 
@@ -130,7 +119,7 @@ def test_the_ordinary_colcon_build_of_a_workspace_is_enough(copy, tmp_path, layo
     clean['COLCON_DEFAULTS_FILE'] = str(defaults)
     script = f"""
         colcon build {layout} >&2 && source install/setup.bash && cd / &&
-        python -c 'from linkage_ros import servo_inverse as node
+        python -c 'from linkage_ros.nodes import servo_inverse as node
 print(node.__file__, node.ServoInverseType.__module__)' && echo $AMENT_PREFIX_PATH
         """
     ended = subprocess.run(['bash', '-c', script], cwd=tmp_path, env=clean, timeout=300,

@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """Parameters that are set while nodes run: judged aside and together, answered one by one."""
 
@@ -23,13 +12,11 @@ import pytest
 pytest.importorskip('rclpy')
 pytest.importorskip('linkage_interfaces')
 
-from linkage_ros import (
-    node as nodes,  # noqa: E402
-    scene,  # noqa: E402
-)
-from linkage_ros.crank_driver import CrankDriver  # noqa: E402
-from linkage_ros.kinematics import Kinematics  # noqa: E402
-from linkage_ros.servo_inverse import ServoInverse  # noqa: E402
+from linkage_ros import scene
+from linkage_ros.nodes import scene_node as nodes
+from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
+from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
+from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
 from rcl_interfaces.msg import (
     Parameter as ParameterMessage,  # noqa: E402
     ParameterValue,  # noqa: E402

@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """What is no longer shown is taken out of the picture, and what cannot be shown is refused."""
 
@@ -23,8 +12,9 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from linkage_ros import scene, urdf  # noqa: E402
-from linkage_ros.kinematics import Kinematics, LATCHED  # noqa: E402
+from linkage_ros import scene  # noqa: E402
+from linkage_ros.nodes.kinematics import Kinematics, LATCHED  # noqa: E402
+from linkage_ros.robot_model import urdf  # noqa: E402
 from ros_harness import Graph, Process  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import String  # noqa: E402

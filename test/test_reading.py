@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """Joint states read from their bytes say what they say when they are deserialised."""
 
@@ -24,9 +13,9 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from linkage_ros import reading, wire  # noqa: E402
-from linkage_ros.kinematics import Kinematics  # noqa: E402
-from linkage_ros.wire import SHORTEST, Unreadable  # noqa: E402
+from linkage_ros.nodes import joint_state_reader, message_layout  # noqa: E402
+from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
+from linkage_ros.nodes.message_layout import SHORTEST, Unreadable  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 
@@ -46,14 +35,14 @@ def message(names, velocities=True, effort=False, frame='', seed=0):
 @pytest.fixture
 def reader(monkeypatch):
     """Return a reader whose `looked` counts the messages that it had to deserialise."""
-    made = reading.Reader(lambda message: message.name)
+    made = joint_state_reader.Reader(lambda message: message.name)
     made.looked = 0
 
     def counted(*args):
         made.looked += 1
-        return wire.deserialized(*args)
+        return message_layout.deserialized(*args)
 
-    monkeypatch.setattr(reading, 'deserialized', counted)
+    monkeypatch.setattr(joint_state_reader, 'deserialized', counted)
     return made
 
 
@@ -76,7 +65,7 @@ def check(graph, reader):
 def compare(reader, text, sent):
     """Read what arrived and compare it with what was sent."""
     turned = reader.read(text)
-    assert wire.unpack(turned.stamp) == sent.header.stamp and turned.source == sent.name
+    assert message_layout.unpack(turned.stamp) == sent.header.stamp and turned.source == sent.name
     assert turned.positions == tuple(sent.position)
     assert turned.velocities == tuple(sent.velocity)
     return turned
@@ -165,8 +154,8 @@ def test_any_number_of_sources_is_learnt(reader, sources):
 
 def test_more_sources_than_are_remembered_cost_no_more_than_reading_each(reader, monkeypatch):
     learnt = Counter()
-    make = reading.Layout.__init__
-    monkeypatch.setattr(reading.Layout, '__init__', lambda self, *args: (
+    make = joint_state_reader.Layout.__init__
+    monkeypatch.setattr(joint_state_reader.Layout, '__init__', lambda self, *args: (
         learnt.update([self.__class__]) or make(self, *args)))
     texts = [serialize_message(message([f'robot{i}_crank'])) for i in range(1000)]
     for _ in range(20):
@@ -182,8 +171,8 @@ def test_what_is_remembered_is_bounded_whatever_comes(reader):
         reader.read(text)
     kept = [layout for alike in reader._layouts.values() for layouts in alike.values()
             for layout in layouts.values()]
-    assert len(kept) == len(reader._used) <= reading.SOURCES
-    assert len(reader._met) <= 2 * reading.SOURCES
+    assert len(kept) == len(reader._used) <= joint_state_reader.SOURCES
+    assert len(reader._met) <= 2 * joint_state_reader.SOURCES
 
 
 def test_a_source_that_cannot_be_learnt_excludes_itself_alone(reader):
@@ -206,11 +195,11 @@ def test_a_name_that_is_no_text_excludes_its_source_alone(reader):
 @pytest.mark.parametrize('joints', [1, 10, 100, 1000, 10_000])
 def test_what_is_learnt_grows_with_the_joints_alone(joints):
     text = serialize_message(message([f'joint{i}' for i in range(joints)]))
-    turned = reading.Reader(lambda made: made.name).read(text)
+    turned = joint_state_reader.Reader(lambda made: made.name).read(text)
     calls = Counter()
     sys.setprofile(lambda _, event, __: calls.update([event]))
     try:
-        layout = reading._layout(text, turned)
+        layout = joint_state_reader._layout(text, turned)
     finally:
         sys.setprofile(None)
     assert layout.take(text) == turned
@@ -233,7 +222,8 @@ def plainly(text):
         read = deserialize_message(text, JointState)
     except Exception:
         raise Unreadable from None
-    return (wire.pack(read.header.stamp), read.name, tuple(read.position), tuple(read.velocity))
+    return (message_layout.pack(read.header.stamp), read.name, tuple(read.position),
+            tuple(read.velocity))
 
 
 def mutated(random, text):

@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """Pictures of scenes: what is drawn is what was solved, the same bytes each time, nothing cut."""
 
@@ -29,7 +18,11 @@ for module in ('matplotlib', 'tqdm', 'yaml'):
     pytest.importorskip(module)
 
 from linkage_ros import mechanisms, scene  # noqa: E402
-from linkage_ros.render import files, layers, main  # noqa: E402
+from linkage_ros.render import (  # noqa: E402
+    files,
+    layers,
+    main,  # noqa: E402
+)
 from linkage_ros.render.cycle import Cycle  # noqa: E402
 from linkage_ros.render.parts import PARTS, TRACES, USUAL  # noqa: E402
 from linkage_ros.render.picture import Picture  # noqa: E402

@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """The robot model on its topic: an unchanged robot_state_publisher sees what the markers show."""
 
@@ -26,9 +15,10 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from linkage_ros import scene, urdf  # noqa: E402
-from linkage_ros.kinematics import Kinematics  # noqa: E402
-from linkage_ros.print_urdf import main  # noqa: E402
+from linkage_ros import scene  # noqa: E402
+from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
+from linkage_ros.robot_model import urdf  # noqa: E402
+from linkage_ros.robot_model.command import main  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from robots import LIBRARIES  # noqa: E402
 from ros_harness import Process  # noqa: E402
@@ -103,14 +93,14 @@ def test_a_new_dimension_makes_a_new_description(graph):
 
 
 def test_the_command_prints_the_robot_of_a_scene():
-    code, printed = Process('print_urdf', CATALOGUE).end()
+    code, printed = Process('urdf', CATALOGUE).end()
     found = scene.load(str(CATALOGUE))
     assert code == 0
     assert printed == urdf.describe(found.machines.values(), found.frame_id) + '\n'
 
 
 def test_the_command_prints_those_that_are_named():
-    code, printed = Process('print_urdf', CATALOGUE, '--mechanism', 'jansen').end()
+    code, printed = Process('urdf', CATALOGUE, '--mechanism', 'jansen').end()
     assert code == 0
     jansen = scene.load(str(CATALOGUE)).machines['jansen']
     assert printed == urdf.describe([jansen], 'world') + '\n'
@@ -123,7 +113,7 @@ def test_the_command_prints_those_that_are_named():
 def test_the_command_says_in_one_line_what_is_wrong(tmp_path, arguments, lines, complaint):
     file = tmp_path / 'scene.yaml'
     file.write_text(f'/**:\n  ros__parameters:\n    {lines}\n')
-    code, printed = Process('print_urdf', file, *arguments).end()
+    code, printed = Process('urdf', file, *arguments).end()
     assert code == 1
     assert complaint in printed and len(printed.splitlines()) == 1
 
@@ -181,7 +171,7 @@ def test_what_is_not_understood_is_refused_in_one_line(capsys, arguments, compla
 
 def test_a_scene_is_described_without_ros():
     code = ('import sys; sys.modules["rclpy"] = None; '
-            'from linkage_ros.print_urdf import main; sys.exit(main(sys.argv[1:]))')
+            'from linkage_ros.robot_model.command import main; sys.exit(main(sys.argv[1:]))')
     for arguments, ended in (([str(CATALOGUE)], 0), (['--ros-args'], 1)):
         process = subprocess.run([sys.executable, '-c', code, *arguments], capture_output=True,
                                  text=True, timeout=60, cwd=Path(__file__).parents[1])

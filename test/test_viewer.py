@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """The viewer: what its page is sent, what its sliders do, and who may look."""
 
@@ -37,14 +26,15 @@ pytest.importorskip('rclpy')
 pytest.importorskip('linkage_interfaces')
 
 import browser  # noqa: E402
-from linkage_ros import mechanisms, messages  # noqa: E402
-from linkage_ros.crank_driver import CrankDriver  # noqa: E402
-from linkage_ros.kinematics import Kinematics  # noqa: E402
-from linkage_ros.servo_inverse import ServoInverse  # noqa: E402
-from linkage_ros.viewer import Viewer  # noqa: E402
+from linkage_ros import mechanisms  # noqa: E402
+from linkage_ros.nodes import messages  # noqa: E402
+from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
+from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
+from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
 from linkage_ros.web import server  # noqa: E402
 from linkage_ros.web.feed import Feed  # noqa: E402
 from linkage_ros.web.stage import LATCHED  # noqa: E402
+from linkage_ros.web.viewer import Viewer  # noqa: E402
 from rcl_interfaces.msg import (  # noqa: E402
     Parameter as ParameterMessage,  # noqa: E402
     ParameterDescriptor,

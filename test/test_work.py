@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """What the kinematics node does and what it leaves undone, counted."""
 
@@ -18,9 +7,10 @@ from collections import Counter
 import math
 
 from builtin_interfaces.msg import Time
-from linkage_ros import kinematics, mechanisms, messages, wire
-from linkage_ros.assembly import Assembly
-from linkage_ros.kinematics import Kinematics, LATCHED
+from linkage_ros import mechanisms
+from linkage_ros.linkage.walker import Assembly
+from linkage_ros.nodes import kinematics, message_layout, messages
+from linkage_ros.nodes.kinematics import Kinematics, LATCHED
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
@@ -73,8 +63,8 @@ def test_for_markers_alone_no_joint_angle_is_computed_and_the_reverse(graph, wor
 
 def test_a_topic_nobody_listens_to_is_not_built(graph, monkeypatch):
     sent = Counter()
-    send = wire.Wire.send
-    monkeypatch.setattr(wire.Wire, 'send', lambda self, *args: (
+    send = message_layout.Wire.send
+    monkeypatch.setattr(message_layout.Wire, 'send', lambda self, *args: (
         sent.update([self._publisher.topic_name]) or send(self, *args)))
     graph.start(Kinematics)
     graph.crank(CRANKS)([0.1] * 4, graph.listen(JointState, 'jansen/joint_states'), [1.0] * 4)
@@ -179,26 +169,27 @@ def test_a_patched_message_reads_like_one_that_is_built(count):
 
     for build, kind, size in ((drawn, MarkerArray, 2 * count if count == 1 else 4 * count),
                               (joined, JointState, count), (joined, JointState, 2 * count)):
-        template = wire.Template(build, size)
+        template = message_layout.Template(build, size)
         for values in (random.normal(size=size), np.zeros(size), -np.arange(size) * 1e300):
             stamp = Time(sec=int(random.integers(2 ** 31)), nanosec=int(random.integers(10 ** 9)))
-            assert deserialize_message(template.patched(wire.pack(stamp), values), kind) == \
-                deserialize_message(serialize_message(build(stamp, values)), kind)
+            patched = template.patched(message_layout.pack(stamp), values)
+            assert deserialize_message(patched, kind) == deserialize_message(
+                serialize_message(build(stamp, values)), kind)
 
 
 def test_what_cannot_be_patched_is_published_as_an_ordinary_message(graph, monkeypatch):
     def refuse(*_):
-        raise wire.NoTemplate('not on this middleware')
+        raise message_layout.NoTemplate('not on this middleware')
 
-    monkeypatch.setattr(wire.Template, '_check', refuse)
+    monkeypatch.setattr(message_layout.Template, '_check', refuse)
     graph.start(Kinematics, WALKER)
     turn = graph.crank(['walker_crank'])
     plain = turn([0.4], graph.listen(JointState, 'walker/joint_states'), [2.0])
     assert plain.position[0] == 0.4 and plain.velocity[0] == 2.0
     monkeypatch.undo()
-    patched = wire.Template(
+    patched = message_layout.Template(
         lambda stamp, values: JointState(name=plain.name, position=values), len(plain.name))
-    text = patched.patched(wire.pack(Time()), np.array(plain.position))
+    text = patched.patched(message_layout.pack(Time()), np.array(plain.position))
     read = deserialize_message(text, JointState)
     assert read.position == plain.position
     assert all(math.isfinite(x) for x in plain.position)

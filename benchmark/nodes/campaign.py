@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """Short bursts, each subject in turn, round after round."""
 
@@ -32,13 +21,14 @@ from . import scenes, subject
 from .driving import Process
 
 SUBJECT = ('-m', 'benchmark.nodes.subject')
-NODE = ('-m', 'linkage_ros.kinematics')
+NODE = ('-m', 'linkage_ros.nodes.kinematics')
 RATES = (50.0, 200.0, 1000.0)
 # How long a burst takes [s], by rate.
 SECONDS = {50.0: 1.2, 200.0: 1.0, 1000.0: 0.6}
 WARM_UP = 60
 TICKS = 300
-MAKE = 'import linkage_ros.kinematics, rclpy; rclpy.init(); linkage_ros.kinematics.Kinematics()'
+MAKE = ('import rclpy; from linkage_ros.nodes.kinematics import Kinematics; '
+        'rclpy.init(); Kinematics()')
 
 
 class Bench:
@@ -164,7 +154,7 @@ class Bench:
 
     def services(self, calls):
         """Return rows of round trips [us] and CPU time a call [us]."""
-        servo = Process('servo', '-m', 'linkage_ros.servo_inverse')
+        servo = Process('servo', '-m', 'linkage_ros.nodes.servo_inverse')
         trigger = Process('plain', *SUBJECT, 'trigger')
         echo = Process('echo', *SUBJECT, 'echo')
         try:

@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """Processes that are measured, and the one that drives them and hears them."""
 
@@ -21,7 +10,7 @@ import subprocess
 import sys
 import time
 
-from linkage_ros import node
+from linkage_ros.nodes import scene_node
 import rclpy
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import MarkerArray
@@ -94,7 +83,7 @@ class Driver:
         self.node = rclpy.create_node('driver')
         # Nobody takes what arrives for this one: what a drawing program does is not measured.
         self._idle = rclpy.create_node('viewer')
-        self._executor = node.Executor()
+        self._executor = scene_node.Executor()
         self._executor.add_node(self.node)
 
     def end(self):

@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """
 What reading joint states from their bytes costs, next to deserialising every message.
@@ -25,8 +14,8 @@ from itertools import cycle, islice
 import statistics
 import time
 
-from linkage_ros.reading import Reader, Turned
-from linkage_ros.wire import pack
+from linkage_ros.nodes.joint_state_reader import Reader, Turned
+from linkage_ros.nodes.message_layout import pack
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 

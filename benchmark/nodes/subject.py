@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """
 A node that is measured, as a process of its own.
@@ -29,8 +18,9 @@ import sys
 import time
 
 from linkage_interfaces.srv import ServoInverse
-from linkage_ros import kinematics, messages, node, reading, scene, wire
-from linkage_ros.kinematics import ANY, Kinematics, Outlet
+from linkage_ros import scene
+from linkage_ros.nodes import joint_state_reader, kinematics, message_layout, messages, scene_node
+from linkage_ros.nodes.kinematics import ANY, Kinematics, Outlet
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -53,7 +43,7 @@ class Floor(Node):
                      for topic, (type_, depth, text) in self.ready.items()]
         self.create_subscription(JointState, 'crank_states', self._turn, ANY)
 
-    @node.until_the_end
+    @scene_node.until_the_end
     def _turn(self, _):
         for publisher, text in self._out:
             publisher.publish(text)
@@ -84,7 +74,7 @@ class FreshOutlet(Outlet):
     def _send(self, publisher, build, stamp):
         self._model.joint_state = messages.JointStates()
         self._model.marker_array = messages.Markers(*self._model.drawn)
-        publisher.publish(build(self._pose, wire.unpack(stamp)))
+        publisher.publish(build(self._pose, message_layout.unpack(stamp)))
 
 
 class Relay(Node):
@@ -98,7 +88,7 @@ class Relay(Node):
         self._publisher = self.create_publisher(JointState, 'leg/joint_states', 10)
         self.create_subscription(JointState, 'crank_states', self._turn, ANY)
 
-    @node.until_the_end
+    @scene_node.until_the_end
     def _turn(self, cranks):
         angles = self._loops.joint_angles(cranks.position[0])
         message = JointState(name=self._names, position=angles.tolist())
@@ -165,8 +155,8 @@ KINDS = {'kinematics': Kinematics, 'fresh': Fresh, 'floor': Floor, 'relay': Rela
          'deaf': Deaf, 'raw': Raw, 'trigger': Triggered, 'echo': Echoed, 'ear': Ear}
 # The parts of the work of a tick.
 PARTS = {'tick': [(Kinematics, '_turn'), (Floor, '_turn'), (Relay, '_turn')],
-         'read': [(reading.Reader, 'read')],
-         'solve': [(kinematics.Model, 'solve')], 'patch': [(wire.Template, 'patched')],
+         'read': [(joint_state_reader.Reader, 'read')],
+         'solve': [(kinematics.Model, 'solve')], 'patch': [(message_layout.Template, 'patched')],
          'publish': [(Publisher, 'publish')],
          'ask who listens': [(Publisher, 'get_subscription_count')]}
 
@@ -222,9 +212,10 @@ def main():
     if options.ready:
         Floor.ready = Ear.ready = ready(pickle.loads(options.ready.read_bytes()))
     times = Times() if options.times else None
-    executor = SingleThreadedExecutor if options.single else node.Executor
+    executor = SingleThreadedExecutor if options.single else scene_node.Executor
     own = len(remove_ros_args())
-    code = node.run(KINDS[options.kind], options.kind, sys.argv[:1] + sys.argv[own:], executor)
+    args = sys.argv[:1] + sys.argv[own:]
+    code = scene_node.run(KINDS[options.kind], options.kind, args, executor)
     if times:
         options.times.write_text(json.dumps(times.medians()))
     return code

@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """
 The catalogue: mechanisms by the names that users type.
@@ -42,9 +31,9 @@ from . import (
     watt,
     whitworth,
 )
-from ..arguments import checked_branches, checked_dimensions
-from ..mechanism import Design, Structure
-from ..servo import Mechanism
+from ..linkage.arguments import checked_branches, checked_dimensions
+from ..linkage.mechanism import Design, Structure
+from ..linkage.servo import Mechanism
 from ..words import quoted
 
 # What a scene shows when it names no mechanism.
@@ -103,7 +92,7 @@ def create(type_: str, /, *, branches=None, joints=None, tracer=None, **dimensio
     branches : mapping, optional
         Assembly signs, +1 or -1, by joint; what is left out is as in the catalogue or as written.
     joints : sequence of str, optional
-        For type 'custom': one line a joint, as `language` describes.
+        For type 'custom': one line a joint, as `linkage.joint_lines` describes.
     tracer : str, optional
         For type 'custom': the joint whose curve is the locus. Default: the last.
     **dimensions : float or array-like

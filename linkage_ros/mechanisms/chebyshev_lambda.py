@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """
 Chebyshev's lambda: the four-bar of his walking machine.
@@ -22,7 +11,7 @@ its height has seven extremes, equally high and low in turn.
 Source: Chebyshev, "Les plus simples systemes de tiges articulees", 1878.
 """
 
-from ..mechanism import Design
+from ..linkage.mechanism import Design
 
 DESIGN = Design('chebyshev_lambda', {'a': 1.0}, tracer='P', joints=(
     'O ground 0 0',

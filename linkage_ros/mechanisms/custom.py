@@ -1,18 +1,7 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
-"""Linkages that users write down themselves; see `language` for the words."""
+"""Linkages that users write down themselves; see `linkage.joint_lines` for the words."""
 
 from collections.abc import Mapping, Set
 from functools import lru_cache, partial
@@ -21,8 +10,8 @@ from typing import Iterable, List, Optional, Tuple
 
 import numpy as np
 
-from .. import language
-from ..mechanism import check_bars, Design, Mechanism
+from ..linkage import joint_lines
+from ..linkage.mechanism import check_bars, Design, Mechanism
 from ..words import listed, quoted
 
 MOST_LINES = 2000
@@ -39,15 +28,15 @@ def design(joints: Tuple[str, ...], tracer: Optional[str], names: Tuple[str, ...
         With the line and what is allowed.
 
     """
-    lines = language.parse(joints)
+    lines = joint_lines.parse(joints)
     if not any(line.word == 'crank' for line in lines):
         raise ValueError('a linkage needs at least one crank line')
     for line in lines:
-        for name in language.lengths([line]):
-            language.check_name(name)
+        for name in joint_lines.lengths([line]):
+            joint_lines.check_name(name)
             if name not in names:
                 raise line.error(f'dimension {name} has no value; given: {listed(names)}')
-    used = language.lengths(lines)
+    used = joint_lines.lengths(lines)
     placed = [name for line in lines for name in line.names]
     if tracer is not None and tracer not in placed:
         raise ValueError(f'tracer {quoted(tracer)} is no joint; allowed: {listed(placed)}')
@@ -56,9 +45,9 @@ def design(joints: Tuple[str, ...], tracer: Optional[str], names: Tuple[str, ...
                   partial(check, lines))
 
 
-def check(lines: List[language.Line], linkage: Mechanism):
+def check(lines: List[joint_lines.Line], linkage: Mechanism):
     """Raise ValueError, with its line, for a number, a bar or a triangle that cannot be."""
-    language.check_numbers(lines, linkage.dimensions)
+    joint_lines.check_numbers(lines, linkage.dimensions)
     check_bars(linkage)
     for line, exists in linkage.triangles().items():
         if not np.all(exists):
@@ -77,7 +66,7 @@ def given(joints: Iterable[str], tracer: Optional[str], dimensions: Iterable[str
         raise ValueError('dimensions must be a list of names, '
                          f'got {quoted(dimensions)}') from None
     for name in names:
-        language.check_name(name)
+        joint_lines.check_name(name)
     return design(lines, tracer, names)
 
 

@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """
 The five-bar: two cranks that put one point anywhere in an area.
@@ -22,7 +11,7 @@ The defaults are those of a double SCARA robot with four equal arms.
 Source: Norton, "Design of Machinery", sec. 4.9 (the geared five-bar, whose letters these are).
 """
 
-from ..mechanism import Design
+from ..linkage.mechanism import Design
 
 DESIGN = Design('five_bar', {'a': 0.09, 'b': 0.09, 'c': 0.09, 'd': 0.09, 'f': 0.118}, tracer='P',
                 joints=(

@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """
 The four-bar: crank OA = a, coupler AB = b, rocker QB = c, ground OQ = d along x.
@@ -23,8 +12,8 @@ Source: Norton, "Design of Machinery", sec. 2.13 (Grashof's condition) and 4.5 (
 
 from math import fsum
 
-from .. import servo
-from ..mechanism import Design
+from ..linkage import servo
+from ..linkage.mechanism import Design
 
 DESIGN = Design('four_bar', {'a': 40.0, 'b': 120.0, 'c': 80.0, 'd': 100.0, 'p': 60.0},
                 tracer='P', signed=frozenset('p'), joints=(

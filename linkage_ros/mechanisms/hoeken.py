@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """
 Hoeken's linkage: a four-bar that draws a nearly straight line at a nearly constant speed.
@@ -23,7 +12,7 @@ Source: Norton, "Design of Machinery", sec. 3.8, whose table 3-1 lists the propo
 that are straightest over 20 to 180 degrees of the crank.
 """
 
-from ..mechanism import Design
+from ..linkage.mechanism import Design
 
 DESIGN = Design('hoeken', {'a': 1.0, 'b': 2.5, 'd': 2.0}, tracer='P', joints=(
     'O ground 0 0',

@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """
 Klann's leg: six bars from a crank to a foot that steps over things.
@@ -22,7 +11,7 @@ the distances between the joints of the patent's example, in its unit.
 Source: Klann, "Walking device", US patent 6,260,862, 2001.
 """
 
-from ..mechanism import Design
+from ..linkage.mechanism import Design
 
 DESIGN = Design('klann', {
     'm': 0.268, 'a': 0.590, 'b': 0.3206, 'c': 0.5221, 'd': 1.1051, 'e': 0.5177, 'f': 0.8966,

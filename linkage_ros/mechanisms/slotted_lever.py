@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """
 The slotted lever, or inverted slider-crank: a crank pin moves a lever by its slot, and back.
@@ -28,9 +17,9 @@ same triangle: a e^(i theta) = e^(i phi) (W + i (e + b sin phi)), W^2 = a^2 - (e
 import math
 from typing import Sequence
 
-from .. import servo
-from ..mechanism import Design
-from ..reach import reachable_arcs
+from ..linkage import servo
+from ..linkage.crank_range import reachable_arcs
+from ..linkage.mechanism import Design
 
 DESIGN = Design('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 0.0}, tracer='L',
                 signed=frozenset('e'), joints=(

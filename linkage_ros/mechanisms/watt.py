@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """
 Watt's linkage: two equal arms and a short coupler whose middle runs nearly straight up and down.
@@ -21,7 +10,7 @@ Q = (2a, -c). Its middle P writes a lemniscate that is flat about the middle of 
 Sources: Watt's letter to Boulton of 1784; Weisstein, "Watt's Curve", MathWorld.
 """
 
-from ..mechanism import Design
+from ..linkage.mechanism import Design
 
 DESIGN = Design('watt', {'a': 3.0, 'c': 2.0}, tracer='P', joints=(
     'O ground 0 0',

@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """
 Where a machine is, counted in turns of its first crank; no picture is drawn here.
@@ -23,8 +12,8 @@ from typing import NamedTuple, Tuple
 
 import numpy as np
 
-from ..motion import Motion
 from ..scene import Crank, in_words, Machine, SceneError
+from ..scene.crank_motion import Motion
 
 SAMPLES = 720  # of a turn
 MOST_TURNS = 24  # after which several cranks need not be where they started

@@ -1,16 +1,5 @@
 # Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
 """Markers as the page draws them: looks, which seldom change, and points, which often do."""
 
@@ -20,7 +9,7 @@ import numpy as np
 from rclpy.serialization import serialize_message
 from visualization_msgs.msg import Marker
 
-from .. import wire
+from ..nodes import message_layout
 
 KINDS = {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'strip', Marker.SPHERE_LIST: 'joints'}
 SECONDS_BETWEEN_WARNINGS = 5.0
@@ -92,7 +81,7 @@ class Feed:
             self._records = _recorded(self._counts, _shown(places))
 
     def _unpack(self, text):
-        message = wire.deserialized(text, self._type)
+        message = message_layout.deserialized(text, self._type)
         markers = [marker for marker in _markers(message)
                    if marker.type in KINDS and marker.action == Marker.ADD]
         numbers = [self._number(i) for i in range(len(markers))]
@@ -131,11 +120,11 @@ class Layout:
         self._text = np.frombuffer(text, np.uint8)
         places = _places(_markers(message))
         points = [point for marker in _markers(message) for point in marker.points]
-        unused = wire.distinct(3 * len(points))
+        unused = message_layout.distinct(3 * len(points))
         for point, place in zip(points, unused.reshape(-1, 3).tolist()):
             point.x, point.y, point.z = place
         for marker in _markers(message):
-            marker.header.stamp = wire.SENTINEL
+            marker.header.stamp = message_layout.SENTINEL
         marked = serialize_message(message)
         # On its way a message may have been filled up at its end.
         marked = np.frombuffer(marked.ljust(len(text), b'\0'), np.uint8)
@@ -143,9 +132,10 @@ class Layout:
         self._slots = np.flatnonzero(np.isin(numbers, unused))
         self._found = len(marked) == len(text) and np.array_equal(numbers[self._slots], unused)
         self._fixed = np.ones(len(marked), bool)
-        self._fixed[(wire.HEADER + 8 * self._slots[:, None] + np.arange(8)).ravel()] = False
-        stamp = wire.pack(wire.SENTINEL)
-        for place in wire.places(marked.tobytes(), stamp):
+        numbers = message_layout.HEADER + 8 * self._slots[:, None] + np.arange(8)
+        self._fixed[numbers.ravel()] = False
+        stamp = message_layout.pack(message_layout.SENTINEL)
+        for place in message_layout.places(marked.tobytes(), stamp):
             self._fixed[place:place + len(stamp)] = False
         # In another encoding the numbers stand elsewhere, or the other way round.
         self._found = self._found and np.array_equal(self.read(text), places)
@@ -169,8 +159,8 @@ class Layout:
 
     @staticmethod
     def _numbers(text):
-        whole = len(text) - (len(text) - wire.HEADER) % 8
-        return np.frombuffer(text[wire.HEADER:whole].tobytes(), float)
+        whole = len(text) - (len(text) - message_layout.HEADER) % 8
+        return np.frombuffer(text[message_layout.HEADER:whole].tobytes(), float)
 
 
 def _markers(message):

@@ -1,0 +1,149 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Expressions turned into machine code, by llvmlite.
+
+The operations are those of the plain Python code, done in the same order on the same numbers, so
+the results are the same to the last bit.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Callable, Sequence
+
+import llvmlite
+from llvmlite import binding as llvm, ir
+import numpy as np
+
+if not hasattr(llvm, 'create_pass_builder'):
+    raise ImportError(f'llvmlite 0.44 or newer is needed, this is {llvmlite.__version__}')
+
+NUMBER, COUNT = ir.DoubleType(), ir.IntType(64)
+ZERO, NAN = ir.Constant(NUMBER, 0.0), ir.Constant(NUMBER, float('nan'))
+# Poses, the addresses of angles, constants and results, then the strides of results in numbers.
+SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, *3 * (ctypes.c_void_p,),
+                             *2 * (ctypes.c_int64,))
+
+llvm.initialize_native_target()
+llvm.initialize_native_asmprinter()
+
+
+class Loop:
+    """
+    A loop over poses in machine code, which lives as long as this.
+
+    Parameters
+    ----------
+    operations : sequence of (int, str, tuple)
+        Number, name and operands of each operation: numbers of others, of an angle, or a value.
+    constants : sequence of int
+        The numbers of what is given with each call.
+    outputs : sequence of int
+        The numbers of what is wanted.
+
+    """
+
+    def __init__(self, operations: Sequence, constants: Sequence[int], outputs: Sequence[int]):
+        target = llvm.Target.from_default_triple().create_target_machine(
+            cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=3)
+        code = llvm.parse_assembly(str(_module(operations, constants, outputs)))
+        options = llvm.create_pipeline_tuning_options(speed_level=3)
+        options.loop_vectorization = options.slp_vectorization = True
+        passes = llvm.create_pass_builder(target, options)
+        passes.getModulePassManager().run(code, passes)
+        self._engine = llvm.create_mcjit_compiler(code, target)
+        self._engine.finalize_object()
+        self.run = SIGNATURE(self._engine.get_function_address('loop'))
+
+    @staticmethod
+    def arguments(angles: np.ndarray, constants: np.ndarray, out: np.ndarray) -> tuple:
+        """
+        Return what to call `run` with, as long as the arrays live.
+
+        It solves at angles, shape (cranks, poses) and C-contiguous, and fills out, shape
+        (outputs, poses).
+        """
+        by_output, by_pose = (stride // out.itemsize for stride in out.strides)
+        return angles.shape[1], *map(_address, (angles, constants, out)), by_pose, by_output
+
+
+def _address(array: np.ndarray) -> int:
+    return array.__array_interface__['data'][0]
+
+
+def _module(operations, constants, outputs) -> ir.Module:
+    module = ir.Module()
+    pointer = NUMBER.as_pointer()
+    loop = ir.Function(module, ir.FunctionType(
+        ir.VoidType(), [COUNT, pointer, pointer, pointer, COUNT, COUNT]), 'loop')
+    poses, angles, given, out, by_pose, by_output = loop.args
+    for array in (angles, given, out):
+        array.add_attribute('noalias')
+    start, body, end = (loop.append_basic_block(name) for name in ('start', 'body', 'end'))
+
+    builder = ir.IRBuilder(start)
+    known = {number: _load(builder, given, _count(i)) for i, number in enumerate(constants)}
+    builder.cbranch(builder.icmp_signed('>', poses, _count(0)), body, end)
+
+    builder.position_at_end(body)
+    pose = builder.phi(COUNT)
+    spell = _operators(builder)
+    for number, name, operands in operations:
+        if name == 'constant':
+            known[number] = ir.Constant(NUMBER, operands[0])
+        elif name == 'angle':
+            row = builder.mul(_count(operands[0]), poses)
+            known[number] = _load(builder, angles, builder.add(row, pose))
+        else:
+            known[number] = spell[name](*(known[operand] for operand in operands))
+    for column, number in enumerate(outputs):
+        place = builder.add(builder.mul(pose, by_pose), builder.mul(_count(column), by_output))
+        builder.store(known[number], builder.gep(out, [place]))
+    after = builder.add(pose, _count(1))
+    pose.add_incoming(_count(0), start)
+    pose.add_incoming(after, body)
+    builder.cbranch(builder.icmp_signed('<', after, poses), body, end)
+
+    builder.position_at_end(end)
+    builder.ret_void()
+    return module
+
+
+def _count(value: int) -> ir.Constant:
+    return ir.Constant(COUNT, value)
+
+
+def _load(builder, array, place):
+    return builder.load(builder.gep(array, [place]))
+
+
+def _operators(builder) -> dict[str, Callable]:
+    """Return what each operation appends to the code."""
+    def call(name, arity=1):
+        function = builder.module.globals.get(name) or ir.Function(
+            builder.module, ir.FunctionType(NUMBER, [NUMBER] * arity), name)
+        return lambda *operands: builder.call(function, operands)
+
+    def compare(sign):
+        return lambda x, y: builder.fcmp_ordered(sign, x, y)
+
+    def reaches(margin, tolerance):
+        return compare('>=')(margin, builder.fneg(tolerance))
+
+    def root(x, tolerance):
+        grazed = builder.select(reaches(x, tolerance), ZERO, NAN)
+        return builder.select(compare('>')(x, ZERO), sqrt(x), grazed)
+
+    def gated(x, margin, tolerance):
+        return builder.select(reaches(margin, tolerance), x, NAN)
+
+    sqrt = call('llvm.sqrt.f64')
+    return {
+        'add': builder.fadd, 'subtract': builder.fsub, 'multiply': builder.fmul,
+        'divide': builder.fdiv, 'negative': builder.fneg, 'absolute': call('llvm.fabs.f64'),
+        'less': compare('<'), 'less_equal': compare('<='), 'where': builder.select,
+        'sin': call('llvm.sin.f64'), 'cos': call('llvm.cos.f64'), 'sqrt': sqrt,
+        'atan2': call('atan2', 2), 'rint': call('llvm.rint.f64'), 'root': root, 'gated': gated,
+    }

@@ -1,0 +1,504 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Expressions turned into code.
+
+One list of operations serves every use: plain Python on floats for a single pose, numpy for
+arrays, and machine code where it is asked for. Only what the outputs depend on is in the list,
+each value once; what depends on dimensions alone is worked out when they are set, and so is every
+condition on dimensions: the code for a pose has no branch for it.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import Future, wait
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain
+import math
+from struct import Struct
+from threading import Thread
+from typing import Callable, Mapping, Optional, Sequence
+import warnings
+
+import numpy as np
+
+from .expression import in_order, Real
+
+# A block of this many poses stays in the second-level cache; measured in benchmark/.
+BLOCK = 4096
+# Below this many poses the float code in a loop beats numpy's cost per call.
+FEW = 32
+# Python's parser bounds how deep parentheses may nest.
+DEEPEST = 16
+# Programs and results that are kept for the next time they are asked for.
+KEPT = 128
+
+
+def keep(found: dict, key, value):
+    """Keep a value and return it; what was kept first is dropped where there are too many."""
+    found[key] = value
+    while len(found) > KEPT:
+        found.pop(next(iter(found)), None)
+    return value
+
+
+def _grazed(x, tolerance):
+    """Return the root of a radicand that is not above zero."""
+    return 0.0 if x >= -tolerance else math.nan
+
+
+def _root(x, tolerance):
+    if _all_at_least(x, 0.0):
+        return np.sqrt(x)
+    return np.sqrt(_gated(np.maximum(x, 0.0), x, tolerance))
+
+
+def _gated(x, margin, tolerance):
+    """Return x where the margin is not below zero by more than the tolerance, else NaN."""
+    if _all_at_least(margin, -tolerance):
+        return x
+    return np.where(margin >= -tolerance, x, np.nan)
+
+
+def _all_at_least(x, bound) -> bool:
+    """Return whether nothing is below a bound, or no number; for one bound in one quick pass."""
+    if isinstance(bound, float) and np.size(x):
+        return np.minimum.reduce(x, axis=None) >= bound
+    return np.all(x >= bound)
+
+
+@np.vectorize
+def _fsum(*terms):
+    try:
+        return math.fsum(terms)
+    except OverflowError:
+        return math.nan
+
+
+_OPERATORS = {
+    'add': '({} + {})', 'subtract': '({} - {})', 'multiply': '({} * {})', 'divide': '({} / {})',
+    'negative': '(-{})', 'less': '({} < {})', 'less_equal': '({} <= {})',
+    'sin': 'sin({})', 'cos': 'cos({})', 'sqrt': 'sqrt({})', 'atan2': 'atan2({}, {})',
+    'absolute': 'abs({})',
+}
+
+
+@dataclass(frozen=True)
+class _Dialect:
+    """How operations are spelt, which of them repeat their first operand, and their names."""
+
+    templates: Mapping[str, str]
+    repeating: frozenset
+    names: Mapping[str, Callable]
+    frees: bool
+
+
+_FLOAT = _Dialect(
+    {**_OPERATORS, 'where': '({1} if {0} else {2})',
+     'rint': 'round({})',
+     'root': '(sqrt({0}) if {0} > 0.0 else grazed({0}, {1}))',
+     'gated': '({0} if {1} >= -{2} else nan)'},
+    frozenset({'root'}),
+    {'sin': math.sin, 'cos': math.cos, 'sqrt': math.sqrt, 'atan2': math.atan2,
+     'grazed': _grazed, 'nan': math.nan, 'inf': math.inf}, frees=False)
+
+_ARRAY = _Dialect(
+    {**_OPERATORS, 'where': 'where({}, {}, {})', 'root': 'root({}, {})',
+     'gated': 'gated({}, {}, {})', 'rint': 'rint({})'},
+    frozenset(),
+    {'sin': np.sin, 'cos': np.cos, 'sqrt': np.sqrt, 'atan2': np.arctan2, 'where': np.where,
+     'root': _root, 'gated': _gated, 'rint': np.rint, 'nan': np.nan,
+     'inf': np.inf}, frees=True)
+
+_EVALUATED = {
+    'add': np.add, 'subtract': np.subtract, 'multiply': np.multiply, 'divide': np.divide,
+    'negative': np.negative, 'absolute': np.absolute, 'less': np.less,
+    'less_equal': np.less_equal, 'sin': np.sin, 'cos': np.cos, 'sqrt': np.sqrt,
+    'atan2': np.arctan2, 'where': np.where, 'root': _root, 'gated': _gated, 'fsum': _fsum,
+}
+
+
+def evaluate(node: Real, dimensions: Mapping, known: dict):
+    """Return the value of an expression of dimensions alone; known is shared between calls."""
+    for x in in_order([node], lambda x: () if x in known else x.operands):
+        if x in known:
+            continue
+        if x.op == 'constant':
+            known[x] = np.float64(x.value)
+        elif x.op == 'dimension':
+            known[x] = np.asarray(dimensions[x.args[0]], float)[()]
+        else:
+            known[x] = _EVALUATED[x.op](*map(known.get, x.operands))[()]
+    return known[node]
+
+
+class _Listing:
+    """The operations behind some outputs, in an order they can be done in, each once."""
+
+    def __init__(self, outputs: Sequence[Real], decided: Mapping[Real, bool],
+                 replaced: Mapping[Real, Real]):
+        self.entries = []
+        self._decided = decided
+        self._numbers = {}
+        self._known = {}
+        for leaf, expression in replaced.items():
+            self._known[leaf] = self._number(expression)
+        self.outputs = [self._number(node) for node in outputs]
+        self.constants = self._boundary()
+        self._uses = self._count_uses()
+
+    def _number(self, node: Real) -> int:
+        for x in in_order([node], self._needed):
+            if x not in self._known:
+                self._known[x] = self._enter(x)
+        return self._known[node]
+
+    def _needed(self, node: Real) -> tuple:
+        if node in self._known:
+            return ()
+        if node.op == 'where' and node.args[0] in self._decided:
+            return (node.args[1 if self._decided[node.args[0]] else 2],)
+        return node.operands
+
+    def _enter(self, node: Real) -> int:
+        needed = self._needed(node)
+        if len(needed) == 1 and node.op in ('where', 'rated'):
+            return self._known[needed[0]]
+        args = tuple(self._known[a] for a in needed) or node.args
+        key = (node.op, tuple(sorted(args)) if node.op in ('add', 'multiply') else args)
+        if key not in self._numbers:
+            self._numbers[key] = len(self.entries)
+            self.entries.append((node, args))
+        return self._numbers[key]
+
+    def _operands(self, number: int) -> tuple:
+        node, args = self.entries[number]
+        return args if node.varies and node.op != 'angle' else ()
+
+    def _live(self) -> list:
+        live, waiting = set(), list(self.outputs)
+        while waiting:
+            number = waiting.pop()
+            if number not in live:
+                live.add(number)
+                waiting.extend(self._operands(number))
+        return sorted(live)
+
+    def _boundary(self) -> list:
+        """Return the values of dimensions alone that the varying operations start from."""
+        return [n for n in self._live()
+                if not self.entries[n][0].varies and self.entries[n][0].op != 'constant']
+
+    def _count_uses(self) -> dict:
+        uses = dict.fromkeys(self._live(), 0)
+        for number in list(uses):
+            for operand in self._operands(number):
+                uses[operand] += 1
+        for number in self.outputs:
+            uses[number] += 1
+        return uses
+
+    def operations(self) -> tuple:
+        """Return the operations as (number, name, operands), the constants and the outputs."""
+        needed = [(number, *self.entries[number])
+                  for number in self._uses if number not in self.constants]
+        return [(number, node.op, (float(node.value),) if node.op == 'constant' else args)
+                for number, node, args in needed], self.constants, self.outputs
+
+    def statements(self, dialect: _Dialect) -> tuple:
+        """Return the assignments as (name, code, names used) and the code of each output."""
+        text, depth, reads, lines = {}, {}, {}, []
+        repeated = {args[0] for node, args in map(self.entries.__getitem__, self._uses)
+                    if node.op in dialect.repeating}
+        for number, uses in self._uses.items():
+            node, args = self.entries[number]
+            if number in self.constants:
+                text[number], depth[number], reads[number] = f'k{number}', 0, set()
+            elif node.op == 'constant':
+                text[number], depth[number], reads[number] = repr(node.value), 0, set()
+            elif node.op == 'angle':
+                text[number], depth[number], reads[number] = f'x{args[0]}', 0, set()
+            else:
+                text[number] = dialect.templates[node.op].format(*(text[a] for a in args))
+                depth[number] = 1 + max(depth[a] for a in args)
+                reads[number] = set().union(*(reads[a] for a in args))
+                if uses > 1 or number in repeated or depth[number] > DEEPEST:
+                    name = f'v{number}'
+                    lines.append((name, text[number], reads[number]))
+                    text[number], depth[number], reads[number] = name, 0, {name}
+        kept = set().union(*(reads[n] for n in self.outputs))
+        return lines, [text[n] for n in self.outputs], kept
+
+
+def _with_releases(lines, kept):
+    """Drop each array after its last use, so that the next one takes over its warm memory."""
+    last = {}
+    for index, (_, _, reads) in enumerate(lines):
+        last.update(dict.fromkeys(reads, index))
+    for index, (name, code, reads) in enumerate(lines):
+        yield f'{name} = {code}'
+        done = sorted(n for n in reads if last[n] == index and n not in kept)
+        if done:
+            yield 'del ' + ', '.join(done)
+
+
+def _python(listing: _Listing, dialect: _Dialect, angles: int, names=()) -> Callable:
+    """
+    Return a function of the constants, and of what to do instead, to the function of the angles.
+
+    That returns the outputs as a tuple or, where there are names, in pairs: an array (2,) each.
+    What Python's floats raise for is left to `instead`.
+    """
+    lines, outputs, kept = listing.statements(dialect)
+    body = (list(_with_releases(lines, kept)) if dialect.frees
+            else [f'{name} = {code}' for name, code, _ in lines])
+    rows = ', '.join(f'{name!r}: pairs[{i}]' for i, name in enumerate(names))
+    # Packing floats as bytes takes a quarter of the time numpy needs to convert them.
+    ending = [
+        f'pairs = empty(({len(names)}, 2))',
+        f'pack(pairs, 0, {", ".join(outputs)})',
+        f'return {{{rows}}}',
+    ] if names else [f'return ({"".join(code + ", " for code in outputs)})']
+    given = ', '.join(f'x{i}' for i in range(angles))
+    source = '\n'.join([
+        f'def bind({"".join(f"k{n}, " for n in listing.constants)}instead=None):',
+        f'    def pose({given}):',
+        '        try:',
+        *(f'            {line}' for line in [*body, *ending]),
+        '        except (ArithmeticError, ValueError):',
+        f'            return instead({given})',
+        '    return pose'])
+    scope = {**dialect.names, 'empty': np.empty, 'pack': Struct(f'{len(outputs)}d').pack_into}
+    exec(compile(source, '<linkage>', 'exec'), scope)
+    return scope['bind']
+
+
+class _Variant:
+    """The code for one outcome of the conditions on dimensions."""
+
+    def __init__(self, outputs, decided, replaced, angles):
+        self._listing = _Listing(outputs, decided, replaced)
+        self.angles, self.outputs = angles, len(outputs)
+        self.constants = [self._listing.entries[n][0] for n in self._listing.constants]
+        self._placing = {}
+
+    def placing(self, names: tuple) -> Callable:
+        """Return the code for one pose that returns the outputs in pairs, by name."""
+        if names not in self._placing:
+            self._placing[names] = _python(self._listing, _FLOAT, self.angles, names)
+        return self._placing[names]
+
+    @cached_property
+    def float(self):
+        return _python(self._listing, _FLOAT, self.angles)
+
+    @cached_property
+    def array(self):
+        return _python(self._listing, _ARRAY, self.angles)
+
+    @cached_property
+    def loop(self) -> Future:
+        """The code for many poses as machine code, which is made beside what goes on."""
+        made = Future()
+        Thread(target=self._compile, args=(made,), name='linkage_ros compiler').start()
+        return made
+
+    def _compile(self, made):
+        try:
+            from .llvm_code import Loop
+
+            made.set_result(Loop(*self._listing.operations()))
+        except Exception as error:
+            made.set_exception(error)
+
+
+class Program:
+    """
+    Some outputs of a linkage, ready to be bound to dimensions.
+
+    Parameters
+    ----------
+    outputs : sequence of Real
+        What is computed.
+    angles : int
+        How many angles are given.
+    replaced : mapping, optional
+        What stands for some angles in the outputs.
+
+    """
+
+    def __init__(self, outputs: Sequence[Real], angles: int = 1,
+                 replaced: Optional[Mapping[Real, Real]] = None):
+        self._outputs = tuple(outputs)
+        self._angles = angles
+        self._replaced = replaced or {}
+        self._conditions = _conditions(self._outputs)
+        self._variants = {}
+
+    def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False) -> Pose:
+        """Return the outputs as functions of the angles; dimensions are floats or arrays."""
+        swept = any(np.ndim(v) for v in dimensions.values())
+        with np.errstate(all='ignore'):
+            decisions = () if swept else tuple(
+                bool(evaluate(c, dimensions, known)) for c in self._conditions)
+            variant = self._variant(decisions)
+            constants = [evaluate(c, dimensions, known) for c in variant.constants]
+        if not swept:
+            constants = list(map(float, constants))
+        shape = np.broadcast_shapes(*map(np.shape, constants)) if swept else ()
+        return Pose(variant, constants, shape, accelerate)
+
+    def _variant(self, decisions: tuple) -> _Variant:
+        if decisions not in self._variants:
+            decided = dict(zip(self._conditions, decisions))
+            keep(self._variants, decisions, _Variant(
+                self._outputs, decided, self._replaced, self._angles))
+        return self._variants[decisions]
+
+
+def _conditions(outputs) -> list:
+    """Return the conditions on dimensions alone that varying operations choose by."""
+    found, seen, waiting = [], set(), list(outputs)
+    while waiting:
+        node = waiting.pop()
+        if node in seen or not node.varies:
+            continue
+        seen.add(node)
+        if node.op == 'where' and not node.args[0].varies and node.args[0] not in found:
+            found.append(node.args[0])
+        waiting.extend(a for a in node.args if isinstance(a, Real))
+    return found
+
+
+class Pose:
+    """The outputs of a program as a function of the angles, for dimensions that are set."""
+
+    def __init__(self, variant: _Variant, constants, shape: tuple, accelerate: bool):
+        self._variant = variant
+        self._constants = constants
+        self._accelerate = accelerate
+        self.shape = shape
+
+    @cached_property
+    def at(self) -> Callable:
+        """The function from the angles, floats, to the outputs of one set of dimensions."""
+        return self._variant.float(*self._constants, self._by_arrays)
+
+    @cached_property
+    def _given(self):
+        return np.array(self._constants)
+
+    def _by_arrays(self, *angles: float) -> tuple:
+        """Return the outputs at one pose with inf or nan where Python's floats raise."""
+        return tuple(self._blocks([np.array([a]) for a in angles], 1)[:, 0].tolist())
+
+    def placer(self, names: tuple) -> Callable:
+        """Return the function from one angle, a float, to an array (2,) for each name."""
+        def by_arrays(theta):
+            return dict(zip(names, np.reshape(self._by_arrays(theta), (-1, 2))))
+
+        return self._variant.placing(names)(*self._constants, by_arrays)
+
+    def __call__(self, *angles):
+        """Return the outputs at floats, as floats, or over arrays that are broadcast together."""
+        if not self.shape and set(map(type, angles)) == {float}:
+            return self.at(*angles)
+        return self.over(*angles)
+
+    def over(self, *angles) -> np.ndarray:
+        """Return the outputs over arrays that are broadcast together, shape (outputs, *shape)."""
+        angles = [np.asarray(a, float) for a in angles]
+        if self.shape:
+            return self._swept(angles)
+        if len(angles) > 1:
+            angles = np.broadcast_arrays(*angles)
+        shape, size = angles[0].shape, angles[0].size
+        flat = [a.ravel() for a in angles]
+        if self._accelerate:
+            out = np.empty((self._variant.outputs, size))
+            loop, given = self._variant.loop.result(), np.array(flat)
+            loop.run(*loop.arguments(given, self._given, out))
+        else:
+            out = self._plainly(flat, size)
+        return out.reshape(self._variant.outputs, *shape)
+
+    def searched(self, *angles) -> np.ndarray:
+        """Return what `over` does for one set of dimensions, without code for single poses."""
+        angles = np.broadcast_arrays(*angles)
+        flat = [a.ravel() for a in angles]
+        return self._blocks(flat, angles[0].size).reshape(self._variant.outputs, *angles[0].shape)
+
+    def batch(self, rows: np.ndarray) -> Batch:
+        """Return poses to be solved again and again, into rows (poses, outputs)."""
+        return Batch(self._plainly, self._variant.loop if self._accelerate else None,
+                     self._given, self._variant.angles, rows)
+
+    def _plainly(self, given, size):
+        return self._one_by_one(given, size) if size < FEW else self._blocks(given, size)
+
+    def _one_by_one(self, given, size):
+        poses = map(self.at, *(a.tolist() for a in given))
+        outputs = self._variant.outputs
+        return np.fromiter(chain.from_iterable(poses), float, size * outputs).reshape(
+            size, outputs).T
+
+    def _blocks(self, given, size):
+        pose = self._variant.array(*self._constants)
+        out = np.empty((self._variant.outputs, size))
+        with np.errstate(all='ignore'):
+            for start in range(0, size, BLOCK):
+                block = slice(start, start + BLOCK)
+                for row, values in zip(out, pose(*(a[block] for a in given))):
+                    row[block] = values
+        return out
+
+    def _swept(self, angles):
+        shape = np.broadcast_shapes(self.shape, *map(np.shape, angles))
+        with np.errstate(all='ignore'):
+            rows = self._variant.array(*self._constants)(*angles)
+        return np.array([np.broadcast_to(row, shape) for row in rows], float)
+
+
+class Batch:
+    """
+    Poses that are solved again and again, in arrays that stay where they are.
+
+    Attributes
+    ----------
+    given : float array (angles, poses)
+        Where the angles are put.
+    rows : float array (poses, outputs)
+        What `solve` makes of them.
+
+    """
+
+    def __init__(self, plainly: Callable, loop, constants, angles: int, rows: np.ndarray):
+        self.given, self.rows = np.zeros((angles, len(rows))), rows
+        self._plainly = plainly
+        self._loop, self._constants = loop, constants
+        self._run = None
+
+    def finish(self):
+        """Wait for the machine code, if there is to be any."""
+        if self._loop:
+            wait([self._loop])
+
+    def solve(self):
+        """Fill the rows: plainly until there is machine code, for which nobody waits."""
+        if self._loop and self._loop.done():
+            self._take(self._loop)
+        if self._run:
+            self._run(*self._arguments)
+        else:
+            self.rows[:] = self._plainly(self.given, len(self.rows)).T
+
+    def _take(self, loop):
+        self._loop = None
+        if error := loop.exception():
+            warnings.warn(f'no machine code, so plain Python goes on: {error}', stacklevel=3)
+            return
+        self._code = loop.result()
+        self._arguments = self._code.arguments(self.given, self._constants, self.rows.T)
+        self._run = self._code.run

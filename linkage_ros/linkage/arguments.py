@@ -1,0 +1,77 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What callers give a mechanism, checked in words that name it and say what is allowed."""
+
+from collections.abc import Mapping
+from numbers import Real
+from typing import Any, Optional
+
+import numpy as np
+
+from ..words import listed, quoted
+
+SHORTEST, LONGEST = 1e-300, 1e300
+
+
+def checked_dimensions(design, given: Mapping[str, Any]) -> dict:
+    """Return all dimensions of a design, defaults filled in; raise ValueError for a bad one."""
+    for name in given:
+        if name not in design.dimensions:
+            raise ValueError(f'{design.name} has no dimension {quoted(name)}; '
+                             f'allowed: {listed(design.dimensions)}')
+    lengths = {name: _checked(design, name, given.get(name, default))
+               for name, default in design.dimensions.items()}
+    try:
+        np.broadcast_shapes(*map(np.shape, lengths.values()))
+    except ValueError:
+        shapes = [f'{name} {np.shape(length)}' for name, length in lengths.items()]
+        raise ValueError(f'{design.name}: arrays of dimensions must have shapes that broadcast, '
+                         f'got {listed(shapes)}') from None
+    return lengths
+
+
+def _checked(design, name, value):
+    def error(rule):
+        return ValueError(f'{design.name}: dimension {name} must {rule}, got {quoted(value)}')
+
+    try:
+        length = _numbers(value)
+    except (TypeError, ValueError, OverflowError, RecursionError):
+        raise error('be a number or an array of numbers') from None
+    if not np.all(np.isfinite(length)):
+        raise error('be finite')
+    if name not in design.signed and not np.all(length > 0.0):
+        raise error('be positive')
+    size = np.abs(length[length != 0.0])
+    if np.any((size < SHORTEST) | (size > LONGEST)):
+        raise error(f'lie between {SHORTEST:g} and {LONGEST:g}')
+    return length if length.ndim else float(length)
+
+
+def _numbers(value) -> np.ndarray:
+    """Return numbers as an array; raise for what only could be converted to some."""
+    given = np.asarray(value)
+    if given.dtype.kind not in 'iufO' or not given.size:
+        raise TypeError
+    if given.dtype.kind == 'O' and any(isinstance(each, (str, bytes, bool, type(None)))
+                                       for each in given.flat):
+        raise TypeError
+    return given.astype(float)
+
+
+def checked_branches(design, given: Optional[Mapping[str, int]]) -> dict:
+    """Return all assembly signs of a design; raise ValueError for a bad one."""
+    if given is not None and not isinstance(given, Mapping):
+        raise ValueError(f'{design.name}: branches must be a mapping from joint to +1 or -1, '
+                         f'got {quoted(given)}')
+    signs = dict(design.branches)
+    for name, sign in (given or {}).items():
+        if name not in signs:
+            raise ValueError(f'{design.name} has no branch {quoted(name)}; '
+                             f'allowed: {listed(signs)}')
+        if not isinstance(sign, Real) or isinstance(sign, bool) or sign not in (1, -1):
+            raise ValueError(f'{design.name}: branch {name} must be +1 or -1, '
+                             f'got {quoted(sign)}')
+        signs[name] = int(sign)
+    return signs

@@ -1,0 +1,319 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+A linkage written down joint by joint.
+
+Each joint is placed by one construction from joints placed before it. From that follow the links,
+the bars that are drawn, the spanning tree of joint angles and the limits of the reach.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+from typing import NamedTuple, Optional, Tuple
+
+from . import planar
+from ..formula.expression import (
+    angle,
+    arctangent,
+    Complex,
+    cosine,
+    cross,
+    Number,
+    Real,
+    real,
+    sine,
+)
+
+GROUND = 'ground'
+
+
+class SketchError(ValueError):
+    """A construction that cannot be on the joints it is given."""
+
+
+class Link(NamedTuple):
+    """
+    A moving link in the spanning tree.
+
+    It turns about the point `joint` of its parent (or slides along its parent, from that point);
+    its bar points from there to `tip`. The joint angle is counted from `zero` [rad]: from +x for
+    links on the ground, else from the parent's bar.
+    """
+
+    name: str
+    parent: str
+    joint: str
+    kind: str
+    zero: Real
+    tip: str
+
+
+class Bar(NamedTuple):
+    """Two points at a constant distance [m], drawn as a line."""
+
+    first: str
+    second: str
+    length: Real
+
+
+@dataclass
+class _Point:
+    place: Complex
+    home: str
+    span: Real
+    stands_on: frozenset = frozenset()
+    crank: Optional[planar.Crank] = None
+
+
+class _Vector(NamedTuple):
+    vector: Complex
+    length: Real
+    link: str
+
+
+class Sketch:
+    """The joints, links and limits of a linkage, as expressions of its dimensions and angles."""
+
+    def __init__(self):
+        self.points = {}
+        self.links = []
+        self.bars = []
+        self.limits = []
+        self.triangles = {}
+        self.frames = {}
+        self.joint_values = {}
+        self.directions = {}
+        self.lines = {}
+        self.corners = {}
+        self.transmissions = {}
+        self.folds = []
+        self.cranks = []
+        self._vectors = {}
+        self._ends = {}
+        self._kites = {}
+
+    def ground(self, name: str, x: Number, y: Number):
+        """Fix a joint to the ground at (x, y) [m]."""
+        place = Complex(x, y)
+        self.points[name] = _Point(place, GROUND, abs(place.x) + abs(place.y))
+
+    def crank(self, name: str, centre: str, length: Real, upright: bool = False):
+        """Turn a crank [m] about a ground joint; upright: its zero is +y, not +x."""
+        self._on_ground(centre)
+        link = f'crank{len(self.cranks) + 1}' if self.cranks else 'crank'
+        zero = Complex(0.0, 1.0) if upright else Complex(1.0, 0.0)
+        turning = angle(len(self.cranks))
+        crank = planar.Crank(self.points[centre].place, length, zero, turning)
+        self.cranks.append(link)
+        self._hang(centre, name, crank.bar(), length, upright, link)
+        self.joint_values[link] = turning
+        self._place(name, centre, crank.bar(), link, length, ())
+        self.points[name].crank = crank
+
+    def dyad(self, name: str, first: str, second: str, to_first: Real, to_second: Real,
+             side: float):
+        """Join bars of to_first and to_second [m] from two joints, left of first -> second."""
+        found = planar.dyad(self.arm(first, second), to_first, to_second, side)
+        self.limits += found.limits
+        self._pair(name, first, second, found, to_first, to_second)
+
+    def rigid(self, name: str, first: str, second: str, to_first: Real, to_second: Real,
+              side: float):
+        """Add the third corner of a rigid triangle on a bar; left of first -> second."""
+        vector, base, link = self._bar_between(first, second)
+        corner = planar.triangle(base, to_first, to_second, side)
+        self.triangles[name] = corner.y
+        self.limits.append(planar.Limit(abs(corner.y), real(0.0)))
+        self._place(name, first, vector * corner, link, to_first, (second,))
+        self._bar(second, name, vector * (corner - Complex(1.0, 0.0)), to_second, link)
+        self._add_to_frame(name, first, second, link, corner)
+
+    def line(self, name: str, first: str, second: str, distance: Real):
+        """Add a point on the line of a bar, a distance [m] from first, towards second."""
+        vector, base, link = self._bar_between(first, second)
+        self._place(name, first, vector * (distance / base), link, abs(distance), (second,))
+        if (first, second) in self._kites:
+            self.points[name].place = self._kites[first, second].beyond_kite(-(distance / base))
+        self._add_to_frame(name, first, second, link, Complex(distance / base, 0.0))
+
+    def mirror(self, name: str, point: str, first: str, second: str):
+        """Mirror a joint in the line of two others: the far corner of a kite."""
+        arm, pin = self.arm(second, first), self.points[first].crank
+        area = arm.offset(self.points[point].place)
+        self.folds.append(planar.Limit(area, planar.GRAZE * self.distance(first, point)
+                                       * self.distance(second, point)))
+        ends = [(self.points[end].place, self._side(end, point).vector)
+                for end in (second, first)]
+        place, *bars = planar.mirror(arm, self.points[point].place, ends)
+        self._pair(name, first, second, planar.Dyad(*reversed(bars), ()),
+                   self.distance(first, point), self.distance(second, point), point)
+        self.points[name].place = place
+        if isinstance(arm, planar.CrankArm) and pin and pin.centre is self.points[point].place:
+            self._kites[first, name] = arm
+
+    def parallelogram(self, name: str, corner: str, first: str, second: str):
+        """Join bars to two joints that are parallel to the bars from a corner to them."""
+        to_first, to_second = (self._side(corner, end) for end in (first, second))
+        self.folds.append(planar.Limit(cross(to_first.vector, to_second.vector),
+                                       planar.GRAZE * to_first.length * to_second.length))
+        place = self.points[first].place + to_second.vector
+        bars = [planar.parallel(side.vector, place) for side in (to_second, to_first)]
+        self._pair(name, first, second, planar.Dyad(*bars, ()), to_second.length,
+                   to_first.length, corner)
+
+    def inversor(self, names: Tuple[str, str, str], pole: str, pin: str, long: Real, short: Real):
+        """Add a Peaucellier cell: the joint right of pole -> pin, the corner, the left joint."""
+        right, corner, left = names
+        found = planar.inversor(self.arm(pole, pin), long, short)
+        self.limits += found.right.limits
+        self._pair(right, pole, pin, found.right, long, short)
+        link = self._hang(right, corner, found.left.second, short)
+        self._place(corner, right, found.left.second, link, short, ())
+        self.points[corner].place = self.points[pole].place + found.inverse
+        self.corners[corner] = pole, pin, (long - short) * (long + short)
+        self._pair(left, pole, pin, found.left, long, short)
+        link = self._hang(left, corner, found.right.second, short)
+        self._bar(left, corner, found.right.second, short, link)
+
+    def slot(self, tip: str, pivot: str, pin: str, offset: Real, half: float, length: Real):
+        """Turn a lever of this length [m] about a ground joint by a pin in its slot."""
+        self._on_ground(pivot)
+        found = planar.slot(self.arm(pivot, pin), offset, half)
+        self.limits.append(found.limit)
+        lever = self._hang(pivot, tip, found.along, length, True, self._numbered('lever'))
+        self._place(tip, pivot, found.along * length, lever, length, (pin,))
+        self.transmissions[tip] = arctangent(abs(found.slide), offset)
+        self._slide('slide', lever, pivot, pin, found.slide, Complex(0.0, offset))
+
+    def slider(self, name: str, pin: str, rod: Real, origin: str, direction: Real, side: float):
+        """Join a rod [m] from a joint to a block on a line through a ground joint."""
+        self._on_ground(origin)
+        along = Complex(cosine(direction), sine(direction))
+        rail = self._rail(pin, origin, along)
+        found = planar.slider(rail, rod, side)
+        self.limits += found.limits
+        link = self._hang(pin, name, found.rod, rod)
+        self._place(name, pin, found.rod, link, rod, (origin,))
+        self.transmissions[name] = arctangent(abs(found.reach), rail.height)
+        block = self._slide('block', GROUND, origin, name, found.place, Complex(0.0, 0.0),
+                            direction)
+        self.lines[block] = along
+
+    def _rail(self, pin, origin, along):
+        """Return a joint as seen from a line through a ground joint."""
+        start, end = self.points[origin], self.points[pin]
+        if end.crank:
+            return planar.CrankRail(end.crank, start.place, along, start.span + end.span)
+        return planar.Rail(end.place, start.place, along, start.span + end.span)
+
+    def _on_ground(self, name):
+        if self.points[name].home != GROUND:
+            raise SketchError(f'joint {name} must be on the ground')
+
+    def _bar_between(self, first, second):
+        """Return the vector between two joints of one link."""
+        if (first, second) not in self._vectors:
+            link = self._shared_link(first, second)
+            if not link:
+                raise SketchError(f'{first} and {second} are not joints of one moving link')
+            bar, frame = self._vectors[self._ends[link]], self.frames[link]
+            across = frame[second] - frame[first]
+            self._vectors[first, second] = _Vector(
+                bar.vector * (across / bar.length), across.length(), link)
+        return self._vectors[first, second]
+
+    def _side(self, first, second):
+        """Return the vector between two joints of one link or of the ground."""
+        ends = self.points[first], self.points[second]
+        if ends[0].home == ends[1].home == GROUND:
+            vector = ends[1].place - ends[0].place
+            return _Vector(vector, vector.length(), GROUND)
+        return self._bar_between(first, second)
+
+    def _shared_link(self, first, second):
+        """Return the moving link that two joints are on, None if there is none."""
+        return next((link for link, frame in self.frames.items()
+                     if first in frame and second in frame), None)
+
+    def _numbered(self, word):
+        taken = sum(link.name.rstrip('0123456789') == word for link in self.links)
+        return f'{word}{taken + 1}' if taken else word
+
+    def _slide(self, word, parent, joint, tip, place, local, direction=0.0):
+        """Add a link that slides along its parent, and return its name."""
+        name = self._numbered(word)
+        self.links.append(Link(name, parent, joint, 'prismatic', real(direction), tip))
+        self.joint_values[name] = place
+        self.frames[name] = {tip: local}
+        return name
+
+    def arm(self, first: str, second: str) -> planar.Arm:
+        """Return the arm from one joint to another."""
+        ends = self.points[first], self.points[second]
+        if self._shared_link(first, second):
+            bar = self._bar_between(first, second)
+            return planar.Arm(ends[0].place, bar.vector, bar.length, bar.length)
+        for (foot, pin), reverse in ((ends, False), (ends[::-1], True)):
+            if pin.crank and foot.home == GROUND and foot.place is not pin.crank.centre:
+                return planar.CrankArm(foot.place, pin.crank, reverse)
+        return planar.Arm(ends[0].place, self._between(first, second),
+                          ends[0].span + ends[1].span)
+
+    def _between(self, first, second):
+        """Return the vector between two joints; bars from one joint to both keep more digits."""
+        ends = [self.points[end] for end in (first, second)]
+        shared = ends[0].stands_on & ends[1].stands_on
+        for name in self.points:
+            bars = [self._vectors.get((name, end)) for end in (first, second)]
+            if name in shared and all(bars):
+                return bars[1].vector - bars[0].vector
+        return ends[1].place - ends[0].place
+
+    def distance(self, first: str, second: str) -> Real:
+        """Return the constant distance [m] of two joints of one link or of the ground."""
+        return self._side(first, second).length
+
+    def _pair(self, name, first, second, found, to_first, to_second, *others):
+        """Join the two bars of a dyad: the joint belongs to the first, the second is cut there."""
+        link = self._hang(first, name, found.first, to_first)
+        self._place(name, first, found.first, link, to_first, (second, *others))
+        link = self._hang(second, name, found.second, to_second)
+        self._bar(second, name, found.second, to_second, link)
+        self.transmissions[name] = planar.transmission(found)
+
+    def _hang(self, joint, tip, bar, length, upright=False, name=None):
+        """Add a link that turns about a joint of its parent, and return its name."""
+        name = name or ('' if len(joint + tip) == 2 else '_').join((joint, tip))
+        if name in self.joint_values:
+            raise SketchError(f'its link {name} would have the name of another')
+        parent = self.points[joint].home
+        zero = Complex(0.0, 1.0) if upright else Complex(1.0, 0.0)
+        relative = bar * self.directions.get(parent, zero).conjugate()
+        self.links.append(Link(name, parent, joint, 'revolute',
+                               real(pi / 2 if upright else 0.0), tip))
+        self.directions[name] = bar
+        self.joint_values[name] = arctangent(relative.y, relative.x)
+        self.frames[name] = {joint: Complex(0.0, 0.0), tip: Complex(length, 0.0)}
+        self._ends[name] = joint, tip
+        return name
+
+    def _add_to_frame(self, name, first, second, link, corner):
+        """Note where a point of a rigid link lies, seen from that link."""
+        frame = self.frames[link]
+        frame[name] = frame[first] + (frame[second] - frame[first]) * corner
+
+    def _place(self, name, start, vector, link, length, others):
+        """Place a joint at the end of a bar from another; it stands on others as well."""
+        origin = self.points[start]
+        stands_on = frozenset().union(*({x} | self.points[x].stands_on for x in (start, *others)))
+        self.points[name] = _Point(origin.place + vector, link, origin.span + length, stands_on)
+        self._bar(start, name, vector, length, link)
+
+    def _bar(self, first, second, vector, length, link):
+        length = real(length)
+        self.bars.append(Bar(first, second, length))
+        self._vectors[first, second] = _Vector(vector, length, link)
+        self._vectors[second, first] = _Vector(-vector, length, link)

@@ -1,0 +1,165 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Which crank angles can be assembled.
+
+The ends of the reach are the angles where a margin vanishes. For the dyad or slot of a crank they
+are closed forms of exactly rounded gaps; elsewhere they are bracketed. Between two neighbouring
+ends one pose decides for the whole arc, and at each end the linkage can still be assembled.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Callable, Iterable, List, Sequence
+
+import numpy as np
+
+from .curves import Arc, lowest, near_misses, refined, sampled
+from .planar import Limit
+
+# Samples of a whole turn in search of ends without a closed form, samples of an arc at least, and
+# how often arcs inside arcs are searched.
+SAMPLES, FEWEST, ROUNDS = 720, 33, 4
+# Arcs below this width [rad] are the rounding of one angle.
+NARROWEST = 2e-15
+# What margins may differ by from turn to turn, as a part of their size, and be the same.
+ALIKE = 1e-6
+
+
+def arcs(margins: Callable, limits: Sequence[Limit], value: Callable) -> List[Arc]:
+    """
+    Return the arcs (lo, hi) [rad] of the first crank on which every margin is at least zero.
+
+    Parameters
+    ----------
+    margins : callable
+        From crank angles, shape (n,), to margins, shape (limits, n).
+    limits : sequence of Limit
+        What the margins belong to.
+    value : callable
+        From an expression of dimensions to its value.
+
+    """
+    def failing(theta):
+        """Return the number of the first limit that is not kept, that of all where none is."""
+        with np.errstate(invalid='ignore'):
+            kept = margins(np.ravel(theta)) >= 0.0
+        return np.vstack([kept, np.zeros(kept.shape[1:], bool)]).argmin(axis=0).reshape(
+            np.shape(theta))
+
+    def assembled(theta):
+        return failing(theta) == len(limits)
+
+    ends = [end for limit in limits if limit.crank == 0
+            for end in _crank_ends(*map(value, (
+                limit.start, limit.end, limit.turn, limit.tolerance)))]
+    if not _is_periodic(margins):
+        # What follows a turn later is another assembly: the arcs are those of [-pi, pi].
+        ends.append(-math.pi)
+    if any(x.margin.varies and x.crank != 0 for x in limits):
+        ends += [end for arc in between(ends) for end in _limits(margins, failing, *arc)]
+    found = reachable_arcs(ends, assembled, joined=-math.pi not in ends)
+    return [tuple(_trimmed(assembled, *arc)) for arc in found] if ends else found
+
+
+def _limits(margins, failing, lo, hi) -> List[float]:
+    """
+    Return the angles on an arc next to which a limit stops or starts to be the first not kept.
+
+    What stands on a limited joint may be limited itself on part of a narrow arc: each arc that is
+    found is searched again.
+    """
+    ends = [lo, hi]
+    for _ in range(ROUNDS):
+        theta = np.unique(np.concatenate([
+            sampled(*arc, SAMPLES, FEWEST) for arc in zip(ends, ends[1:])]))
+        theta = np.unique(np.concatenate([theta, _touches(margins, theta)]))
+        first = failing(theta)
+        place = np.flatnonzero(first[1:] != first[:-1])
+        before, after = refined(lambda x, as_before=first[place][:, None]: failing(x) == as_before,
+                                theta[place], theta[place + 1])
+        known, ends = len(ends), sorted({lo, hi, *before.tolist(), *after.tolist()})
+        if len(ends) == known:
+            break
+    return ends[1:-1]
+
+
+def _touches(margins, theta) -> np.ndarray:
+    """Return where margins come nearest to zero between samples."""
+    values = margins(theta)
+    row, place = np.nonzero(near_misses(values))
+    sign = np.sign(values[row, place + 1])[:, None]
+    chosen = np.arange(len(row))
+
+    def distance(angles):
+        found = margins(angles.ravel()).reshape(-1, *angles.shape)
+        return sign * found[row, chosen]
+
+    return lowest(distance, theta[place], theta[place + 2])
+
+
+def _trimmed(assembled, lo, hi):
+    """Return an arc whose ends can be assembled."""
+    if hi - lo >= math.tau:
+        return lo, hi
+    ends, middle = np.array([lo, hi]), np.full(2, 0.5 * (lo + hi))
+    return np.where(assembled(ends), ends, refined(assembled, middle, ends)[0]).tolist()
+
+
+def _is_periodic(margins: Callable) -> bool:
+    """Return whether margins are the same a turn later."""
+    theta = np.linspace(-math.pi, math.pi, 66)[1:-1]
+    now, later = (np.nan_to_num(margins(theta + turn), nan=-1.0) for turn in (0.0, math.tau))
+    return bool(np.all(np.abs(now - later) <= ALIKE * np.abs(now).max(
+        axis=1, initial=0.0, keepdims=True)))
+
+
+def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
+                   joined: bool = True) -> List[Arc]:
+    """
+    Return the arcs between angles where reachability may change, in one where they touch.
+
+    They are joined across -pi and pi as well, unless that is not to be.
+    """
+    parts = between(ends)
+    held = [arc for arc in parts if bool(reachable(0.5 * (arc[0] + arc[1])))]
+    if held == parts:
+        return [(-math.pi, math.pi)]
+    found: List[Arc] = []
+    for lo, hi in held:
+        if found and lo - found[-1][1] <= NARROWEST:
+            found[-1] = found[-1][0], hi
+        else:
+            found.append((lo, hi))
+    if joined and len(found) > 1 and found[0][0] + math.tau - found[-1][1] <= NARROWEST:
+        found[-1] = found[-1][0], found.pop(0)[1] + math.tau
+    return [(lo - math.tau, hi - math.tau) if lo >= math.pi else (lo, hi) for lo, hi in found]
+
+
+def is_full_turn(reach: Sequence[Arc]) -> bool:
+    """Return whether a reach is one arc of a whole turn."""
+    return len(reach) == 1 and reach[0][1] - reach[0][0] >= math.tau
+
+
+def _crank_ends(start: float, end: float, turn: float, tolerance: float) -> List[float]:
+    """Return the crank angles where start h^2 + end s^2 vanishes; theta' = theta + turn."""
+    # A gap of nothing but rounding is a limit that is touched, and may be all there is.
+    start, end = (0.0 if abs(gap) <= tolerance else gap for gap in (start, end))
+    if start * end > 0.0:
+        return []
+    half = math.atan2(math.sqrt(abs(start)), math.sqrt(abs(end)))
+    return [float(2.0 * half - turn), float(-2.0 * half - turn)]
+
+
+def between(ends: Iterable[float]) -> List[Arc]:
+    """Return the arcs of one turn between angles, in order, from the least in [-pi, pi)."""
+    marks: List[float] = []
+    for end in sorted(end - 2.0 * math.pi * math.floor((end + math.pi) / (2.0 * math.pi))
+                      for end in ends):
+        if not marks or end - marks[-1] > NARROWEST:
+            marks.append(end)
+    if not marks:
+        return [(-math.pi, math.pi)]
+    return list(zip(marks, marks[1:] + [marks[0] + 2.0 * math.pi]))

@@ -1,0 +1,108 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Curves over the crank angle: where to sample them, where they change sign, where they turn round.
+
+All that is looked for is refined at once, in brackets that are cut again and again, so that a
+curve is computed a few dozen times for however many results.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Callable, Sequence, Tuple
+
+import numpy as np
+
+Arc = Tuple[float, float]
+
+# Samples of a whole turn; and how often the distance to an end of an arc is halved for more.
+SAMPLES, HALVINGS = 360, 48
+# Where a bracket is cut; an odd number of places, so that one is its middle.
+CUTS = np.arange(1, 16) / 16
+# Angles below this [rad] are zero: the rounding of any other angle is coarser.
+LEAST = 1e-18
+
+
+def sampled(lo: float, hi: float, samples: int = SAMPLES, fewest: int = 9) -> np.ndarray:
+    """Return angles [rad] over an arc, evenly and ever denser towards both of its ends."""
+    even = np.linspace(lo, hi, max(fewest, math.ceil(samples * (hi - lo) / math.tau)))
+    steps = (hi - lo) * 0.5 ** np.arange(2, HALVINGS)
+    theta = np.concatenate([even, lo + steps, hi - steps])
+    return np.unique(np.clip(theta, lo, hi))
+
+
+def refined(test: Callable, lo, hi) -> Tuple[np.ndarray, np.ndarray]:
+    """
+    Return, for each bracket, the last angle that is as its start is and the first that is not.
+
+    Parameters
+    ----------
+    test : callable
+        From angles [rad], shape (brackets, n), to whether each is as its start is.
+    lo, hi : float array (brackets,)
+        Starts and ends [rad]; a bracket may run backwards.
+
+    Returns
+    -------
+    (float array, float array)
+        Neighbouring floats.
+
+    """
+    lo, hi = np.array(lo, float), np.array(hi, float)
+    row = np.arange(len(lo))
+    while np.any((abs(hi - lo) > LEAST) & (hi != np.nextafter(lo, hi))):
+        theta = lo[:, None] + (hi - lo)[:, None] * CUTS
+        same = test(theta)
+        first = np.where(same.all(axis=1), len(CUTS), np.argmin(same, axis=1))
+        edges = np.column_stack([lo, theta, hi])
+        lo, hi = edges[row, first], edges[row, first + 1]
+    return lo, hi
+
+
+def lowest(curve: Callable, lo, hi, steps: int = 10) -> np.ndarray:
+    """
+    Return, for each bracket, the angle [rad] at which a curve is least, to half of all digits.
+
+    The curve takes angles, shape (brackets, n), and returns as many values.
+    """
+    lo, hi = np.array(lo, float), np.array(hi, float)
+    row = np.arange(len(lo))
+    for _ in range(steps if len(lo) else 0):
+        edges = np.column_stack([lo, lo[:, None] + (hi - lo)[:, None] * CUTS, hi])
+        value = curve(edges)
+        best = np.argmin(np.where(np.isnan(value), np.inf, value), axis=1).clip(1, len(CUTS))
+        lo, hi = edges[row, best - 1], edges[row, best + 1]
+    return 0.5 * (lo + hi)
+
+
+def near_misses(values: np.ndarray) -> np.ndarray:
+    """
+    Return where samples may step over a pair of zeros, as an array over the inner ones.
+
+    There a curve has a least distance from zero that is small beside how much it bends.
+    """
+    before, inner, after = values[..., :-2], values[..., 1:-1], values[..., 2:]
+    with np.errstate(invalid='ignore'):
+        sign = np.sign(inner)
+        bent = sign * (before - 2.0 * inner + after)
+        return ((sign * before >= sign * inner) & (sign * after >= sign * inner)
+                & (sign * inner <= 2.0 * bent))
+
+
+def turns(values: Sequence[float], rates: Sequence[float], least: Sequence[float]) -> list:
+    """
+    Return the samples after which a curve turns round, by more than what is least at each.
+
+    Between samples with rates of opposite signs there is an extreme. One that a later extreme
+    takes back within rounding is none.
+    """
+    rising = np.asarray(rates) >= 0.0
+    kept: list = []
+    for i in np.flatnonzero(rising[1:] != rising[:-1]).tolist():
+        if kept and abs(values[i] - values[kept[-1]]) <= least[i] + least[kept[-1]]:
+            kept.pop()
+        else:
+            kept.append(i)
+    return kept

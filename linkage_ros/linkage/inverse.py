@@ -1,0 +1,241 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Crank angles that bring about a wanted value of any output.
+
+The output is cut into branches on which it rises or falls all along: at its extremes, at the ends
+of the reach, and where the linkage passes a dead point. On a branch a value is found by Newton's
+method kept inside a bracket, to the last digit.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Callable, Iterable, List, NamedTuple, Sequence
+
+import numpy as np
+
+from .curves import Arc, LEAST, refined, sampled, turns
+
+# Answers that are no further apart than this [rad] are one.
+CLOSE = 1e-13
+# A step to the outermost sample of an arc by more than this part of the output breaks it off.
+BROKEN = 1e-6
+# Newton's method halves its error more than once a step; bisection needs one step a bit.
+STEPS = 200
+# An output that changes by no more than so many times its rounding stands still.
+STILL = 64.0
+# What a value may miss, as a part of the output's range, before it counts as stepped over.
+MISSED = 1e-9
+
+
+def wrapped(theta):
+    """Return angles [rad] in [-pi, pi)."""
+    turned = theta - math.tau * np.floor((theta + math.pi) / math.tau)
+    turned = np.where((turned < -math.pi) | (turned >= math.pi), -math.pi, turned)
+    return np.where((theta >= -math.pi) & (theta < math.pi), theta, turned)
+
+
+def in_order(answers: np.ndarray) -> np.ndarray:
+    """
+    Return crank angles, shape (candidates, n), as shape (n, answers).
+
+    Each row ascends in [-pi, pi), holds no angle twice, and is filled up with NaN.
+    """
+    rows = np.sort(wrapped(np.where(np.abs(answers) < LEAST, 0.0, answers)), axis=0)
+    if len(rows) > 1:
+        rows[1:][np.diff(rows, axis=0) <= CLOSE] = np.nan
+        last = np.nanmax(rows, axis=0, initial=-np.inf)
+        again = (rows == last) & (last - rows[0] >= math.tau - CLOSE)
+        rows = np.sort(np.where(again, np.nan, rows), axis=0)
+    most = int(np.isfinite(rows).sum(axis=0).max(initial=0))
+    rows = rows[:max(most, 1)] if len(rows) else np.full((1, answers.shape[1]), np.nan)
+    return np.moveaxis(rows, 0, -1)
+
+
+def nearest(answers: np.ndarray, near) -> np.ndarray:
+    """Return of answers, shape (..., k), the one nearest to an angle, whole turns included."""
+    near = np.asarray(near, float)[..., None]
+    theta = answers + math.tau * np.round((near - answers) / math.tau)
+    away = np.where(np.isnan(theta), np.inf, np.abs(theta - near))
+    best = np.argmin(away, axis=-1)[..., None]
+    return np.take_along_axis(np.broadcast_to(theta, away.shape), best, -1)[..., 0][()]
+
+
+def distinct(theta: Iterable[float]) -> List[float]:
+    """Return angles [rad] in [-pi, pi), in order, without those next to another."""
+    found = np.array(list(theta), float)
+    return [x for x in in_order(found[:, None])[0].tolist() if x == x]
+
+
+class _Branch(NamedTuple):
+    """Samples of an arc on which an output rises, or falls if the sign is -1."""
+
+    theta: np.ndarray
+    value: np.ndarray
+    sign: float
+
+
+class MonotoneBranches:
+    """
+    An output over the reach, in branches on which it rises or falls all along.
+
+    Parameters
+    ----------
+    curve : callable
+        From crank angles, shape (n,), to the output and its rate, shape (2, n).
+    reach : sequence of (float, float)
+        The crank angles that can be assembled [rad].
+    marks : sequence of float
+        Crank angles [rad] next to which the output may change quickly or break off.
+    angular : bool
+        Whether the output is an angle, compared modulo a turn.
+    rounding : float
+        What the output is rounded to at least; a value so far beyond an extreme is the extreme.
+
+    """
+
+    def __init__(self, curve: Callable, reach: Sequence[Arc], marks: Sequence[float],
+                 angular: bool, rounding: float):
+        self._curve = curve
+        self._angular = angular
+        self._rounding = rounding
+        runs = [run for arc in _cut(reach, marks) for run in self._runs(*arc)]
+        self._range = max((np.ptp(value) for _, value, *_ in runs), default=0.0)
+        self._branches = [branch for run in runs for branch in self._branched(*run)] \
+            if self._moves(runs) else []
+
+    def answers(self, values: np.ndarray) -> np.ndarray:
+        """Return the crank angles [rad] for values, shape (n,), as shape (candidates, n)."""
+        asked = [(branch, place, target[place]) for branch in self._branches
+                 for target in self._targets(branch, values)
+                 if len(place := np.flatnonzero(np.isfinite(target)))]
+        found = np.full((max(len(asked), 1), *values.shape), np.nan)
+        if asked:
+            theta = self._solved(*map(np.concatenate, zip(*(
+                _bracketed(branch, target) for branch, _, target in asked))))
+            ends = np.cumsum([len(place) for _, place, _ in asked])[:-1]
+            near = 0.25 * self._rounding
+            for row, (branch, place, target), part in zip(found, asked, np.split(theta, ends)):
+                part = np.where(target <= branch.value[0] + near, branch.theta[0], part)
+                row[place] = np.where(target >= branch.value[-1] - near, branch.theta[-1], part)
+        return found
+
+    def _runs(self, lo, hi):
+        """Yield samples as angles, values, rates and rounding, cut where there is no value."""
+        theta = sampled(lo, hi)
+        theta[[0, -1]] = self._unbroken(theta[[0, -1]], theta[[1, -2]], theta[len(theta) // 2])
+        digit = 4.0 * np.spacing(np.abs(theta).clip(1e-3))
+        around = (theta + digit * np.array([[0.0], [1.0], [-1.0]])).clip(theta[0], theta[-1])
+        value, rate = self._curve(around.ravel()).reshape(2, *around.shape)
+        with np.errstate(all='ignore'):
+            # What the rate does not explain of the values next to each is rounding.
+            noise = np.abs(self._difference(value[1:] - value[0])
+                           - rate[0] * (around[1:] - theta)).max(axis=0)
+        noise[~np.isfinite(noise)] = 0.0
+        known = np.isfinite(value[0])
+        for run in np.split(np.arange(len(theta)), np.flatnonzero(~known)):
+            run = run[known[run]]
+            if len(run) > 1:
+                values = np.unwrap(value[0, run]) if self._angular else value[0, run]
+                yield theta[run], values, rate[0, run], noise[run]
+
+    def _unbroken(self, ends, beside, middle):
+        """Return the ends of an arc, or where the output breaks off right before them."""
+        values = self._curve(np.array([*ends, *beside, middle]))[0]
+        start, size = values[2:4], BROKEN * (math.pi if self._angular else np.ptp(values[2:]))
+        with np.errstate(invalid='ignore'):
+            return refined(lambda x: ~(np.abs(self._difference(
+                self._curve(x.ravel())[0].reshape(x.shape) - start[:, None])) > size),
+                beside, np.nextafter(ends, 2.0 * ends - beside))[0]
+
+    def _moves(self, runs) -> bool:
+        """Return whether the output changes by more than rounding."""
+        if not runs:
+            return False
+        _, values, _, noise = (np.concatenate(part) for part in zip(*runs))
+        noise = STILL * (noise + np.median(noise)) + self._rounding
+        return bool(np.any(np.abs(values - np.median(values)) > noise))
+
+    def _branched(self, theta, value, rate, noise):
+        least = 4.0 * (noise + self._rounding)
+        with np.errstate(invalid='ignore'):
+            places = np.array(turns(value, rate, least), int)
+            rising = rate[places] >= 0.0
+            ends, _ = refined(lambda x: (self._curve(x.ravel())[1] >= 0.0).reshape(
+                x.shape) == rising[:, None], theta[places], theta[places + 1])
+        reached = self._curve(ends)[0] if len(ends) else ends
+        reached = value[places] + self._difference(reached - value[places])
+        theta = np.insert(theta, places + 1, ends)
+        value = np.insert(value, places + 1, reached)
+        cuts = [0, *(places + 1 + np.arange(len(places))).tolist(), len(theta) - 1]
+        for first, last in zip(cuts, cuts[1:]):
+            part = slice(first, last + 1)
+            sign = 1.0 if value[last] >= value[first] else -1.0
+            yield _Branch(theta[part], np.maximum.accumulate(sign * value[part]), sign)
+
+    def _difference(self, gap):
+        return gap - math.tau * np.round(gap / math.tau) if self._angular else gap
+
+    def _targets(self, branch, values):
+        """Yield the values as the branch counts them; NaN where it does not hold them."""
+        lo, hi = branch.value[0], branch.value[-1]
+        values, slack = branch.sign * values, self._rounding
+        turn, count = math.tau, int((hi - lo + 2.0 * slack) // math.tau) + 1
+        if not self._angular:
+            turn, count = 0.0, 1
+        else:
+            values = values + math.tau * np.ceil((lo - slack - values) / math.tau)
+        for i in range(count):
+            target = values + i * turn
+            held = (target >= lo - slack) & (target <= hi + slack)
+            yield np.where(held, np.clip(target, lo, hi), np.nan)
+
+    def _solved(self, lo, hi, target, sign):
+        """Return where the output meets its targets, by Newton's method inside a bracket."""
+        theta, step = 0.5 * (lo + hi), hi - lo
+        best, least, steepest = theta, np.full(theta.shape, np.inf), np.zeros(theta.shape)
+        done = np.zeros(theta.shape, bool)
+        for _ in range(STEPS):
+            value, rate = self._curve(theta)
+            gap = self._difference(sign * value - target)
+            closer = np.abs(gap) < least
+            best, least = np.where(closer, theta, best), np.where(closer, np.abs(gap), least)
+            steepest = np.where(closer, np.abs(rate), steepest)
+            lo, hi = np.where(gap < 0.0, theta, lo), np.where(gap < 0.0, hi, theta)
+            with np.errstate(all='ignore'):
+                guess = theta - gap / (sign * rate)
+            digit = np.spacing(np.maximum(np.abs(lo), np.abs(hi)))
+            done |= (least == 0.0) | (hi - lo <= digit) | (np.abs(guess - theta) <= digit)
+            if done.all():
+                break
+            good = (lo < guess) & (guess < hi) & (np.abs(guess - theta) < 0.5 * step)
+            following = np.where(good, guess, 0.5 * (lo + hi))
+            theta, step = following, np.abs(following - theta)
+        # Where the output breaks off, its sides enclose values that it never has.
+        far = STILL * np.spacing(math.pi) * steepest + MISSED * self._range + self._rounding
+        return np.where(least <= far, best, np.nan)
+
+
+def within_a_turn(lo: float, hi: float):
+    """Yield an arc [rad] in one or two parts within [-pi, pi]."""
+    for turn in (0.0, math.tau):
+        start, end = max(lo - turn, -math.pi), min(hi - turn, math.pi)
+        if start < end:
+            yield start, end
+
+
+def _cut(reach: Sequence[Arc], marks: Sequence[float]):
+    """Yield the reach as arcs within [-pi, pi], cut beside marks, which may be dead points."""
+    for lo, hi in reach:
+        for start, end in within_a_turn(lo, hi):
+            inside = [mark for mark in marks if start < mark < end]
+            yield from zip([start, *inside], [*inside, end])
+
+
+def _bracketed(branch: _Branch, target: np.ndarray) -> tuple:
+    """Return the samples on both sides of targets, the targets, and the sign of the branch."""
+    index = np.clip(np.searchsorted(branch.value, target), 1, len(branch.theta) - 1)
+    return (branch.theta[index - 1], branch.theta[index], target,
+            np.full(target.shape, branch.sign))

@@ -1,0 +1,282 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Linkages written down: one line a joint, in the order they are placed.
+
+    O ground 0 0              a joint fixed to the ground at x y
+    A crank O m [up]          on the crank circle of radius m about O, zero to the right [or up]
+    B dyad A Q b c left       joined to A by a bar b and to Q by a bar c, left of A -> Q
+    P rigid A B d e right     corner of a rigid triangle on bar AB, d from A, e from B
+    P line A B d              on the line of bar AB, d from A; negative: on the other side of A
+    B mirror O A C            mirror image of O in the line AC: the far corner of a kite
+    C parallelogram B A D     corner opposite B of a parallelogram on the bars BA and BD
+    B C D inversor P A a b    Peaucellier cell from pole P to pin A: long bars a, rhombus b
+    L slot Q A e out d        tip, d from Q, of a lever about Q; A in its slot, e to its left
+    S slider A r G p out      block on a line through G in direction p [rad], on a rod r from A
+
+A joint's name begins with a letter, and a letter, digit or underscore follows; so does a
+dimension's. `left` and `right` are as seen along the first two joints; `out` is the half of a slot
+on the tip's side, or the block ahead of the pin; `in` the other. A number is a length [m], an
+angle [rad], a dimension's name, or arithmetic on them without spaces: + - * / and parentheses,
+max(a,b), sqrt(a), `pi`, and for angles degrees: 30deg or (a+b)deg. It is zero or between 1e-70
+and 1e70; an angle beyond a turn is written with `deg` or `pi`. A dimension that is the length of
+a bar must be positive; one that is not may be zero or negative.
+
+A dyad keeps to its side of first -> second for as long as it can be assembled. Only where it is
+hung between a ground joint and a crank pin, and stretches or folds just as the crank passes the
+ground line (a change point: the longest and shortest of the four bars together as long as the
+other two), it goes on smoothly, which changes sides: a parallelogram stays a parallelogram. The
+side written is then the one at a crank angle of a quarter turn. So does the block of a slider hung
+on a crank pin where the rod stands upright on the line; `out` and `in` are then as they are where
+the pin is farthest along it. With one change point in a turn the linkage is the same again only
+after two turns: its crank angle counts beyond a turn.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+import re
+from typing import Iterable, List, Mapping, NamedTuple, Tuple
+
+import numpy as np
+
+from .arithmetic import Formula, IN_RANGE, in_range, WORDS
+from .builder import Sketch, SketchError
+from .planar import LEFT, RIGHT
+from ..formula.expression import dimension, Real
+from ..words import elided, listed, quoted
+
+_WORDS = {'left': LEFT, 'right': RIGHT, 'out': 1.0, 'in': -1.0, 'up': True}
+_JOINTS = ('CENTRE', 'FIRST', 'SECOND', 'POINT', 'CORNER', 'POLE', 'PIN', 'PIVOT', 'ORIGIN')
+_NUMBERS = ('X', 'Y', 'LENGTH', 'DISTANCE', 'OFFSET', 'ANGLE')
+
+# What follows each word, in the order its construction takes it.
+_FORMS = {
+    'ground': 'ground X Y', 'crank': 'crank CENTRE LENGTH [up]',
+    'dyad': 'dyad FIRST SECOND LENGTH LENGTH left|right',
+    'rigid': 'rigid FIRST SECOND LENGTH LENGTH left|right',
+    'line': 'line FIRST SECOND DISTANCE', 'mirror': 'mirror POINT FIRST SECOND',
+    'parallelogram': 'parallelogram CORNER FIRST SECOND',
+    'inversor': 'inversor POLE PIN LENGTH LENGTH',
+    'slot': 'slot PIVOT PIN OFFSET out|in LENGTH',
+    'slider': 'slider PIN LENGTH ORIGIN ANGLE out|in',
+}
+_NAME = re.compile(r'[A-Za-z][A-Za-z0-9_]{0,63}')
+# What a dimension cannot be called: words of arithmetic, and what `mechanisms.create` takes.
+_TAKEN = (*WORDS, 'joints', 'tracer', 'branches')
+# Letters in a line, and in what is said about it.
+_LONGEST, _SAID = 10000, 220
+# An angle [rad] beyond this was meant in degrees, unless it is written with `deg` or `pi`.
+_TURN = 6.2832
+
+formula = lru_cache(maxsize=1024)(Formula)
+
+
+class Line(NamedTuple):
+    """One construction: the joints it places, its word, and what follows the word."""
+
+    text: str
+    names: Tuple[str, ...]
+    word: str
+    args: Tuple[str, ...]
+
+    def arguments(self) -> Iterable[Tuple[str, str]]:
+        """Return what follows the word, each with its kind."""
+        return zip(_FORMS[self.word].split()[1:], self.args)
+
+    @property
+    def stands_on(self) -> Tuple[str, ...]:
+        """The joints that it is constructed from."""
+        return tuple(arg for kind, arg in self.arguments() if kind in _JOINTS)
+
+    def numbers(self) -> Iterable[Tuple[str, Formula]]:
+        """Yield its numbers, each with its kind; raise ValueError for what is none."""
+        for kind, arg in self.arguments():
+            if kind in _NUMBERS:
+                try:
+                    yield kind, formula(arg)
+                except ValueError as error:
+                    raise self.error(error) from None
+
+    def error(self, problem) -> ValueError:
+        """Return the error that names this line."""
+        return _error(self.text, f'{problem}{_hint(self.args)}')
+
+
+def _error(line: str, problem) -> ValueError:
+    return ValueError(elided(f'joint line "{elided(line)}": {problem}', _SAID))
+
+
+def _hint(args: Iterable[str]) -> str:
+    """Return what is to be said about a slip that is likely in any line."""
+    for arg in args:
+        if arg.count('(') != arg.count(')') or arg[0] in '+*/,)' or arg[-1] in '+-*/(':
+            return '; arithmetic has no spaces: 2*r, not 2 * r'
+        if ',' in arg and 'max(' not in arg:
+            return '; numbers are separated by spaces, without commas'
+        if '\N{DEGREE SIGN}' in arg or arg in ('deg', 'rad'):
+            return '; an angle is in rad, or in degrees: 30deg'
+    return ''
+
+
+def parse(texts: Iterable[str]) -> List[Line]:
+    """Return the lines of a linkage; raise ValueError with the line that cannot be."""
+    lines = [_parsed(text) for text in texts]
+    _check_order(lines)
+    return lines
+
+
+def _parsed(text: str) -> Line:
+    if len(text) > _LONGEST:
+        raise _error(text, f'a line has up to {_LONGEST} letters, this has {len(text)}')
+    parts = text.split()
+    found = [i for i, part in enumerate(parts) if part in _FORMS and i > 0]
+    if not found:
+        raise _error(text, f'expected NAME and one of the constructions {", ".join(_FORMS)}')
+    at = found[0]
+    line = Line(text, tuple(parts[:at]), parts[at], tuple(parts[at + 1:]))
+    form = _FORMS[line.word].split()[1:]
+    least = sum(not word.startswith('[') for word in form)
+    names = 3 if line.word == 'inversor' else 1
+    if len(line.names) != names or not least <= len(line.args) <= len(form):
+        several = '; one line a joint' if len(found) > 1 else ''
+        raise line.error(f'expected "{"NAME " * names}{_FORMS[line.word]}"{several}')
+    for name in line.names:
+        if not _NAME.fullmatch(name) or name in _FORMS:
+            raise line.error(f'{quoted(name)} is no name for a joint: a letter, then up to 63 '
+                             'letters, digits and underscores, but none of the constructions')
+    for kind, arg in zip(form, line.args):
+        if '|' in kind and arg not in kind.split('|') or kind == '[up]' and arg != 'up':
+            raise line.error(f'{quoted(arg)} must be {kind.strip("[]").replace("|", " or ")}')
+    for kind, number in line.numbers():
+        if 'deg' in number.words and kind != 'ANGLE':
+            raise line.error(f'{quoted(number.text)} is in degrees, but {kind} is a length')
+        if not number.names:
+            _check_number(line, kind, number, {})
+    return line
+
+
+def _check_order(lines: List[Line]):
+    """Raise ValueError unless every joint is placed once, from joints placed before it."""
+    placed = {}
+    for line in lines:
+        if len(set(line.stands_on)) < len(line.stands_on):
+            raise line.error('the joints it stands on must differ')
+        for joint in line.stands_on:
+            if joint not in placed:
+                raise line.error(_missing(lines, line, joint, placed))
+        for name in line.names:
+            if name in placed:
+                raise line.error(f'joint {name} is placed already')
+            placed[name] = line
+
+
+def _missing(lines, line, joint, placed) -> str:
+    """Return why a line cannot stand on a joint that is not placed before it."""
+    places = {name: each for each in lines for name in each.names}
+    if joint not in places or joint in line.names:
+        return f'joint {elided(joint)} is not placed before; there are: {listed(placed)}'
+    after, waiting = {joint: None}, [joint]
+    for name in waiting:
+        for needed in places[name].stands_on:
+            if needed in line.names:
+                return (f'joints {listed((needed, *_way(after, name)))} wait for each other: only '
+                        'groups of two bars, dyads, can be solved, one after the other')
+            if needed in places and needed not in placed and needed not in after:
+                after[needed] = name
+                waiting.append(needed)
+    return f'joint {joint} is placed later, in line {lines.index(places[joint]) + 1}: move it up'
+
+
+def _way(after, name):
+    while name:
+        yield name
+        name = after[name]
+
+
+def _check_number(line: Line, kind: str, number: Formula, dimensions: Mapping, fixed=False):
+    """Raise ValueError if a number is not what its kind can be, for dimensions or arrays."""
+    value = number.value(dimensions)
+    if not np.all(np.isfinite(value)):
+        raise line.error(f'{quoted(number.text)} is not finite')
+    if kind == 'LENGTH' and not np.all(value > 0.0):
+        raise line.error(f'a bar must be longer than zero, got {elided(number.text)}')
+    if kind != 'ANGLE' and fixed and not np.all(in_range(value)):
+        raise line.error(f'{quoted(number.text)} must be {IN_RANGE} where '
+                         'lengths are written as numbers')
+    if kind == 'ANGLE' and np.any(np.abs(value) > _TURN) \
+            and not {'deg', 'pi'} & number.words.keys():
+        plain = number.text.lstrip('-').replace('.', '').isdigit()
+        degrees = f'{number.text}deg' if plain else f'({number.text})deg'
+        raise line.error(f'an angle is in rad, and {elided(number.text)} is more than a turn; '
+                         f'in degrees it is written {elided(degrees)}')
+
+
+def check_numbers(lines: Iterable[Line], dimensions: Mapping):
+    """Raise ValueError, with its line, for a number that cannot be, for dimensions or arrays."""
+    fixed = has_literal_lengths(lines)
+    if not fixed:
+        # Counted in a power of two, which changes no digit, no product is too large or small.
+        longest = max((np.max(np.abs(length)) for length in dimensions.values()), default=1.0)
+        unit = 2.0 ** np.frexp(longest)[1]
+        dimensions = {name: length / unit for name, length in dimensions.items()}
+    for line in lines:
+        for kind, number in line.numbers():
+            _check_number(line, kind, number, dimensions, fixed)
+
+
+def branches(lines: Iterable[Line]) -> dict:
+    """Return the assembly sign, +1 or -1, of each joint that can be assembled in two ways."""
+    return {line.names[0]: int(_WORDS[arg])
+            for line in lines if line.word in ('dyad', 'slot', 'slider')
+            for kind, arg in line.arguments() if '|' in kind}
+
+
+def check_name(called: str):
+    """Raise ValueError if a dimension cannot be called so."""
+    if not isinstance(called, str) or not _NAME.fullmatch(called) or called in _TAKEN:
+        raise ValueError(f'no dimension can be called {quoted(called)}: a letter, then up to '
+                         f'63 letters, digits and underscores, but not {", ".join(_TAKEN)}')
+
+
+def lengths(lines: Iterable[Line]) -> dict:
+    """Return every dimension that the lines name, and whether it is used as a length."""
+    found = {}
+    for line in lines:
+        for kind, number in line.numbers():
+            for name in number.names:
+                found[name] = found.get(name, False) or (kind == 'LENGTH' and number.text == name)
+    return found
+
+
+def has_literal_lengths(lines: Iterable[Line]) -> bool:
+    """Return whether any length does not grow as the dimensions do, or an angle does."""
+    return any(number.degree not in (None, 0 if kind == 'ANGLE' else 1)
+               for line in lines for kind, number in line.numbers())
+
+
+def draw(sketch: Sketch, lines: Iterable[Line], symbols: Mapping[str, Real],
+         signs: Mapping[str, int]):
+    """Place the joints of a linkage, one line after the other."""
+    for line in lines:
+        args = [_argument(line, kind, arg, symbols, signs) for kind, arg in line.arguments()]
+        names = line.names if len(line.names) > 1 else line.names[0]
+        try:
+            getattr(sketch, line.word)(names, *args)
+        except SketchError as error:
+            raise line.error(error) from None
+
+
+def _argument(line, kind, arg, symbols, signs):
+    """Return what a construction takes for one word of its line."""
+    if kind in _JOINTS:
+        return arg
+    if kind in _NUMBERS:
+        return formula(arg).expression(symbols)
+    return signs.get(line.names[0], _WORDS[arg])
+
+
+def symbols_of(dimensions: Iterable[str], signed: Iterable[str]) -> dict:
+    """Return the leaves of expressions for named dimensions."""
+    return {name: dimension(name, positive=name not in signed) for name in dimensions}

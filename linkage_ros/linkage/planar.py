@@ -1,0 +1,485 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Constructions in the plane, each written once for poses, arrays, rates and the accelerator.
+
+Points and vectors are `Complex`, lengths and angles `Real`. A construction that stands on two
+points takes the `Arm` between them: the vector, its square, and how far that is from the square
+of a radius. Where an arm runs from the ground to a crank pin these come from half-angle forms,
+which keep every digit at dead points and reach limits; elsewhere from coordinates.
+
+With theta' the crank angle from the ground line (foot to crank centre), g the ground line, m the
+crank, s = sin(theta'/2) and h = cos(theta'/2), the arm w and its square are, in the line's frame,
+
+    w = (g - m) + 2 m h e^(i theta'/2),   |w|^2 = (g - m)^2 + 4 g m h^2 = (g + m)^2 - 4 g m s^2.
+
+Sources: Norton, "Design of Machinery", ch. 4 (loop closure of the four-bar and the inverted
+slider-crank); Hartenberg and Denavit, "Kinematic Synthesis of Linkages" (the inversor); Kahan,
+"Miscalculating Area and Angles of a Needle-like Triangle" (factored gaps).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import reduce
+from typing import NamedTuple, Optional, Sequence, Tuple
+
+from ..formula.expression import (
+    arctangent,
+    Complex,
+    cosine,
+    cross,
+    dot,
+    exact_sum,
+    gated,
+    Rate,
+    Real,
+    real,
+    root,
+    sine,
+    spin,
+    square,
+    square_root,
+    where,
+    with_rate,
+    with_spin,
+)
+
+LEFT, RIGHT = 1.0, -1.0
+
+# A limit that is hit up to rounding counts as reached: eight half ulps of the scale.
+GRAZE = 8 * 2.0 ** -53
+
+
+@dataclass(frozen=True)
+class Crank:
+    """A crank: its centre, length [m], direction of the angle zero, and the angle [rad]."""
+
+    centre: Complex
+    length: Real
+    zero: Complex
+    angle: Real
+
+    def bar(self) -> Complex:
+        """Return the vector from the centre to the pin."""
+        s, h = sine(0.5 * self.angle), cosine(0.5 * self.angle)
+        turned = self.zero * Complex(1.0 - 2.0 * square(s), 2.0 * s * h)
+        return with_spin(turned * self.length, Rate((self.angle,), lambda rate: rate))
+
+
+class Limit(NamedTuple):
+    """
+    A margin that is negative, by more than the tolerance, where a linkage cannot be assembled.
+
+    For a crank arm the margin is start + (end - start) s^2 with theta' = theta + turn, and
+    `smooth` is its root with the sign that carries on through a change point.
+    """
+
+    margin: Real
+    tolerance: Real
+    smooth: Optional[Real] = None
+    start: Optional[Real] = None
+    end: Optional[Real] = None
+    turn: Optional[Real] = None
+    crank: Optional[int] = None
+
+    def root(self) -> Real:
+        """Return the root of the margin."""
+        return root(self.margin, self.tolerance)
+
+
+class Arm:
+    """The arm between two points that both move, of constant length where that is given."""
+
+    def __init__(self, foot: Complex, vector: Complex, span: Real, length: Optional[Real] = None):
+        self.foot = foot
+        self.vector = vector
+        # A constant tells nothing of a point that cannot be assembled.
+        self.square = vector.squared() if length is None else gated(
+            square(length), abs(vector.x), real(0.0))
+        self._span = span
+
+    def offset(self, point: Complex) -> Real:
+        """Return the cross product of the arm and the vector from its foot to a point."""
+        return cross(self.vector, point - self.foot)
+
+    def within(self, radius: Real, size: Real) -> Limit:
+        """Return the margin radius^2 - square; the radius is made from lengths up to size."""
+        margin = square(radius) - self.square
+        return self._limit(radius, size, 1.0, margin)
+
+    def beyond(self, radius: Real, size: Real) -> Limit:
+        """Return the margin square - radius^2; the radius is made from lengths up to size."""
+        margin = self.square - square(radius)
+        return self._limit(radius, size, -1.0, margin)
+
+    def mirrored(self, point: Complex) -> Complex:
+        """Return the mirror image of a point in the line of the arm."""
+        return point - self.vector.turned() * (2.0 * self.offset(point) / self.square)
+
+    def _with_rate(self, margin, sign):
+        return with_rate(margin, self.square, formula=lambda rate: -(sign * rate))
+
+    def _limit(self, radius, size, sign, margin):
+        margin = self._with_rate(margin, sign)
+        # At the limit the length is the radius: the square moves by that times what lengths do.
+        return Limit(margin, GRAZE * abs(radius) * (size + self._span))
+
+
+class CrankArm(Arm):
+    """The arm from a ground point to a crank pin, or back if `reverse`, from half angles."""
+
+    def __init__(self, ground: Complex, crank: Crank, reverse: bool = False):
+        line = crank.centre - ground
+        g, m = line.length(), crank.length
+        along = line.direction()
+        turn = crank.zero * along.conjugate()
+        s, h = _half_angle(crank.angle, turn)
+        vector = along * Complex((g - m) + 2.0 * m * square(h), 2.0 * m * s * h)
+        self.foot = crank.centre + crank.bar() if reverse else ground
+        self.square = square(g - m) + 4.0 * g * m * square(h)
+        self._crank, self._along, self._turn = crank, -along if reverse else along, turn
+        self._line = along
+        self._area = 2.0 * g * m * s * h * (1.0 if reverse else -1.0)
+        self._g, self._m, self._s, self._h = g, m, s, h
+        bar = crank.bar()
+        vector = Complex(
+            with_rate(vector.x, crank.angle, formula=lambda rate: -(rate * bar.y)),
+            with_rate(vector.y, crank.angle, formula=lambda rate: rate * bar.x))
+        # An arm of two equal lengths bisects them, and still does where it has no length.
+        turning = where(self._is_isosceles, 0.5,
+                        m * ((m - g) + 2.0 * g * square(h)) / self.square)
+        vector.spin = Rate((crank.angle,), lambda rate: rate * turning)
+        self.vector = -vector if reverse else vector
+
+    @property
+    def _is_isosceles(self) -> Real:
+        return abs(self._g - self._m) <= 0.0
+
+    def offset(self, point: Complex) -> Real:
+        """Return the cross product of the arm and the vector from its foot to a point."""
+        if point is self._crank.centre:
+            return self._area
+        return super().offset(point)
+
+    def mirrored(self, point: Complex) -> Complex:
+        """Return the mirror image of a point in the line of the arm."""
+        image = super().mirrored(point)
+        if point is not self._crank.centre:
+            return image
+        s, m = self._s, self._m
+        centre = point + self._line.turned() * Complex(self._h, s) * (2.0 * m * s)
+        return Complex(where(self._is_isosceles, centre.x, image.x),
+                       where(self._is_isosceles, centre.y, image.y))
+
+    def within(self, radius: Real, size: Real) -> Limit:
+        """Return the margin radius^2 - square; the radius is made from lengths up to size."""
+        g, m = self._g, self._m
+        return self._limit(radius, size, 1.0,
+                           exact_sum(radius, -g, -m) * exact_sum(radius, g, m),
+                           exact_sum(radius, -g, m) * exact_sum(radius, g, -m))
+
+    def beyond(self, radius: Real, size: Real) -> Limit:
+        """Return the margin square - radius^2; the radius is made from lengths up to size."""
+        g, m = self._g, self._m
+        return self._limit(radius, size, -1.0,
+                           exact_sum(g, m, -radius) * exact_sum(g, m, radius),
+                           exact_sum(g, -m, -radius) * exact_sum(g, -m, radius))
+
+    def _limit(self, radius, size, sign, start, end):
+        gm, s, h = 4.0 * self._g * self._m, self._s, self._h
+        # The smaller gap is the one next to which the margin can vanish.
+        margin = where(abs(start) <= abs(end), start + sign * gm * square(s),
+                       end - sign * gm * square(h))
+        margin = self._with_rate(margin, sign)
+        tolerance = GRAZE * abs(radius) * (size + self._g + self._m)
+        gap, half = (start, s) if sign > 0.0 else (end, h)
+        grown = square_root(gm) * self._first_sign(sign)
+        smooth = where(abs(gap) <= tolerance, grown * half, root(margin, tolerance))
+        return Limit(margin, tolerance, smooth, start, end,
+                     arctangent(self._turn.y, self._turn.x), self._crank.angle.args[0])
+
+    def beyond_kite(self, k: Real) -> Complex:
+        """
+        Return pin + k (pin - image), the image being the crank centre's in the line of the arm.
+
+        The cross component is one product: next to a cusp, where its leading terms cancel, it
+        keeps every digit.
+        """
+        g, m, s, sin = self._g, self._m, self._s, 2.0 * self._s * self._h
+        lead = (g + m) * ((g + m) + k * (m - g))
+        across = m * sin * (lead - 4.0 * g * m * square(s)) / self.square
+        along = (1.0 + k) * m * (1.0 - 2.0 * square(s)) + \
+            2.0 * k * g * square(m * sin) / self.square
+        return self._crank.centre + self._line * Complex(along, across)
+
+    def _first_sign(self, sign):
+        """Return the sign that makes s (sign +1) or h positive for crank angles in (0, pi)."""
+        left = where(0.0 <= self._turn.y, sign, -sign)
+        return where(0.0 <= self._turn.x, 1.0, left)
+
+    def inverse_of_isosceles(self) -> Optional[Complex]:
+        """Return 1 / conjugate(arm) where foot and pin are as far from the centre, else None."""
+        if self._g is not self._m:
+            return None
+        return self._along * Complex(1.0, self._s / self._h) / (2.0 * self._m)
+
+    def crank_of_inverse(self, axis: str, value: Real, power: Real) -> Optional[Complex]:
+        """
+        Return a vector along the crank, seen from its zero, that puts an inverse somewhere.
+
+        It is the inverse of the pin in the foot by `power`; its x or y coordinate is to be the
+        value. None where that is not a straight line, as with `inverse_of_isosceles`.
+        """
+        if self._g is not self._m:
+            return None
+        along, scaled = self._along, (value - getattr(self.foot, axis)) * (2.0 * self._m) / power
+        tangent = (along.x - scaled) / along.y if axis == 'x' else (scaled - along.y) / along.x
+        half = Complex(1.0, tangent)
+        return half * half * self._turn.conjugate()
+
+
+def _half_angle(theta: Real, turn: Complex) -> Tuple[Real, Real]:
+    """Return sine and cosine of (theta + arg turn) / 2 for a unit vector turn."""
+    s, h = sine(0.5 * theta), cosine(0.5 * theta)
+    if turn.y.value == 0.0 and turn.x.value == 1.0:
+        return s, h
+    ahead = 0.0 <= turn.x
+    large = square_root(0.5 * (1.0 + abs(turn.x)))
+    small = 0.5 * abs(turn.y) / large
+    cos = where(ahead, large, small)
+    sin = where(ahead, small, large) * where(turn.y < 0.0, -1.0, 1.0)
+    s, h = s * cos + h * sin, h * cos - s * sin
+    return (with_rate(s, theta, formula=lambda rate: 0.5 * rate * h),
+            with_rate(h, theta, formula=lambda rate: -(0.5 * rate * s)))
+
+
+class Dyad(NamedTuple):
+    """Two bars that meet in a joint: the bars from each end to it, and what limits them."""
+
+    first: Complex
+    second: Complex
+    limits: Tuple[Limit, Limit]
+
+
+def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) -> Dyad:
+    """
+    Return the RRR dyad on an arm: circles of radius first [m] and second [m] about its ends.
+
+    The joint is foot + w (u + i v) with u = 1/2 + (r1 - r2)(r1 + r2) / 2|w|^2 and
+    v = side sqrt((r1 + r2)^2 - |w|^2) sqrt(|w|^2 - (r1 - r2)^2) / 2|w|^2; left of the arm for
+    side = +1. At a change point of a crank arm the branch goes on smoothly if `smooth`.
+    """
+    size = first + second
+    limits = arm.within(size, size), arm.beyond(first - second, size)
+    roots = [x.smooth if smooth and x.smooth else x.root() for x in limits]
+    twice = 2.0 * arm.square
+    skew = (first - second) * (first + second) / twice
+    u, v = 0.5 + skew, roots[0] * roots[1] / twice * side
+    bars = arm.vector * Complex(u, v), arm.vector * Complex(skew - 0.5, v)
+
+    turning = spin(arm.vector)
+
+    def with_turning(bar, along, length):
+        """Add to the arm's turning that of a bar, along + i v, on the arm."""
+        return with_spin(bar, Rate(
+            (v, skew, *turning.of), lambda dv, dskew, *rates: turning.formula(*rates) + (
+                (along * dv - v * dskew) * arm.square / square(length))))
+
+    return Dyad(with_turning(bars[0], u, first), with_turning(bars[1], skew - 0.5, second),
+                limits)
+
+
+def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
+    """
+    Return k such that P + (Q - P) k is the corner of a rigid triangle on the bar PQ.
+
+    The base is |PQ|, first and second are the corner's distances from P and Q [m]; left of
+    P -> Q for side = +1. NaN where no such triangle exists.
+    """
+    gaps = (exact_sum(first, second, -base) * exact_sum(first, second, base),
+            exact_sum(base, -first, second) * exact_sum(base, first, -second))
+    twice = 2.0 * square(base)
+    grazed = GRAZE * square(first + second)
+    height = root(gaps[0], grazed) * root(gaps[1], grazed)
+    return Complex(0.5 + (first - second) * (first + second) / twice, height / twice * side)
+
+
+def mirror(arm: Arm, point: Complex,
+           ends: Sequence[Tuple[Complex, Complex]]) -> Tuple[Complex, ...]:
+    """
+    Return the mirror image of a point in the line of an arm, and the bars from both ends to it.
+
+    For each end of the arm, its foot first, its place and its bar to the point are given; a bar's
+    image turns twice as fast as the arm, less what the bar itself turns.
+    """
+    image, turning, bars = arm.mirrored(point), spin(arm.vector), []
+    for place, bar in ends:
+        own = spin(bar)
+        bars.append(with_spin(image - place, Rate(
+            (*turning.of, *own.of), lambda *rates, own=own: 2.0 * turning.formula(
+                *rates[:len(turning.of)]) - own.formula(*rates[len(turning.of):]))))
+    return _with_velocity(image, arm.foot, bars[0]), *bars
+
+
+def parallel(bar: Complex, place: Complex) -> Complex:
+    """Return a bar like another one, NaN where its end has no place."""
+    def there(part):
+        return gated(part, abs(place.x), real(0.0))
+
+    turning = spin(bar)
+    same = Complex(there(bar.x), there(bar.y))
+    same.spin = Rate(turning.of, lambda *rates: there(turning.formula(*rates)))
+    return same
+
+
+def _with_velocity(place: Complex, start: Complex, bar: Complex) -> Complex:
+    """Return a place with the velocity of the end of a bar of constant length from a start."""
+    turning = spin(bar)
+    return Complex(
+        with_rate(place.x, start.x, *turning.of,
+                  formula=lambda rate, *rates: rate - turning.formula(*rates) * bar.y),
+        with_rate(place.y, start.y, *turning.of,
+                  formula=lambda rate, *rates: rate + turning.formula(*rates) * bar.x))
+
+
+def transmission(found: Dyad) -> Real:
+    """
+    Return the angle [rad] in [0, pi] between the two bars of a dyad, at their joint.
+
+    With the arm w, tan^2(mu/2) = (|w|^2 - (r1 - r2)^2) / ((r1 + r2)^2 - |w|^2).
+    """
+    if not found.limits:
+        return arctangent(abs(cross(found.first, found.second)), dot(found.first, found.second))
+    within, beyond = found.limits
+    return 2.0 * arctangent(beyond.root(), within.root())
+
+
+class Inversor(NamedTuple):
+    """A Peaucellier cell on the arm pole - pin: its three joints as vectors, and its limits."""
+
+    right: Dyad
+    left: Dyad
+    inverse: Complex
+
+
+def inversor(arm: Arm, long: Real, short: Real) -> Inversor:
+    """
+    Return the Peaucellier-Lipkin cell with bars long [m] from the pole and a rhombus of short [m].
+
+    The traced corner is pole + (long^2 - short^2) / conjugate(w): it runs on a straight line
+    when the pole lies on the crank circle.
+    """
+    right = dyad(arm, long, short, RIGHT, smooth=False)
+    left = dyad(arm, long, short, LEFT, smooth=False)
+    power = (long - short) * (long + short)
+    straight = arm.inverse_of_isosceles() if isinstance(arm, CrankArm) else None
+    inverse = (arm.vector * (power / arm.square) if straight is None else straight * power)
+    return Inversor(right, left, _where_assembled(inverse, right.limits))
+
+
+def _where_assembled(vector: Complex, limits) -> Complex:
+    x, y = vector.x, vector.y
+    for limit in limits:
+        x, y = (gated(part, limit.margin, limit.tolerance) for part in (x, y))
+    return Complex(x, y)
+
+
+class Slot(NamedTuple):
+    """A lever that a pin moves by its slot: unit vector along the slot, the slide, the limit."""
+
+    along: Complex
+    slide: Real
+    limit: Limit
+
+
+def slot(arm: Arm, offset: Real, half: float) -> Slot:
+    """
+    Return the lever about the arm's foot whose slot, `offset` [m] to its left, takes the pin.
+
+    w = l (t + i e) with the unit vector l along the lever and t = half sqrt(|w|^2 - e^2) [m].
+    """
+    limit = arm.beyond(offset, abs(offset))
+    slide = limit.root() * half
+    central, aside = abs(offset) <= 0.0, arm.vector * Complex(slide, -offset)
+    along = Complex(where(central, arm.vector.x * half, aside.x),
+                    where(central, arm.vector.y * half, aside.y))
+    turning = spin(arm.vector)
+    return Slot(with_spin(along.direction(), Rate(
+        (slide, *turning.of), lambda rate, *rates: turning.formula(*rates) + where(
+            central, 0.0, offset * rate / arm.square))), slide, limit)
+
+
+class Rail:
+    """A pin as seen from the line that a block slides on: how far along it, and how high above."""
+
+    def __init__(self, pin: Complex, origin: Complex, along: Complex, span: Real):
+        self.along = along
+        self.height, self.foot = cross(along, pin - origin), dot(along, pin - origin)
+        self._span = span
+
+    def limits(self, rod: Real) -> Tuple[Limit, ...]:
+        """Return the margins whose product is rod^2 - height^2."""
+        margin = (rod - self.height) * (rod + self.height)
+        return (Limit(margin, GRAZE * rod * (rod + self._span)),)
+
+
+class CrankRail(Rail):
+    """
+    A crank pin as seen from the line that a block slides on, from half angles.
+
+    With the height h0 of the crank's centre, the crank m and its angle psi from the line, the
+    margins are (rod + h0 - m) + 2 m s^2 and (rod - h0 - m) + 2 m h^2, where s and h are sine and
+    cosine of (psi + pi/2)/2.
+    """
+
+    def __init__(self, crank: Crank, origin: Complex, along: Complex, span: Real):
+        super().__init__(crank.centre + crank.bar(), origin, along, span)
+        self._crank = crank
+        self._centre = cross(along, crank.centre - origin)
+        self._turn = (crank.zero * along.conjugate()).turned()
+
+    def limits(self, rod: Real) -> Tuple[Limit, ...]:
+        """Return the margins whose product is rod^2 - height^2."""
+        m, centre, (s, h) = self._crank.length, self._centre, _half_angle(
+            self._crank.angle, self._turn)
+        low, high = exact_sum(rod, centre, -m), exact_sum(rod, centre, m)
+        near, far = exact_sum(rod, -centre, -m), exact_sum(rod, -centre, m)
+        # Both roots are positive where the pin is farthest along the line.
+        behind = where(self._turn.y < 0.0, where(self._turn.x <= 0.0, -1.0, 1.0), 1.0)
+        return (self._limit(rod, low, high, low, s, behind),
+                self._limit(rod, far, near, near, h, behind))
+
+    def _limit(self, rod, start, end, gap, half, sign):
+        margin = gap + 2.0 * self._crank.length * square(half)
+        tolerance = GRAZE * (rod + self._span)
+        grown = square_root(2.0 * self._crank.length) * sign
+        smooth = where(abs(gap) <= tolerance, grown * half, root(margin, tolerance))
+        return Limit(margin, tolerance, smooth, start, end,
+                     arctangent(self._turn.y, self._turn.x), self._crank.angle.args[0])
+
+
+class Slider(NamedTuple):
+    """
+    A block on a fixed line: the rod to it, its place along the line [m], and the limits.
+
+    Also how far along the line the block is ahead of the pin [m].
+    """
+
+    rod: Complex
+    place: Real
+    limits: Tuple[Limit, ...]
+    reach: Real
+
+
+def slider(rail: Rail, rod: Real, side: float) -> Slider:
+    """
+    Return the RRP dyad: a rod [m] from a pin to a block on a line.
+
+    The block is ahead of the pin's foot on the line for side = +1; past a change point of a crank
+    it goes on smoothly.
+    """
+    limits = rail.limits(rod)
+    reach = reduce(lambda x, y: x * y, (limit.smooth or limit.root() for limit in limits)) * side
+    return Slider(rail.along * Complex(reach, -rail.height), rail.foot + reach, limits, reach)

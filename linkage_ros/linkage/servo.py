@@ -1,0 +1,267 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Servo angles: where the crank has to be for an output, at what reduction, and which is taken.
+
+The reduction, d output / d crank, grows without bound next to an end of the reach, where a crank
+angle that is rounded no longer tells it. A lever that a crank pin moves by its slot has a closed
+form for both that starts from the lever, and keeps every digit next to its limits. About its pivot
+Q, seen along the ground line of length b from Q to the crank's centre O, with the crank a, the
+slot's distance e, the lever's angle phi and the crank's theta:
+
+    a e^(i theta) + b = e^(i phi) (t + i e),    a e^(i theta) = e^(i phi) (W + i (e + b sin phi)),
+    W^2 = a^2 - (e + b sin phi)^2,    t = b cos phi + W,    d phi / d theta = W / t.
+
+Of W and -W those are answers that leave the pin on the lever's half of its slot.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache, reduce
+import math
+from typing import NamedTuple, Optional, Sequence, Tuple
+
+import numpy as np
+
+from . import mechanism
+from .builder import GROUND
+from .inverse import in_order
+from .planar import GRAZE
+from ..formula.expression import (
+    angle,
+    arctangent,
+    Complex,
+    cosine,
+    exact_sum,
+    gated,
+    nearest_integer,
+    Real,
+    real,
+    root,
+    sine,
+    square,
+    where,
+)
+from ..formula.program import Program
+
+TURN = 2.0 * math.pi
+# Angles nearer than this [rad] may be one, if the output does not tell them apart.
+CLOSE = 1e-7
+# How much rounding takes an angle beyond the ends that it is to be between, as a part of them.
+ULPS = 4 * 2.0 ** -52
+# Rounding of an angle on its way through a closed form [rad].
+ROUNDED = 8 * 2.0 ** -52 * math.pi
+# More than any angle.
+LARGE = 1e300
+
+Ends = Optional[Tuple[float, float]]
+
+
+class Answer(NamedTuple):
+    """A crank angle [rad] that an output allows if it is `held`, and d output / d crank there."""
+
+    theta: Real
+    rate: Real
+    held: Real
+
+
+class Mechanism(mechanism.Mechanism):
+    """A linkage that is solved from its outputs, its levers by a closed form of their own."""
+
+    def crank_angle(self, output, value, near=None, others: Sequence[float] = ()):
+        """Return the crank angles that give an output a value; see `Analysis.crank_angle`."""
+        swept = any(np.ndim(length) for length in self.dimensions.values())
+        if swept or others or not self._has_lever(output):
+            return super().crank_angle(output, value, near, others)
+        if near is not None:
+            return self.servo_for(output, np.asarray(value, float), near)[0][()]
+        theta, _ = self.servos(output, value)
+        return in_order(theta.reshape(-1, 2).T).reshape(*theta.shape[:-1], -1)
+
+    def servos(self, output: str, value) -> Tuple[np.ndarray, np.ndarray]:
+        """
+        Return all crank angles that give an output a value, and d output / d crank there.
+
+        Parameters
+        ----------
+        output : str
+            What `crank_angle` takes, of a linkage with one crank.
+        value : float or array-like
+            What the output is to be.
+
+        Returns
+        -------
+        (array, array)
+            Crank angles in [-pi, pi] and rates, on a last axis that is filled up with NaN; a
+            lever's answer on the working branch comes first, else they ascend.
+
+        Raises
+        ------
+        ValueError
+            As `crank_angle` does.
+
+        """
+        if not self._has_lever(output):
+            value = np.where(np.isfinite(value), value, np.nan)
+            theta = np.asarray(self.crank_angle(output, value))
+            return theta, self._rates_at(output, theta)
+        found = np.moveaxis(self._solved_by(_lever_all, output).over(value), 0, -1)
+        theta, rates = found[..., ::2], found[..., 1::2]
+        theta = theta if self._is_free else _inside(theta, self.reach())
+        return theta, np.where(np.isnan(theta), np.nan, rates)
+
+    def servo_for(self, output: str, value, near=None, ends: Ends = None) -> Sequence:
+        """
+        Return one crank angle that gives an output a value, and d output / d crank there.
+
+        Parameters
+        ----------
+        output, value
+            As for `servos`.
+        near : float or array-like, optional
+            The answer nearest to this angle is taken, whole turns included. Default: of a lever
+            the one on the working branch, on which lever and crank turn the same way; of any
+            other output the least.
+        ends : (float, float), optional
+            The lowest and the highest angle [rad] that may be taken. Default: any with near,
+            otherwise those of one turn from -pi.
+
+        Returns
+        -------
+        (float or array, float or array)
+            In the shape of value and near broadcast; NaN where there is none.
+
+        """
+        lever, kind = self._has_lever(output), (near is not None, ends is not None)
+        limits = ((near,) if kind[0] else ()) + (ends or ())
+        if lever and self._is_free:
+            return self._solved_by(_lever_taken, output, *kind)(value, *limits)
+        theta, rates = self.servos(output, value)
+        rounding = GRAZE * (math.pi if self._structure.turns(output) else self.longest)
+        choice = _choice(theta.shape[-1], lever, *kind)
+        return choice.over(*np.moveaxis(theta, -1, 0), *np.moveaxis(rates, -1, 0), rounding,
+                           *limits)
+
+    def _has_lever(self, output) -> bool:
+        return (len(self.cranks) == 1 and isinstance(output, str)
+                and output in _levers(self._structure))
+
+    @property
+    def _is_free(self) -> bool:
+        """Whether nothing but its lever's slot limits the crank."""
+        return len(self._structure.sketch.limits) == 1
+
+    def _solved_by(self, draw, *args):
+        """Return the code that solves for a lever in some way."""
+        return self._remembered(draw.__name__, args, lambda: draw(
+            self._structure, *args).bind(self._lengths, self._evaluated))
+
+    def _rates_at(self, output, theta):
+        """Return d output / d crank."""
+        joint, _, axis = output.rpartition('.')
+        if joint:
+            return self.velocity(theta, (joint,))[joint][..., 'xy'.index(axis)]
+        return self.joint_rates(theta, (output,))[output]
+
+
+@lru_cache(maxsize=32)
+def _levers(structure) -> dict:
+    """Return for each lever that the crank's pin moves both answers to its angle."""
+    sketch = structure.sketch
+    links = {link.name: link for link in sketch.links}
+    return {slide.parent: list(_lever(sketch, slide, structure.branches[links[slide.parent].tip]))
+            for slide in sketch.links if slide.kind == 'prismatic' and slide.parent != GROUND
+            and links[slide.parent].parent == GROUND and sketch.points[slide.tip].crank}
+
+
+def _lever(sketch, slide, half):
+    """Yield both crank angles for a lever's angle, that on the working branch first."""
+    crank, e = sketch.points[slide.tip].crank, sketch.frames[slide.name][slide.tip].y
+    line = crank.centre - sketch.points[slide.joint].place
+    a, b, along = crank.length, line.length(), line.direction()
+    bar = Complex(cosine(angle(0)), sine(angle(0))) * (Complex(0.0, 1.0) * along.conjugate())
+    cos, sin = bar.x, bar.y
+    # Next to a limit at +-90 degrees the gap is small: it is formed from what is small.
+    upper = where(0.7 < sin, exact_sum(a, -e, -b) + b * square(cos) / (1.0 + sin),
+                  exact_sum(a, -e) - b * sin)
+    lower = where(sin < -0.7, exact_sum(a, e, -b) + b * square(cos) / (1.0 - sin),
+                  exact_sum(a, e) + b * sin)
+    grazed = GRAZE * (a + b + abs(e))
+    height = root(upper, grazed) * root(lower, grazed)
+    # With the pin on the pivot the lever points anywhere.
+    least = where(abs(e) <= grazed, grazed, -grazed)
+    for share in (half * height, -half * height):
+        pin = bar * Complex(share, e + b * sin) * (along * crank.zero.conjugate())
+        slide_ = half * (b * cos + share)
+        yield Answer(arctangent(pin.y, pin.x), half * share / where(0.0 < slide_, slide_, 0.0),
+                     least <= slide_)
+
+
+@lru_cache(maxsize=32)
+def _lever_all(structure, name) -> Program:
+    """Return the code for both crank angles for a lever's angle, each with its rate."""
+    return Program([gated(part, where(answer.held, 1.0, -1.0), 0.0)
+                    for answer in _levers(structure)[name] for part in answer[:2]])
+
+
+@lru_cache(maxsize=64)
+def _lever_taken(structure, name, follows, ended) -> Program:
+    """Return the code for the crank angle that is taken for a lever's angle, and its rate."""
+    return _taken(_levers(structure)[name], True, real(GRAZE * math.pi), follows, ended, 1)
+
+
+@lru_cache(maxsize=256)
+def _choice(count, working, follows, ended):
+    """Return the code that takes one of some crank angles: from these, their rates, rounding."""
+    answers = [Answer(angle(i), angle(count + i), angle(i) <= angle(i)) for i in range(count)]
+    return _taken(answers, working, angle(2 * count), follows, ended, 2 * count + 1).bind({}, {})
+
+
+def _taken(answers, working, rounding, follows, ended, given) -> Program:
+    """
+    Return the code for the answer that is taken, and its rate.
+
+    With `follows` it is the nearest to an angle, with `ended` between two: these are given from
+    number `given` on. What is beyond an end by so little that the output, known up to `rounding`,
+    does not tell is at the end.
+    """
+    near, ends = angle(given), (angle(given + follows), angle(given + follows + 1))
+    choices = []
+    for rank, (theta, rate, held) in enumerate(answers):
+        place, misses = _turned(theta, near) if follows else theta, []
+        if ended:
+            speed = abs(rate)
+            slack = ULPS * (4.0 + abs(ends[0]) + abs(ends[1])) + where(
+                rounding < CLOSE * speed, rounding / speed, CLOSE)
+            low, high = ends[0] - slack, ends[1] + slack
+            first, last = (_turned(theta, end) for end in ends)
+            first = where(first < low, first + TURN, first)
+            last = where(high < last, last - TURN, last)
+            place = where(place < low, first, where(high < place, last, place)) \
+                if follows else first
+            misses = [place < low, high < place]
+            place = where(place < ends[0], ends[0], where(ends[1] < place, ends[1], place))
+        away = abs(place - near) if follows else real(rank) if working else place
+        away = reduce(lambda away, miss: where(miss, math.inf, away), misses, away)
+        choices.append((where(held, away, math.inf), place, rate))
+    away, *taken = reduce(lambda best, other: [
+        where(other[0] < best[0], mine, its) for mine, its in zip(other, best)], choices)
+    return Program([gated(part, LARGE - away, 0.0) for part in taken],
+                   given + follows + 2 * ended)
+
+
+def _turned(theta, near):
+    """Return an angle plus the whole turns that take it next to another."""
+    return theta + TURN * nearest_integer((near - theta) / TURN)
+
+
+def _inside(theta, arcs):
+    """Return angles [rad] that lie on arcs, those beyond an end by rounding at it; NaN others."""
+    kept = np.full(theta.shape, np.nan)
+    for low, high in arcs:
+        turns = TURN * np.round((0.5 * (low + high) - theta) / TURN)
+        beyond = np.maximum(low - (theta + turns), (theta + turns) - high)
+        at_end = np.clip(theta + turns, low, high) - turns
+        kept = np.where(beyond <= 0.0, theta, np.where(beyond <= ROUNDED, at_end, kept))
+    return kept

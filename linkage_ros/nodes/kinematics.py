@@ -1,0 +1,419 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Node that publishes joint angles, markers, loci and robot models of a scene's mechanisms."""
+
+import math
+import sys
+from threading import Lock
+import time
+from typing import NamedTuple, Optional, Sequence, Tuple
+
+import numpy as np
+from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from visualization_msgs.msg import Marker, MarkerArray
+
+from . import joint_state_reader, messages, scene_node
+from .message_layout import pack, unpack, Unreadable, Wire
+from .. import scene
+from ..linkage.walker import Layout
+from ..robot_model import urdf
+from ..words import listed
+
+# Any source will do; what comes while the node is kept waiting, 50 ms at 1000 Hz, is not lost.
+ANY = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+SECONDS_BETWEEN_WARNINGS = 5.0
+# How long inputs that nobody sends are waited for [s], and how many names that are no input's are
+# remembered so that each is said once.
+PATIENCE = 5.0
+STRANGERS = 1000
+# How long the end may wait for what takes the mechanisms out of the picture [s].
+FAREWELL = 0.1
+# A message without a stamp.
+NEVER = bytes(8)
+
+
+class Kinematics(scene_node.SceneNode):
+    """Solves the mechanisms at the angles on `crank_states`, as far as anyone listens."""
+
+    def __init__(self, **kwargs):
+        # A scene that cannot be read ends the node before there is anything to show.
+        self._outlets = {}
+        self._drawing, self._ended = Lock(), False
+        super().__init__(scene.KINEMATICS, **kwargs)
+        self._outlets = {name: Outlet(self, name, machine.linkage.cranks)
+                         for name, machine in self.scene.machines.items()}
+        self._inputs = {f'{name}_{crank}': (outlet, i) for name, outlet in self._outlets.items()
+                        for i, crank in enumerate(outlet.cranks)}
+        self._unheard, self._strangers = set(self._inputs), set()
+        self._reader = joint_state_reader.Reader(self._routed)
+        self._patience = self.create_timer(
+            PATIENCE, self._miss, clock=Clock(clock_type=ClockType.STEADY_TIME), autostart=False)
+        self.begin()
+        try:
+            next(iter(self.scene.machines.values())).linkage.accelerated()
+        except ImportError as error:
+            self.get_logger().info(f'{error}; plain Python moves the legs, to the same places')
+        self.create_subscription(JointState, 'crank_states', self._turn, ANY, raw=True)
+
+    def serves(self):
+        """Say which mechanisms it moves."""
+        return f'moves {listed(self.scene.machines, 200)} by crank_states'
+
+    def prepare(self, new):
+        """Return what shows each mechanism: another for each that has changed."""
+        return {name: self._outlets[name].prepared(machine, new.frame_id)
+                for name, machine in new.machines.items()}
+
+    def adopt(self, prepared):
+        """Show the mechanisms so from now on."""
+        with self._drawing:
+            for name, model in prepared.items():
+                if not self._ended:
+                    self._outlets[name].adopt(model)
+
+    def say_goodbye(self):
+        """Take what is drawn out of the picture, for good."""
+        with self._drawing:
+            self._ended = True
+            for outlet in self._outlets.values():
+                outlet.clear()
+        # What has not arrived when a process ends is lost.
+        until = time.monotonic() + FAREWELL
+        for outlet in self._outlets.values():
+            outlet.let_arrive(until)
+
+    def destroy_node(self):
+        """Say goodbye where that is still possible, and end."""
+        if self.context.ok() and not self._ended:
+            self.say_goodbye()
+        super().destroy_node()
+
+    @scene_node.until_the_end
+    def _turn(self, text):
+        with self._drawing:
+            if not self._ended:
+                self._draw(text)
+
+    def _draw(self, text):
+        try:
+            stamp, routes, positions, speeds = self._reader.read(text)
+        except Unreadable as error:
+            self.get_logger().warning(
+                f'crank_states: {len(text)} bytes that are no joint states are passed over: '
+                f'{error}', throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
+            return
+        if stamp == NEVER:
+            stamp = pack(self.get_clock().now().to_msg())
+        for outlet, places, known in routes:
+            outlet.turn(stamp, places, positions, speeds if known else ())
+
+    def _routed(self, message):
+        """Return the mechanisms that a message turns, where it says how far, and if how fast."""
+        known = len(message.velocity) == len(message.name)
+        routes = {}
+        for name, place in dict(zip(message.name, range(len(message.position)))).items():
+            if name in self._inputs:
+                outlet, i = self._inputs[name]
+                routes.setdefault(outlet, []).append((i, place))
+                self._hear(name)
+        self._meet(message.name)
+        return [(outlet, places, known) for outlet, places in routes.items()]
+
+    def _hear(self, name):
+        if len(self._unheard) == len(self._inputs):
+            self._patience.reset()
+        self._unheard.discard(name)
+
+    def _meet(self, names):
+        """Say once which names are no input's."""
+        room = STRANGERS - len(self._strangers)
+        new = room and [name for name in dict.fromkeys(names) if name not in self._inputs
+                        and hash(name) not in self._strangers][:room]
+        if new:
+            # Names may be long, and many.
+            self._strangers.update(map(hash, new))
+            self.get_logger().warning(
+                f'crank_states: nothing is called {listed(new, 150)}; the inputs are '
+                f'{listed(self._inputs, 150)}'
+                f'{"; no more will be named" if len(new) == room else ""}')
+
+    def _miss(self):
+        """Say once which inputs nobody sends."""
+        self._patience.cancel()
+        if self._unheard:
+            waiting = [name for name in self._inputs if name in self._unheard]
+            self.get_logger().warning(
+                f'crank_states: nothing was heard of {listed(waiting, 150)}, without which '
+                f'{listed(dict.fromkeys(self._inputs[name][0].name for name in waiting), 150)} '
+                'cannot move')
+
+
+class Drive(NamedTuple):
+    """What a pose is made from: crank angles [rad], speeds [rad/s] if known, and who listens."""
+
+    thetas: Tuple[float, ...]
+    speeds: Tuple[float, ...]
+    joints: bool
+    markers: bool
+
+    @property
+    def wanted(self):
+        """Whether joint states, markers and velocities are."""
+        return self.joints, self.markers, len(self.speeds) > 0
+
+
+class Pose(NamedTuple):
+    """
+    What is shown of a mechanism.
+
+    `held` tells which legs can be assembled, None that all can; `moving` whether all velocities
+    are known.
+    """
+
+    layout: Layout
+    values: np.ndarray
+    held: Optional[np.ndarray]
+    moving: bool
+
+    def rows(self) -> np.ndarray:
+        """Return the rows of the legs that can be assembled."""
+        rows = self.layout.rows(self.values)
+        return rows if self.held is None else rows[self.held]
+
+
+class Model:
+    """
+    A mechanism as it is shown: solutions, messages, locus and robot model.
+
+    Raises
+    ------
+    SceneError
+        If that cannot be published.
+
+    """
+
+    def __init__(self, machine: scene.Machine, frame_id: str):
+        self.made_for = machine, frame_id
+        self.robot = urdf.describe([machine], frame_id)
+        self.assembly = machine.assembly()
+        self.cranks = [f'{machine.name}_{crank}' for crank in machine.linkage.cranks]
+        self._points = machine.points
+        self._joint_names = np.array([
+            [f'{machine.name}_{leg.prefix}{joint}' for joint in self.assembly.joints]
+            for leg in self.assembly.legs])
+        drawn = machine.name, frame_id, machine.pose
+        size = urdf.size(machine)
+        place = {point: i for i, point in enumerate(machine.points)}
+        bars = [(place[p], place[q]) for p, q in machine.linkage.bars
+                if p in place and q in place]
+        self.drawn = *drawn, bars, size
+        self.marker_array = messages.Markers(*self.drawn)
+        self.joint_state = messages.JointStates()
+        curve = self.assembly.locus(machine.tracer)
+        self.locus = messages.locus(*drawn, curve, size) if len(curve) > 1 else None
+        self._solutions, self._wires = {}, {}
+
+    def solution(self, joints: bool, markers: bool, moving: bool):
+        """Return what solves the legs for those who listen."""
+        wanted = joints, markers, moving
+        if wanted not in self._solutions:
+            names = self.assembly.joints if joints else ()
+            self._solutions[wanted] = self.assembly.solution(
+                self._points if markers else (), names, names if moving else ())
+        return self._solutions[wanted]
+
+    def solve(self, drive: Drive) -> Pose:
+        """Solve the legs."""
+        solution = self.solution(*drive.wanted)
+        solution.solve(drive.thetas, drive.speeds)
+        layout, values = solution.layout, solution.values
+        held, moving = None, layout.velocities > 0
+        if self.assembly.is_limited:
+            held = self.assembly.within_reach(drive.thetas[0])
+        # One sum, of squares, tells whether all values are finite; it is rarely asked which are.
+        # It may overflow: unlike `dot`, `vdot` says nothing then.
+        if not math.isfinite(np.vdot(values, values)):
+            finite = np.isfinite(solution.rows[:, :layout.posed]).all(axis=1)
+            finite &= bool(np.isfinite(drive.thetas).all())
+            held = finite if held is None else held & finite
+            moving = moving and bool(np.isfinite(solution.rows[held, layout.posed:]).all()
+                                     and np.isfinite(drive.speeds).all())
+        if held is not None and held.all():
+            held = None
+        return Pose(layout, values, held, moving)
+
+    def wire(self, publisher, build, pose: Pose, logger) -> Wire:
+        """Return a publisher of messages of all legs that patches one that is built once."""
+        kind = build, pose.moving, pose.layout
+        if kind not in self._wires:
+            self._wires[kind] = Wire(
+                publisher, lambda stamp, values: build(pose._replace(values=values), stamp),
+                pose.layout.size, logger)
+        return self._wires[kind]
+
+    def joint_message(self, pose: Pose, stamp) -> JointState:
+        """Return the joint states of the legs that can be assembled."""
+        legs = slice(None) if pose.held is None else pose.held
+        names = [*self.cranks, *self._joint_names[legs].ravel().tolist()]
+        layout, rows, drive = pose.layout, pose.rows(), pose.layout.drive(pose.values)
+        thetas, speeds = drive[:layout.cranks], drive[layout.cranks:]
+        return self.joint_state.message(
+            stamp, names, [*thetas, *rows[:, layout.coordinates:layout.posed].flat],
+            [*speeds, *rows[:, layout.posed:].flat] if pose.moving else ())
+
+    def marker_message(self, pose: Pose, stamp) -> MarkerArray:
+        """Return the markers of the legs that can be assembled."""
+        places = pose.rows()[:, :pose.layout.coordinates]
+        return self.marker_array.message(stamp, places.reshape(len(places), -1, 2))
+
+
+class Outlet:
+    """The topics of one mechanism, and the last that was heard of each of its cranks."""
+
+    def __init__(self, node_, name: str, cranks: Sequence[str]):
+        self.name, self.cranks = name, cranks
+        self._joint_states = node_.create_publisher(JointState, f'{name}/joint_states', 10)
+        self._markers = node_.create_publisher(MarkerArray, f'{name}/markers', 1)
+        self._locus = node_.create_publisher(Marker, f'{name}/locus', LATCHED)
+        self._description = node_.create_publisher(String, f'{name}/robot_description', LATCHED)
+        # A logger of its own: what is throttled is the warnings of this mechanism alone.
+        self._logger = node_.get_logger().get_child(name)
+        self._model, self._pose, self._drive = None, None, None
+        self._stamp = NEVER
+        self._thetas = [None] * len(cranks)
+        self._speeds = [None] * len(cranks)
+        # The markers in the picture, and whether the locus is.
+        self._drawn, self._curved = frozenset(), False
+
+    def prepared(self, machine: scene.Machine, frame_id: str) -> Model:
+        """Return what shows a mechanism, ready for who listens now; the same where it is."""
+        if self._model and self._model.made_for == (machine, frame_id):
+            return self._model
+        model = Model(machine, frame_id)
+        if drive := self._drive:
+            model.solution(*drive.wanted).finish()
+            pose = model.solve(drive)
+            pose = pose._replace(held=None, moving=pose.layout.velocities > 0)
+            for publisher, build in self._listening(model, drive):
+                model.wire(publisher, build, pose, self._logger)
+        return model
+
+    def adopt(self, model: Model):
+        """Show a mechanism so, where it was last."""
+        before, self._model = self._model, model
+        if model is before:
+            return
+        if not before or model.robot != before.robot:
+            self._description.publish(String(data=model.robot))
+        self._draw_locus(model)
+        self._delete(self._drawn - model.marker_array.ids)
+        if drive := self._drive:
+            self._drive = None
+            self._show(self._stamp, drive.thetas, drive.speeds)
+
+    def _draw_locus(self, model):
+        if model.locus:
+            self._locus.publish(model.locus)
+        elif self._curved:
+            self._locus.publish(messages.deleted(self.name, messages.LOCUS_ID))
+        self._curved = bool(model.locus)
+
+    def clear(self):
+        """Take the markers and the locus out of the picture."""
+        self._delete(self._drawn)
+        if self._curved:
+            self._curved = False
+            self._locus.publish(messages.deleted(self.name, messages.LOCUS_ID))
+
+    def let_arrive(self, until: float):
+        """Wait until a time on the steady clock [s] for the picture's topics to be heard."""
+        for publisher in (self._markers, self._locus):
+            publisher.wait_for_all_acked(Duration(seconds=max(0.0, until - time.monotonic())))
+
+    def _delete(self, ids):
+        if ids:
+            self._drawn -= ids
+            self._markers.publish(MarkerArray(
+                markers=[messages.deleted(self.name, id_) for id_ in sorted(ids)]))
+
+    def turn(self, stamp: bytes, places: Sequence[Tuple[int, int]], positions: Sequence[float],
+             speeds: Sequence[float]):
+        """
+        Take over what a message says of the cranks, and show them as soon as all are known.
+
+        Parameters
+        ----------
+        stamp : bytes
+            Its time, packed.
+        places : sequence of (int, int)
+            For each crank that it tells of, the crank's place and the place in the message.
+        positions, speeds : sequence of float
+            The message's angles [rad] and speeds [rad/s], or no speeds.
+
+        """
+        for i, place in places:
+            self._thetas[i] = positions[place]
+            self._speeds[i] = speeds[place] if speeds else None
+        if None not in self._thetas:
+            self._show(stamp, tuple(self._thetas),
+                       () if None in self._speeds else tuple(self._speeds))
+
+    def _show(self, stamp, thetas, speeds):
+        """Publish what is listened to."""
+        drive = Drive(thetas, speeds, self._joint_states.get_subscription_count() > 0,
+                      self._markers.get_subscription_count() > 0)
+        if not (drive.joints or drive.markers):
+            return
+        self._stamp = stamp
+        if drive != self._drive:
+            # Once for each drive.
+            self._drive = drive
+            self._pose = self._model.solve(drive)
+        held = self._pose.held
+        if held is not None:
+            self._warn(thetas, held)
+        if held is None or held.any():
+            for publisher, build in self._listening(self._model, drive):
+                self._send(publisher, build, stamp)
+            if drive.markers:
+                self._drawn = self._model.marker_array.ids
+        else:
+            self._delete(self._drawn)
+
+    def _listening(self, model, drive):
+        if drive.joints:
+            yield self._joint_states, model.joint_message
+        if drive.markers:
+            yield self._markers, model.marker_message
+
+    def _warn(self, thetas, held):
+        legs = [f'{self.name}_{leg.prefix}'.rstrip('_')
+                for leg, placed in zip(self._model.assembly.legs, held) if not placed]
+        angles = ', '.join(f'{theta:.6g}' for theta in thetas)
+        self._logger.warning(
+            f'{", ".join(legs)} cannot be assembled at crank angle {angles} rad; the reach is '
+            f'{scene.in_words(self._model.assembly.reach)} rad',
+            throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
+
+    def _send(self, publisher, build, stamp):
+        """Publish all legs by patching one message; where some are left out, build another."""
+        pose = self._pose
+        if pose.held is not None:
+            publisher.publish(build(pose, unpack(stamp)))
+        else:
+            self._model.wire(publisher, build, pose, self._logger).send(stamp, pose.values)
+
+
+def main(args=None):
+    """Run the node; return the exit code."""
+    return scene_node.run(Kinematics, scene.KINEMATICS, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,119 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Messages from numbers; a message that is published again and again is made once."""
+
+from array import array
+import math
+from typing import Sequence
+
+from geometry_msgs.msg import Point, Pose, Quaternion
+import numpy as np
+from sensor_msgs.msg import JointState
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
+# Colours that colour-blind people tell apart (Okabe and Ito, "Color Universal Design").
+BLUE, ORANGE, GREEN = (0.0, 0.447, 0.698), (0.902, 0.624, 0.0), (0.0, 0.62, 0.451)
+
+# Widths of what is drawn, as parts of the longest bar.
+LINK, JOINT, LOCUS = 1 / 40, 1 / 20, 1 / 100
+LINKS_ID, JOINTS_ID, LOCUS_ID = 0, 1, 2
+
+
+class JointStates:
+    """The joint states of one mechanism, or of several cranks."""
+
+    def __init__(self):
+        self._message = JointState()
+
+    def message(self, stamp, names: Sequence[str], positions, velocities=()) -> JointState:
+        """Return joints [rad or m] and their velocities, where they are known."""
+        self._message.header.stamp = stamp
+        self._message.name = names
+        self._message.position = array('d', positions)
+        self._message.velocity = array('d', velocities)
+        return self._message
+
+
+class Markers:
+    """
+    The links and the joints of one mechanism, as one marker each.
+
+    Parameters
+    ----------
+    name : str
+        The mechanism: the markers' namespace.
+    frame_id : str
+        Frame of the pose.
+    pose : sequence of float
+        Of the linkage's plane: x, y, z [m], roll, pitch, yaw [rad].
+    bars : sequence of (int, int)
+        The joints at the ends of each bar, by their place among the points.
+    size : float
+        The longest bar [m].
+
+    Attributes
+    ----------
+    ids : frozenset of int
+        Of the markers that there are.
+
+    """
+
+    def __init__(self, name: str, frame_id: str, pose, bars, size: float):
+        self._ends = np.array(bars, int).reshape(-1)
+        self._links = _marker(name, LINKS_ID, Marker.LINE_LIST, frame_id, pose, BLUE, LINK * size)
+        self._joints = _marker(
+            name, JOINTS_ID, Marker.SPHERE_LIST, frame_id, pose, ORANGE, JOINT * size)
+        markers = [self._links, self._joints] if bars else [self._joints]
+        self._message = MarkerArray(markers=markers)
+        self.ids = frozenset(marker.id for marker in markers)
+        self._points = {}
+
+    def message(self, stamp, places: np.ndarray) -> MarkerArray:
+        """Return the markers of places [m], shape (legs, points, 2)."""
+        for marker, row in ((self._links, places[:, self._ends]), (self._joints, places)):
+            marker.header.stamp = stamp
+            marker.points = self._filled(marker.id, row.reshape(-1, 2).tolist())
+        return self._message
+
+    def _filled(self, id_, pairs):
+        """Return points at x, y pairs; for as many as before, the same ones."""
+        points = self._points.get((id_, len(pairs)))
+        if points is None:
+            points = self._points[id_, len(pairs)] = [Point() for _ in pairs]
+        for point, (x, y) in zip(points, pairs):
+            point.x, point.y = x, y
+        return points
+
+
+def locus(name: str, frame_id: str, pose, places: np.ndarray, size: float) -> Marker:
+    """Return the curve through places [m], shape (n, 2); without a stamp it holds at any time."""
+    marker = _marker(name, LOCUS_ID, Marker.LINE_STRIP, frame_id, pose, GREEN, LOCUS * size)
+    marker.points = [Point(x=x, y=y) for x, y in places.tolist()]
+    return marker
+
+
+def deleted(name: str, id_: int) -> Marker:
+    """Return the marker that takes another out of the picture."""
+    return Marker(ns=name, id=id_, action=Marker.DELETE)
+
+
+def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
+    """Return the rotation by roll, pitch and yaw [rad] about the fixed axes x, y, z in turn."""
+    (sr, cr), (sp, cp), (sy, cy) = ((math.sin(0.5 * x), math.cos(0.5 * x))
+                                    for x in (roll, pitch, yaw))
+    return Quaternion(x=sr * cp * cy - cr * sp * sy, y=cr * sp * cy + sr * cp * sy,
+                      z=cr * cp * sy - sr * sp * cy, w=cr * cp * cy + sr * sp * sy)
+
+
+def _marker(name, id_, type_, frame_id, pose, colour, width) -> Marker:
+    marker = Marker(ns=name, id=id_, type=type_, action=Marker.ADD)
+    marker.header.frame_id = frame_id
+    x, y, z, *angles = pose
+    marker.pose = Pose(position=Point(x=x, y=y, z=z), orientation=quaternion(*angles))
+    marker.scale.x = width
+    if type_ == Marker.SPHERE_LIST:
+        marker.scale.y = marker.scale.z = width
+    marker.color = ColorRGBA(**dict(zip('rgb', colour)), a=1.0)
+    return marker

@@ -1,0 +1,112 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+One owner of what several nodes act on: types, dimensions, branches, scale and sweep.
+
+`kinematics` announces its values on `scene_parameters`; the other nodes follow them while it is
+there. Without it, or after it, each goes by its own.
+"""
+
+from typing import Optional
+
+from rcl_interfaces.msg import ParameterEvent
+from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+from .parameter_server import Asked, Change
+from .. import scene
+from ..words import elided, listed, quoted
+
+TOPIC = 'scene_parameters'
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Announcer:
+    """Publishes the values of all parameters that several nodes act on."""
+
+    def __init__(self, node):
+        self._node = node
+        self._publisher = node.create_publisher(ParameterEvent, TOPIC, LATCHED)
+        self._messages = {}
+        self.announce(node.scene, started=True)
+
+    def announce(self, new: scene.Scene, started: bool = False):
+        """Publish the values of a scene; those that a node starts with count as new too."""
+        parts = {'': new.general, **{name: machine.parameters
+                                     for name, machine in new.machines.items()}}
+        # Most mechanisms are as they were.
+        self._messages = {name: kept if kept and kept[0] is part else (part, _messages(part))
+                          for name, part in parts.items()
+                          for kept in [self._messages.get(name)]}
+        values = [message for _, part in self._messages.values() for message in part]
+        self._publisher.publish(ParameterEvent(
+            stamp=self._node.get_clock().now().to_msg(),
+            node=self._node.get_fully_qualified_name(),
+            new_parameters=values if started else [], changed_parameters=values))
+
+
+class Follower:
+    """Hears the owner's values, and asks for the changes that they make."""
+
+    def __init__(self, node, ask):
+        self._node, self._ask = node, ask
+        self._owner, self._owned, self._said = None, set(), {}
+        self._subscription = node.create_subscription(
+            ParameterEvent, TOPIC, self._hear, LATCHED)
+
+    def owner_of(self, name: str) -> Optional[str]:
+        """Return the full name of the node that a parameter belongs to, while it is there."""
+        there = name in self._owned and self._node.count_publishers(self._subscription.topic_name)
+        return self._owner if there else None
+
+    def _hear(self, event):
+        values = dict(filter(None, map(_value, event.changed_parameters)))
+        started = event.node != self._owner or event.new_parameters
+        self._owner = event.node
+        fields, machines = self._node.fields, self._node.scene.machines
+        here = {name: scene.plain(self._node.get_parameter_or(name).value)
+                for name in values if name in fields}
+        fixed = {name for name in here if fields[name].read_only and name != 'mechanisms'}
+        unlike = {name.partition('.')[0]: name for name in fixed if here[name] != values[name]}
+        missing = set(machines) ^ set(values.get('mechanisms') or ())
+        self._owned = {name for name in here if '.' in name
+                       and name.partition('.')[0] in machines.keys() - missing - unlike.keys()}
+        self._say('unlike', [f'{name} is {quoted(here[name])} here and '
+                             f'{quoted(values[name])} there' for name in unlike.values()],
+                  'another mechanism, which is not followed')
+        self._say('missing', sorted(missing), 'other mechanisms')
+        followed = sorted(self._owned - fixed)
+        if started:
+            self._said.pop('values', None)
+            self._say('values', [
+                f'{name} was {quoted(here[name])} and is now {quoted(values[name])}'
+                for name in followed if here[name] != values[name]],
+                'other values, which are followed')
+        changes = [Change([Parameter(name, value=values[name])], followed=True)
+                   for name in followed]
+        self._ask(Asked(changes, lambda: self._complain(changes), []))
+
+    def _complain(self, changes):
+        self._say('refused', [change.result.reason for change in changes
+                              if not change.result.successful],
+                  'values that cannot be followed')
+
+    def _say(self, kind, particulars, what):
+        """Warn of something once, and again when it is another thing."""
+        if particulars and particulars != self._said.get(kind):
+            self._node.get_logger().warning(
+                f'{elided(self._owner)} has {what}: {listed(particulars, 1000)}')
+        self._said[kind] = particulars
+
+
+def _messages(parameters):
+    return [Parameter(p.name, Parameter.Type[p.field.kind.upper()], p.value).to_parameter_msg()
+            for p in parameters if p.field.shared]
+
+
+def _value(message):
+    try:
+        return message.name, scene.plain(parameter_value_to_python(message.value))
+    except RuntimeError:
+        return None

@@ -1,0 +1,263 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Node that answers which servo angle puts a lever, or any other output, where it is wanted."""
+
+from functools import cached_property
+import math
+from operator import itemgetter
+import sys
+
+import numpy as np
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+
+from . import joint_state_reader, scene_node
+from .message_layout import Unreadable
+from .. import scene
+from ..linkage.servo import CLOSE, TURN
+from ..words import elided, listed, MESSAGE, quoted
+
+try:
+    from linkage_interfaces.srv import ServoInverse as ServoInverseType
+except ImportError as error:
+    raise ImportError(
+        'servo_inverse needs the service type linkage_interfaces/srv/ServoInverse: run colcon '
+        'build in the workspace, which builds linkage_interfaces too, and source '
+        'install/setup.bash') from error
+
+LEVER = 'lever'
+# An angle beyond this [rad] has lost digits that a servo needs.
+FARTHEST = 1e6
+# More values than this at once would keep other callers waiting.
+MOST_VALUES = 1_000_000
+# Values named, and letters of names allowed, in a message.
+MOST_NAMED, MOST = 5, 150
+# An extreme is looked for among so many samples, then so often next to the best of them.
+SAMPLES, ZOOMS = 721, 4
+ANY = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+class ServoInverse(scene_node.SceneNode):
+    """Serves `servo_inverse` for the mechanisms of a scene."""
+
+    def __init__(self, **kwargs):
+        super().__init__(scene.INVERSE, **kwargs)
+        self._turned = {}
+        self._reader = joint_state_reader.Reader(self._cranks_in)
+        self.create_subscription(JointState, 'crank_states', self._turn, ANY, raw=True)
+        self.create_service(ServoInverseType, 'servo_inverse', self.answer)
+        self.begin()
+
+    def serves(self):
+        """Say of which mechanisms it answers."""
+        return f'answers servo_inverse for {listed(self.scene.machines, 200)}'
+
+    def adopt(self, new):
+        """Forget what was asked about."""
+        self._known = {}
+        self._cranks = {f'{name}_{crank}' for name, machine in new.machines.items()
+                        for crank in machine.cranks}
+
+    def _cranks_in(self, message):
+        """Return the names of the scene's cranks in a message, and their places."""
+        return [(name, place) for place, name in enumerate(message.name[:len(message.position)])
+                if name in self._cranks]
+
+    def _turn(self, text):
+        try:
+            turned = self._reader.read(text)
+        except Unreadable:
+            # `kinematics` says so.
+            return
+        self._turned.update((name, turned.positions[place]) for name, place in turned.source)
+
+    def answer(self, request, response):
+        """Fill in a response; what cannot be done is said in it, never raised."""
+        response.success = False
+        try:
+            key = request.mechanism, request.output
+            asked = self._known.get(key) or Asked(_machine(self.scene, *key), request.output)
+            solve(asked, request, response, self._turned.get(asked.crank, math.inf))
+            self._known[key] = asked
+        except ValueError as problem:
+            response.message = elided(str(problem), MESSAGE)
+        except Exception as problem:
+            # A client waits for ever for a service that raised.
+            response.message = elided(f'internal error: {problem!r}', MESSAGE)
+            self.get_logger().error(response.message)
+        return response
+
+
+def solve(asked, request, response, present=math.inf):
+    """
+    Answer a request for values of an output, with the crank at a present angle [rad] if finite.
+
+    Raises
+    ------
+    ValueError
+        If the request as a whole cannot be answered.
+
+    """
+    wanted, near = request.lever_angle, request.servo_near
+    if not wanted:
+        raise ValueError('lever_angle is empty; give at least one value')
+    if len(wanted) > MOST_VALUES:
+        raise ValueError(f'lever_angle has {len(wanted)} values; give up to {MOST_VALUES} at once')
+    if near and len(near) != len(wanted):
+        raise ValueError(f'servo_near must be empty or have one angle for each of the '
+                         f'{len(wanted)} in lever_angle, not {len(near)}')
+    if not all(-FARTHEST <= theta <= FARTHEST for theta in near):
+        raise ValueError(f'servo_near must be finite and within {FARTHEST:g} rad of zero')
+    # One angle is the usual question, and floats answer it sooner than arrays.
+    given = np.array if len(wanted) > 1 else itemgetter(0)
+    known = present if abs(present) <= FARTHEST else None
+    found = asked.servo(given(wanted), given(near) if near else known)
+    response.servo_angle, response.reduction = map(_listed, found)
+    response.reachable = list(map(math.isfinite, response.servo_angle))
+    response.success = all(response.reachable)
+    response.message = '' if response.success else elided(_complaint(asked, [
+        value for value, reached in zip(wanted, response.reachable) if not reached]), MESSAGE)
+
+
+def _listed(found):
+    return np.ravel(found).tolist() if isinstance(found, np.ndarray) else [float(found)]
+
+
+class Asked:
+    """
+    An output of a mechanism with one crank, and the crank angles that may be taken.
+
+    That is a link's joint angle or slide, or a joint's coordinate; empty: the lever.
+
+    Raises
+    ------
+    ValueError
+        If there are several cranks.
+
+    """
+
+    def __init__(self, machine: scene.Machine, output: str):
+        self._linkage, self._name = machine.linkage, output or LEVER
+        if len(self._linkage.cranks) > 1:
+            raise ValueError(f'{machine.name} has several cranks; only a linkage with one can be '
+                             'solved for an output')
+        self.crank = f'{machine.name}_{self._linkage.cranks[0]}'
+        self.what = 'lever angles' if self._name == LEVER else f'values of {self._name}'
+        self._joint, _, self._axis = self._name.partition('.')
+        slides = [link.name for link in self._linkage.links if link.kind == 'prismatic']
+        self._turns = not self._axis and self._name not in slides
+        self._unit = 1.0 if self._turns else machine.scale
+        self._sweep, self._reach = machine.crank.ends, machine.reach
+
+    def servo(self, wanted, near):
+        """Return for each value the crank angle [rad] and d output / d crank angle there."""
+        theta, rate = self._linkage.servo_for(
+            self._name, wanted / self._unit, near, self._sweep)
+        return theta, rate * self._unit
+
+    def reason(self, value: float) -> str:
+        """Return in words why a value cannot be had: which end of the sweep or reach forbids."""
+        if not math.isfinite(value):
+            return 'a value must be finite'
+        angles, _ = self._linkage.servos(self._name, value / self._unit)
+        angles = angles[np.isfinite(angles)]
+        if angles.size and self._sweep:
+            low, high = self._sweep
+            below = float(np.mod(low - angles, TURN).min())
+            above = float(np.mod(angles - high, TURN).min())
+            needed, end = (low - below, 'lower') if below < above else (high + above, 'upper')
+            return (f'{value:.6g} needs the crank at {needed:.6g} rad, outside '
+                    f'{self._where}: beyond its {end} end')
+        return self._out_of_range(value)
+
+    @property
+    def _where(self):
+        return f'crank.sweep {scene.in_words([self._sweep])}' if self._sweep else 'the reach'
+
+    def _out_of_range(self, value):
+        gaps = [gap for (low, _), (high, _) in self._spans for gap in (low - value, value - high)]
+        nearest = int(np.argmin([gap % TURN if self._turns else gap if gap > 0.0 else math.inf
+                                 for gap in gaps]))
+        (_, theta), arc = self._spans[nearest // 2][nearest % 2], self._arcs[nearest // 2]
+        at = [end for end, limit in zip(('lower', 'upper'), arc)
+              if abs(limit - theta) < CLOSE and arc[1] - arc[0] < TURN]
+        end = f', the {at[0]} end of {self._where}' if at else ''
+        spans = scene.in_words((low, high) for (low, _), (high, _) in self._spans)
+        what = 'the lever' if self._name == LEVER else self._name
+        return (f'{what} reaches {spans} {"rad" if self._turns else "m"}, its '
+                f'{("least", "greatest")[nearest % 2]} at the crank angle {theta:.6g} rad{end}')
+
+    @property
+    def _arcs(self):
+        """The crank angles that may be taken, no more than a turn."""
+        if self._sweep:
+            low, high = self._sweep
+            return [(low, min(high, low + TURN))]
+        return self._reach
+
+    @cached_property
+    def _spans(self):
+        """The least and the greatest value on each arc, with their crank angles [rad]."""
+        return [tuple(self._extreme(arc, side) for side in (-1.0, 1.0)) for arc in self._arcs]
+
+    def _extreme(self, arc, side):
+        theta = np.linspace(*arc, SAMPLES)
+        value = self._value(theta)
+        for _ in range(ZOOMS):
+            best = int(np.nanargmax(side * value))
+            top = value[best]
+            theta = np.linspace(*theta[[max(best - 1, 0), min(best + 1, SAMPLES - 1)]], SAMPLES)
+            value = self._value(theta)
+            if self._turns:
+                value += TURN * np.round((top - value[SAMPLES // 2]) / TURN)
+        best = int(np.nanargmax(side * value))
+        return float(value[best]) * self._unit, float(theta[best])
+
+    def _value(self, theta):
+        if self._axis:
+            moved = self._linkage.solve(theta, (self._joint,))[self._joint]
+            return moved[..., 'xy'.index(self._axis)]
+        value = self._linkage.joint_angles(theta, (self._name,))[self._name]
+        if self._turns:
+            known = np.isfinite(value)
+            value[known] = np.unwrap(value[known])
+        return value
+
+
+def _machine(scene_, name, output):
+    """Return a mechanism by its name, or the only one, or for a lever the only slotted lever."""
+    levers = {key: machine for key, machine in scene_.machines.items()
+              if machine.linkage.type == 'slotted_lever'}
+    machines = scene_.machines if output else levers
+    if name in machines:
+        return machines[name]
+    if not name:
+        for only in (machines, levers if output in ('', LEVER) else {}):
+            if len(only) == 1:
+                return next(iter(only.values()))
+    allowed = listed(machines, MOST) if machines else 'none: the scene has no slotted_lever'
+    if name in scene_.machines:
+        raise ValueError(f'{name} is a {scene_.machines[name].linkage.type}, not a slotted lever; '
+                         f'name an output, or take one of: {allowed}')
+    if name:
+        raise ValueError(f'there is no mechanism {quoted(name)}; allowed: {allowed}')
+    what = '' if output else ' slotted lever'
+    raise ValueError(f'mechanism may be empty only where there is one{what}; allowed: {allowed}')
+
+
+def _complaint(asked, missed):
+    named = ', '.join(f'{value:.6g}' for value in missed[:MOST_NAMED])
+    more = f' and {len(missed) - MOST_NAMED} more' if len(missed) > MOST_NAMED else ''
+    # The reason is that of the first value that is one.
+    first = next(filter(math.isfinite, missed), math.nan)
+    return f'{asked.what} {named}{more} cannot be reached; {asked.reason(first)}'
+
+
+def main(args=None):
+    """Run the node; return the exit code."""
+    return scene_node.run(ServoInverse, scene.INVERSE, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,55 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Signals that end a node while it can still publish: it says goodbye, then its context ends."""
+
+import os
+import signal
+import socket
+from threading import Thread
+
+from rclpy.signals import install_signal_handlers, SignalHandlerOptions
+
+
+class Goodbye:
+    """
+    What happens at the first SIGINT or SIGTERM, in a thread, whatever goes on meanwhile.
+
+    The client library must not have handlers of its own. A node that has a method `say_goodbye` is
+    to be put into `node`.
+    """
+
+    def __init__(self):
+        self.node = None
+
+    def __enter__(self):
+        self._heard, told = socket.socketpair()
+        told.setblocking(False)
+        self._told = told
+        self._thread = Thread(target=self._wait, daemon=True)
+        self._thread.start()
+        # An interrupt is not to raise amid a callback.
+        self._before = {number: signal.signal(number, lambda *_: None)
+                        for number in (signal.SIGINT, signal.SIGTERM)}
+        signal.set_wakeup_fd(told.fileno(), warn_on_full_buffer=False)
+        return self
+
+    def __exit__(self, *_):
+        signal.set_wakeup_fd(-1)
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        self._told.close()
+        self._thread.join()
+        self._heard.close()
+
+    def _wait(self):
+        number = self._heard.recv(1)
+        if not number:
+            return
+        try:
+            if hasattr(self.node, 'say_goodbye'):
+                self.node.say_goodbye()
+        finally:
+            # From here on it is as if nobody had caught the signal.
+            install_signal_handlers(SignalHandlerOptions.ALL)
+            os.kill(os.getpid(), *number)

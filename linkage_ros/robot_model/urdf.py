@@ -1,0 +1,271 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Robot models: the mechanisms of a scene as URDF.
+
+A URDF is a tree, so each closed loop is cut open at a joint. A link's own frame is on the joint
+that it hangs on, x along its bar; the joints that it carries are frames fixed to it. A link that
+was cut off a joint has a frame for it too, which coincides with the joint's as long as the loop
+is closed:
+
+    <frame_id>
+      <mechanism>_ground_link             at the mechanism's pose; its plane is x-y
+        <mechanism>_<link>_link           moved by the joint <mechanism>_<link>
+          <mechanism>_<point>             fixed, one for each joint of the linkage
+          <mechanism>_<point>_cut         fixed, on the link that has to meet that joint
+
+Legs of a walker have their prefix before link and point, and one crank for all of them. There are
+no inertias: a scene says nothing about masses. Limits have effort and velocity 0: not known.
+
+Format: the URDF XML specification of ROS (wiki.ros.org/urdf/XML).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+import math
+from typing import Iterable, Optional, Sequence
+from xml.etree import ElementTree
+
+from ..linkage.builder import GROUND
+from ..linkage.crank_range import is_full_turn
+from ..linkage.output_range import crank_reach, ground_frame, Travel, travels
+from ..linkage.walker import Leg
+from ..scene import Machine, SceneError
+
+# Colours that colour-blind people tell apart (Okabe and Ito, "Color Universal Design").
+COLOURS = {'orange': (0.902, 0.624, 0.0), 'blue': (0.0, 0.447, 0.698), 'green': (0.0, 0.62, 0.451),
+           'vermilion': (0.835, 0.369, 0.0), 'sky': (0.337, 0.706, 0.914),
+           'purple': (0.8, 0.475, 0.655), 'grey': (0.25, 0.25, 0.25)}
+*BARS, JOINTS = COLOURS
+
+# Radii of bars and joints, as parts of the longest bar.
+BAR, JOINT = 1 / 80, 1 / 40
+
+# Sizes [m] between which nothing that is drawn is lost in single precision, as displays have it.
+SMALLEST, LARGEST = 1e-30, 1e30
+
+
+def describe(machines: Iterable[Machine], frame_id: str) -> str:
+    """
+    Return mechanisms as one robot model.
+
+    Parameters
+    ----------
+    machines : iterable of Machine
+        What is in it; the model of a single one bears its name.
+    frame_id : str
+        The root link: the frame that the mechanisms' poses are in.
+
+    Returns
+    -------
+    str
+        URDF.
+
+    Raises
+    ------
+    SceneError
+        If two links or two joints would have the same name, or something is too large or small.
+
+    """
+    machines = list(machines)
+    robot = _Robot(machines[0].name if len(machines) == 1 else 'linkages', frame_id)
+    for machine in machines:
+        robot.owner = machine.name
+        try:
+            _Model(robot, machine).add_to(frame_id)
+        except OverflowError as error:
+            raise SceneError(f'{machine.name}.pose, {machine.name}.scale and {machine.name}'
+                             f'.dimensions must keep everything within {LARGEST:g} m, not at '
+                             f'{error}') from None
+    return robot.text()
+
+
+def size(machine: Machine) -> float:
+    """Return the longest bar [m]; raise SceneError where it cannot be drawn."""
+    length = machine.scale * float(machine.linkage.longest)
+    if not SMALLEST <= length <= LARGEST:
+        raise SceneError(
+            f'{machine.name}.scale and {machine.name}.dimensions must make the longest bar from '
+            f'{SMALLEST:g} to {LARGEST:g} m long, not {length:g}')
+    return length
+
+
+class _Model:
+    """A mechanism as links and joints of a robot."""
+
+    def __init__(self, robot, machine: Machine):
+        self._size = size(machine)
+        self._robot, self._machine, self._assembly = robot, machine, machine.assembly()
+        self._links = machine.linkage.links
+        self._bars = machine.linkage.bars
+        self._frames = {GROUND: ground_frame(machine.linkage), **machine.linkage.frames}
+        self._travels = {**travels(machine.linkage, machine.reach),
+                         'crank': _crank_travel(machine, self._assembly)}
+
+    def add_to(self, root: str):
+        """Add ground, crank and legs."""
+        legs = self._assembly.legs
+        self._robot.fix(root, self._link('', GROUND), self._machine.pose)
+        if len(legs) > 1:
+            self._hang(Leg('', 0.0, 1.0), self._links[0])
+        for leg in legs:
+            self._add(leg)
+
+    def _add(self, leg):
+        ends = Counter()
+        self._add_points(leg, GROUND, self._frames[GROUND], ends)
+        for i, link in enumerate(self._links):
+            shared = link.name == 'crank' and leg.prefix
+            element = self._lag(leg) if shared else self._hang(leg, link)
+            self._draw(leg, link, element, BARS[i % len(BARS)])
+            carried = [point for point in self._frames[link.name] if point != link.joint]
+            self._add_points(leg, link.name, carried, ends)
+
+    def _lag(self, leg):
+        """Fix a leg's pins to the crank of all legs."""
+        return self._robot.fix(self._link('', 'crank'), self._link(leg.prefix, 'crank'),
+                               (0.0, 0.0, 0.0, 0.0, 0.0, -leg.lag))
+
+    def _hang(self, leg, link):
+        """Add a link that moves on its parent; in a mirrored leg the other way round."""
+        prismatic, mirrored = link.kind == 'prismatic', leg.side < 0.0
+        zero = math.pi - link.zero if mirrored and link.parent == GROUND else link.zero
+        axis = (leg.side, 0.0, 0.0) if prismatic else (0.0, 0.0, 1.0)
+        travel = self._travels.get(link.name)
+        if travel and mirrored:
+            travel = -travel[1], -travel[0]
+        if travel and prismatic:
+            travel = tuple(self._machine.scale * end for end in travel)
+        place = self._place(leg, link.parent, link.joint)
+        return self._robot.move(
+            f'{self._machine.name}_{leg.prefix}{link.name}', link.kind,
+            self._link(leg.prefix, link.parent), self._link(leg.prefix, link.name),
+            (*place, 0.0, 0.0, 0.0, zero), axis, travel)
+
+    def _draw(self, leg, link, element, colour):
+        """Add bars as rods, and a slide as a block."""
+        frame, size = self._frames[link.name], self._size
+        for first, second in self._bars:
+            if first in frame and second in frame:
+                _draw_rod(element, colour, BAR * size, self._place(leg, link.name, first),
+                          self._place(leg, link.name, second))
+        if link.kind == 'prismatic':
+            _draw(element, colour, (*self._place(leg, link.name, link.tip), *[0.0] * 4),
+                  'box', size=_numbers(4.0 * JOINT * size, *[2.0 * JOINT * size] * 2))
+
+    def _add_points(self, leg, link, points, ends):
+        """Add joints of a link as links of their own, those that it was cut off as well."""
+        for point in points:
+            name = f'{self._machine.name}_{leg.prefix}{point}'
+            ends[point] += 1
+            if ends[point] > 1:
+                name += f'_cut{ends[point] - 1 if ends[point] > 2 else ""}'
+            element = self._robot.fix(self._link(leg.prefix, link), name,
+                                      (*self._place(leg, link, point), *[0.0] * 4))
+            _draw(element, JOINTS, [0.0] * 6, 'sphere', radius=_numbers(JOINT * self._size))
+
+    def _link(self, prefix, name):
+        return f'{self._machine.name}_{"" if name == GROUND else prefix}{name}_link'
+
+    def _place(self, leg, link, point):
+        """Return x, y [m] of a point of a link; the ground is mirrored in y, a link in its bar."""
+        x, y = (self._machine.scale * value for value in self._frames[link][point])
+        return (leg.side * x, y) if link == GROUND else (x, leg.side * y)
+
+
+def _crank_travel(machine, assembly) -> Optional[Travel]:
+    """Return the outermost ends of the crank's reach [rad], in the turn that it is driven in."""
+    arcs = crank_reach(assembly)
+    if not arcs or is_full_turn(arcs):
+        return None
+    low, high = min(lo for lo, _ in arcs), max(hi for _, hi in arcs)
+    sweep = machine.crank.sweep
+    turns = math.tau * math.floor((sweep[1] - low) / math.tau) if sweep else 0.0
+    return low + turns, high + turns
+
+
+class _Robot:
+    """The elements of a URDF."""
+
+    def __init__(self, name: str, root: str):
+        self._element = ElementTree.Element('robot', name=name)
+        self._root, self.owner = root, None
+        self._owners = {}
+        for colour, rgb in COLOURS.items():
+            material = ElementTree.SubElement(self._element, 'material', name=colour)
+            ElementTree.SubElement(material, 'color', rgba=_numbers(*rgb, 1.0))
+        self._named('link', root)
+
+    def fix(self, parent: str, child: str, pose: Sequence[float]) -> ElementTree.Element:
+        """Return a new link that is fixed to another at x, y, z [m], roll, pitch, yaw [rad]."""
+        self._joint(f'{child}_fixed', 'fixed', parent, child, pose)
+        return self._named('link', child)
+
+    def move(self, joint: str, kind: str, parent: str, child: str, pose: Sequence[float],
+             axis: Sequence[float], travel: Optional[Travel]) -> ElementTree.Element:
+        """Return a new link that turns about an axis of its own or slides along it."""
+        endless = kind == 'revolute' and not travel
+        element = self._joint(joint, 'continuous' if endless else kind, parent, child, pose)
+        ElementTree.SubElement(element, 'axis', xyz=_numbers(*axis))
+        if travel:
+            lower, upper = map(_numbers, travel)
+            ElementTree.SubElement(element, 'limit', lower=lower, upper=upper,
+                                   effort='0', velocity='0')
+        return self._named('link', child)
+
+    def text(self) -> str:
+        """Return the whole."""
+        ElementTree.indent(self._element)
+        return ElementTree.tostring(self._element, encoding='unicode')
+
+    def _joint(self, name, kind, parent, child, pose):
+        element = self._named('joint', name, type=kind)
+        ElementTree.SubElement(element, 'parent', link=parent)
+        ElementTree.SubElement(element, 'child', link=child)
+        _origin(element, pose)
+        return element
+
+    def _named(self, tag, name, **attributes):
+        if (tag, name) in self._owners:
+            raise self._doubled(tag, name)
+        self._owners[tag, name] = self.owner
+        return ElementTree.SubElement(self._element, tag, name=name, **attributes)
+
+    def _doubled(self, tag, name):
+        if (tag, name) == ('link', self._root):
+            return SceneError(f'frame_id must be no link of the robot model, not {name!r}')
+        own = self._owners[tag, name] == self.owner
+        whose = f'{self.owner}.joints' if own else 'mechanisms'
+        return SceneError(f'{whose} must be other names: the robot model would have two {tag}s '
+                          f'{name}')
+
+
+def _draw_rod(element, colour, radius, start, end):
+    along = end[0] - start[0], end[1] - start[1]
+    middle = 0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1])
+    # A cylinder's axis is z: it is laid down along x, then turned.
+    _draw(element, colour, (*middle, 0.0, 0.0, 0.5 * math.pi, math.atan2(along[1], along[0])),
+          'cylinder', radius=_numbers(radius), length=_numbers(math.hypot(*along)))
+
+
+def _draw(element, colour, pose, shape, **sizes):
+    visual = ElementTree.SubElement(element, 'visual')
+    _origin(visual, pose)
+    ElementTree.SubElement(ElementTree.SubElement(visual, 'geometry'), shape, sizes)
+    ElementTree.SubElement(visual, 'material', name=colour)
+
+
+def _origin(element, pose):
+    if any(pose):
+        ElementTree.SubElement(element, 'origin', xyz=_numbers(*pose[:3]),
+                               rpy=_numbers(*pose[3:]))
+
+
+def _numbers(*values: float) -> str:
+    """Return numbers with all their digits; adding zero makes -0.0 plain."""
+    for value in values:
+        if not abs(value) <= LARGEST:
+            raise OverflowError(f'{value:g}')
+    return ' '.join(repr(float(value) + 0.0) for value in values)

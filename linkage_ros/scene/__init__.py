@@ -1,0 +1,381 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Scenes: which mechanisms there are, how large, where, and how their cranks move.
+
+The only place that knows the names of parameters. `read` turns given values into a Scene, or says
+in one sentence which parameter is wrong and what it may be; the scene's `parameters` are what a
+node declares. No ROS is needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field as some, replace
+from functools import lru_cache
+import math
+import re
+from typing import Any, Dict, List, Optional, Tuple
+
+from .parameters import Field, Parameter, plain, SceneError, Values
+from .. import mechanisms
+from ..linkage.crank_range import is_full_turn
+from ..linkage.mechanism import Mechanism
+from ..linkage.walker import Assembly
+from ..words import elided, listed, quoted
+
+__all__ = ['Crank', 'Machine', 'Parameter', 'Scene', 'SceneError', 'in_words', 'load', 'plain',
+           'read']
+
+DRIVER, KINEMATICS, INVERSE = ALL = 'crank_driver', 'kinematics', 'servo_inverse'
+# Whose values of the parameters that several nodes act on count.
+OWNER = KINEMATICS
+
+# What a crank that swings by default leaves of its reach at each end, as a part of its width.
+MARGIN = 0.01
+NARROWEST_SWEEP = 1e-6
+FULL_TURN = ((-math.pi, math.pi),)
+
+# What the client library declares for itself.
+_ROS = re.compile(r'(use_sim_time|start_type_description_service|qos_overrides\..*)$')
+_NAME = re.compile(r'(?=.{1,64}$)[A-Za-z](_?[A-Za-z0-9])*')
+
+
+TYPES = (*mechanisms.TYPES, mechanisms.CUSTOM)
+
+MECHANISMS = Field(
+    'string_array', 'Names of the mechanisms in the scene.', readers=ALL, read_only=True,
+    rule='at least one, each once, of up to 64 letters, digits and single underscores, '
+         'a letter first', pattern=_NAME)
+FRAME_ID = Field('string', 'Frame that the poses are in.', readers=(KINEMATICS,),
+                 rule='1 to 100 letters, digits and _ . : - /, the first a letter, digit or _',
+                 pattern=re.compile(r'\w[\w.:/-]{0,99}'))
+RATE = Field('double', 'Crank messages in a second [Hz]; 0: none.', 0.0, 1000.0, readers=(DRIVER,))
+TYPE = Field('string', 'Type of the mechanism.', readers=ALL, read_only=True,
+             rule=f'one of {", ".join(TYPES)}')
+JOINTS = Field('string_array', 'The linkage, one line a joint.', readers=ALL, read_only=True)
+TRACER = Field('string', 'Joint whose curve is the locus; empty: the last.', readers=ALL,
+               read_only=True)
+DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [m].', positive=True,
+                  readers=ALL)
+BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the usual one.', -1, 1, readers=ALL)
+SCALE = Field('double', 'Factor of every length.', positive=True, readers=(KINEMATICS, INVERSE))
+LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.', 1, 50,
+                  readers=(KINEMATICS,))
+MIRRORED = Field('bool', 'Whether each leg has a mirror image on the other side; '
+                 'if never set: where there is more than one pair.', readers=(KINEMATICS,))
+POINTS = Field('string_array', 'Joints that are wanted in the markers.', readers=(KINEMATICS,))
+POSE = Field('double_array', "Pose of the linkage's plane in frame_id: "
+             'x, y, z [m], roll, pitch, yaw [rad].', rule='six of them', readers=(KINEMATICS,))
+SPEED = Field('double', 'Speed of the crank [rad/s].', -100.0, 100.0, readers=(DRIVER,))
+START = Field('double', 'Crank angle at the start [rad]; a new one moves the crank there.',
+              -4.0 * math.pi, 4.0 * math.pi, readers=(DRIVER,))
+SWEEP = Field('double_array', 'Crank angles [rad] between which the crank swings; '
+              'empty: it turns all round, or swings through its reach.', readers=ALL,
+              rule='the lower end and the higher end, or none')
+
+
+@dataclass(frozen=True)
+class Crank:
+    """
+    How a crank moves: speed [rad/s], start [rad], and the ends of its swing [rad] or None.
+
+    `ends` are those that were set, beyond which no answer lies either; None: all its reach.
+    """
+
+    speed: float
+    start: float
+    sweep: Optional[Tuple[float, float]]
+    ends: Optional[Tuple[float, float]] = None
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A mechanism in a scene: one leg, its reach and scale, its legs, its look and its cranks."""
+
+    name: str
+    linkage: Mechanism
+    reach: Tuple[Tuple[float, float], ...]
+    scale: float
+    leg_pairs: int
+    mirrored: bool
+    points: Tuple[str, ...]
+    pose: Tuple[float, ...]
+    cranks: Mapping[str, Crank]
+    given: Mapping[str, Any] = some(compare=False, repr=False)
+    parameters: Tuple[Parameter, ...] = some(compare=False, repr=False)
+
+    def is_of(self, given: Mapping[str, Any]) -> bool:
+        """Return whether it was read from these very values."""
+        return self.given.keys() == given.keys() and all(
+            self.given[key] is value for key, value in given.items())
+
+    @property
+    def crank(self) -> Crank:
+        """The first crank, for most linkages the only one."""
+        return self.cranks['crank']
+
+    def assembly(self) -> Assembly:
+        """Return its legs on their crank."""
+        return Assembly(self.linkage, self.leg_pairs, self.mirrored, self.scale, self.reach)
+
+    @property
+    def tracer(self) -> str:
+        """The joint whose curve is shown: the linkage's own tracer if it is wanted."""
+        return self.linkage.tracer if self.linkage.tracer in self.points else self.points[-1]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Machines by name, the frame they are in, and the rate of the crank messages [Hz]."""
+
+    machines: Mapping[str, Machine]
+    frame_id: str
+    rate: float
+    general: Tuple[Parameter, ...]
+
+    @property
+    def parameters(self) -> Tuple[Parameter, ...]:
+        """All parameters, the general ones first."""
+        return (*self.general, *(parameter for machine in self.machines.values()
+                                 for parameter in machine.parameters))
+
+    def changed_from(self, old: 'Scene') -> List[Parameter]:
+        """Return the parameters that have not the value that they have in a scene before."""
+        parts = [(self.general, old.general), *(
+            (machine.parameters, old.machines[name].parameters)
+            for name, machine in self.machines.items() if machine is not old.machines[name])]
+        before = {parameter.name: parameter.value for _, part in parts for parameter in part}
+        return [parameter for part, _ in parts for parameter in part
+                if parameter.value != before.get(parameter.name)]
+
+
+def load(path: str) -> Scene:
+    """Read a scene from a parameter file, its `/**` section; needs PyYAML."""
+    import yaml
+
+    try:
+        with open(path) as file:
+            given = dict(_flattened(yaml.safe_load(file)['/**']['ros__parameters']))
+    except (yaml.YAMLError, LookupError, TypeError, AttributeError, ValueError,
+            RecursionError) as error:
+        reason = ' '.join(str(error).split())
+        raise SceneError(f"{path} must be YAML with '/**:' and below it 'ros__parameters:' "
+                         f'({reason})') from None
+    return read(given)
+
+
+def read(given: Mapping[str, Any], before: Optional[Scene] = None, strict: bool = True) -> Scene:
+    """
+    Read a scene from the values that are given, by full parameter name.
+
+    Parameters
+    ----------
+    given : mapping
+        Values by full parameter name.
+    before : Scene, optional
+        The scene that this one follows: what is given for a mechanism as before is not read again.
+    strict : bool
+        Whether a start must be where its crank moves. Where others change the sweep or the reach
+        of a crank that has long left its start, it need not.
+
+    Raises
+    ------
+    SceneError
+        If a parameter is unknown or cannot be what it is.
+
+    """
+    parts = _parted(given)
+    values = Values(parts.pop('', {}))
+    names = values.take('mechanisms', MECHANISMS, mechanisms.CATALOGUE)
+    if not names or len(set(names)) < len(names):
+        raise MECHANISMS.error('mechanisms', names)
+    frame_id = values.take('frame_id', FRAME_ID, 'world')
+    rate = values.take('rate', RATE, 50.0)
+    known = before.machines if before else {}
+    machines = {name: _machine(name, parts.pop(name, {}), known.get(name), strict)
+                for name in names}
+    known = ['mechanisms', 'frame_id', 'rate', *(f'{name}.*' for name in names)]
+    for left in (values.left(), *parts.values()):
+        _refuse_unknown(left, known)
+    return Scene(machines, frame_id, rate, tuple(values.parameters))
+
+
+def in_words(arcs) -> str:
+    """Return arcs as text, for messages."""
+    return ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in arcs)
+
+
+def _parted(given) -> Dict[str, Dict[str, Any]]:
+    """Return the values by mechanism, those of none under an empty name."""
+    if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in given):
+        raise SceneError(f'a scene is values by the names of parameters, not {quoted(given)}')
+    parts = {}
+    for name, value in given.items():
+        mechanism, dot, _ = name.partition('.')
+        parts.setdefault(mechanism if dot else '', {})[name] = value
+    return parts
+
+
+def _refuse_unknown(names, known):
+    for name in names:
+        known = [f'{name}.type', *known] if f'{name}.*' in known else known
+        if not _ROS.match(name):
+            raise SceneError(f'{elided(name)} is not a parameter of the scene; allowed: '
+                             f'{listed(known, 180)}')
+
+
+def _machine(name: str, given: Mapping[str, Any], old: Optional[Machine], strict) -> Machine:
+    if old and old.is_of(given):
+        return old
+    values = Values(given)
+    type_ = values.take(f'{name}.type', TYPE, name)
+    if type_ not in TYPES:
+        raise SceneError(f'{name}.type must be {TYPE.rule}, not {quoted(type_)}')
+    linkage, reach = _linkage(name, type_, values)
+    scale = values.take(f'{name}.scale', SCALE, 1.0)
+    legs = _legs(name, linkage, values)
+    points, pose = _points(name, linkage, values), _pose(name, values)
+    settled = old.cranks if old else {}
+    cranks = {crank: _crank(f'{name}.{crank}', reach, values, settled.get(crank), strict)
+              for crank in linkage.cranks}
+    _refuse_unknown(values.left(), [parameter.name for parameter in values.parameters])
+    return Machine(name, linkage, reach, scale, *legs, points, pose, cranks, given,
+                   tuple(values.parameters))
+
+
+def _linkage(name, type_, values):
+    design = _design(name, type_, values)
+    dimensions = _dimensions(name, design, values)
+    branches = _branches(name, design, values)
+    try:
+        linkage, reach = _built(design, tuple(dimensions.items()), tuple(branches.items()))
+    except ValueError as error:
+        raise SceneError(f'{name}.dimensions: {error}') from None
+    if not reach:
+        lengths = listed(f'{key}={value:g}' for key, value in dimensions.items())
+        raise SceneError(f'{name}.dimensions must let the {type_} be assembled at some crank '
+                         f'angle, which {lengths} do not')
+    return linkage, reach
+
+
+def _design(name, type_, values):
+    if type_ in mechanisms.TYPES:
+        return mechanisms.design(type_)
+    joints = values.take(f'{name}.joints', JOINTS, ())
+    tracer = values.take(f'{name}.tracer', TRACER, '')
+    start = f'{name}.dimensions.'
+    dimensions = [key[len(start):] for key in values.left(start)]
+    try:
+        return mechanisms.design(type_, joints, tracer or None, dimensions)
+    except ValueError as error:
+        raise SceneError(f'{name}.joints: {error}') from None
+
+
+def _dimensions(name, design, values):
+    taken = {}
+    for key in design.dimensions:
+        field = replace(_about(DIMENSION, key, design.name), positive=key not in design.signed)
+        taken[key] = values.take(f'{name}.dimensions.{key}', field, design.dimensions[key])
+    return taken
+
+
+def _branches(name, design, values):
+    taken = {}
+    for key, sign in design.branches.items():
+        field = _about(BRANCH, key, design.name)
+        taken[key] = values.take(f'{name}.branches.{key}', field, sign) or sign
+    return taken
+
+
+def _about(field, *words):
+    return replace(field, meaning=field.meaning.format(*words))
+
+
+@lru_cache(maxsize=16)
+def _built(design, dimensions, branches):
+    """Return a linkage and its reach; the same ones for the same dimensions."""
+    own = {} if design.name in mechanisms.TYPES else {
+        'joints': design.joints, 'tracer': design.tracer}
+    linkage = mechanisms.create(design.name, branches=dict(branches), **own, **dict(dimensions))
+    # How far one of several cranks reaches depends on the others: only a pose tells.
+    return linkage, tuple(linkage.reach()) if len(linkage.cranks) == 1 else FULL_TURN
+
+
+def _legs(name, linkage, values):
+    able = _can_have_more_legs(linkage)
+    # A slider for what cannot be changed would only be refused.
+    pairs, mirrored = (replace(field, read_only=not able) for field in (LEG_PAIRS, MIRRORED))
+    pairs = values.take(f'{name}.leg_pairs', pairs, 1)
+    mirrored = values.take(f'{name}.mirrored', mirrored, pairs > 1)
+    if (pairs > 1 or mirrored) and not able:
+        what, allowed = ('leg_pairs', '1') if pairs > 1 else ('mirrored', 'false')
+        raise SceneError(f'{name}.{what} must be {allowed}: only a linkage whose one crank '
+                         'turns about x = 0, its angle counted from +x, can have more legs')
+    return pairs, mirrored
+
+
+def _can_have_more_legs(linkage) -> bool:
+    crank, *others = (link for link in linkage.links if link.name in linkage.cranks)
+    if others or crank.zero:
+        return False
+    return linkage.solve(0.0, (crank.joint,))[crank.joint][0] == 0.0
+
+
+def _points(name, linkage, values):
+    points = values.take(f'{name}.points', POINTS, linkage.points)
+    if not points or len(set(points)) < len(points) or set(points) - set(linkage.points):
+        raise SceneError(f'{name}.points must name some of {listed(linkage.points)}, each '
+                         f'once, not {quoted(list(points))}')
+    return points
+
+
+def _pose(name, values):
+    pose = values.take(f'{name}.pose', POSE, (0.0,) * 6)
+    if len(pose) != 6:
+        raise POSE.error(f'{name}.pose', pose)
+    return pose
+
+
+def _crank(name, reach, values, old, strict) -> Crank:
+    speed = values.take(f'{name}.speed', SPEED, 1.0)
+    chosen = values.left(f'{name}.start')
+    start = values.take(f'{name}.start', START, 0.0)
+    sweep = values.take(f'{name}.sweep', SWEEP, ())
+    if sweep:
+        _check_sweep(f'{name}.sweep', sweep, reach)
+    elif is_full_turn(reach):
+        return Crank(speed, start, None)
+    arcs = [sweep] if sweep else reach
+    home = [arc for arc in arcs if _inside(start, start, arc)]
+    low, high = (home or arcs)[0]
+    trimmed = 0.0 if sweep else MARGIN * (high - low)
+    crank = Crank(speed, start, (low + trimmed, high - trimmed), tuple(sweep) or None)
+    settled = not strict or old and (old.start, old.sweep) == (crank.start, crank.sweep)
+    if chosen and not home and not settled:
+        raise SceneError(f'{name}.start must be inside the {"sweep" if sweep else "reach"} '
+                         f'{in_words(arcs)} rad, not {start}')
+    return crank
+
+
+def _check_sweep(name, sweep, reach):
+    if len(sweep) != 2 or not sweep[0] + NARROWEST_SWEEP <= sweep[1]:
+        raise SWEEP.error(name, sweep)
+    if not is_full_turn(reach) and not any(_inside(*sweep, arc) for arc in reach):
+        raise SceneError(f'{name} must be inside the reach {in_words(reach)} rad, '
+                         f'not {quoted(list(sweep))}')
+
+
+def _inside(low, high, arc) -> bool:
+    """Return whether an arc holds another, up to whole turns."""
+    turns = math.tau * math.floor((high - arc[0]) / math.tau)
+    return arc[0] <= low - turns and high - turns <= arc[1]
+
+
+def _flattened(values, prefix=''):
+    for key, value in values.items():
+        if isinstance(value, dict):
+            yield from _flattened(value, f'{prefix}{key}.')
+        else:
+            yield f'{prefix}{key}', value

@@ -1,0 +1,96 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+A crank angle as a function of the clock.
+
+Angles are counted in whole steps of 2^-128 rad and time in whole nanoseconds, so nothing is lost
+however long a crank runs: the only rounding is that of the answer.
+"""
+
+import math
+from typing import Optional, Tuple
+
+STEPS = 1 << 128
+TURN = 62831853071795864769252867665590057683943387987502116 * STEPS // 10 ** 52
+
+Sweep = Optional[Tuple[float, float]]
+
+
+def _steps(value: float, per: int = 1) -> int:
+    numerator, denominator = float(value).as_integer_ratio()
+    return numerator * STEPS // (denominator * per)
+
+
+class Motion:
+    """
+    A crank that turns, or swings as a triangle wave, at a constant speed.
+
+    Its phase runs through one turn, or from the low end of the sweep to the high end and back.
+
+    Parameters
+    ----------
+    speed : float
+        Speed [rad/s]; of a crank that swings, its sign is the direction from the start.
+    sweep : (float, float), optional
+        Ends of the swing [rad]; None: it turns all round.
+    start : float
+        Angle at the time `since` [rad]; one outside the sweep is moved to the nearer end.
+    since : int
+        Time [ns].
+
+    """
+
+    def __init__(self, speed: float, sweep: Sweep = None, start: float = 0.0, since: int = 0):
+        self._speed = speed
+        self._rate = _steps(speed, per=10 ** 9)
+        self._sweep = sweep
+        self._low, high = (0, TURN) if sweep is None else map(_steps, sweep)
+        self._width = high - self._low
+        self._period = TURN if sweep is None else 2 * self._width
+        self._phase = self._place(_steps(start))
+        self._since = since
+
+    def at(self, now: int) -> Tuple[float, float]:
+        """Return the angle [rad], in [0, 2 pi) or in the sweep, and its speed [rad/s]."""
+        travelled, ahead = self._fold(self._phase_at(now))
+        angle = (self._low + travelled) / STEPS
+        if self._sweep is None and angle >= math.tau:
+            # What is just below a turn may round up to it.
+            angle = 0.0
+        return angle, self._speed if ahead else -self._speed or 0.0
+
+    def changed(self, speed: float, sweep: Sweep, now: int) -> 'Motion':
+        """Return the motion that takes over from this one at a time [ns], without a jump."""
+        taken = Motion(speed, sweep, since=now)
+        phase = self._phase_at(now)
+        if sweep == self._sweep:
+            taken._phase = phase
+            return taken
+        travelled, ahead = self._fold(phase)
+        place = taken._place(self._low + travelled)
+        taken._phase = place if ahead or sweep is None else -place
+        return taken
+
+    def moved(self, before: int, now: int) -> 'Motion':
+        """Return the motion that is at `now` [ns] where this one is at `before` [ns]."""
+        motion = self.changed(self._speed, self._sweep, before)
+        motion._since = now
+        return motion
+
+    def _phase_at(self, now: int) -> int:
+        return (self._phase + self._rate * (now - self._since)) % self._period
+
+    def _fold(self, phase: int) -> Tuple[int, bool]:
+        """Return how far from the low end a phase is, and whether it is on the way up."""
+        ahead = phase < self._width
+        return (phase, ahead) if ahead else (2 * self._width - phase, ahead)
+
+    def _place(self, angle: int) -> int:
+        """Return the phase of an angle, on the way up."""
+        if self._sweep is None:
+            return angle % TURN
+        half = self._width // 2
+        if not 0 <= angle - self._low <= self._width:
+            angle = (angle - self._low - half + TURN // 2) % TURN - TURN // 2 + self._low + half
+        return min(max(angle - self._low, 0), self._width)

@@ -1,0 +1,104 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Sliders: between which values one may move a parameter, so that something can be seen.
+
+They guide and refuse nothing. The ends are whole stops: the sliders of rqt_reconfigure have a
+hundred, counted from zero. No ROS is needed.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+import math
+from typing import Optional, Tuple
+
+import numpy as np
+
+from . import Machine, Scene
+from .parameters import Parameter
+from ..linkage.crank_range import is_full_turn
+
+STOPS = 100
+# How far from its value a length may be moved, in parts of it or, from 0, of the longest bar.
+LEAST, MOST = 1e-4, 9.0
+TRIED = 48
+# The least step, as a part of the value.
+FINEST = 1e-5
+LARGEST = 1e300
+ANGLES, FEW_ANGLES = 91, 13
+
+
+def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
+    """Return the least and greatest value for the slider of a number; None: it has none."""
+    field, value = parameter.field, parameter.value
+    if field.high is not None:
+        return field.low, field.high
+    if field.kind != 'double':
+        return None
+    name, what, key = (parameter.name.split('.') + ['', ''])[:3]
+    if what == 'dimensions':
+        machine = scene.machines[name]
+        return _length(machine.linkage, key, field.positive, _used(machine))
+    return _whole_stops(value, 0.1 * value, 10.1 * value)
+
+
+def _used(machine: Machine) -> Optional[Tuple[float, float]]:
+    """Return between which crank angles it has to be assembled; None: at one at least."""
+    if len(machine.linkage.cranks) > 1 or not is_full_turn(machine.reach):
+        return None
+    return machine.crank.sweep or machine.reach[0]
+
+
+@lru_cache(maxsize=16)
+def _length(linkage, key, positive, used):
+    """Return how far a length may be moved with the linkage still assembled."""
+    value = float(linkage.dimensions[key])
+    size = abs(value) or float(linkage.longest)
+    low, high = (_farthest(linkage, key, value, sign * size, used, positive)
+                 for sign in (-1.0, 1.0))
+    return _whole_stops(value, low, high)
+
+
+def _farthest(linkage, key, value, size, used, positive):
+    """Return the last value on one side up to which all that are tried can be assembled."""
+    most = 0.9 * abs(size) if positive and size < 0.0 else MOST * abs(size)
+    steps = np.geomspace(LEAST * abs(size), most, TRIED) * math.copysign(1.0, size)
+    good, bad = 0.0, None
+    for _ in range(2):
+        able = _assembled(linkage, key, value + steps, used)
+        if able.all():
+            good = steps[-1]
+            break
+        first = int(np.argmin(able))
+        good, bad = steps[first - 1] if first else good, steps[first]
+        steps = np.linspace(good, bad, TRIED)[1:]
+    return float(value + good)
+
+
+def _assembled(linkage, key, values, used):
+    """Return for each value of a dimension whether the linkage can be assembled."""
+    try:
+        tried = linkage.with_dimensions(**{key: values[:, None]})
+    except ValueError:
+        if len(values) == 1:
+            return np.array([False])
+        return np.concatenate([_assembled(linkage, key, values[i:i + 1], used)
+                               for i in range(len(values))])
+    cranks = len(linkage.cranks)
+    arc = used or (-math.pi, math.pi)
+    theta = np.linspace(*arc, ANGLES) if cranks == 1 else [
+        angles.ravel() for angles in np.meshgrid(*[np.linspace(*arc, FEW_ANGLES)] * cranks)]
+    placed = np.ones((len(values), 1), dtype=bool)
+    for places in tried.solve(theta).values():
+        placed = placed & np.isfinite(places).all(axis=-1)
+    return placed.all(axis=1) if used else placed.any(axis=1)
+
+
+def _whole_stops(value: float, low: float, high: float) -> Tuple[float, float]:
+    """Return the ends of a hundred whole stops between two ends, that hold a value."""
+    low, value, high = (min(max(x, -LARGEST), LARGEST) for x in (low, value, high))
+    step = max((high - low) / (STOPS + 1), FINEST * abs(value), 1.0 / LARGEST)
+    first = min(math.ceil(low / step), math.floor(value / step))
+    return first * step, (first + STOPS) * step

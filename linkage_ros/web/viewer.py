@@ -1,0 +1,72 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Node that shows the running scene on a page in the browser, with sliders to change it."""
+
+import sys
+
+from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
+from rclpy.exceptions import ParameterException
+from rclpy.node import Node
+
+from .. import scene
+from ..nodes import scene_node
+
+try:
+    from .server import Server
+except ImportError as error:
+    raise ImportError('viewer needs aiohttp: apt install python3-aiohttp, or pip install '
+                      'aiohttp') from error
+from .bridge import Bridge
+from .stage import Stage
+
+VIEWER = 'viewer'
+PORT = 8020
+
+
+class Viewer(Node):
+    """
+    Serves a page that draws the mechanisms in the graph; listens only while somebody looks.
+
+    Raises
+    ------
+    SceneError
+        If it cannot listen where it is told to.
+
+    """
+
+    def __init__(self, **kwargs):
+        super().__init__(VIEWER, **kwargs)
+        try:
+            self._server = self._served()
+        except (OSError, ParameterException) as error:
+            super().destroy_node()
+            raise scene.SceneError(f'the viewer cannot be started: {error}') from None
+        self.url = self._server.url
+        self.get_logger().info(f'Look at {self.url}')
+
+    def destroy_node(self):
+        """Stop the server, then end."""
+        self._server.stop()
+        super().destroy_node()
+
+    def _served(self):
+        host = self._declared('host', '127.0.0.1', 'Address to listen at; 127.0.0.1: for browsers '
+                              'on this machine alone. Whoever reaches it can move the scene.')
+        port = self._declared('port', PORT, 'Port to listen at; 0: any that is free.',
+                              integer_range=[IntegerRange(from_value=0, to_value=65535, step=1)])
+        bridge = Bridge(self)
+        return Server(Stage(bridge), bridge, host, port)
+
+    def _declared(self, name, default, description, **ranges):
+        return self.declare_parameter(name, default, ParameterDescriptor(
+            description=description, read_only=True, **ranges)).value
+
+
+def main(args=None):
+    """Run the node; return the exit code."""
+    return scene_node.run(Viewer, VIEWER, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
