@@ -1,0 +1,55 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The rooms of the package stand on each other in one order; ls shows which of them need ROS."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / 'linkage_ros'
+# From the ground up: a module imports from its own room and from those below.
+ROOMS = ('words', 'formula', 'linkage', 'mechanisms', 'scene', 'command', 'robot_model', 'render',
+         'nodes', 'web')
+WITH_ROS = ('nodes', 'web')
+ROS = ('rclpy', 'builtin_interfaces', 'geometry_msgs', 'rcl_interfaces', 'sensor_msgs', 'std_msgs',
+       'visualization_msgs', 'linkage_interfaces')
+MODULES = sorted(PACKAGE.rglob('*.py'))
+
+
+def room(module):
+    """Return the room that a module is in, '' for the package itself."""
+    first = module.relative_to(PACKAGE).with_suffix('').parts[0]
+    return '' if first == '__init__' else first
+
+
+def imported(module):
+    """Yield what a module imports when it is imported, as full names."""
+    here = ('linkage_ros', *module.relative_to(PACKAGE).parent.parts)
+    for node in ast.parse(module.read_text()).body:
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = here[:len(here) - node.level + 1] if node.level else ()
+            base += tuple((node.module or '').split('.')) if node.module else ()
+            yield from ('.'.join((*base, alias.name)) for alias in node.names)
+
+
+def test_every_module_has_its_room():
+    assert {room(module) for module in MODULES} == {'', *ROOMS}
+
+
+@pytest.mark.parametrize('module', MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_a_module_imports_nothing_from_above(module):
+    own = room(module)
+    for name in imported(module):
+        top, *below = name.split('.')
+        if top == 'linkage_ros' and own:
+            assert ROOMS.index(below[0]) <= ROOMS.index(own), f'{module.name} imports {name}'
+        assert own in WITH_ROS or top not in ROS, f'{module.name} needs ROS: {name}'
+
+
+@pytest.mark.parametrize('module', MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_a_module_begins_with_what_it_is_for(module):
+    assert ast.get_docstring(ast.parse(module.read_text()))
