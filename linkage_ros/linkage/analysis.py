@@ -17,6 +17,7 @@ import numpy as np
 
 from .curves import refined, sampled
 from .inverse import distinct, in_order, MonotoneBranches, nearest, within_a_turn, wrapped
+from .mechanism import Mechanism
 from .planar import GRAZE
 from ..words import listed, quoted
 
@@ -26,8 +27,8 @@ NEAR = 1e-2
 ONE = 1e-9
 
 
-class Analysis:
-    """Questions about a mechanism's motion, asked of its poses and reach."""
+class Analysed(Mechanism):
+    """A mechanism that also answers questions about its motion."""
 
     def crank_angle(self, output: str, value, near=None, others: Sequence[float] = ()):
         """
@@ -166,8 +167,8 @@ class Analysis:
         Each with how near the closure comes to zero, its rounding and its size.
         """
         return self._remembered('near closures', others, lambda: [
-            found for arc in self.reach(*others) for part in within_a_turn(*arc)
-            for found in self._near_closures_on(*part, others)])
+            found for arc in self.reach(*others) for lo, hi in within_a_turn(*arc)
+            for found in self._near_closures_on(lo, hi, others)])
 
     def _near_closures_on(self, lo, hi, others):
         pose = self._bound('closures', ())

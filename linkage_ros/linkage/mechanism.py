@@ -15,7 +15,6 @@ from typing import Callable, Mapping, Optional, Sequence, Tuple
 import numpy as np
 
 from . import joint_lines
-from .analysis import Analysis
 from .arguments import checked_dimensions
 from .builder import Sketch
 from .crank_range import arcs
@@ -89,16 +88,21 @@ class Structure:
 
     def __init__(self, design: Design, branches: Mapping[str, int]):
         self.sketch = Sketch()
-        joint_lines.draw(self.sketch, design.lines,
-                      joint_lines.symbols_of(design.dimensions, design.signed), branches)
+        joint_lines.draw(self.sketch, design.lines, joint_lines.symbols_of(
+            design.dimensions, design.signed), branches)
         self.branches = dict(branches)
-        self._programs = {}
+        self._programs: dict = {}
+        self._outputs: Mapping[str, Callable] = {
+            'points': self._points, 'velocities': self._velocities, 'angles': self._angles,
+            'rates': self._rates, 'parts': self._parts, 'margins': self._margins,
+            'transmissions': self._transmissions, 'closures': self._closures,
+            'output': self._output}
 
     def program(self, kind: str, names: Tuple[str, ...], *crank: int) -> Program:
         """Return the code for outputs of one kind; what they do not depend on is left out."""
         key = (kind, names, *crank)
         if key not in self._programs:
-            outputs = getattr(self, f'_{kind}')(names, *crank)
+            outputs = self._outputs[kind](names, *crank)
             keep(self._programs, key, Program(outputs, len(self.sketch.cranks)))
         return self._programs[key]
 
@@ -226,7 +230,7 @@ def in_metres(length: Real) -> Real:
     return where(abs(UNIT - 1.0) <= 0.0, length, length * UNIT)
 
 
-class Mechanism(Analysis):
+class Mechanism:
     """
     A linkage whose dimensions are set.
 
@@ -250,8 +254,10 @@ class Mechanism(Analysis):
         self._structure = structure
         self._accelerate = accelerate
         self._lengths = _in_own_unit(self.dimensions, design.has_literal_lengths)
-        self._evaluated = {}
-        self._poses, self._placers, self._found = {}, {}, {}
+        self._evaluated: dict = {}
+        self._poses: dict = {}
+        self._placers: dict = {}
+        self._found: dict = {}
         self.links = tuple(link._replace(zero=np.asarray(self._value(link.zero)).tolist())
                            for link in sketch.links)
 

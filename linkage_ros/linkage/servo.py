@@ -24,7 +24,7 @@ from typing import NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from . import mechanism
+from .analysis import Analysed
 from .builder import GROUND
 from .inverse import in_order
 from .planar import GRAZE
@@ -66,11 +66,11 @@ class Answer(NamedTuple):
     held: Real
 
 
-class Mechanism(mechanism.Mechanism):
+class Mechanism(Analysed):
     """A linkage that is solved from its outputs, its levers by a closed form of their own."""
 
     def crank_angle(self, output, value, near=None, others: Sequence[float] = ()):
-        """Return the crank angles that give an output a value; see `Analysis.crank_angle`."""
+        """Return the crank angles that give an output a value; see `Analysed.crank_angle`."""
         swept = any(np.ndim(length) for length in self.dimensions.values())
         if swept or others or not self._has_lever(output):
             return super().crank_angle(output, value, near, others)
