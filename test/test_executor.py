@@ -103,7 +103,7 @@ def test_where_there_is_no_such_executor_the_plain_one_is_used_and_ends_as_quiet
     done = python("""
         import sys
         sys.modules['rclpy.experimental'] = None
-        from linkage_ros import node
+        from linkage_ros.nodes import scene_node
         from rclpy.executors import SingleThreadedExecutor
         assert scene_node.Executor is SingleThreadedExecutor
         """ + ENDS_ITSELF.format(stop=int(stop)))
@@ -116,7 +116,7 @@ def test_where_there_is_no_such_executor_the_plain_one_is_used_and_ends_as_quiet
 def test_a_signal_amid_a_callback_ends_a_node_quietly(stop, plain):
     done = python(f"""
         import signal, sys
-        from linkage_ros import node
+        from linkage_ros.nodes import scene_node
         from linkage_ros.nodes.crank_driver import CrankDriver
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
@@ -144,7 +144,7 @@ def test_a_signal_amid_a_callback_ends_a_node_quietly(stop, plain):
 @pytest.mark.parametrize('executor', [scene_node.Executor, SingleThreadedExecutor])
 def test_a_programming_error_ends_a_node_loudly(executor):
     done = python(f"""
-        from linkage_ros import node
+        from linkage_ros.nodes import scene_node
         from rclpy import executors, node as rclpy_node
 
         class Wrong(rclpy_node.Node):
