@@ -211,6 +211,11 @@ def test_the_shape_is_that_of_the_values_with_the_answers_last():
     assert isinstance(linkage.crank_angle('QB', 1.0, near=0.0), float)
     assert linkage.crank_angle('QB', [1.0, 1.1], near=0.0).shape == (2,)
     assert linkage.crank_angle('QB', 1.0, near=np.zeros((3, 2))).shape == (3, 2)
+    for output in ('QB', 'B.x'):
+        assert linkage.crank_angle(output, []).shape[0] == 0
+        assert linkage.crank_angle(output, np.zeros((0, 2)), near=0.0).shape == (0, 2)
+        assert linkage.servo_for(output, [])[0].shape == (0,)
+    assert mechanisms.create('slotted_lever').crank_angle('lever', []).shape[0] == 0
     assert linkage.crank_angle('QB', np.ones((3, 1)), near=np.zeros(2)).shape == (3, 2)
 
 

@@ -172,7 +172,9 @@ def test_announcements_that_make_no_sense_are_passed_over(graph, warned):
     nonsense = [Parameter(A, value='long'), Parameter('lever.scale', value=-1.0),
                 Parameter('lever.dimensions.b', value=float('nan')), Parameter('', value=1.0),
                 Parameter('x' * 10 ** 5, value=1.0), Parameter('lever.type', value=3)]
-    for values in ([], nonsense[:3], nonsense, [*good, *nonsense[1:5]]):
+    unlisted = [[Parameter('mechanisms', value=value), *nonsense]
+                for value in (5, 0.5, True, 'lever', [1.0], [b'l'])]
+    for values in ([], *unlisted, nonsense[:3], nonsense, [*good, *nonsense[1:5]]):
         messages = [value.to_parameter_msg() for value in values]
         messages.append(ParameterMessage(name=A if values == [] else 'b',
                                          value=ParameterValue(type=200)))

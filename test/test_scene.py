@@ -133,6 +133,8 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'jansen.crank.start': math.nan}, 'jansen.crank.start must be'),
     ({'jansen.crank.sweep': [1.0]}, 'jansen.crank.sweep must be .* lower end and the higher end'),
     ({'jansen.crank.sweep': [1.0, 1.0]}, 'jansen.crank.sweep must be'),
+    ({'jansen.crank.sweep': [1e16, 1e16 + 8.0]}, r'jansen.crank.sweep must be .* within 1e\+06'),
+    ({'jansen.crank.sweep': [-1e300, 1e300]}, r'jansen.crank.sweep must be .* within 1e\+06'),
     ({'jansen.crank.sweep': [1.0, 2.0], 'jansen.crank.start': 0.5},
      r'jansen.crank.start must be inside the sweep \[1, 2\]'),
     ({'peaucellier.crank.sweep': [-1.2, 1.0]},

@@ -16,7 +16,7 @@ pytest.importorskip('linkage_interfaces')
 
 from linkage_interfaces.srv import ServoInverse as Service  # noqa: E402
 from linkage_ros import mechanisms, scene  # noqa: E402
-from linkage_ros.nodes.servo_inverse import FARTHEST, ServoInverse  # noqa: E402
+from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 
@@ -198,6 +198,20 @@ def test_a_sweep_may_lie_anywhere_and_be_more_than_a_turn(graph, sweep, servo):
         assert lever_of(answer.servo_angle[0]) == pytest.approx(0.3)
 
 
+@pytest.mark.parametrize('bad', [
+    {'slotted_lever.crank.sweep': [1e16, 1e16 + 8.0]}, {'slotted_lever.scale': 1e308},
+    {'slotted_lever.scale': 1e-308}])
+def test_what_would_cost_an_answer_its_digits_is_refused(graph, bad):
+    node = graph.start(ServoInverse, SWEPT)
+    before = ask(node, [0.2])
+    assert before.success
+    refused = graph.set(node, **bad)
+    assert not refused.successful and next(iter(bad)) in refused.reason
+    assert ask(node, [0.2]) == before
+    with pytest.raises(scene.SceneError):
+        graph.start(ServoInverse, {**SWEPT, **bad})
+
+
 def test_a_sweep_changes_while_the_node_runs(graph):
     node = graph.start(ServoInverse, {'mechanisms': ['slotted_lever']})
     assert ask(node, [0.5]).success
@@ -239,7 +253,7 @@ def test_the_answer_nearest_to_the_present_crank_is_taken_where_it_is_known(grap
 
 @pytest.mark.parametrize('request_, message', [
     ({'servo_near': [1e308]}, 'servo_near must be finite and within 1e+06 rad of zero'),
-    ({'servo_near': [-1.1 * FARTHEST]}, 'servo_near must be finite and within'),
+    ({'servo_near': [-1.1 * scene.FARTHEST]}, 'servo_near must be finite and within'),
     ({'mechanism': 'x' * 10 ** 6}, "there is no mechanism 'xxx"),
     ({'output': 'y' * 10 ** 6, 'mechanism': 'jansen'}, 'jansen has no output'),
     ({'output': '.x', 'mechanism': 'jansen'}, "jansen has no output '.x'"),

@@ -70,7 +70,8 @@ class Analysed(Mechanism):
         """
         value = np.asarray(value, float)
         solver = self._inverse(output, tuple(map(float, others)))
-        answers = in_order(solver(value.ravel())).reshape(*value.shape, -1)
+        answers = in_order(solver(value.ravel()))
+        answers = answers.reshape(*value.shape, answers.shape[-1])
         return answers if near is None else nearest(answers, near)
 
     def transmission_angles(self, theta, joints: Optional[Sequence[str]] = None) -> dict:

@@ -77,7 +77,8 @@ class Mechanism(Analysed):
         if near is not None:
             return self.servo_for(output, np.asarray(value, float), near)[0][()]
         theta, _ = self.servos(output, value)
-        return in_order(theta.reshape(-1, 2).T).reshape(*theta.shape[:-1], -1)
+        answers = in_order(theta.reshape(-1, 2).T)
+        return answers.reshape(*theta.shape[:-1], answers.shape[-1])
 
     def servos(self, output: str, value) -> Tuple[np.ndarray, np.ndarray]:
         """

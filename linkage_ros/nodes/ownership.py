@@ -61,12 +61,11 @@ class Follower:
         return self._owner if there else None
 
     def _hear(self, event):
-        values = dict(filter(None, map(_value, event.changed_parameters)))
+        fields, machines = self._node.fields, self._node.scene.machines
+        values, wrong = _read(event.changed_parameters, fields)
         started = event.node != self._owner or event.new_parameters
         self._owner = event.node
-        fields, machines = self._node.fields, self._node.scene.machines
-        here = {name: scene.plain(self._node.get_parameter_or(name).value)
-                for name in values if name in fields}
+        here = {name: scene.plain(self._node.get_parameter_or(name).value) for name in values}
         fixed = {name for name in here if fields[name].read_only and name != 'mechanisms'}
         unlike = {name.partition('.')[0]: name for name in fixed if here[name] != values[name]}
         missing = set(machines) ^ set(values.get('mechanisms') or ())
@@ -85,11 +84,11 @@ class Follower:
                 'other values, which are followed')
         changes = [Change([Parameter(name, value=values[name])], followed=True)
                    for name in followed]
-        self._ask(Asked(changes, lambda: self._complain(changes), []))
+        self._ask(Asked(changes, lambda: self._complain(changes, wrong), []))
 
-    def _complain(self, changes):
-        self._say('refused', [change.result.reason for change in changes
-                              if not change.result.successful],
+    def _complain(self, changes, wrong):
+        self._say('refused', wrong + [change.result.reason for change in changes
+                                      if not change.result.successful],
                   'values that cannot be followed')
 
     def _say(self, kind, particulars, what):
@@ -105,8 +104,16 @@ def _messages(parameters):
             for p in parameters if p.field.shared]
 
 
-def _value(message):
-    try:
-        return message.name, scene.plain(parameter_value_to_python(message.value))
-    except RuntimeError:
-        return None
+def _read(messages, fields):
+    """Return the values of the fields that there are, and what is wrong with the others."""
+    values, wrong = {}, []
+    for message in messages:
+        name = message.name
+        if name in fields:
+            try:
+                values[name] = fields[name].checked(name, parameter_value_to_python(message.value))
+            except scene.SceneError as error:
+                wrong.append(str(error))
+            except RuntimeError:
+                wrong.append(f'{name} has a type that there is not')
+    return values, wrong

@@ -16,6 +16,7 @@ from . import joint_state_reader, scene_node
 from .message_layout import Unreadable
 from .. import scene
 from ..linkage.servo import CLOSE, TURN
+from ..robot_model import urdf
 from ..words import elided, listed, MESSAGE, quoted
 
 try:
@@ -27,8 +28,6 @@ except ImportError as error:
         'install/setup.bash') from error
 
 LEVER = 'lever'
-# An angle beyond this [rad] has lost digits that a servo needs.
-FARTHEST = 1e6
 # More values than this at once would keep other callers waiting.
 MOST_VALUES = 1_000_000
 # Values named, and letters of names allowed, in a message.
@@ -52,6 +51,12 @@ class ServoInverse(scene_node.SceneNode):
     def serves(self):
         """Say of which mechanisms it answers."""
         return f'answers servo_inverse for {listed(self.scene.machines, 200)}'
+
+    def prepare(self, new):
+        """Refuse lengths that `kinematics` could not publish; SceneError says which."""
+        for machine in new.machines.values():
+            urdf.size(machine)
+        return new
 
     def adopt(self, new):
         """Forget what was asked about."""
@@ -107,11 +112,11 @@ def solve(asked, request, response, present=math.inf):
     if near and len(near) != len(wanted):
         raise ValueError(f'servo_near must be empty or have one angle for each of the '
                          f'{len(wanted)} in lever_angle, not {len(near)}')
-    if not all(-FARTHEST <= theta <= FARTHEST for theta in near):
-        raise ValueError(f'servo_near must be finite and within {FARTHEST:g} rad of zero')
+    if not all(-scene.FARTHEST <= theta <= scene.FARTHEST for theta in near):
+        raise ValueError(f'servo_near must be finite and within {scene.FARTHEST:g} rad of zero')
     # One angle is the usual question, and floats answer it sooner than arrays.
     given = np.array if len(wanted) > 1 else itemgetter(0)
-    known = present if abs(present) <= FARTHEST else None
+    known = present if abs(present) <= scene.FARTHEST else None
     found = asked.servo(given(wanted), given(near) if near else known)
     response.servo_angle, response.reduction = map(_listed, found)
     response.reachable = list(map(math.isfinite, response.servo_angle))

@@ -35,6 +35,8 @@ OWNER = KINEMATICS
 # What a crank that swings by default leaves of its reach at each end, as a part of its width.
 MARGIN = 0.01
 NARROWEST_SWEEP = 1e-6
+# Angles beyond this [rad] have lost digits that a crank needs.
+FARTHEST = 1e6
 FULL_TURN = ((-math.pi, math.pi),)
 
 # What the client library declares for itself.
@@ -73,7 +75,7 @@ START = Field('double', 'Crank angle at the start [rad]; a new one moves the cra
               -4.0 * math.pi, 4.0 * math.pi, readers=(DRIVER,))
 SWEEP = Field('double_array', 'Crank angles [rad] between which the crank swings; '
               'empty: it turns all round, or swings through its reach.', readers=ALL,
-              rule='the lower end and the higher end, or none')
+              rule=f'the lower end and the higher end, within {FARTHEST:g} of zero, or none')
 
 
 @dataclass(frozen=True)
@@ -360,7 +362,8 @@ def _crank(name, reach, values, old, strict) -> Crank:
 
 
 def _check_sweep(name, sweep, reach):
-    if len(sweep) != 2 or not sweep[0] + NARROWEST_SWEEP <= sweep[1]:
+    if (len(sweep) != 2 or not sweep[0] + NARROWEST_SWEEP <= sweep[1]
+            or max(map(abs, sweep)) > FARTHEST):
         raise SWEEP.error(name, sweep)
     if not is_full_turn(reach) and not any(_inside(*sweep, arc) for arc in reach):
         raise SceneError(f'{name} must be inside the reach {in_words(reach)} rad, '
