@@ -174,12 +174,13 @@ def test_announcements_that_make_no_sense_are_passed_over(graph, warned):
                 Parameter('x' * 10 ** 5, value=1.0), Parameter('lever.type', value=3)]
     unlisted = [[Parameter('mechanisms', value=value), *nonsense]
                 for value in (5, 0.5, True, 'lever', [1.0], [b'l'])]
-    for values in ([], *unlisted, nonsense[:3], nonsense, [*good, *nonsense[1:5]]):
+    for number, values in enumerate(
+            ([], *unlisted, nonsense[:3], nonsense, [*good, *nonsense[1:5]])):
         messages = [value.to_parameter_msg() for value in values]
         messages.append(ParameterMessage(name=A if values == [] else 'b',
                                          value=ParameterValue(type=200)))
-        publisher.publish(ParameterEvent(node='/odd', changed_parameters=messages))
-        graph.until(lambda: service._follower._owner == '/odd')
+        publisher.publish(ParameterEvent(node=f'/odd{number}', changed_parameters=messages))
+        graph.until(lambda: service._follower._owner == f'/odd{number}')
     graph.until(lambda: of(service) == 90.0)
     graph.until(lambda: any('lever.scale must be' in text for text in warned))
     assert of(service, 'lever.scale') == 1.0
