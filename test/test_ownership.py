@@ -180,7 +180,7 @@ def test_announcements_that_make_no_sense_are_passed_over(graph, warned):
         messages.append(ParameterMessage(name=A if values == [] else 'b',
                                          value=ParameterValue(type=200)))
         publisher.publish(ParameterEvent(node=f'/odd{number}', changed_parameters=messages))
-        graph.until(lambda: service._follower._owner == f'/odd{number}')
+        graph.until(lambda name=f'/odd{number}': service._follower._owner == name)
     graph.until(lambda: of(service) == 90.0)
     graph.until(lambda: any('lever.scale must be' in text for text in warned))
     assert of(service, 'lever.scale') == 1.0

@@ -324,7 +324,10 @@ def _run(node_class, name, args, executor_class, goodbye):
     except (RuntimeError, scene.SceneError) as error:
         # What the client library makes of an argument may be as long as that.
         rclpy.try_shutdown()
-        return _failed(name, elided(f'bad arguments: {error}', 299))
+        unknown = isinstance(error, rclpy_implementation.UnknownROSArgsError)
+        what = 'nothing after --ros-args is called ' if unknown else ''
+        hint = '; allowed: -p, -r, --params-file, --log-level, ...' if unknown else ''
+        return _failed(name, elided(f'bad arguments: {what}{error}', 240) + hint)
     node = None
     try:
         node = goodbye.node = node_class()
