@@ -18,7 +18,8 @@ import numpy as np
 
 from . import Machine, Scene
 from .parameters import Parameter
-from ..linkage.crank_range import is_full_turn
+from ..linkage.crank_range import Arc, is_full_turn
+from ..linkage.mechanism import Mechanism
 
 STOPS = 100
 # How far from its value a length may be moved, in parts of it or, from 0, of the longest bar.
@@ -33,7 +34,7 @@ ANGLES, FEW_ANGLES = 91, 13
 def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
     """Return the least and greatest value for the slider of a number; None: it has none."""
     field, value = parameter.field, parameter.value
-    if field.high is not None:
+    if field.low is not None and field.high is not None:
         return field.low, field.high
     if field.kind != 'double':
         return None
@@ -52,7 +53,7 @@ def _used(machine: Machine) -> Optional[Tuple[float, float]]:
 
 
 @lru_cache(maxsize=16)
-def _length(linkage, key, positive, used):
+def _length(linkage: Mechanism, key: str, positive: bool, used: Optional[Arc]) -> Arc:
     """Return how far a length may be moved with the linkage still assembled."""
     value = float(linkage.dimensions[key])
     size = abs(value) or float(linkage.longest)
@@ -61,7 +62,8 @@ def _length(linkage, key, positive, used):
     return _whole_stops(value, low, high)
 
 
-def _farthest(linkage, key, value, size, used, positive):
+def _farthest(linkage: Mechanism, key: str, value: float, size: float, used: Optional[Arc],
+              positive: bool) -> float:
     """Return the last value on one side up to which all that are tried can be assembled."""
     most = 0.9 * abs(size) if positive and size < 0.0 else MOST * abs(size)
     steps = np.geomspace(LEAST * abs(size), most, TRIED) * math.copysign(1.0, size)
@@ -77,7 +79,8 @@ def _farthest(linkage, key, value, size, used, positive):
     return float(value + good)
 
 
-def _assembled(linkage, key, values, used):
+def _assembled(linkage: Mechanism, key: str, values: np.ndarray,
+               used: Optional[Arc]) -> np.ndarray:
     """Return for each value of a dimension whether the linkage can be assembled."""
     try:
         tried = linkage.with_dimensions(**{key: values[:, None]})
@@ -87,13 +90,13 @@ def _assembled(linkage, key, values, used):
         return np.concatenate([_assembled(linkage, key, values[i:i + 1], used)
                                for i in range(len(values))])
     cranks = len(linkage.cranks)
-    arc = used or (-math.pi, math.pi)
-    theta = np.linspace(*arc, ANGLES) if cranks == 1 else [
-        angles.ravel() for angles in np.meshgrid(*[np.linspace(*arc, FEW_ANGLES)] * cranks)]
+    low, high = used or (-math.pi, math.pi)
+    theta = np.linspace(low, high, ANGLES) if cranks == 1 else [
+        angles.ravel() for angles in np.meshgrid(*[np.linspace(low, high, FEW_ANGLES)] * cranks)]
     placed = np.ones((len(values), 1), dtype=bool)
     for places in tried.solve(theta).values():
         placed = placed & np.isfinite(places).all(axis=-1)
-    return placed.all(axis=1) if used else placed.any(axis=1)
+    return np.all(placed, axis=1) if used else np.any(placed, axis=1)
 
 
 def _whole_stops(value: float, low: float, high: float) -> Tuple[float, float]:
