@@ -189,6 +189,21 @@ def test_what_is_asked_again_and_again_does_not_pile_up():
     assert after - before < 500_000
 
 
+@pytest.mark.parametrize('bad', [10 ** 400, object(), 1j, 'a', [[1.0], [1.0, 2.0]], {'a': 1.0}],
+                         ids=['huge', 'object', 'complex', 'text', 'ragged', 'mapping'])
+def test_what_is_no_number_is_refused_by_its_name(bad):
+    for kind in ('jansen', 'five_bar'):
+        found = mechanisms.create(kind)
+        for ask in (found.solve, found.velocity, found.joint_angles, found.joint_rates,
+                    found.transmission_angles):
+            with pytest.raises(ValueError, match='theta must be a number or an array of numbers'):
+                ask([bad] * len(found.cranks) if len(found.cranks) > 1 else bad)
+    for kind, output in (('jansen', 'G.x'), ('slotted_lever', 'lever')):
+        found = mechanisms.create(kind)
+        with pytest.raises(ValueError, match='value must be a number'):
+            found.crank_angle(output, bad)
+
+
 @pytest.mark.parametrize('kind', list(mechanisms.TYPES))
 def test_no_angles_give_no_places(kind):
     found = mechanisms.create(kind)

@@ -15,6 +15,7 @@ from typing import Callable, Optional, Sequence, Tuple
 
 import numpy as np
 
+from .arguments import numbers
 from .curves import refined, sampled
 from .inverse import distinct, in_order, MonotoneBranches, nearest, within_a_turn, wrapped
 from .mechanism import Mechanism
@@ -68,11 +69,11 @@ class Analysed(Mechanism):
         answers are those of the turn [-pi, pi), and `near` should lie there.
 
         """
-        value = np.asarray(value, float)
+        value = numbers('value', value)
         solver = self._inverse(output, tuple(map(float, others)))
         answers = in_order(solver(value.ravel()))
         answers = answers.reshape(*value.shape, answers.shape[-1])
-        return answers if near is None else nearest(answers, near)
+        return answers if near is None else nearest(answers, numbers('near', near))
 
     def transmission_angles(self, theta, joints: Optional[Sequence[str]] = None) -> dict:
         """

@@ -49,6 +49,15 @@ def _checked(design, name, value):
     return length if length.ndim else float(length)
 
 
+def numbers(name: str, value: Any) -> np.ndarray:
+    """Return a number or an array of them as float64; raise ValueError, by its name, if not."""
+    try:
+        return np.asarray(value, float)
+    except (TypeError, ValueError, OverflowError, RecursionError):
+        raise ValueError(f'{name} must be a number or an array of numbers, '
+                         f'got {quoted(value)}') from None
+
+
 def _numbers(value) -> np.ndarray:
     """Return numbers as an array; raise for what only could be converted to some."""
     given = np.asarray(value)

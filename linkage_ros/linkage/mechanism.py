@@ -15,7 +15,7 @@ from typing import Callable, Mapping, Optional, Sequence, Tuple
 import numpy as np
 
 from . import joint_lines
-from .arguments import checked_dimensions
+from .arguments import checked_dimensions, numbers
 from .builder import Sketch
 from .crank_range import arcs
 from ..formula.expression import angle, derivative, dimension, gated, Real, real, spin, where
@@ -494,11 +494,11 @@ class Mechanism:
 
     def _each_crank(self, theta):
         if len(self.cranks) == 1:
-            return (theta,)
+            return (numbers('theta', theta),)
         if not hasattr(theta, '__len__') or len(theta) != len(self.cranks):
             raise ValueError(f'{self.type} has {len(self.cranks)} cranks: '
                              'theta must be a sequence of as many angles')
-        return theta
+        return [numbers('theta', each) for each in theta]
 
     def _ready(self, kind: str, wanted, *crank: int) -> Tuple[Tuple[str, ...], Pose]:
         """Return the names that are wanted and the function that computes them."""

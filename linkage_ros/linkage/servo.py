@@ -25,6 +25,7 @@ from typing import NamedTuple, Optional, Sequence, Tuple
 import numpy as np
 
 from .analysis import Analysed
+from .arguments import numbers
 from .builder import GROUND
 from .inverse import in_order
 from .planar import GRAZE
@@ -75,7 +76,7 @@ class Mechanism(Analysed):
         if swept or others or not self._has_lever(output):
             return super().crank_angle(output, value, near, others)
         if near is not None:
-            return self.servo_for(output, np.asarray(value, float), near)[0][()]
+            return self.servo_for(output, numbers('value', value), near)[0][()]
         theta, _ = self.servos(output, value)
         answers = in_order(theta.reshape(-1, 2).T)
         return answers.reshape(*theta.shape[:-1], answers.shape[-1])

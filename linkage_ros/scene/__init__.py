@@ -52,7 +52,7 @@ MECHANISMS = Field(
          'a letter first', pattern=_NAME)
 FRAME_ID = Field('string', 'Frame that the poses are in.', readers=(KINEMATICS,),
                  rule='1 to 100 letters, digits and _ . : - /, the first a letter, digit or _',
-                 pattern=re.compile(r'\w[\w.:/-]{0,99}'))
+                 pattern=re.compile(r'\w[\w.:/-]{0,99}', re.ASCII))
 RATE = Field('double', 'Crank messages in a second [Hz]; 0: none.', 0.0, 1000.0, readers=(DRIVER,))
 TYPE = Field('string', 'Type of the mechanism.', readers=ALL, read_only=True,
              rule=f'one of {", ".join(TYPES)}')
