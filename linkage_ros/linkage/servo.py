@@ -77,7 +77,7 @@ class Mechanism(Analysed):
             return super().crank_angle(output, value, near, others)
         if near is not None:
             return self.servo_for(output, numbers('value', value), near)[0][()]
-        theta, _ = self.servos(output, value)
+        theta, _ = self.servos(output, numbers('value', value))
         answers = in_order(theta.reshape(-1, 2).T)
         return answers.reshape(*theta.shape[:-1], answers.shape[-1])
 
