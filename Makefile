@@ -77,8 +77,9 @@ long: build $(venv)/.tools ## Run the long tests
 	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 -m long
 
 .PHONY: lint
-lint: .venv-lint/.installed ## Check the style
+lint: .venv-lint/.installed ## Check style and types
 	@$(lint_bin)/ruff check .
+	@$(lint_bin)/mypy
 	@$(lint_bin)/python -c 'import sys; from xml.dom.minidom import parse; [parse(f) for f in sys.argv[1:]]' \
 	  package.xml linkage_interfaces/package.xml
 
@@ -88,7 +89,7 @@ build: $(install)/.built ## Build both packages
 .PHONY: clean
 clean: ## Remove everything that was made
 	rm -rf .venv .venv-* build build-* install install-* log log-* demo/out pictures/out \
-	  docs/_build docs/mechanisms benchmark/.cache .hypothesis .pytest_cache .ruff_cache *.egg-info
+	  docs/_build docs/mechanisms benchmark/.cache .hypothesis .mypy_cache .pytest_cache .ruff_cache *.egg-info
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
 $(install)/.built: $(venv)/.installed $(sources)
@@ -121,5 +122,5 @@ $(venv)/.tools: $(venv)/.installed $(tools)
 	@touch $@
 
 .venv-lint/.installed: wheels/lint.txt
-	@about='the linter.' wheels/install.sh '$(PYTHON)' .venv-lint $<
+	@about='what checks style and types.' wheels/install.sh '$(PYTHON)' .venv-lint $<
 	@touch $@

@@ -41,7 +41,7 @@ def run(name, work, args, needs) -> int:
         work(args)
         return 0
     except (RequestError, SceneError) as error:
-        why = error
+        why: object = error
     except ImportError as error:
         why = f'{(error.name or "").split(".")[0]} is not installed: {needs}'
     except OSError as error:

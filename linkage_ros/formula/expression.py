@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from functools import reduce
 from math import cos, sin
-from typing import Callable, Iterable, Iterator, NamedTuple, Tuple, Union
+from typing import Callable, Iterable, Iterator, Mapping, NamedTuple, Optional, Tuple, Union
 
 
 class Real:
@@ -132,7 +132,7 @@ Number = Union[Real, float, int]
 
 _LEAVES = frozenset({'constant', 'dimension', 'angle'})
 
-_FOLDED = {
+_FOLDED: Mapping[str, Callable] = {
     'add': lambda x, y: x + y,
     'subtract': lambda x, y: x - y,
     'multiply': lambda x, y: x * y,
@@ -199,7 +199,7 @@ def root(x: Real, tolerance: Real) -> Real:
     return _node('root', x, real(tolerance))
 
 
-def gated(x: Real, margin: Real, tolerance: Real) -> Real:
+def gated(x: Real, margin: Real, tolerance: Number) -> Real:
     """Return x where the margin is not below zero by more than the tolerance, else NaN."""
     return _node('gated', x, margin, real(tolerance))
 
@@ -254,7 +254,7 @@ class Complex:
     def __init__(self, x: Number, y: Number):
         self.x = real(x)
         self.y = real(y)
-        self.spin = None
+        self.spin: Optional[Rate] = None
 
     def __add__(self, other: Complex) -> Complex:
         return Complex(self.x + other.x, self.y + other.y)
@@ -405,7 +405,7 @@ def _product_rule(node, _, dx, dy):
     return 2.0 * (dx * x) if x is y else dx * y + x * dy
 
 
-_RULES = {
+_RULES: Mapping[str, Callable] = {
     'angle': lambda n, rates: real(rates.get(n.args[0], 0.0)),
     'sin': lambda n, _, dx: cosine(n.args[0]) * dx,
     'cos': lambda n, _, dx: -(sine(n.args[0]) * dx),

@@ -19,7 +19,7 @@ from itertools import chain
 import math
 from struct import Struct
 from threading import Thread
-from typing import Callable, Mapping, Optional, Sequence
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Set, Tuple
 import warnings
 
 import numpy as np
@@ -62,7 +62,7 @@ def _gated(x, margin, tolerance):
     return np.where(margin >= -tolerance, x, np.nan)
 
 
-def _all_at_least(x, bound) -> bool:
+def _all_at_least(x, bound) -> np.bool_:
     """Return whether nothing is below a bound, or no number; for one bound in one quick pass."""
     if isinstance(bound, float) and np.size(x):
         return np.minimum.reduce(x, axis=None) >= bound
@@ -91,7 +91,7 @@ class _Dialect:
 
     templates: Mapping[str, str]
     repeating: frozenset
-    names: Mapping[str, Callable]
+    names: Mapping[str, Any]
     frees: bool
 
 
@@ -112,7 +112,7 @@ _ARRAY = _Dialect(
      'root': _root, 'gated': _gated, 'rint': np.rint, 'nan': np.nan,
      'inf': np.inf}, frees=True)
 
-_EVALUATED = {
+_EVALUATED: Mapping[str, Callable] = {
     'add': np.add, 'subtract': np.subtract, 'multiply': np.multiply, 'divide': np.divide,
     'negative': np.negative, 'absolute': np.absolute, 'less': np.less,
     'less_equal': np.less_equal, 'sin': np.sin, 'cos': np.cos, 'sqrt': np.sqrt,
@@ -139,9 +139,9 @@ class _Listing:
 
     def __init__(self, outputs: Sequence[Real], decided: Mapping[Real, bool],
                  replaced: Mapping[Real, Real]):
-        self.entries = []
+        self.entries: List[Tuple[Real, tuple]] = []
         self._decided = decided
-        self._numbers = {}
+        self._numbers: Dict[tuple, int] = {}
         self._known = {}
         for leaf, expression in replaced.items():
             self._known[leaf] = self._number(expression)
@@ -209,7 +209,8 @@ class _Listing:
 
     def statements(self, dialect: _Dialect) -> tuple:
         """Return the assignments as (name, code, names used) and the code of each output."""
-        text, depth, reads, lines = {}, {}, {}, []
+        text, depth, lines = {}, {}, []
+        reads: Dict[int, Set[str]] = {}
         repeated = {args[0] for node, args in map(self.entries.__getitem__, self._uses)
                     if node.op in dialect.repeating}
         for number, uses in self._uses.items():
@@ -270,7 +271,8 @@ def _python(listing: _Listing, dialect: _Dialect, angles: int, names=()) -> Call
         '        except (ArithmeticError, ValueError):',
         f'            return instead({given})',
         '    return pose'])
-    scope = {**dialect.names, 'empty': np.empty, 'pack': Struct(f'{len(outputs)}d').pack_into}
+    scope: Dict[str, Any] = {
+        **dialect.names, 'empty': np.empty, 'pack': Struct(f'{len(outputs)}d').pack_into}
     exec(compile(source, '<linkage>', 'exec'), scope)
     return scope['bind']
 
@@ -301,7 +303,7 @@ class _Variant:
     @cached_property
     def loop(self) -> Future:
         """The code for many poses as machine code, which is made beside what goes on."""
-        made = Future()
+        made: Future = Future()
         Thread(target=self._compile, args=(made,), name='linkage_ros compiler').start()
         return made
 
@@ -335,7 +337,7 @@ class Program:
         self._angles = angles
         self._replaced = replaced or {}
         self._conditions = _conditions(self._outputs)
-        self._variants = {}
+        self._variants: Dict[tuple, _Variant] = {}
 
     def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False) -> Pose:
         """Return the outputs as functions of the angles; dimensions are floats or arrays."""
@@ -409,13 +411,13 @@ class Pose:
 
     def over(self, *angles) -> np.ndarray:
         """Return the outputs over arrays that are broadcast together, shape (outputs, *shape)."""
-        angles = [np.asarray(a, float) for a in angles]
+        arrays: Sequence[np.ndarray] = [np.asarray(a, float) for a in angles]
         if self.shape:
-            return self._swept(angles)
-        if len(angles) > 1:
-            angles = np.broadcast_arrays(*angles)
-        shape, size = angles[0].shape, angles[0].size
-        flat = [a.ravel() for a in angles]
+            return self._swept(arrays)
+        if len(arrays) > 1:
+            arrays = np.broadcast_arrays(*arrays)
+        shape, size = arrays[0].shape, arrays[0].size
+        flat = [a.ravel() for a in arrays]
         if self._accelerate:
             out = np.empty((self._variant.outputs, size))
             loop, given = self._variant.loop.result(), np.array(flat)

@@ -12,12 +12,15 @@ from __future__ import annotations
 import math
 import operator
 import re
-from typing import Any, Callable, List, Mapping, Union
+from typing import Any, Callable, Dict, List, Mapping, Union
 
 import numpy as np
 
 from ..formula.expression import Real, real, square_root, where
 from ..words import quoted
+
+# A number, or the name of a dimension or an operation.
+Step = Union[float, str]
 
 SMALLEST, LARGEST = 1e-70, 1e70
 IN_RANGE = '0 or between 1e-70 and 1e70'
@@ -25,15 +28,17 @@ IN_RANGE = '0 or between 1e-70 and 1e70'
 _TOKEN = re.compile(r'(?P<number>(?:0|[1-9][0-9]*|(?=\.[0-9]))(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?)'
                     r'|(?P<opened>(?:max|sqrt)?\()|(?P<name>[A-Za-z][A-Za-z0-9_]*)'
                     r'|(?P<sign>[-+*/,)])')
-_TAKES = {'+': 2, '-': 2, '*': 2, '/': 2, 'max': 2, 'sqrt': 1, 'deg': 1, 'negative ': 1}
+_TAKES: Mapping[Step, int] = {
+    '+': 2, '-': 2, '*': 2, '/': 2, 'max': 2, 'sqrt': 1, 'deg': 1, 'negative ': 1}
 _BINDS = {'+': 1, '-': 1, '*': 2, '/': 2, 'negative ': 3}
 WORDS = 'pi', 'deg', 'max', 'sqrt'
 
-_EXPRESSIONS = {
+_EXPRESSIONS: Mapping[Step, Callable] = {
     '+': operator.add, '-': operator.sub, '*': operator.mul, '/': operator.truediv,
     'negative ': operator.neg, 'max': lambda x, y: where(x < y, y, x), 'sqrt': square_root,
     'deg': lambda x: x * (math.pi / 180.0)}
-_VALUES = {**_EXPRESSIONS, '/': np.divide, 'max': np.maximum, 'sqrt': np.sqrt}
+_VALUES: Mapping[Step, Callable] = {
+    **_EXPRESSIONS, '/': np.divide, 'max': np.maximum, 'sqrt': np.sqrt}
 
 
 def _alike(x, y):
@@ -41,7 +46,7 @@ def _alike(x, y):
 
 
 # The power of a length that a result is; None for zero, which is any, NaN for none.
-_DEGREES = {
+_DEGREES: Mapping[Step, Callable] = {
     '+': _alike, '-': _alike, 'max': _alike, 'negative ': lambda x: x, 'deg': lambda x: x,
     '*': lambda x, y: None if x is None or y is None else x + y,
     '/': lambda x, y: x if x is None else math.nan if y is None else x - y,
@@ -66,8 +71,8 @@ class Formula:
 
     def __init__(self, text: str):
         self.text = text
-        self._steps: List[Union[float, str]] = []
-        self.words = {}
+        self._steps: List[Step] = []
+        self.words: Dict[str, bool] = {}
         self._parse()
         self.names = tuple(word for word in self.words if word not in WORDS)
 
@@ -89,8 +94,8 @@ class Formula:
                 lambda leaf: np.float64(leaf) if isinstance(leaf, float) else dimensions[leaf],
                 _VALUES)
 
-    def _worked_out(self, leaf: Callable, operations: Mapping[str, Callable]):
-        stack = []
+    def _worked_out(self, leaf: Callable, operations: Mapping[Step, Callable]):
+        stack: List[Any] = []
         for step in self._steps:
             taken = _TAKES.get(step, 0)
             operands = stack[len(stack) - taken:]
@@ -100,7 +105,8 @@ class Formula:
 
     def _parse(self):
         """Fill the steps; operators and parentheses wait until what they bind is complete."""
-        waiting, begins = [], True
+        waiting: List[str] = []
+        begins = True
         for kind, word in self._tokens():
             begins = (self._operand if begins else self._operator)(kind, word, waiting)
         if begins:

@@ -147,8 +147,8 @@ class Sketch:
                                        * self.distance(second, point)))
         ends = [(self.points[end].place, self._side(end, point).vector)
                 for end in (second, first)]
-        place, *bars = planar.mirror(arm, self.points[point].place, ends)
-        self._pair(name, first, second, planar.Dyad(*reversed(bars), ()),
+        place, from_second, from_first = planar.mirror(arm, self.points[point].place, ends)
+        self._pair(name, first, second, planar.Dyad(from_first, from_second, ()),
                    self.distance(first, point), self.distance(second, point), point)
         self.points[name].place = place
         if isinstance(arm, planar.CrankArm) and pin and pin.centre is self.points[point].place:
@@ -160,9 +160,10 @@ class Sketch:
         self.folds.append(planar.Limit(cross(to_first.vector, to_second.vector),
                                        planar.GRAZE * to_first.length * to_second.length))
         place = self.points[first].place + to_second.vector
-        bars = [planar.parallel(side.vector, place) for side in (to_second, to_first)]
-        self._pair(name, first, second, planar.Dyad(*bars, ()), to_second.length,
-                   to_first.length, corner)
+        from_first, from_second = (planar.parallel(side.vector, place)
+                                   for side in (to_second, to_first))
+        self._pair(name, first, second, planar.Dyad(from_first, from_second, ()),
+                   to_second.length, to_first.length, corner)
 
     def inversor(self, names: Tuple[str, str, str], pole: str, pin: str, long: Real, short: Real):
         """Add a Peaucellier cell: the joint right of pole -> pin, the corner, the left joint."""
@@ -267,8 +268,9 @@ class Sketch:
         ends = [self.points[end] for end in (first, second)]
         shared = ends[0].stands_on & ends[1].stands_on
         for name in self.points:
-            bars = [self._vectors.get((name, end)) for end in (first, second)]
-            if name in shared and all(bars):
+            bars = [self._vectors[name, end] for end in (first, second)
+                    if (name, end) in self._vectors]
+            if name in shared and len(bars) == 2:
                 return bars[1].vector - bars[0].vector
         return ends[1].place - ends[0].place
 

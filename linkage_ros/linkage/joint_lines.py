@@ -37,7 +37,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 import re
-from typing import Iterable, List, Mapping, NamedTuple, Tuple
+from typing import Dict, Iterable, List, Mapping, NamedTuple, Tuple
 
 import numpy as np
 
@@ -159,7 +159,7 @@ def _parsed(text: str) -> Line:
 
 def _check_order(lines: List[Line]):
     """Raise ValueError unless every joint is placed once, from joints placed before it."""
-    placed = {}
+    placed: Dict[str, Line] = {}
     for line in lines:
         if len(set(line.stands_on)) < len(line.stands_on):
             raise line.error('the joints it stands on must differ')
@@ -242,7 +242,7 @@ def check_name(called: str):
 
 def lengths(lines: Iterable[Line]) -> dict:
     """Return every dimension that the lines name, and whether it is used as a length."""
-    found = {}
+    found: Dict[str, bool] = {}
     for line in lines:
         for kind, number in line.numbers():
             for name in number.names:

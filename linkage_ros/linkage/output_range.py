@@ -92,7 +92,7 @@ def _farthest(linkage) -> float:
 
 def _extremes(linkage, names, reach) -> np.ndarray:
     """Return the least and the greatest value of each joint, shape (2, joints)."""
-    marks = [np.linspace(*arc, PARTS + 1) for arc in reach]
+    marks = [np.linspace(lo, hi, PARTS + 1) for lo, hi in reach]
     parts = np.concatenate([np.stack([mark[:-1], mark[1:]]) for mark in marks], axis=1)
     # One row of parts for each extreme: the greatest of minus a joint is its least.
     signs = np.repeat([-1.0, 1.0], len(names))

@@ -176,18 +176,18 @@ class CrankArm(Arm):
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
         g, m = self._g, self._m
-        return self._limit(radius, size, 1.0,
-                           exact_sum(radius, -g, -m) * exact_sum(radius, g, m),
-                           exact_sum(radius, -g, m) * exact_sum(radius, g, -m))
+        return self._half_angle_limit(radius, size, 1.0,
+                                      exact_sum(radius, -g, -m) * exact_sum(radius, g, m),
+                                      exact_sum(radius, -g, m) * exact_sum(radius, g, -m))
 
     def beyond(self, radius: Real, size: Real) -> Limit:
         """Return the margin square - radius^2; the radius is made from lengths up to size."""
         g, m = self._g, self._m
-        return self._limit(radius, size, -1.0,
-                           exact_sum(g, m, -radius) * exact_sum(g, m, radius),
-                           exact_sum(g, -m, -radius) * exact_sum(g, -m, radius))
+        return self._half_angle_limit(radius, size, -1.0,
+                                      exact_sum(g, m, -radius) * exact_sum(g, m, radius),
+                                      exact_sum(g, -m, -radius) * exact_sum(g, -m, radius))
 
-    def _limit(self, radius, size, sign, start, end):
+    def _half_angle_limit(self, radius, size, sign, start, end):
         gm, s, h = 4.0 * self._g * self._m, self._s, self._h
         # The smaller gap is the one next to which the margin can vanish.
         margin = where(abs(start) <= abs(end), start + sign * gm * square(s),
@@ -260,7 +260,7 @@ class Dyad(NamedTuple):
 
     first: Complex
     second: Complex
-    limits: Tuple[Limit, Limit]
+    limits: Tuple[Limit, ...]
 
 
 def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) -> Dyad:

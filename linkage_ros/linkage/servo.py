@@ -244,7 +244,7 @@ def _taken(answers, working, rounding, follows, ended, given) -> Program:
             place = where(place < ends[0], ends[0], where(ends[1] < place, ends[1], place))
         away = abs(place - near) if follows else real(rank) if working else place
         away = reduce(lambda away, miss: where(miss, math.inf, away), misses, away)
-        choices.append((where(held, away, math.inf), place, rate))
+        choices.append([where(held, away, math.inf), place, rate])
     away, *taken = reduce(lambda best, other: [
         where(other[0] < best[0], mine, its) for mine, its in zip(other, best)], choices)
     return Program([gated(part, LARGE - away, 0.0) for part in taken],

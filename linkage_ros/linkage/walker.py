@@ -11,7 +11,7 @@ leg at pi - (theta - 2 pi j/N), on the same crank pin.
 from functools import cached_property
 import math
 from struct import Struct
-from typing import NamedTuple, Optional, Sequence
+from typing import Callable, NamedTuple, Optional, Sequence
 
 import numpy as np
 
@@ -80,7 +80,7 @@ class Solution:
         self._thetas = list(batch.given[:layout.cranks])
         self._speeds = list(batch.given[layout.cranks:2 * layout.cranks])
         self._drive = layout.drive(values)
-        self._pack = Struct(f'{self._drive.size}d').pack_into
+        self._pack: Callable = Struct(f'{self._drive.size}d').pack_into
 
     def finish(self):
         """Wait for what makes the first solution slower than the others."""

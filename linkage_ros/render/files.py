@@ -7,7 +7,6 @@ from contextlib import contextmanager
 import csv
 import math
 from pathlib import Path
-import shutil
 import subprocess
 import tempfile
 
@@ -111,11 +110,12 @@ def mp4(picture, times, fps, file: Path, progress):
     height, width, _ = picture.at(times[0]).shape
     with replacing(file) as new, tempfile.TemporaryFile() as said:
         encoder = subprocess.Popen([
-            shutil.which('ffmpeg'), '-v', 'error', '-y', '-f', 'rawvideo', '-pix_fmt', 'rgb24',
+            'ffmpeg', '-v', 'error', '-y', '-f', 'rawvideo', '-pix_fmt', 'rgb24',
             '-video_size', f'{width}x{height}', '-framerate', f'{fps:g}', '-i', '-',
             '-c:v', 'libx264', '-crf', '18', '-pix_fmt', 'yuv420p', '-movflags', '+faststart',
             *REPRODUCIBLE, '-f', 'mp4', new], stdin=subprocess.PIPE, stderr=said)
         try:
+            assert encoder.stdin
             with encoder.stdin as pipe:
                 for turns in progress(times):
                     pipe.write(picture.at(turns).tobytes())

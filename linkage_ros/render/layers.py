@@ -342,9 +342,9 @@ class Names:
     def settle(self, poses):
         """Choose each name's place beside its joint, for poses of shape (n, legs, joints, 2)."""
         joints = self._pixels(poses[:, 0])
-        obstacles = [joints[:, self._bars[:, 0]], joints[:, self._bars[:, 1]]], [joints, joints], [
-            joints[:, self._fixed], joints[:, self._fixed] - 1j * self._pivot]
-        obstacles = [*obstacles, *self._curves()]
+        obstacles = [
+            [joints[:, self._bars[:, 0]], joints[:, self._bars[:, 1]]], [joints, joints],
+            [joints[:, self._fixed], joints[:, self._fixed] - 1j * self._pivot], *self._curves()]
         for text, index, distance in zip(self.artists, self._index, self._distances):
             tried = joints[:, [index]] + distance * self.DIRECTIONS
             room = np.min([clearance(tried, *lines) for lines in obstacles], axis=0)

@@ -121,7 +121,7 @@ class Panel:
         self._axes = axes
         self._margin = 14 + 30 * unit  # pixels, for pivots, slots and names
         self._joints = [machine.linkage.points.index(name) for name in machine.points]
-        moving = [layers.Trace(axes, machine, self.cycle, trace, unit)]
+        moving: list = [layers.Trace(axes, machine, self.cycle, trace, unit)]
         if 'floor' in parts:
             moving.append(layers.Floor(axes, machine, self.cycle, unit))
         if 'guides' in parts:
@@ -141,8 +141,8 @@ class Panel:
         """Return the lowest and the highest x and y of what is drawn in a turn [m]."""
         places = [self.cycle.course[:, :, self._joints].reshape(-1, 2)]
         places += [line.get_xydata() for line in self._axes.lines if len(line.get_xdata()) > 2]
-        places = np.concatenate(places)
-        return np.nanmin(places, axis=0), np.nanmax(places, axis=0)
+        drawn = np.concatenate(places)
+        return np.nanmin(drawn, axis=0), np.nanmax(drawn, axis=0)
 
     def _dress(self, axes_shown, unit):
         if not axes_shown:

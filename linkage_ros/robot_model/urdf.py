@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from collections import Counter
 import math
-from typing import Iterable, Optional, Sequence
+from typing import Dict, Iterable, Optional, Sequence, Tuple
 from xml.etree import ElementTree
 
 from ..linkage.builder import GROUND
@@ -114,7 +114,7 @@ class _Model:
             self._add(leg)
 
     def _add(self, leg):
-        ends = Counter()
+        ends: Counter[str] = Counter()
         self._add_points(leg, GROUND, self._frames[GROUND], ends)
         for i, link in enumerate(self._links):
             shared = link.name == 'crank' and leg.prefix
@@ -137,7 +137,7 @@ class _Model:
         if travel and mirrored:
             travel = -travel[1], -travel[0]
         if travel and prismatic:
-            travel = tuple(self._machine.scale * end for end in travel)
+            travel = self._machine.scale * travel[0], self._machine.scale * travel[1]
         place = self._place(leg, link.parent, link.joint)
         return self._robot.move(
             f'{self._machine.name}_{leg.prefix}{link.name}', link.kind,
@@ -191,8 +191,9 @@ class _Robot:
 
     def __init__(self, name: str, root: str):
         self._element = ElementTree.Element('robot', name=name)
-        self._root, self.owner = root, None
-        self._owners = {}
+        self._root = root
+        self.owner: Optional[str] = None
+        self._owners: Dict[Tuple[str, str], Optional[str]] = {}
         for colour, rgb in COLOURS.items():
             material = ElementTree.SubElement(self._element, 'material', name=colour)
             ElementTree.SubElement(material, 'color', rgba=_numbers(*rgb, 1.0))

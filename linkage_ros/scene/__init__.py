@@ -196,9 +196,9 @@ def read(given: Mapping[str, Any], before: Optional[Scene] = None, strict: bool 
     known = before.machines if before else {}
     machines = {name: _machine(name, parts.pop(name, {}), known.get(name), strict)
                 for name in names}
-    known = ['mechanisms', 'frame_id', 'rate', *(f'{name}.*' for name in names)]
+    allowed = ['mechanisms', 'frame_id', 'rate', *(f'{name}.*' for name in names)]
     for left in (values.left(), *parts.values()):
-        _refuse_unknown(left, known)
+        _refuse_unknown(left, allowed)
     return Scene(machines, frame_id, rate, tuple(values.parameters))
 
 
@@ -211,7 +211,7 @@ def _parted(given) -> Dict[str, Dict[str, Any]]:
     """Return the values by mechanism, those of none under an empty name."""
     if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in given):
         raise SceneError(f'a scene is values by the names of parameters, not {quoted(given)}')
-    parts = {}
+    parts: Dict[str, Dict[str, Any]] = {}
     for name, value in given.items():
         mechanism, dot, _ = name.partition('.')
         parts.setdefault(mechanism if dot else '', {})[name] = value
@@ -235,13 +235,13 @@ def _machine(name: str, given: Mapping[str, Any], old: Optional[Machine], strict
         raise SceneError(f'{name}.type must be {TYPE.rule}, not {quoted(type_)}')
     linkage, reach = _linkage(name, type_, values)
     scale = values.take(f'{name}.scale', SCALE, 1.0)
-    legs = _legs(name, linkage, values)
+    leg_pairs, mirrored = _legs(name, linkage, values)
     points, pose = _points(name, linkage, values), _pose(name, values)
     settled = old.cranks if old else {}
     cranks = {crank: _crank(f'{name}.{crank}', reach, values, settled.get(crank), strict)
               for crank in linkage.cranks}
     _refuse_unknown(values.left(), [parameter.name for parameter in values.parameters])
-    return Machine(name, linkage, reach, scale, *legs, points, pose, cranks, given,
+    return Machine(name, linkage, reach, scale, leg_pairs, mirrored, points, pose, cranks, given,
                    tuple(values.parameters))
 
 
@@ -362,7 +362,7 @@ def _crank(name, reach, values, old, strict) -> Crank:
 def _check_sweep(name, sweep, reach):
     if len(sweep) != 2 or not sweep[0] + NARROWEST_SWEEP <= sweep[1]:
         raise SWEEP.error(name, sweep)
-    if not is_full_turn(reach) and not any(_inside(*sweep, arc) for arc in reach):
+    if not is_full_turn(reach) and not any(_inside(sweep[0], sweep[1], arc) for arc in reach):
         raise SceneError(f'{name} must be inside the reach {in_words(reach)} rad, '
                          f'not {quoted(list(sweep))}')
 

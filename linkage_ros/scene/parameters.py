@@ -126,7 +126,9 @@ class Field:
             return bool(self.pattern.fullmatch(value))
         if isinstance(value, float) and not math.isfinite(value) or self.positive and value <= 0:
             return False
-        return self.high is None or self.low <= value <= self.high or any(
+        if self.low is None or self.high is None:
+            return True
+        return self.low <= value <= self.high or any(
             math.isclose(value, end, rel_tol=ROUNDED) for end in (self.low, self.high))
 
 

@@ -33,7 +33,7 @@ ANGLES, FEW_ANGLES = 91, 13
 def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
     """Return the least and greatest value for the slider of a number; None: it has none."""
     field, value = parameter.field, parameter.value
-    if field.high is not None:
+    if field.low is not None and field.high is not None:
         return field.low, field.high
     if field.kind != 'double':
         return None
@@ -87,9 +87,9 @@ def _assembled(linkage, key, values, used):
         return np.concatenate([_assembled(linkage, key, values[i:i + 1], used)
                                for i in range(len(values))])
     cranks = len(linkage.cranks)
-    arc = used or (-math.pi, math.pi)
-    theta = np.linspace(*arc, ANGLES) if cranks == 1 else [
-        angles.ravel() for angles in np.meshgrid(*[np.linspace(*arc, FEW_ANGLES)] * cranks)]
+    low, high = used or (-math.pi, math.pi)
+    theta = np.linspace(low, high, ANGLES) if cranks == 1 else [
+        angles.ravel() for angles in np.meshgrid(*[np.linspace(low, high, FEW_ANGLES)] * cranks)]
     placed = np.ones((len(values), 1), dtype=bool)
     for places in tried.solve(theta).values():
         placed = placed & np.isfinite(places).all(axis=-1)
