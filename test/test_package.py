@@ -48,6 +48,7 @@ def test_all_files_name_one_version(arguments):
     assert manifest('linkage_interfaces').findtext('version') == version
     assert arguments['version'] == version
     assert released[0] == version
+    assert f'\nversion: {version}\n' in (ROOT / 'CITATION.cff').read_text()
 
 
 def test_setup_names_the_package_of_the_manifest(arguments):
@@ -55,6 +56,20 @@ def test_setup_names_the_package_of_the_manifest(arguments):
     assert arguments['license'] == manifest('.').findtext('license')
     assert 'linkage_ros.mechanisms' in arguments['packages']
     assert all(name.split('.')[0] == 'linkage_ros' for name in arguments['packages'])
+
+
+def test_the_workflow_runs_what_has_to_be_green():
+    yaml = pytest.importorskip('yaml')
+
+    def made(text):
+        return set(re.findall(r'\bmake (\w+)', text))
+
+    workflow = (ROOT / '.github/workflows/ci.yml').read_text()
+    jobs = yaml.safe_load(workflow)['jobs']
+    steps = [step['run'] for job in jobs.values() for step in job['steps'] if 'run' in step]
+    assert set().union(*map(made, steps)) == made((ROOT / '.ci/run').read_text())
+    assert set(jobs['test']['strategy']['matrix']['distro']) == {
+        file.stem for file in (ROOT / 'wheels').glob('*.txt') if 'ros-rclpy' in file.read_text()}
 
 
 def test_a_robot_without_a_screen_installs_nothing_to_look_at_it_with():
@@ -100,6 +115,7 @@ def test_a_wheel_has_the_library_and_the_page_and_no_commands(copy, tmp_path):
     with zipfile.ZipFile(wheel) as packed:
         names = packed.namelist()
     assert 'linkage_ros/mechanisms/jansen.py' in names
+    assert 'linkage_ros/py.typed' in names
     assert any(name.startswith('linkage_ros/web/page/') for name in names)
     assert not any(name.endswith('entry_points.txt') or 'scripts/' in name for name in names)
 
