@@ -5,8 +5,9 @@
 
 import argparse
 import sys
+from typing import Callable, List, Mapping, NoReturn, Optional, Sequence
 
-from .scene import SceneError
+from .scene import Machine, SceneError
 
 
 class RequestError(Exception):
@@ -16,12 +17,12 @@ class RequestError(Exception):
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one sentence."""
 
-    def error(self, message):
+    def error(self, message: str) -> NoReturn:
         """Raise RequestError."""
         raise RequestError(message)
 
 
-def run(name, work, args, needs) -> int:
+def run(name: str, work: Callable, args: Optional[Sequence[str]], needs: str) -> int:
     """
     Do what a command line asks for; return the exit code.
 
@@ -52,7 +53,7 @@ def run(name, work, args, needs) -> int:
     return 1
 
 
-def chosen(machines, names):
+def chosen(machines: Mapping[str, Machine], names: Sequence[str]) -> List[Machine]:
     """Return the machines that are named, or all; raise RequestError for one that is not there."""
     for name in names:
         if name not in machines:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from functools import reduce
 from math import cos, sin
-from typing import Callable, Iterable, Iterator, Mapping, NamedTuple, Optional, Tuple, Union
+from typing import Any, Callable, Iterable, Iterator, Mapping, NamedTuple, Optional, Tuple, Union
 
 
 class Real:
@@ -28,7 +28,8 @@ class Real:
 
     __slots__ = ('op', 'args', 'varies', 'positive', 'rate')
 
-    def __init__(self, op, args, varies=None, positive=False, rate=None):
+    def __init__(self, op: str, args: tuple, varies: Optional[bool] = None,
+                 positive: bool = False, rate: Optional[Rate] = None):
         self.op = op
         self.args = args
         self.varies = any(a.varies for a in args) if varies is None else varies
@@ -41,11 +42,11 @@ class Real:
         return () if self.op in _LEAVES else self.args
 
     @property
-    def value(self):
+    def value(self) -> Optional[float]:
         """The number of a constant leaf, None for anything else."""
         return self.args[0] if self.op == 'constant' else None
 
-    def __add__(self, other):
+    def __add__(self, other: Number) -> Real:
         other = real(other)
         if self.value == 0.0:
             return other
@@ -55,7 +56,7 @@ class Real:
             return self - other.args[0]
         return _node('add', self, other, positive=self.positive and other.positive)
 
-    def __sub__(self, other):
+    def __sub__(self, other: Number) -> Real:
         other = real(other)
         if other.value == 0.0:
             return self
@@ -67,7 +68,7 @@ class Real:
             return self + other.args[0]
         return _node('subtract', self, other)
 
-    def __mul__(self, other):
+    def __mul__(self, other: Number) -> Real:
         other = real(other)
         for one, rest in ((self, other), (other, self)):
             if one.value == 0.0:
@@ -81,7 +82,7 @@ class Real:
                 return -(one.args[0] * rest)
         return _node('multiply', self, other, positive=self.positive and other.positive)
 
-    def __truediv__(self, other):
+    def __truediv__(self, other: Number) -> Real:
         other = real(other)
         if self.value == 0.0 or other.value == 1.0:
             return self
@@ -91,40 +92,40 @@ class Real:
             return -(self.args[0] / other)
         return _node('divide', self, other, positive=self.positive and other.positive)
 
-    def __neg__(self):
+    def __neg__(self) -> Real:
         if self.op == 'negative':
             return self.args[0]
         return _node('negative', self)
 
-    def __abs__(self):
+    def __abs__(self) -> Real:
         if self.positive:
             return self
         if self.op == 'negative':
             return abs(self.args[0])
         return _node('absolute', self)
 
-    def __lt__(self, other):
+    def __lt__(self, other: Number) -> Real:
         return _node('less', self, real(other))
 
-    def __le__(self, other):
+    def __le__(self, other: Number) -> Real:
         return _node('less_equal', self, real(other))
 
-    def __gt__(self, other):
+    def __gt__(self, other: Number) -> Real:
         return real(other) < self
 
-    def __ge__(self, other):
+    def __ge__(self, other: Number) -> Real:
         return real(other) <= self
 
-    def __radd__(self, other):
+    def __radd__(self, other: Number) -> Real:
         return real(other) + self
 
-    def __rsub__(self, other):
+    def __rsub__(self, other: Number) -> Real:
         return real(other) - self
 
-    def __rmul__(self, other):
+    def __rmul__(self, other: Number) -> Real:
         return real(other) * self
 
-    def __rtruediv__(self, other):
+    def __rtruediv__(self, other: Number) -> Real:
         return real(other) / self
 
 
@@ -143,7 +144,7 @@ _FOLDED: Mapping[str, Callable] = {
 }
 
 
-def _node(op, *args, positive=False) -> Real:
+def _node(op: str, *args: Real, positive: bool = False) -> Real:
     """Join an operation to its operands; arithmetic on constants is done at once."""
     if op in _FOLDED and all(a.op == 'constant' for a in args):
         return real(_FOLDED[op](*(a.value for a in args)))
@@ -267,7 +268,7 @@ class Complex:
         opposite.spin = self.spin
         return opposite
 
-    def __mul__(self, other) -> Complex:
+    def __mul__(self, other: Union[Complex, Number]) -> Complex:
         if isinstance(other, Complex):
             return Complex(self.x * other.x - self.y * other.y,
                            self.x * other.y + self.y * other.x)
@@ -347,7 +348,7 @@ def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
         Derivatives found so far, shared between calls.
 
     """
-    def needed(x):
+    def needed(x: Real) -> Iterable[Real]:
         if x in known or not x.varies or x.op in _STEPS:
             return ()
         return x.rate.of if x.rate else x.operands
@@ -396,11 +397,11 @@ def spin(vector: Complex) -> Rate:
         vector, Complex(dx, dy)) / vector.squared())
 
 
-def _sqrt_rule(node, _, dx, *__):
+def _sqrt_rule(node: Real, _: Any, dx: Real, *__: Any) -> Real:
     return dx / (2.0 * node)
 
 
-def _product_rule(node, _, dx, dy):
+def _product_rule(node: Real, _: Any, dx: Real, dy: Real) -> Real:
     x, y = node.args
     return 2.0 * (dx * x) if x is y else dx * y + x * dy
 

@@ -12,15 +12,18 @@ from __future__ import annotations
 import math
 import operator
 import re
-from typing import Any, Callable, Dict, List, Mapping, Union
+from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Tuple, Union
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..formula.expression import Real, real, square_root, where
 from ..words import quoted
 
 # A number, or the name of a dimension or an operation.
 Step = Union[float, str]
+# The power of a length that a result is; None for zero, which is any, NaN for none.
+Degree = Optional[float]
 
 SMALLEST, LARGEST = 1e-70, 1e70
 IN_RANGE = '0 or between 1e-70 and 1e70'
@@ -41,11 +44,10 @@ _VALUES: Mapping[Step, Callable] = {
     **_EXPRESSIONS, '/': np.divide, 'max': np.maximum, 'sqrt': np.sqrt}
 
 
-def _alike(x, y):
+def _alike(x: Degree, y: Degree) -> Degree:
     return y if x is None else x if y is None or x == y else math.nan
 
 
-# The power of a length that a result is; None for zero, which is any, NaN for none.
 _DEGREES: Mapping[Step, Callable] = {
     '+': _alike, '-': _alike, 'max': _alike, 'negative ': lambda x: x, 'deg': lambda x: x,
     '*': lambda x, y: None if x is None or y is None else x + y,
@@ -53,7 +55,7 @@ _DEGREES: Mapping[Step, Callable] = {
     'sqrt': lambda x: x and x / 2}
 
 
-def in_range(number):
+def in_range(number: ArrayLike) -> Any:
     """Return whether a number, or each of an array, is 0 or between SMALLEST and LARGEST."""
     return (number == 0.0) | (np.abs(number) >= SMALLEST) & (np.abs(number) <= LARGEST)
 
@@ -77,7 +79,7 @@ class Formula:
         self.names = tuple(word for word in self.words if word not in WORDS)
 
     @property
-    def degree(self):
+    def degree(self) -> Degree:
         """The power of a length that it is: 0, 1, ...; None if it is zero, NaN if it is none."""
         return self._worked_out(lambda leaf: 1 if leaf in self.names else 0 if leaf else None,
                                 _DEGREES)
@@ -87,14 +89,14 @@ class Formula:
         return self._worked_out(lambda leaf: symbols[leaf] if leaf in symbols else real(leaf),
                                 _EXPRESSIONS)
 
-    def value(self, dimensions: Mapping[str, Any]):
+    def value(self, dimensions: Mapping[str, Any]) -> Any:
         """Return what it is for dimensions, numbers or arrays; not finite where it is nothing."""
         with np.errstate(all='ignore'):
             return self._worked_out(
                 lambda leaf: np.float64(leaf) if isinstance(leaf, float) else dimensions[leaf],
                 _VALUES)
 
-    def _worked_out(self, leaf: Callable, operations: Mapping[Step, Callable]):
+    def _worked_out(self, leaf: Callable, operations: Mapping[Step, Callable]) -> Any:
         stack: List[Any] = []
         for step in self._steps:
             taken = _TAKES.get(step, 0)
@@ -103,7 +105,7 @@ class Formula:
             stack.append(operations[step](*operands) if taken else leaf(step))
         return stack.pop()
 
-    def _parse(self):
+    def _parse(self) -> None:
         """Fill the steps; operators and parentheses wait until what they bind is complete."""
         waiting: List[str] = []
         begins = True
@@ -115,7 +117,7 @@ class Formula:
         if waiting:
             raise self._error()
 
-    def _tokens(self):
+    def _tokens(self) -> Iterator[Tuple[Optional[str], str]]:
         at = 0
         while at < len(self.text):
             token = _TOKEN.match(self.text, at)
@@ -126,7 +128,7 @@ class Formula:
             yield token.lastgroup, token[0]
             at = token.end()
 
-    def _operand(self, kind, word, waiting) -> bool:
+    def _operand(self, kind: Optional[str], word: str, waiting: List[str]) -> bool:
         """Take a word where an operand is due; return whether it still is."""
         if word == '-' or kind == 'opened':
             waiting.append('negative ' if word == '-' else word)
@@ -137,7 +139,7 @@ class Formula:
                            self._number(word))
         return False
 
-    def _operator(self, kind, word, waiting) -> bool:
+    def _operator(self, kind: Optional[str], word: str, waiting: List[str]) -> bool:
         """Take a word behind an operand; return whether another one is due."""
         if word == 'deg':
             self._work_out(word)
@@ -157,12 +159,12 @@ class Formula:
             self._work_out(opened[:-1])
         return word == ','
 
-    def _complete(self, waiting, binding=0):
+    def _complete(self, waiting: List[str], binding: int = 0) -> None:
         """Work out what waits, from the last on, down to a parenthesis or a looser operator."""
         while waiting and _BINDS.get(waiting[-1], -1) >= binding:
             self._work_out(waiting.pop())
 
-    def _work_out(self, step):
+    def _work_out(self, step: str) -> None:
         operands = self._steps[-_TAKES[step]:]
         if step == '/' and operands[1] == 0.0:
             raise ValueError(f'{quoted(self.text)} divides by zero')
@@ -172,22 +174,22 @@ class Formula:
         with np.errstate(all='ignore'):
             self._steps[-_TAKES[step]:] = [self._ranged(float(_VALUES[step](*operands)))]
 
-    def _number(self, word):
+    def _number(self, word: str) -> float:
         number = float(word)
         if not number and word.lower().split('e')[0].strip('0.'):
             raise self._out_of_range(word, 'too small')
         return self._ranged(number, word)
 
-    def _ranged(self, number, word=None):
+    def _ranged(self, number: float, word: Optional[str] = None) -> float:
         if in_range(number):
             return number
         size = abs(number)
         raise self._out_of_range(word or self.text, 'too large' if size > LARGEST else
                                  'too small' if size < SMALLEST else 'not real')
 
-    def _out_of_range(self, word, wrong):
+    def _out_of_range(self, word: str, wrong: str) -> ValueError:
         return ValueError(f'{quoted(word)} is {wrong}: a number is {IN_RANGE}')
 
-    def _error(self):
+    def _error(self) -> ValueError:
         return ValueError(f'{quoted(self.text)} is no number, dimension or arithmetic on them; '
                           'allowed: + - * / ( ) max(a,b) sqrt(a) pi 30deg')

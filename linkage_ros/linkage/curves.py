@@ -33,7 +33,7 @@ def sampled(lo: float, hi: float, samples: int = SAMPLES, fewest: int = 9) -> np
     return np.unique(np.clip(theta, lo, hi))
 
 
-def refined(test: Callable, lo, hi) -> Tuple[np.ndarray, np.ndarray]:
+def refined(test: Callable, lo: np.ndarray, hi: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """
     Return, for each bracket, the last angle that is as its start is and the first that is not.
 
@@ -61,7 +61,7 @@ def refined(test: Callable, lo, hi) -> Tuple[np.ndarray, np.ndarray]:
     return lo, hi
 
 
-def lowest(curve: Callable, lo, hi, steps: int = 10) -> np.ndarray:
+def lowest(curve: Callable, lo: np.ndarray, hi: np.ndarray, steps: int = 10) -> np.ndarray:
     """
     Return, for each bracket, the angle [rad] at which a curve is least, to half of all digits.
 

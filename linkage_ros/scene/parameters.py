@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 import re
-from typing import Any, List, Optional, Tuple
+from typing import Any, List, Optional, Tuple, Type
 
 from ..words import elided, MESSAGE, quoted
 
@@ -109,17 +109,17 @@ class Field:
         shown = list(value) if isinstance(value, tuple) else value
         return SceneError(f'{elided(name, 100)} must be {self.allowed}, not {quoted(shown)}')
 
-    def _taken(self, value):
+    def _taken(self, value: Any) -> Any:
         try:
             return float(value) if type(value) is int and self._type is float else value
         except OverflowError:
             return value
 
     @property
-    def _type(self):
+    def _type(self) -> Type[Any]:
         return KINDS[self.kind][0]
 
-    def _holds(self, value) -> bool:
+    def _holds(self, value: Any) -> bool:
         if type(value) is not self._type:
             return False
         if isinstance(value, str):

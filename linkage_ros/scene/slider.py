@@ -18,7 +18,8 @@ import numpy as np
 
 from . import Machine, Scene
 from .parameters import Parameter
-from ..linkage.crank_range import is_full_turn
+from ..linkage.crank_range import Arc, is_full_turn
+from ..linkage.mechanism import Mechanism
 
 STOPS = 100
 # How far from its value a length may be moved, in parts of it or, from 0, of the longest bar.
@@ -52,7 +53,7 @@ def _used(machine: Machine) -> Optional[Tuple[float, float]]:
 
 
 @lru_cache(maxsize=16)
-def _length(linkage, key, positive, used):
+def _length(linkage: Mechanism, key: str, positive: bool, used: Optional[Arc]) -> Arc:
     """Return how far a length may be moved with the linkage still assembled."""
     value = float(linkage.dimensions[key])
     size = abs(value) or float(linkage.longest)
@@ -61,7 +62,8 @@ def _length(linkage, key, positive, used):
     return _whole_stops(value, low, high)
 
 
-def _farthest(linkage, key, value, size, used, positive):
+def _farthest(linkage: Mechanism, key: str, value: float, size: float, used: Optional[Arc],
+              positive: bool) -> float:
     """Return the last value on one side up to which all that are tried can be assembled."""
     most = 0.9 * abs(size) if positive and size < 0.0 else MOST * abs(size)
     steps = np.geomspace(LEAST * abs(size), most, TRIED) * math.copysign(1.0, size)
@@ -77,7 +79,8 @@ def _farthest(linkage, key, value, size, used, positive):
     return float(value + good)
 
 
-def _assembled(linkage, key, values, used):
+def _assembled(linkage: Mechanism, key: str, values: np.ndarray,
+               used: Optional[Arc]) -> np.ndarray:
     """Return for each value of a dimension whether the linkage can be assembled."""
     try:
         tried = linkage.with_dimensions(**{key: values[:, None]})
@@ -93,7 +96,7 @@ def _assembled(linkage, key, values, used):
     placed = np.ones((len(values), 1), dtype=bool)
     for places in tried.solve(theta).values():
         placed = placed & np.isfinite(places).all(axis=-1)
-    return placed.all(axis=1) if used else placed.any(axis=1)
+    return np.all(placed, axis=1) if used else np.any(placed, axis=1)
 
 
 def _whole_stops(value: float, low: float, high: float) -> Tuple[float, float]:
