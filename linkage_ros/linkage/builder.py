@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
-from typing import NamedTuple, Optional, Tuple
+from typing import Dict, List, NamedTuple, Optional, Tuple
 
 from . import planar
 from ..formula.expression import (
@@ -77,30 +77,30 @@ class _Vector(NamedTuple):
 class Sketch:
     """The joints, links and limits of a linkage, as expressions of its dimensions and angles."""
 
-    def __init__(self):
-        self.points = {}
-        self.links = []
-        self.bars = []
-        self.limits = []
-        self.triangles = {}
-        self.frames = {}
-        self.joint_values = {}
-        self.directions = {}
-        self.lines = {}
-        self.corners = {}
-        self.transmissions = {}
-        self.folds = []
-        self.cranks = []
-        self._vectors = {}
-        self._ends = {}
-        self._kites = {}
+    def __init__(self) -> None:
+        self.points: Dict[str, _Point] = {}
+        self.links: List[Link] = []
+        self.bars: List[Bar] = []
+        self.limits: List[planar.Limit] = []
+        self.triangles: Dict[str, Real] = {}
+        self.frames: Dict[str, Dict[str, Complex]] = {}
+        self.joint_values: Dict[str, Real] = {}
+        self.directions: Dict[str, Complex] = {}
+        self.lines: Dict[str, Complex] = {}
+        self.corners: Dict[str, Tuple[str, str, Real]] = {}
+        self.transmissions: Dict[str, Real] = {}
+        self.folds: List[planar.Limit] = []
+        self.cranks: List[str] = []
+        self._vectors: Dict[Tuple[str, str], _Vector] = {}
+        self._ends: Dict[str, Tuple[str, str]] = {}
+        self._kites: Dict[Tuple[str, str], planar.CrankArm] = {}
 
-    def ground(self, name: str, x: Number, y: Number):
+    def ground(self, name: str, x: Number, y: Number) -> None:
         """Fix a joint to the ground at (x, y) [m]."""
         place = Complex(x, y)
         self.points[name] = _Point(place, GROUND, abs(place.x) + abs(place.y))
 
-    def crank(self, name: str, centre: str, length: Real, upright: bool = False):
+    def crank(self, name: str, centre: str, length: Real, upright: bool = False) -> None:
         """Turn a crank [m] about a ground joint; upright: its zero is +y, not +x."""
         self._on_ground(centre)
         link = f'crank{len(self.cranks) + 1}' if self.cranks else 'crank'
@@ -114,14 +114,14 @@ class Sketch:
         self.points[name].crank = crank
 
     def dyad(self, name: str, first: str, second: str, to_first: Real, to_second: Real,
-             side: float):
+             side: float) -> None:
         """Join bars of to_first and to_second [m] from two joints, left of first -> second."""
         found = planar.dyad(self.arm(first, second), to_first, to_second, side)
         self.limits += found.limits
         self._pair(name, first, second, found, to_first, to_second)
 
     def rigid(self, name: str, first: str, second: str, to_first: Real, to_second: Real,
-              side: float):
+              side: float) -> None:
         """Add the third corner of a rigid triangle on a bar; left of first -> second."""
         vector, base, link = self._bar_between(first, second)
         corner = planar.triangle(base, to_first, to_second, side)
@@ -131,7 +131,7 @@ class Sketch:
         self._bar(second, name, vector * (corner - Complex(1.0, 0.0)), to_second, link)
         self._add_to_frame(name, first, second, link, corner)
 
-    def line(self, name: str, first: str, second: str, distance: Real):
+    def line(self, name: str, first: str, second: str, distance: Real) -> None:
         """Add a point on the line of a bar, a distance [m] from first, towards second."""
         vector, base, link = self._bar_between(first, second)
         self._place(name, first, vector * (distance / base), link, abs(distance), (second,))
@@ -139,7 +139,7 @@ class Sketch:
             self.points[name].place = self._kites[first, second].beyond_kite(-(distance / base))
         self._add_to_frame(name, first, second, link, Complex(distance / base, 0.0))
 
-    def mirror(self, name: str, point: str, first: str, second: str):
+    def mirror(self, name: str, point: str, first: str, second: str) -> None:
         """Mirror a joint in the line of two others: the far corner of a kite."""
         arm, pin = self.arm(second, first), self.points[first].crank
         area = arm.offset(self.points[point].place)
@@ -154,7 +154,7 @@ class Sketch:
         if isinstance(arm, planar.CrankArm) and pin and pin.centre is self.points[point].place:
             self._kites[first, name] = arm
 
-    def parallelogram(self, name: str, corner: str, first: str, second: str):
+    def parallelogram(self, name: str, corner: str, first: str, second: str) -> None:
         """Join bars to two joints that are parallel to the bars from a corner to them."""
         to_first, to_second = (self._side(corner, end) for end in (first, second))
         self.folds.append(planar.Limit(cross(to_first.vector, to_second.vector),
@@ -165,7 +165,8 @@ class Sketch:
         self._pair(name, first, second, planar.Dyad(from_first, from_second, ()),
                    to_second.length, to_first.length, corner)
 
-    def inversor(self, names: Tuple[str, str, str], pole: str, pin: str, long: Real, short: Real):
+    def inversor(self, names: Tuple[str, str, str], pole: str, pin: str, long: Real,
+                 short: Real) -> None:
         """Add a Peaucellier cell: the joint right of pole -> pin, the corner, the left joint."""
         right, corner, left = names
         found = planar.inversor(self.arm(pole, pin), long, short)
@@ -179,7 +180,8 @@ class Sketch:
         link = self._hang(left, corner, found.right.second, short)
         self._bar(left, corner, found.right.second, short, link)
 
-    def slot(self, tip: str, pivot: str, pin: str, offset: Real, half: float, length: Real):
+    def slot(self, tip: str, pivot: str, pin: str, offset: Real, half: float,
+             length: Real) -> None:
         """Turn a lever of this length [m] about a ground joint by a pin in its slot."""
         self._on_ground(pivot)
         found = planar.slot(self.arm(pivot, pin), offset, half)
@@ -189,7 +191,8 @@ class Sketch:
         self.transmissions[tip] = arctangent(abs(found.slide), offset)
         self._slide('slide', lever, pivot, pin, found.slide, Complex(0.0, offset))
 
-    def slider(self, name: str, pin: str, rod: Real, origin: str, direction: Real, side: float):
+    def slider(self, name: str, pin: str, rod: Real, origin: str, direction: Real,
+               side: float) -> None:
         """Join a rod [m] from a joint to a block on a line through a ground joint."""
         self._on_ground(origin)
         along = Complex(cosine(direction), sine(direction))
@@ -203,18 +206,18 @@ class Sketch:
                             direction)
         self.lines[block] = along
 
-    def _rail(self, pin, origin, along):
+    def _rail(self, pin: str, origin: str, along: Complex) -> planar.Rail:
         """Return a joint as seen from a line through a ground joint."""
         start, end = self.points[origin], self.points[pin]
         if end.crank:
             return planar.CrankRail(end.crank, start.place, along, start.span + end.span)
         return planar.Rail(end.place, start.place, along, start.span + end.span)
 
-    def _on_ground(self, name):
+    def _on_ground(self, name: str) -> None:
         if self.points[name].home != GROUND:
             raise SketchError(f'joint {name} must be on the ground')
 
-    def _bar_between(self, first, second):
+    def _bar_between(self, first: str, second: str) -> _Vector:
         """Return the vector between two joints of one link."""
         if (first, second) not in self._vectors:
             link = self._shared_link(first, second)
@@ -226,7 +229,7 @@ class Sketch:
                 bar.vector * (across / bar.length), across.length(), link)
         return self._vectors[first, second]
 
-    def _side(self, first, second):
+    def _side(self, first: str, second: str) -> _Vector:
         """Return the vector between two joints of one link or of the ground."""
         ends = self.points[first], self.points[second]
         if ends[0].home == ends[1].home == GROUND:
@@ -234,16 +237,17 @@ class Sketch:
             return _Vector(vector, vector.length(), GROUND)
         return self._bar_between(first, second)
 
-    def _shared_link(self, first, second):
+    def _shared_link(self, first: str, second: str) -> Optional[str]:
         """Return the moving link that two joints are on, None if there is none."""
         return next((link for link, frame in self.frames.items()
                      if first in frame and second in frame), None)
 
-    def _numbered(self, word):
+    def _numbered(self, word: str) -> str:
         taken = sum(link.name.rstrip('0123456789') == word for link in self.links)
         return f'{word}{taken + 1}' if taken else word
 
-    def _slide(self, word, parent, joint, tip, place, local, direction=0.0):
+    def _slide(self, word: str, parent: str, joint: str, tip: str, place: Real, local: Complex,
+               direction: Number = 0.0) -> str:
         """Add a link that slides along its parent, and return its name."""
         name = self._numbered(word)
         self.links.append(Link(name, parent, joint, 'prismatic', real(direction), tip))
@@ -263,7 +267,7 @@ class Sketch:
         return planar.Arm(ends[0].place, self._between(first, second),
                           ends[0].span + ends[1].span)
 
-    def _between(self, first, second):
+    def _between(self, first: str, second: str) -> Complex:
         """Return the vector between two joints; bars from one joint to both keep more digits."""
         ends = [self.points[end] for end in (first, second)]
         shared = ends[0].stands_on & ends[1].stands_on
@@ -278,7 +282,8 @@ class Sketch:
         """Return the constant distance [m] of two joints of one link or of the ground."""
         return self._side(first, second).length
 
-    def _pair(self, name, first, second, found, to_first, to_second, *others):
+    def _pair(self, name: str, first: str, second: str, found: planar.Dyad, to_first: Real,
+              to_second: Real, *others: str) -> None:
         """Join the two bars of a dyad: the joint belongs to the first, the second is cut there."""
         link = self._hang(first, name, found.first, to_first)
         self._place(name, first, found.first, link, to_first, (second, *others))
@@ -286,7 +291,8 @@ class Sketch:
         self._bar(second, name, found.second, to_second, link)
         self.transmissions[name] = planar.transmission(found)
 
-    def _hang(self, joint, tip, bar, length, upright=False, name=None):
+    def _hang(self, joint: str, tip: str, bar: Complex, length: Number, upright: bool = False,
+              name: Optional[str] = None) -> str:
         """Add a link that turns about a joint of its parent, and return its name."""
         name = name or ('' if len(joint + tip) == 2 else '_').join((joint, tip))
         if name in self.joint_values:
@@ -302,19 +308,22 @@ class Sketch:
         self._ends[name] = joint, tip
         return name
 
-    def _add_to_frame(self, name, first, second, link, corner):
+    def _add_to_frame(self, name: str, first: str, second: str, link: str,
+                      corner: Complex) -> None:
         """Note where a point of a rigid link lies, seen from that link."""
         frame = self.frames[link]
         frame[name] = frame[first] + (frame[second] - frame[first]) * corner
 
-    def _place(self, name, start, vector, link, length, others):
+    def _place(self, name: str, start: str, vector: Complex, link: str, length: Real,
+               others: Tuple[str, ...]) -> None:
         """Place a joint at the end of a bar from another; it stands on others as well."""
         origin = self.points[start]
         stands_on = frozenset().union(*({x} | self.points[x].stands_on for x in (start, *others)))
         self.points[name] = _Point(origin.place + vector, link, origin.span + length, stands_on)
         self._bar(start, name, vector, length, link)
 
-    def _bar(self, first, second, vector, length, link):
+    def _bar(self, first: str, second: str, vector: Complex, length: Number,
+             link: str) -> None:
         length = real(length)
         self.bars.append(Bar(first, second, length))
         self._vectors[first, second] = _Vector(vector, length, link)

@@ -12,7 +12,7 @@ ends one pose decides for the whole arc, and at each end the linkage can still b
 from __future__ import annotations
 
 import math
-from typing import Callable, Iterable, List, Sequence
+from typing import Any, Callable, Iterable, List, Sequence
 
 import numpy as np
 
@@ -42,14 +42,14 @@ def arcs(margins: Callable, limits: Sequence[Limit], value: Callable) -> List[Ar
         From an expression of dimensions to its value.
 
     """
-    def failing(theta):
+    def failing(theta: Any) -> Any:
         """Return the number of the first limit that is not kept, that of all where none is."""
         with np.errstate(invalid='ignore'):
             kept = margins(np.ravel(theta)) >= 0.0
         return np.vstack([kept, np.zeros(kept.shape[1:], bool)]).argmin(axis=0).reshape(
             np.shape(theta))
 
-    def assembled(theta):
+    def assembled(theta: Any) -> Any:
         return failing(theta) == len(limits)
 
     ends = [end for limit in limits if limit.crank == 0
@@ -61,10 +61,10 @@ def arcs(margins: Callable, limits: Sequence[Limit], value: Callable) -> List[Ar
     if any(x.margin.varies and x.crank != 0 for x in limits):
         ends += [end for arc in between(ends) for end in _limits(margins, failing, *arc)]
     found = reachable_arcs(ends, assembled, joined=-math.pi not in ends)
-    return [tuple(_trimmed(assembled, *arc)) for arc in found] if ends else found
+    return [_trimmed(assembled, *arc) for arc in found] if ends else found
 
 
-def _limits(margins, failing, lo, hi) -> List[float]:
+def _limits(margins: Callable, failing: Callable, lo: float, hi: float) -> List[float]:
     """
     Return the angles on an arc next to which a limit stops or starts to be the first not kept.
 
@@ -86,26 +86,27 @@ def _limits(margins, failing, lo, hi) -> List[float]:
     return ends[1:-1]
 
 
-def _touches(margins, theta) -> np.ndarray:
+def _touches(margins: Callable, theta: np.ndarray) -> np.ndarray:
     """Return where margins come nearest to zero between samples."""
     values = margins(theta)
     row, place = np.nonzero(near_misses(values))
     sign = np.sign(values[row, place + 1])[:, None]
     chosen = np.arange(len(row))
 
-    def distance(angles):
+    def distance(angles: np.ndarray) -> np.ndarray:
         found = margins(angles.ravel()).reshape(-1, *angles.shape)
         return sign * found[row, chosen]
 
     return lowest(distance, theta[place], theta[place + 2])
 
 
-def _trimmed(assembled, lo, hi):
+def _trimmed(assembled: Callable, lo: float, hi: float) -> Arc:
     """Return an arc whose ends can be assembled."""
     if hi - lo >= math.tau:
         return lo, hi
     ends, middle = np.array([lo, hi]), np.full(2, 0.5 * (lo + hi))
-    return np.where(assembled(ends), ends, refined(assembled, middle, ends)[0]).tolist()
+    low, high = np.where(assembled(ends), ends, refined(assembled, middle, ends)[0]).tolist()
+    return low, high
 
 
 def _is_periodic(margins: Callable) -> bool:

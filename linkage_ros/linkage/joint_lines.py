@@ -37,7 +37,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 import re
-from typing import Dict, Iterable, List, Mapping, NamedTuple, Tuple
+from typing import Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple, Union
 
 import numpy as np
 
@@ -99,12 +99,12 @@ class Line(NamedTuple):
                 except ValueError as error:
                     raise self.error(error) from None
 
-    def error(self, problem) -> ValueError:
+    def error(self, problem: object) -> ValueError:
         """Return the error that names this line."""
         return _error(self.text, f'{problem}{_hint(self.args)}')
 
 
-def _error(line: str, problem) -> ValueError:
+def _error(line: str, problem: object) -> ValueError:
     return ValueError(elided(f'joint line "{elided(line)}": {problem}', _SAID))
 
 
@@ -157,7 +157,7 @@ def _parsed(text: str) -> Line:
     return line
 
 
-def _check_order(lines: List[Line]):
+def _check_order(lines: List[Line]) -> None:
     """Raise ValueError unless every joint is placed once, from joints placed before it."""
     placed: Dict[str, Line] = {}
     for line in lines:
@@ -172,12 +172,13 @@ def _check_order(lines: List[Line]):
             placed[name] = line
 
 
-def _missing(lines, line, joint, placed) -> str:
+def _missing(lines: List[Line], line: Line, joint: str, placed: Mapping[str, Line]) -> str:
     """Return why a line cannot stand on a joint that is not placed before it."""
     places = {name: each for each in lines for name in each.names}
     if joint not in places or joint in line.names:
         return f'joint {elided(joint)} is not placed before; there are: {listed(placed)}'
-    after, waiting = {joint: None}, [joint]
+    after: Dict[str, Optional[str]] = {joint: None}
+    waiting = [joint]
     for name in waiting:
         for needed in places[name].stands_on:
             if needed in line.names:
@@ -189,13 +190,14 @@ def _missing(lines, line, joint, placed) -> str:
     return f'joint {joint} is placed later, in line {lines.index(places[joint]) + 1}: move it up'
 
 
-def _way(after, name):
+def _way(after: Mapping[str, Optional[str]], name: Optional[str]) -> Iterable[str]:
     while name:
         yield name
         name = after[name]
 
 
-def _check_number(line: Line, kind: str, number: Formula, dimensions: Mapping, fixed=False):
+def _check_number(line: Line, kind: str, number: Formula, dimensions: Mapping,
+                  fixed: bool = False) -> None:
     """Raise ValueError if a number is not what its kind can be, for dimensions or arrays."""
     value = number.value(dimensions)
     if not np.all(np.isfinite(value)):
@@ -213,7 +215,7 @@ def _check_number(line: Line, kind: str, number: Formula, dimensions: Mapping, f
                          f'in degrees it is written {elided(degrees)}')
 
 
-def check_numbers(lines: Iterable[Line], dimensions: Mapping):
+def check_numbers(lines: Iterable[Line], dimensions: Mapping) -> None:
     """Raise ValueError, with its line, for a number that cannot be, for dimensions or arrays."""
     fixed = has_literal_lengths(lines)
     if not fixed:
@@ -233,7 +235,7 @@ def branches(lines: Iterable[Line]) -> dict:
             for kind, arg in line.arguments() if '|' in kind}
 
 
-def check_name(called: str):
+def check_name(called: str) -> None:
     """Raise ValueError if a dimension cannot be called so."""
     if not isinstance(called, str) or not _NAME.fullmatch(called) or called in _TAKEN:
         raise ValueError(f'no dimension can be called {quoted(called)}: a letter, then up to '
@@ -257,7 +259,7 @@ def has_literal_lengths(lines: Iterable[Line]) -> bool:
 
 
 def draw(sketch: Sketch, lines: Iterable[Line], symbols: Mapping[str, Real],
-         signs: Mapping[str, int]):
+         signs: Mapping[str, int]) -> None:
     """Place the joints of a linkage, one line after the other."""
     for line in lines:
         args = [_argument(line, kind, arg, symbols, signs) for kind, arg in line.arguments()]
@@ -268,7 +270,8 @@ def draw(sketch: Sketch, lines: Iterable[Line], symbols: Mapping[str, Real],
             raise line.error(error) from None
 
 
-def _argument(line, kind, arg, symbols, signs):
+def _argument(line: Line, kind: str, arg: str, symbols: Mapping[str, Real],
+              signs: Mapping[str, int]) -> Union[str, Real, float]:
     """Return what a construction takes for one word of its line."""
     if kind in _JOINTS:
         return arg

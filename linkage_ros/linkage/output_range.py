@@ -12,7 +12,7 @@ reach, where joints are fastest.
 from __future__ import annotations
 
 import math
-from typing import Dict, Optional, Sequence, Tuple
+from typing import Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -80,17 +80,17 @@ def travels(linkage: Mechanism, reach: Sequence[Arc]) -> Dict[str, Optional[Trav
             for (name, kind), lo, hi in zip(kinds.items(), *_extremes(linkage, [*kinds], reach))}
 
 
-def _travel(kind, lo, hi):
+def _travel(kind: str, lo: float, hi: float) -> Optional[Travel]:
     return None if kind == 'revolute' and hi - lo >= math.tau else (lo, hi)
 
 
-def _farthest(linkage) -> float:
+def _farthest(linkage: Mechanism) -> float:
     """Return a length [m] that no two joints are ever apart."""
     return float(sum(linkage.bar_lengths.values())
                  + np.abs(list(ground_frame(linkage).values())).sum())
 
 
-def _extremes(linkage, names, reach) -> np.ndarray:
+def _extremes(linkage: Mechanism, names: List[str], reach: Sequence[Arc]) -> np.ndarray:
     """Return the least and the greatest value of each joint, shape (2, joints)."""
     marks = [np.linspace(lo, hi, PARTS + 1) for lo, hi in reach]
     parts = np.concatenate([np.stack([mark[:-1], mark[1:]]) for mark in marks], axis=1)
@@ -109,6 +109,6 @@ def _extremes(linkage, names, reach) -> np.ndarray:
     return (signs * value.max(axis=(1, 2))).reshape(2, -1)
 
 
-def _at(samples, place):
+def _at(samples: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Return the samples at a place along the last axis, or the nearest there is."""
     return np.take_along_axis(samples, place.clip(0, SAMPLES - 1), -1)[..., 0]

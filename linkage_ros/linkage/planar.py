@@ -118,10 +118,10 @@ class Arm:
         """Return the mirror image of a point in the line of the arm."""
         return point - self.vector.turned() * (2.0 * self.offset(point) / self.square)
 
-    def _with_rate(self, margin, sign):
+    def _with_rate(self, margin: Real, sign: float) -> Real:
         return with_rate(margin, self.square, formula=lambda rate: -(sign * rate))
 
-    def _limit(self, radius, size, sign, margin):
+    def _limit(self, radius: Real, size: Real, sign: float, margin: Real) -> Limit:
         margin = self._with_rate(margin, sign)
         # At the limit the length is the radius: the square moves by that times what lengths do.
         return Limit(margin, GRAZE * abs(radius) * (size + self._span))
@@ -187,7 +187,8 @@ class CrankArm(Arm):
                                       exact_sum(g, m, -radius) * exact_sum(g, m, radius),
                                       exact_sum(g, -m, -radius) * exact_sum(g, -m, radius))
 
-    def _half_angle_limit(self, radius, size, sign, start, end):
+    def _half_angle_limit(self, radius: Real, size: Real, sign: float, start: Real,
+                          end: Real) -> Limit:
         gm, s, h = 4.0 * self._g * self._m, self._s, self._h
         # The smaller gap is the one next to which the margin can vanish.
         margin = where(abs(start) <= abs(end), start + sign * gm * square(s),
@@ -214,7 +215,7 @@ class CrankArm(Arm):
             2.0 * k * g * square(m * sin) / self.square
         return self._crank.centre + self._line * Complex(along, across)
 
-    def _first_sign(self, sign):
+    def _first_sign(self, sign: float) -> Real:
         """Return the sign that makes s (sign +1) or h positive for crank angles in (0, pi)."""
         left = where(0.0 <= self._turn.y, sign, -sign)
         return where(0.0 <= self._turn.x, 1.0, left)
@@ -281,7 +282,7 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) 
 
     turning = spin(arm.vector)
 
-    def with_turning(bar, along, length):
+    def with_turning(bar: Complex, along: Real, length: Real) -> Complex:
         """Add to the arm's turning that of a bar, along + i v, on the arm."""
         return with_spin(bar, Rate(
             (v, skew, *turning.of), lambda dv, dskew, *rates: turning.formula(*rates) + (
@@ -325,7 +326,7 @@ def mirror(arm: Arm, point: Complex,
 
 def parallel(bar: Complex, place: Complex) -> Complex:
     """Return a bar like another one, NaN where its end has no place."""
-    def there(part):
+    def there(part: Real) -> Real:
         return gated(part, abs(place.x), real(0.0))
 
     turning = spin(bar)
@@ -379,7 +380,7 @@ def inversor(arm: Arm, long: Real, short: Real) -> Inversor:
     return Inversor(right, left, _where_assembled(inverse, right.limits))
 
 
-def _where_assembled(vector: Complex, limits) -> Complex:
+def _where_assembled(vector: Complex, limits: Sequence[Limit]) -> Complex:
     x, y = vector.x, vector.y
     for limit in limits:
         x, y = (gated(part, limit.margin, limit.tolerance) for part in (x, y))
@@ -451,7 +452,8 @@ class CrankRail(Rail):
         return (self._limit(rod, low, high, low, s, behind),
                 self._limit(rod, far, near, near, h, behind))
 
-    def _limit(self, rod, start, end, gap, half, sign):
+    def _limit(self, rod: Real, start: Real, end: Real, gap: Real, half: Real,
+               sign: Real) -> Limit:
         margin = gap + 2.0 * self._crank.length * square(half)
         tolerance = GRAZE * (rod + self._span)
         grown = square_root(2.0 * self._crank.length) * sign

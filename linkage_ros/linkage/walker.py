@@ -55,7 +55,7 @@ class Layout(NamedTuple):
         """Return the cranks' angles and, where there are velocities, their speeds."""
         return values[self._rows_end():]
 
-    def _rows_end(self):
+    def _rows_end(self) -> int:
         return self.legs * (self.posed + self.velocities)
 
 
@@ -82,11 +82,11 @@ class Solution:
         self._drive = layout.drive(values)
         self._pack: Callable = Struct(f'{self._drive.size}d').pack_into
 
-    def finish(self):
+    def finish(self) -> None:
         """Wait for what makes the first solution slower than the others."""
         self._batch.finish()
 
-    def solve(self, thetas: Sequence[float], speeds: Sequence[float] = ()):
+    def solve(self, thetas: Sequence[float], speeds: Sequence[float] = ()) -> None:
         """Solve at crank angles [rad] and, if there are velocities, crank speeds [rad/s]."""
         if not self.layout.velocities:
             speeds = ()
