@@ -19,7 +19,19 @@ from itertools import chain
 import math
 from struct import Struct
 from threading import Thread
-from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Set, Tuple
+from typing import (
+    Any,
+    Callable,
+    Dict,
+    Iterable,
+    Iterator,
+    List,
+    Mapping,
+    Optional,
+    Sequence,
+    Set,
+    Tuple,
+)
 import warnings
 
 import numpy as np
@@ -36,7 +48,7 @@ DEEPEST = 16
 KEPT = 128
 
 
-def keep(found: dict, key, value):
+def keep(found: dict, key: Any, value: Any) -> Any:
     """Keep a value and return it; what was kept first is dropped where there are too many."""
     found[key] = value
     while len(found) > KEPT:
@@ -44,25 +56,25 @@ def keep(found: dict, key, value):
     return value
 
 
-def _grazed(x, tolerance):
+def _grazed(x: float, tolerance: float) -> float:
     """Return the root of a radicand that is not above zero."""
     return 0.0 if x >= -tolerance else math.nan
 
 
-def _root(x, tolerance):
+def _root(x: Any, tolerance: Any) -> Any:
     if _all_at_least(x, 0.0):
         return np.sqrt(x)
     return np.sqrt(_gated(np.maximum(x, 0.0), x, tolerance))
 
 
-def _gated(x, margin, tolerance):
+def _gated(x: Any, margin: Any, tolerance: Any) -> Any:
     """Return x where the margin is not below zero by more than the tolerance, else NaN."""
     if _all_at_least(margin, -tolerance):
         return x
     return np.where(margin >= -tolerance, x, np.nan)
 
 
-def _all_at_least(x, bound) -> np.bool_:
+def _all_at_least(x: Any, bound: Any) -> np.bool_:
     """Return whether nothing is below a bound, or no number; for one bound in one quick pass."""
     if isinstance(bound, float) and np.size(x):
         return np.minimum.reduce(x, axis=None) >= bound
@@ -70,7 +82,7 @@ def _all_at_least(x, bound) -> np.bool_:
 
 
 @np.vectorize
-def _fsum(*terms):
+def _fsum(*terms: float) -> float:
     try:
         return math.fsum(terms)
     except OverflowError:
@@ -120,7 +132,7 @@ _EVALUATED: Mapping[str, Callable] = {
 }
 
 
-def evaluate(node: Real, dimensions: Mapping, known: dict):
+def evaluate(node: Real, dimensions: Mapping, known: dict) -> Any:
     """Return the value of an expression of dimensions alone; known is shared between calls."""
     for x in in_order([node], lambda x: () if x in known else x.operands):
         if x in known:
@@ -142,7 +154,7 @@ class _Listing:
         self.entries: List[Tuple[Real, tuple]] = []
         self._decided = decided
         self._numbers: Dict[tuple, int] = {}
-        self._known = {}
+        self._known: Dict[Real, int] = {}
         for leaf, expression in replaced.items():
             self._known[leaf] = self._number(expression)
         self.outputs = [self._number(node) for node in outputs]
@@ -233,7 +245,7 @@ class _Listing:
         return lines, [text[n] for n in self.outputs], kept
 
 
-def _with_releases(lines, kept):
+def _with_releases(lines: Sequence[Tuple[str, str, Set[str]]], kept: Set[str]) -> Iterator[str]:
     """Drop each array after its last use, so that the next one takes over its warm memory."""
     last = {}
     for index, (_, _, reads) in enumerate(lines):
@@ -245,7 +257,8 @@ def _with_releases(lines, kept):
             yield 'del ' + ', '.join(done)
 
 
-def _python(listing: _Listing, dialect: _Dialect, angles: int, names=()) -> Callable:
+def _python(listing: _Listing, dialect: _Dialect, angles: int,
+            names: Tuple[str, ...] = ()) -> Callable:
     """
     Return a function of the constants, and of what to do instead, to the function of the angles.
 
@@ -280,11 +293,12 @@ def _python(listing: _Listing, dialect: _Dialect, angles: int, names=()) -> Call
 class _Variant:
     """The code for one outcome of the conditions on dimensions."""
 
-    def __init__(self, outputs, decided, replaced, angles):
+    def __init__(self, outputs: Sequence[Real], decided: Mapping[Real, bool],
+                 replaced: Mapping[Real, Real], angles: int):
         self._listing = _Listing(outputs, decided, replaced)
         self.angles, self.outputs = angles, len(outputs)
         self.constants = [self._listing.entries[n][0] for n in self._listing.constants]
-        self._placing = {}
+        self._placing: Dict[tuple, Callable] = {}
 
     def placing(self, names: tuple) -> Callable:
         """Return the code for one pose that returns the outputs in pairs, by name."""
@@ -293,11 +307,11 @@ class _Variant:
         return self._placing[names]
 
     @cached_property
-    def float(self):
+    def float(self) -> Callable:
         return _python(self._listing, _FLOAT, self.angles)
 
     @cached_property
-    def array(self):
+    def array(self) -> Callable:
         return _python(self._listing, _ARRAY, self.angles)
 
     @cached_property
@@ -307,7 +321,7 @@ class _Variant:
         Thread(target=self._compile, args=(made,), name='linkage_ros compiler').start()
         return made
 
-    def _compile(self, made):
+    def _compile(self, made: Future) -> None:
         try:
             from .llvm_code import Loop
 
@@ -360,7 +374,7 @@ class Program:
         return self._variants[decisions]
 
 
-def _conditions(outputs) -> list:
+def _conditions(outputs: Iterable[Real]) -> list:
     """Return the conditions on dimensions alone that varying operations choose by."""
     found, seen, waiting = [], set(), list(outputs)
     while waiting:
@@ -377,7 +391,7 @@ def _conditions(outputs) -> list:
 class Pose:
     """The outputs of a program as a function of the angles, for dimensions that are set."""
 
-    def __init__(self, variant: _Variant, constants, shape: tuple, accelerate: bool):
+    def __init__(self, variant: _Variant, constants: Sequence, shape: tuple, accelerate: bool):
         self._variant = variant
         self._constants = constants
         self._accelerate = accelerate
@@ -389,7 +403,7 @@ class Pose:
         return self._variant.float(*self._constants, self._by_arrays)
 
     @cached_property
-    def _given(self):
+    def _given(self) -> np.ndarray:
         return np.array(self._constants)
 
     def _by_arrays(self, *angles: float) -> tuple:
@@ -398,18 +412,18 @@ class Pose:
 
     def placer(self, names: tuple) -> Callable:
         """Return the function from one angle, a float, to an array (2,) for each name."""
-        def by_arrays(theta):
+        def by_arrays(theta: float) -> Dict[str, np.ndarray]:
             return dict(zip(names, np.reshape(self._by_arrays(theta), (-1, 2))))
 
         return self._variant.placing(names)(*self._constants, by_arrays)
 
-    def __call__(self, *angles):
+    def __call__(self, *angles: Any) -> Any:
         """Return the outputs at floats, as floats, or over arrays that are broadcast together."""
         if not self.shape and set(map(type, angles)) == {float}:
             return self.at(*angles)
         return self.over(*angles)
 
-    def over(self, *angles) -> np.ndarray:
+    def over(self, *angles: Any) -> np.ndarray:
         """Return the outputs over arrays that are broadcast together, shape (outputs, *shape)."""
         arrays: Sequence[np.ndarray] = [np.asarray(a, float) for a in angles]
         if self.shape:
@@ -426,7 +440,7 @@ class Pose:
             out = self._plainly(flat, size)
         return out.reshape(self._variant.outputs, *shape)
 
-    def searched(self, *angles) -> np.ndarray:
+    def searched(self, *angles: Any) -> np.ndarray:
         """Return what `over` does for one set of dimensions, without code for single poses."""
         angles = np.broadcast_arrays(*angles)
         flat = [a.ravel() for a in angles]
@@ -437,16 +451,16 @@ class Pose:
         return Batch(self._plainly, self._variant.loop if self._accelerate else None,
                      self._given, self._variant.angles, rows)
 
-    def _plainly(self, given, size):
+    def _plainly(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
         return self._one_by_one(given, size) if size < FEW else self._blocks(given, size)
 
-    def _one_by_one(self, given, size):
+    def _one_by_one(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
         poses = map(self.at, *(a.tolist() for a in given))
         outputs = self._variant.outputs
         return np.fromiter(chain.from_iterable(poses), float, size * outputs).reshape(
             size, outputs).T
 
-    def _blocks(self, given, size):
+    def _blocks(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
         pose = self._variant.array(*self._constants)
         out = np.empty((self._variant.outputs, size))
         with np.errstate(all='ignore'):
@@ -456,7 +470,7 @@ class Pose:
                     row[block] = values
         return out
 
-    def _swept(self, angles):
+    def _swept(self, angles: Sequence[np.ndarray]) -> np.ndarray:
         shape = np.broadcast_shapes(self.shape, *map(np.shape, angles))
         with np.errstate(all='ignore'):
             rows = self._variant.array(*self._constants)(*angles)
@@ -476,18 +490,19 @@ class Batch:
 
     """
 
-    def __init__(self, plainly: Callable, loop, constants, angles: int, rows: np.ndarray):
+    def __init__(self, plainly: Callable, loop: Optional[Future], constants: np.ndarray,
+                 angles: int, rows: np.ndarray):
         self.given, self.rows = np.zeros((angles, len(rows))), rows
         self._plainly = plainly
         self._loop, self._constants = loop, constants
-        self._run = None
+        self._run: Optional[Callable] = None
 
-    def finish(self):
+    def finish(self) -> None:
         """Wait for the machine code, if there is to be any."""
         if self._loop:
             wait([self._loop])
 
-    def solve(self):
+    def solve(self) -> None:
         """Fill the rows: plainly until there is machine code, for which nobody waits."""
         if self._loop and self._loop.done():
             self._take(self._loop)
@@ -496,7 +511,7 @@ class Batch:
         else:
             self.rows[:] = self._plainly(self.given, len(self.rows)).T
 
-    def _take(self, loop):
+    def _take(self, loop: Future) -> None:
         self._loop = None
         if error := loop.exception():
             warnings.warn(f'no machine code, so plain Python goes on: {error}', stacklevel=3)

@@ -14,6 +14,9 @@ The catalogue: mechanisms by the names that users type.
 
 from functools import lru_cache
 from types import MappingProxyType
+from typing import Iterable, Mapping, Optional, Sequence, Tuple
+
+from numpy.typing import ArrayLike
 
 from . import (
     chebyshev_lambda,
@@ -48,11 +51,12 @@ CUSTOM = 'custom'
 
 
 @lru_cache(maxsize=32)
-def _structure(design, branches):
+def _structure(design: Design, branches: Tuple[Tuple[str, int], ...]) -> Structure:
     return Structure(design, dict(branches))
 
 
-def design(type_: str, /, joints=None, tracer=None, dimensions=()) -> Design:
+def design(type_: str, /, joints: Optional[Sequence[str]] = None, tracer: Optional[str] = None,
+           dimensions: Iterable[str] = ()) -> Design:
     """
     Return what a type is: its dimensions, joints, branches and tracer.
 
@@ -81,7 +85,9 @@ def defaults(type_: str, /) -> dict:
     return dict(TYPES[type_].DESIGN.dimensions)
 
 
-def create(type_: str, /, *, branches=None, joints=None, tracer=None, **dimensions) -> Mechanism:
+def create(type_: str, /, *, branches: Optional[Mapping[str, int]] = None,
+           joints: Optional[Sequence[str]] = None, tracer: Optional[str] = None,
+           **dimensions: ArrayLike) -> Mechanism:
     """
     Make a mechanism.
 

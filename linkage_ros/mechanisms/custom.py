@@ -6,7 +6,7 @@
 from collections.abc import Mapping, Set
 from functools import lru_cache, partial
 from itertools import islice
-from typing import Iterable, List, Optional, Tuple
+from typing import Any, Iterable, List, Optional, Tuple
 
 import numpy as np
 
@@ -45,7 +45,7 @@ def design(joints: Tuple[str, ...], tracer: Optional[str], names: Tuple[str, ...
                   partial(check, lines))
 
 
-def check(lines: List[joint_lines.Line], linkage: Mechanism):
+def check(lines: List[joint_lines.Line], linkage: Mechanism) -> None:
     """Raise ValueError, with its line, for a number, a bar or a triangle that cannot be."""
     joint_lines.check_numbers(lines, linkage.dimensions)
     check_bars(linkage)
@@ -55,7 +55,8 @@ def check(lines: List[joint_lines.Line], linkage: Mechanism):
                              'other two together')
 
 
-def given(joints: Iterable[str], tracer: Optional[str], dimensions: Iterable[str]) -> Design:
+def given(joints: Optional[Iterable[str]], tracer: Optional[str],
+          dimensions: Iterable[str]) -> Design:
     """Return the design of what a user gives; raise ValueError for what is none."""
     if tracer is not None and not isinstance(tracer, str):
         raise ValueError(f'tracer must be the name of a joint, got {quoted(tracer)}')
@@ -70,7 +71,7 @@ def given(joints: Iterable[str], tracer: Optional[str], dimensions: Iterable[str
     return design(lines, tracer, names)
 
 
-def given_lines(joints: Iterable[str]) -> Tuple[str, ...]:
+def given_lines(joints: Any) -> Tuple[str, ...]:
     """Return the joints as a tuple of lines; raise ValueError if they are none."""
     try:
         # A set has no order, and of a mapping only the keys would be read.

@@ -15,7 +15,9 @@ same triangle: a e^(i theta) = e^(i phi) (W + i (e + b sin phi)), W^2 = a^2 - (e
 """
 
 import math
-from typing import Sequence
+from typing import Any, Optional, Sequence
+
+from numpy.typing import ArrayLike
 
 from ..linkage import servo
 from ..linkage.crank_range import reachable_arcs
@@ -32,7 +34,7 @@ DESIGN = Design('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 0.0}, tracer='L',
 class Mechanism(servo.Mechanism):
     """A slotted lever: also solved from the lever angle."""
 
-    def servo_angle(self, lever_angle, near=None):
+    def servo_angle(self, lever_angle: ArrayLike, near: Optional[ArrayLike] = None) -> Any:
         """
         Return the crank angle that puts the lever where it is wanted.
 
@@ -54,11 +56,11 @@ class Mechanism(servo.Mechanism):
         """
         return self.servo(lever_angle, near)[0]
 
-    def servo(self, lever_angle, near=None) -> Sequence:
+    def servo(self, lever_angle: ArrayLike, near: Optional[ArrayLike] = None) -> Sequence:
         """Return what `servo_angle` does, and d lever / d servo there."""
         return self.servo_for('lever', lever_angle, near)
 
-    def reduction(self, servo_angle):
+    def reduction(self, servo_angle: ArrayLike) -> Any:
         """Return d lever / d servo at a crank angle [rad], in its shape."""
         _, pose = self._ready('rates', ('lever',), 0)
         return pose(servo_angle)[0]
