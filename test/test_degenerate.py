@@ -189,6 +189,22 @@ def test_what_is_asked_again_and_again_does_not_pile_up():
     assert after - before < 500_000
 
 
+def test_a_kite_that_always_lies_flat_has_no_dead_points_of_its_own():
+    found = linkage(*FOUR_BAR, 'P line A B 1', 'C mirror P A B')
+    assert found.dead_points() == linkage(*FOUR_BAR).dead_points() == []
+
+
+def test_an_extreme_where_an_arm_has_no_direction_spoils_no_answer():
+    # The arm from D, the mirror image of A in the line B C, to A vanishes on the way.
+    found = linkage('A ground 0.5 0', 'B ground 0 -1.9', 'C crank A 0.44', 'D mirror A B C',
+                    'G mirror C D A')
+    theta = np.linspace(-3.0, 3.0, 21)
+    wanted = found.solve(theta)['G']
+    for axis in 'xy':
+        answers = found.crank_angle(f'G.{axis}', wanted[:, 'xy'.index(axis)])
+        assert (np.nanmin(np.abs(answers - theta[:, None]), axis=1) < 1e-7).all()
+
+
 @pytest.mark.parametrize('bad', [10 ** 400, object(), 1j, 'a', [[1.0], [1.0, 2.0]], {'a': 1.0}],
                          ids=['huge', 'object', 'complex', 'text', 'ragged', 'mapping'])
 def test_what_is_no_number_is_refused_by_its_name(bad):

@@ -26,6 +26,8 @@ from ..words import listed, quoted
 NEAR = 1e-2
 # Dead points nearer to an end of the reach than this [rad] are that end.
 ONE = 1e-9
+# A closure whose size is less than so many times its rounding never leaves zero.
+FLAT = 256.0
 
 
 class Analysed(Mechanism):
@@ -180,8 +182,10 @@ class Analysed(Mechanism):
         theta = sampled(lo, hi)
         values, rates = self._split(pose.searched(theta, *others))
         size = np.fmax.reduce(np.abs(values), axis=1, initial=0.0)
-        # An arm vanishes where it is as short as rounding makes it.
-        rounding = np.array(rounding) + GRAZE ** 2 * size
+        # An arm vanishes where it is as short as rounding makes it. What is never more than
+        # rounding, as the area of a kite that always lies flat, tells nothing.
+        rounding = np.where(size > FLAT * np.array(rounding),
+                            np.array(rounding) + GRAZE ** 2 * size, -np.inf)
         for place in (0, -1):
             if abs(theta[place]) == math.pi:
                 yield from zip(repeat(theta[place]), abs(values[:, place]), rounding, size)
@@ -198,7 +202,8 @@ class Analysed(Mechanism):
             gaps = np.abs(self._split(pose.searched(found, *others))[0][row, np.arange(len(row))])
             # A fold that changes sign vanishes between two neighbouring angles.
             yield from ((angle, gap if kind else 0.0, rounding[i], size[i])
-                        for angle, gap, i in zip(found.tolist(), gaps.tolist(), row.tolist()))
+                        for angle, gap, i in zip(found.tolist(), gaps.tolist(), row.tolist())
+                        if rounding[i] > 0.0)
 
     @staticmethod
     def _split(rows):

@@ -156,7 +156,7 @@ class MonotoneBranches:
             return False
         _, values, _, noise = (np.concatenate(part) for part in zip(*runs))
         noise = STILL * (noise + np.median(noise)) + self._rounding
-        return bool(np.any(np.abs(values - np.median(values)) > noise))
+        return bool(np.any(np.abs(self._difference(values - np.median(values))) > noise))
 
     def _branched(self, theta, value, rate, noise):
         least = 4.0 * (noise + self._rounding)
@@ -166,7 +166,10 @@ class MonotoneBranches:
             ends, _ = refined(lambda x: (self._curve(x.ravel())[1] >= 0.0).reshape(
                 x.shape) == rising[:, None], theta[places], theta[places + 1])
         reached = self._curve(ends)[0] if len(ends) else ends
-        reached = value[places] + self._difference(reached - value[places])
+        # An extreme may be the one angle at which an arm has no length and no direction.
+        known = np.isfinite(reached)
+        ends = np.where(known, ends, theta[places])
+        reached = value[places] + self._difference(np.where(known, reached - value[places], 0.0))
         theta = np.insert(theta, places + 1, ends)
         value = np.insert(value, places + 1, reached)
         cuts = [0, *(places + 1 + np.arange(len(places))).tolist(), len(theta) - 1]

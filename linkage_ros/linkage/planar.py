@@ -319,8 +319,9 @@ def mirror(arm: Arm, point: Complex,
     for place, bar in ends:
         own = spin(bar)
         bars.append(with_spin(image - place, Rate(
-            (*turning.of, *own.of), lambda *rates, own=own: 2.0 * turning.formula(
-                *rates[:len(turning.of)]) - own.formula(*rates[len(turning.of):]))))
+            (*turning.of, *own.of), lambda *rates, own=own: gated(
+                2.0 * turning.formula(*rates[:len(turning.of)])
+                - own.formula(*rates[len(turning.of):]), abs(image.x + image.y), real(0.0)))))
     return _with_velocity(image, arm.foot, bars[0]), *bars
 
 
