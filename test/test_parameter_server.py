@@ -229,6 +229,7 @@ def test_a_hundred_sets_at_once_cost_as_much_as_the_last(graph):
     node = graph.start(Slow, LEG)
     client = Client(graph, node)
     client.set(('leg.scale', 1.5))
+    graph.until(lambda: node._worker._thread is None)
     node.free.clear()
     answered = []
     for number in range(100):

@@ -85,7 +85,11 @@ class Worker:
             finally:
                 done.set()
 
-        executor.create_task(on_its_thread)
+        try:
+            executor.create_task(on_its_thread)
+        except (AttributeError, RuntimeError, rclpy_implementation.InvalidHandle):
+            # An executor that has been shut down takes nothing, each distribution's in its way.
+            return
         while not (self._ended.is_set() or done.wait(LONGEST_WAIT)):
             pass
 
