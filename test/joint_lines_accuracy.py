@@ -342,21 +342,6 @@ def _error(out, result, value):
     return abs(mpfr(float(result)) - value)
 
 
-def measured(mechanism, linkage, thetas, rates=False):
-    """Return the rows of all answers, on the way past change points that fits them best."""
-    poses = outputs(linkage, mechanism.links)
-    found = answers(mechanism, thetas, poses, rates)
-    best = None
-    for way in linkage.passings():
-        rows = judge(Measure(linkage, poses, way), thetas, found, rates)
-        count = sum(bool(row.problem) for row in rows)
-        if best is None or count < best[0]:
-            best = count, rows
-        if not count:
-            break
-    return best[1]
-
-
 def broken(rows):
     """Return the rows that break the rule, worst first."""
     return sorted((row for row in rows if row.problem), key=lambda row: -row.ratio)

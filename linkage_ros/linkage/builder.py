@@ -86,8 +86,6 @@ class Sketch:
         self.frames: Dict[str, Dict[str, Complex]] = {}
         self.joint_values: Dict[str, Real] = {}
         self.directions: Dict[str, Complex] = {}
-        self.lines: Dict[str, Complex] = {}
-        self.corners: Dict[str, Tuple[str, str, Real]] = {}
         self.transmissions: Dict[str, Real] = {}
         self.folds: List[planar.Limit] = []
         self.cranks: List[str] = []
@@ -175,7 +173,6 @@ class Sketch:
         link = self._hang(right, corner, found.left.second, short)
         self._place(corner, right, found.left.second, link, short, ())
         self.points[corner].place = self.points[pole].place + found.inverse
-        self.corners[corner] = pole, pin, (long - short) * (long + short)
         self._pair(left, pole, pin, found.left, long, short)
         link = self._hang(left, corner, found.right.second, short)
         self._bar(left, corner, found.right.second, short, link)
@@ -202,9 +199,7 @@ class Sketch:
         link = self._hang(pin, name, found.rod, rod)
         self._place(name, pin, found.rod, link, rod, (origin,))
         self.transmissions[name] = arctangent(abs(found.reach), rail.height)
-        block = self._slide('block', GROUND, origin, name, found.place, Complex(0.0, 0.0),
-                            direction)
-        self.lines[block] = along
+        self._slide('block', GROUND, origin, name, found.place, Complex(0.0, 0.0), direction)
 
     def _rail(self, pin: str, origin: str, along: Complex) -> planar.Rail:
         """Return a joint as seen from a line through a ground joint."""
@@ -247,13 +242,12 @@ class Sketch:
         return f'{word}{taken + 1}' if taken else word
 
     def _slide(self, word: str, parent: str, joint: str, tip: str, place: Real, local: Complex,
-               direction: Number = 0.0) -> str:
-        """Add a link that slides along its parent, and return its name."""
+               direction: Number = 0.0) -> None:
+        """Add a link that slides along its parent."""
         name = self._numbered(word)
         self.links.append(Link(name, parent, joint, 'prismatic', real(direction), tip))
         self.joint_values[name] = place
         self.frames[name] = {tip: local}
-        return name
 
     def arm(self, first: str, second: str) -> planar.Arm:
         """Return the arm from one joint to another."""

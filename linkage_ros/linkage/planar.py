@@ -226,20 +226,6 @@ class CrankArm(Arm):
             return None
         return self._along * Complex(1.0, self._s / self._h) / (2.0 * self._m)
 
-    def crank_of_inverse(self, axis: str, value: Real, power: Real) -> Optional[Complex]:
-        """
-        Return a vector along the crank, seen from its zero, that puts an inverse somewhere.
-
-        It is the inverse of the pin in the foot by `power`; its x or y coordinate is to be the
-        value. None where that is not a straight line, as with `inverse_of_isosceles`.
-        """
-        if self._g is not self._m:
-            return None
-        along, scaled = self._along, (value - getattr(self.foot, axis)) * (2.0 * self._m) / power
-        tangent = (along.x - scaled) / along.y if axis == 'x' else (scaled - along.y) / along.x
-        half = Complex(1.0, tangent)
-        return half * half * self._turn.conjugate()
-
 
 def _half_angle(theta: Real, turn: Complex) -> Tuple[Real, Real]:
     """Return sine and cosine of (theta + arg turn) / 2 for a unit vector turn."""

@@ -46,7 +46,6 @@ from ..formula.expression import (
 )
 from ..formula.program import Program
 
-TURN = 2.0 * math.pi
 # Angles nearer than this [rad] may be one, if the output does not tell them apart.
 CLOSE = 1e-7
 # How much rounding takes an angle beyond the ends that it is to be between, as a part of them.
@@ -238,8 +237,8 @@ def _taken(answers, working, rounding, follows, ended, given) -> Program:
                 rounding < CLOSE * speed, rounding / speed, CLOSE)
             low, high = ends[0] - slack, ends[1] + slack
             first, last = (_turned(theta, end) for end in ends)
-            first = where(first < low, first + TURN, first)
-            last = where(high < last, last - TURN, last)
+            first = where(first < low, first + math.tau, first)
+            last = where(high < last, last - math.tau, last)
             place = where(place < low, first, where(high < place, last, place)) \
                 if follows else first
             misses = [place < low, high < place]
@@ -255,14 +254,14 @@ def _taken(answers, working, rounding, follows, ended, given) -> Program:
 
 def _turned(theta, near):
     """Return an angle plus the whole turns that take it next to another."""
-    return theta + TURN * nearest_integer((near - theta) / TURN)
+    return theta + math.tau * nearest_integer((near - theta) / math.tau)
 
 
 def _inside(theta, arcs):
     """Return angles [rad] that lie on arcs, those beyond an end by rounding at it; NaN others."""
     kept = np.full(theta.shape, np.nan)
     for low, high in arcs:
-        turns = TURN * np.round((0.5 * (low + high) - theta) / TURN)
+        turns = math.tau * np.round((0.5 * (low + high) - theta) / math.tau)
         beyond = np.maximum(low - (theta + turns), (theta + turns) - high)
         at_end = np.clip(theta + turns, low, high) - turns
         kept = np.where(beyond <= 0.0, theta, np.where(beyond <= ROUNDED, at_end, kept))

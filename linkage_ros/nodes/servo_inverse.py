@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState
 from . import joint_state_reader, scene_node
 from .message_layout import Unreadable
 from .. import scene
-from ..linkage.servo import CLOSE, TURN
+from ..linkage.servo import CLOSE
 from ..robot_model import urdf
 from ..words import elided, listed, MESSAGE, quoted
 
@@ -169,8 +169,8 @@ class Asked:
         angles = angles[np.isfinite(angles)]
         if angles.size and self._sweep:
             low, high = self._sweep
-            below = float(np.mod(low - angles, TURN).min())
-            above = float(np.mod(angles - high, TURN).min())
+            below = float(np.mod(low - angles, math.tau).min())
+            above = float(np.mod(angles - high, math.tau).min())
             needed, end = (low - below, 'lower') if below < above else (high + above, 'upper')
             return (f'{value:.6g} needs the crank at {needed:.6g} rad, outside '
                     f'{self._where}: beyond its {end} end')
@@ -182,11 +182,11 @@ class Asked:
 
     def _out_of_range(self, value):
         gaps = [gap for (low, _), (high, _) in self._spans for gap in (low - value, value - high)]
-        nearest = int(np.argmin([gap % TURN if self._turns else gap if gap > 0.0 else math.inf
+        nearest = int(np.argmin([gap % math.tau if self._turns else gap if gap > 0.0 else math.inf
                                  for gap in gaps]))
         (_, theta), arc = self._spans[nearest // 2][nearest % 2], self._arcs[nearest // 2]
         at = [end for end, limit in zip(('lower', 'upper'), arc)
-              if abs(limit - theta) < CLOSE and arc[1] - arc[0] < TURN]
+              if abs(limit - theta) < CLOSE and arc[1] - arc[0] < math.tau]
         end = f', the {at[0]} end of {self._where}' if at else ''
         spans = scene.in_words((low, high) for (low, _), (high, _) in self._spans)
         what = 'the lever' if self._name == LEVER else self._name
@@ -198,7 +198,7 @@ class Asked:
         """The crank angles that may be taken, no more than a turn."""
         if self._sweep:
             low, high = self._sweep
-            return [(low, min(high, low + TURN))]
+            return [(low, min(high, low + math.tau))]
         return self._reach
 
     @cached_property
@@ -215,7 +215,7 @@ class Asked:
             theta = np.linspace(*theta[[max(best - 1, 0), min(best + 1, SAMPLES - 1)]], SAMPLES)
             value = self._value(theta)
             if self._turns:
-                value += TURN * np.round((top - value[SAMPLES // 2]) / TURN)
+                value += math.tau * np.round((top - value[SAMPLES // 2]) / math.tau)
         best = int(np.nanargmax(side * value))
         return float(value[best]) * self._unit, float(theta[best])
 
