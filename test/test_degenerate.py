@@ -189,6 +189,14 @@ def test_what_is_asked_again_and_again_does_not_pile_up():
     assert after - before < 500_000
 
 
+def test_an_arc_of_the_reach_goes_on_past_a_limit_that_is_only_touched_at_minus_pi():
+    # The parallelogram is flat at 0 and pi; the second dyad lets the crank swing about pi alone.
+    found = linkage('O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'B dyad A Q 4 1 left',
+                    'R ground -2 0', 'C dyad A R 1.5 0.6 left')
+    (lo, hi), = found.reach()
+    assert lo < math.pi < hi and hi - math.pi == pytest.approx(math.pi - lo)
+
+
 def test_a_kite_that_always_lies_flat_has_no_dead_points_of_its_own():
     found = linkage(*FOUR_BAR, 'P line A B 1', 'C mirror P A B')
     assert found.dead_points() == linkage(*FOUR_BAR).dead_points() == []

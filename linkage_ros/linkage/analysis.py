@@ -152,8 +152,8 @@ class Analysed(Mechanism):
             Distance [rad] in the shape of theta, at most pi; infinite without dead points.
 
         """
-        away = [abs(wrapped(np.asarray(theta, float) - dead))
-                for dead in self._dead_points(others)]
+        theta = numbers('theta', theta)
+        away = [abs(wrapped(theta - dead)) for dead in self._dead_points(others)]
         return np.min([np.full(np.shape(theta), np.inf), *away], axis=0)[()]
 
     def _dead_points(self, others):

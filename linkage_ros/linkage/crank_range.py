@@ -55,12 +55,13 @@ def arcs(margins: Callable, limits: Sequence[Limit], value: Callable) -> List[Ar
     ends = [end for limit in limits if limit.crank == 0
             for end in _crank_ends(*map(value, (
                 limit.start, limit.end, limit.turn, limit.tolerance)))]
-    if not _is_periodic(margins):
+    periodic = _is_periodic(margins)
+    if not periodic:
         # What follows a turn later is another assembly: the arcs are those of [-pi, pi].
         ends.append(-math.pi)
     if any(x.margin.varies and x.crank != 0 for x in limits):
         ends += [end for arc in between(ends) for end in _limits(margins, failing, *arc)]
-    found = reachable_arcs(ends, assembled, joined=-math.pi not in ends)
+    found = reachable_arcs(ends, assembled, joined=periodic)
     return [_trimmed(assembled, *arc) for arc in found] if ends else found
 
 
