@@ -160,7 +160,7 @@ In Python:
 from linkage_ros import mechanisms
 
 linkage = mechanisms.create('{type_}')
-linkage.solve({0.5 if len(linkage.cranks) == 1 else [1.2, 1.3]}, points=('{linkage.tracer}',))
+linkage.solve({0.5 if len(linkage.inputs) == 1 else [1.2, 1.3]}, points=('{linkage.tracer}',))
 ```
 """
 
@@ -237,7 +237,7 @@ def placed(design):
 
 def reach(linkage) -> str:
     """Return in words which crank angles can be assembled."""
-    if len(linkage.cranks) > 1:
+    if len(linkage.inputs) > 1:
         return 'How far one crank reaches depends on where the others are.'
     arcs = linkage.reach()
     if arcs[0][1] - arcs[0][0] >= math.tau:

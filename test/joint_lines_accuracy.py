@@ -84,12 +84,12 @@ def outputs(linkage, links):
 
 def answers(mechanism, thetas, poses, rates):
     """Return {output: array} of a mechanism at crank angles, shape (n, cranks)."""
-    given = thetas.T if len(mechanism.cranks) > 1 else thetas[:, 0]
+    given = thetas.T if len(mechanism.inputs) > 1 else thetas[:, 0]
     points, angles = mechanism.solve(given), mechanism.joint_angles(given)
     found = {out: (points if out.what == 'point' else angles)[out.name] for out in poses}
-    for crank in range(len(mechanism.cranks) if rates else 0):
-        points = mechanism.velocity(given, crank=crank)
-        angles = mechanism.joint_rates(given, crank=crank)
+    for crank in range(len(mechanism.inputs) if rates else 0):
+        points = mechanism.velocity(given, by=crank)
+        angles = mechanism.joint_rates(given, by=crank)
         found.update((out._replace(crank=crank),
                       (points if out.what == 'point' else angles)[out.name]) for out in poses)
     return found

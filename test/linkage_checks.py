@@ -41,7 +41,7 @@ class Subject:
         self.mechanism = mechanisms.create('custom', joints=design.joints,
                                            branches=design.branches, **design.dimensions)
         self.linkage = Linkage(design.joints, design.dimensions, design.branches)
-        self.cranks = len(self.mechanism.cranks)
+        self.cranks = len(self.mechanism.inputs)
         self.held = tuple(float(x) for x in rng.uniform(-3.0, 3.0, self.cranks - 1))
         self.poses = accuracy.outputs(self.linkage, self.mechanism.links)
         self.theta = np.linspace(-math.pi, math.pi, 2 * samples + 1)[1::2]
@@ -238,9 +238,9 @@ def _all(mechanism, theta):
     for ask in ('solve', 'joint_angles', 'transmission_angles'):
         answers = getattr(mechanism, ask)(theta)
         found.update((f'{ask} {name}', np.asarray(value)) for name, value in answers.items())
-    for crank in range(len(mechanism.cranks)):
+    for crank in range(len(mechanism.inputs)):
         for ask in ('velocity', 'joint_rates'):
-            answers = getattr(mechanism, ask)(theta, crank=crank)
+            answers = getattr(mechanism, ask)(theta, by=crank)
             found.update((f'{ask} {name} {crank}', np.asarray(value))
                          for name, value in answers.items())
     return found
@@ -422,7 +422,7 @@ def inverse(subject, count=2):
 
 def _asked_back(subject, output, drawing, unit, held):
     mechanism, rng = subject.mechanism, subject.rng
-    if output in mechanism.cranks:
+    if output in [input_.name for input_ in mechanism.inputs]:
         return
     turns = '.' not in output and not any(
         pose.what == 'slide' and pose.name == output for pose in subject.poses)
@@ -436,7 +436,7 @@ def _asked_back(subject, output, drawing, unit, held):
     for limit, target in zip((FIRST, FURTHER), wanted):
         start = time.process_time()
         try:
-            answers = mechanism.crank_angle(output, target, others=subject.held)
+            answers = mechanism.input_for(output, target, others=subject.held)
         except ValueError:
             if spread > 1e-9:
                 yield 'inverse refused', f'{output} moves by {spread:.3g}'
@@ -445,7 +445,7 @@ def _asked_back(subject, output, drawing, unit, held):
         if took > limit:
             # The collector's time counts too, but not twice.
             start = time.process_time()
-            mechanism.crank_angle(output, np.nextafter(target, np.inf), others=subject.held)
+            mechanism.input_for(output, np.nextafter(target, np.inf), others=subject.held)
             took = time.process_time() - start
         if took > limit:
             yield 'inverse slow', f'{output} = {target!r}: {took:.3f} s'

@@ -21,7 +21,7 @@ WIDER = ['four_bar', 'slider_crank', 'hoeken', 'chebyshev_lambda', 'watt', 'klan
 
 def held(linkage):
     """Return the angle of a second crank, if there is one."""
-    return (HELD,) * (len(linkage.cranks) - 1)
+    return (HELD,) * (len(linkage.inputs) - 1)
 
 
 def rows_of(linkage, thetas):

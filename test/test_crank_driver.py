@@ -157,7 +157,7 @@ def test_a_bad_value_is_refused_with_a_reason_and_the_node_runs_on(graph, name, 
     result = driver.set(**{name: value})
     assert not result.successful and re.search(reason, result.reason)
     assert driver.at(2 * SECOND) == (1.0, 1.0)
-    assert driver.node.scene.machines['drop'].crank.speed == 1.0
+    assert driver.node.scene.machines['drop'].first.speed == 1.0
 
 
 def test_a_parameter_cannot_be_removed(graph):

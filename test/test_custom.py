@@ -29,7 +29,7 @@ def four_bar(m, b, c, g, side=1):
 def angles(linkage):
     """Return crank angles over a turn, as many rows as there are cranks."""
     theta = np.linspace(-math.pi, math.pi, 73)
-    return [theta * speed for speed in (1.0, 0.5)] if len(linkage.cranks) > 1 else theta
+    return [theta * speed for speed in (1.0, 0.5)] if len(linkage.inputs) > 1 else theta
 
 
 @pytest.mark.parametrize('kind', list(mechanisms.TYPES))
@@ -43,7 +43,7 @@ def test_the_catalogue_written_out_gives_the_same_bits(kind):
         assert mine.keys() == theirs.keys()
         for name in mine:
             np.testing.assert_array_equal(mine[name], theirs[name], f'{ask} {name}')
-    held = (0.7,) * (len(own.cranks) - 1)
+    held = (0.7,) * (len(own.inputs) - 1)
     assert written.reach(*held) == own.reach(*held)
     assert (written.bars, written.points, written.links) == (own.bars, own.points, own.links)
 
@@ -200,7 +200,7 @@ def test_the_chain_has_a_partial_reach():
 
 def test_two_cranks_turn_on_their_own():
     linkage = mechanisms.create('five_bar')
-    assert linkage.cranks == ('crank', 'crank2')
+    assert [input_.name for input_ in linkage.inputs] == ['crank', 'crank2']
     first, second = np.meshgrid(np.linspace(0.5, 2.0, 4), np.linspace(1.0, 2.5, 3))
     place = linkage.solve([first, second])
     assert place['P'].shape == (3, 4, 2)
@@ -237,9 +237,9 @@ def test_the_reach_of_one_crank_depends_on_the_other():
 
 def test_every_crank_is_asked_for():
     linkage = mechanisms.create('five_bar')
-    with pytest.raises(ValueError, match='five_bar has 2 cranks: the angle of each but the first'):
+    with pytest.raises(ValueError, match='five_bar has 2 inputs: the value of each but the first'):
         linkage.reach()
-    with pytest.raises(ValueError, match='theta must be a sequence of as many angles'):
+    with pytest.raises(ValueError, match='theta must be a sequence of as many values'):
         linkage.solve(0.5)
 
 
@@ -266,7 +266,7 @@ def test_an_array_of_dimensions_is_broadcast_against_the_angle(shape, turned):
 
 def test_questions_about_the_reach_are_for_one_set_of_dimensions():
     linkage = four_bar(1.0, np.array([3.0, 3.1]), 2.5, 4.0)
-    for ask in (linkage.reach, linkage.dead_points, lambda: linkage.crank_angle('QB', 1.0)):
+    for ask in (linkage.reach, linkage.dead_points, lambda: linkage.input_for('QB', 1.0)):
         with pytest.raises(ValueError, match='for one set of dimensions, not for arrays'):
             ask()
 

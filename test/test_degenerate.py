@@ -7,6 +7,7 @@ import math
 import tracemalloc
 
 from linkage_ros import mechanisms
+from linkage_ros.linkage.inputs import CRANK
 from linkage_ros.linkage.inverse import distinct
 import numpy as np
 import pytest
@@ -50,11 +51,11 @@ def asked(angles):
 @pytest.mark.parametrize('kind', ALIKE)
 def test_bars_that_are_alike_have_velocities_and_rates(kind):
     found = ALIKE[kind]
-    for crank in range(len(found.cranks)):
-        theta = [np.linspace(-3.0, 3.0, 31) + 0.05 * i for i in range(len(found.cranks))]
+    for crank in range(len(found.inputs)):
+        theta = [np.linspace(-3.0, 3.0, 31) + 0.05 * i for i in range(len(found.inputs))]
         now, before, after = (asked(x + side * STEP * (i == crank) for i, x in enumerate(theta))
                               for side in (0.0, -1.0, 1.0))
-        velocity, rate = found.velocity(now, crank=crank), found.joint_rates(now, crank=crank)
+        velocity, rate = found.velocity(now, by=crank), found.joint_rates(now, by=crank)
         places = [found.solve(there) for there in (before, after)]
         angles = [found.joint_angles(there) for there in (before, after)]
         for name in found.points:
@@ -71,14 +72,14 @@ def test_bars_that_are_alike_have_velocities_and_rates(kind):
 @pytest.mark.parametrize('kind', ALIKE)
 def test_bars_that_are_alike_can_be_asked_about_their_motion(kind):
     found = ALIKE[kind]
-    others = [0.4] * (len(found.cranks) - 1)
+    others = [0.4] * (len(found.inputs) - 1)
     assert all(math.isfinite(theta) for theta in found.dead_points(*others))
     assert found.distance_to_dead_point(0.5, *others) >= 0.0
     parts = found.function(rates=found.joints)(0.5, *others)
-    assert len(parts) == 2 * len(found.points) + len(found.joints) * len(found.cranks)
+    assert len(parts) == 2 * len(found.points) + len(found.joints) * len(found.inputs)
     place = found.solve(asked([0.5, *others]))
     name = next(name for name in reversed(found.points) if np.isfinite(place[name]).all())
-    answers = found.crank_angle(f'{name}.x', place[name][0], others=others)
+    answers = found.input_for(f'{name}.x', place[name][0], others=others)
     assert np.nanmin(np.abs(answers - 0.5)) < 1e-7
 
 
@@ -138,8 +139,8 @@ def test_a_joint_that_cannot_be_assembled_has_no_velocity_by_any_crank():
     found = linkage('O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'D crank Q 1',
                     'B dyad O A 0.2 0.2 left', 'C dyad A D 3 2 left')
     for crank in (0, 1):
-        velocity = found.velocity([0.3, 0.1], crank=crank)
-        rates = found.joint_rates([0.3, 0.1], crank=crank)
+        velocity = found.velocity([0.3, 0.1], by=crank)
+        rates = found.joint_rates([0.3, 0.1], by=crank)
         assert np.isnan(velocity['B']).all() and np.isnan([rates['OB'], rates['AB']]).all()
         assert np.isfinite([velocity['C'], velocity['D']]).all() and np.isfinite(rates['AC'])
 
@@ -178,7 +179,7 @@ def test_what_is_asked_again_and_again_does_not_pile_up():
 
     def ask(first, last):
         for other in np.linspace(first, last, 60).tolist():
-            five_bar.crank_angle('P.y', 40.0, others=(other,))
+            five_bar.input_for('P.y', 40.0, others=(other,))
         return tracemalloc.get_traced_memory()[0]
 
     tracemalloc.start()
@@ -209,7 +210,7 @@ def test_an_extreme_where_an_arm_has_no_direction_spoils_no_answer():
     theta = np.linspace(-3.0, 3.0, 21)
     wanted = found.solve(theta)['G']
     for axis in 'xy':
-        answers = found.crank_angle(f'G.{axis}', wanted[:, 'xy'.index(axis)])
+        answers = found.input_for(f'G.{axis}', wanted[:, 'xy'.index(axis)])
         assert (np.nanmin(np.abs(answers - theta[:, None]), axis=1) < 1e-7).all()
 
 
@@ -221,17 +222,17 @@ def test_what_is_no_number_is_refused_by_its_name(bad):
         for ask in (found.solve, found.velocity, found.joint_angles, found.joint_rates,
                     found.transmission_angles):
             with pytest.raises(ValueError, match='theta must be a number or an array of numbers'):
-                ask([bad] * len(found.cranks) if len(found.cranks) > 1 else bad)
+                ask([bad] * len(found.inputs) if len(found.inputs) > 1 else bad)
     for kind, output in (('jansen', 'G.x'), ('slotted_lever', 'lever')):
         found = mechanisms.create(kind)
         with pytest.raises(ValueError, match='value must be a number'):
-            found.crank_angle(output, bad)
+            found.input_for(output, bad)
 
 
 @pytest.mark.parametrize('kind', list(mechanisms.TYPES))
 def test_no_angles_give_no_places(kind):
     found = mechanisms.create(kind)
-    none = asked([np.empty((0, 3))] * len(found.cranks))
+    none = asked([np.empty((0, 3))] * len(found.inputs))
     assert {value.shape for value in found.solve(none).values()} == {(0, 3, 2)}
     for ask in (found.velocity, found.joint_angles, found.joint_rates, found.transmission_angles):
         assert all(value.size == 0 for value in ask(none).values())
@@ -252,7 +253,7 @@ def test_the_reach_past_a_change_point_is_that_of_the_turn_from_minus_pi_to_pi()
 
 @pytest.mark.parametrize('theta', [3.1415926535897927, math.pi, -math.pi, 1e9, -7.0, 0.0])
 def test_a_dead_point_is_between_minus_pi_and_pi(theta):
-    wrapped = distinct([theta])
+    wrapped = distinct([theta], CRANK)
     assert -math.pi <= wrapped[0] < math.pi
     assert abs(math.remainder(wrapped[0] - theta, math.tau)) < 1e-6
     assert wrapped == [theta] or not -math.pi <= theta < math.pi

@@ -124,10 +124,10 @@ def without(module, code):
 def test_the_library_works_where_there_is_no_ros():
     done = without('rclpy', """
         from linkage_ros import scene
-        from linkage_ros.scene import crank_motion
+        from linkage_ros.scene import motion
         machine = scene.read({}).machines['jansen']
         assert machine.assembly().solution(('G',)).rows.shape == (1, 2)
-        assert crank_motion.Motion(1.0).at(10 ** 9) == (1.0, 1.0)
+        assert motion.Motion(1.0).at(10 ** 9) == (1.0, 1.0)
         try:
             import linkage_ros.nodes.kinematics
         except ImportError as error:

@@ -21,7 +21,7 @@ CONSTANT = {'peaucellier': ['C.x'], 'slider_crank': ['B.y']}
 
 def held(linkage):
     """Return the angle of a second crank, if there is one."""
-    return (HELD,) * (len(linkage.cranks) - 1)
+    return (HELD,) * (len(linkage.inputs) - 1)
 
 
 def outputs(linkage):
@@ -70,7 +70,7 @@ def test_every_answer_is_right_to_the_last_digits(kind):
         if output in ('block',):  # the truth knows it as its joint's place
             continue
         wanted = value_at(linkage, output, inside(linkage, rng, 2))
-        for value, answers in zip(wanted.tolist(), linkage.crank_angle(output, wanted)):
+        for value, answers in zip(wanted.tolist(), linkage.input_for(output, wanted)):
             for theta in answers[np.isfinite(answers)].tolist():
                 exact = truth(case, theta, turning)
                 miss, sensitivity = _miss(exact, output, value)
@@ -100,7 +100,7 @@ def test_all_answers_are_found(kind):
     arcs = linkage.reach(*held(linkage))
     for output in outputs(linkage):
         wanted = value_at(linkage, output, inside(linkage, rng, 12))
-        answers = linkage.crank_angle(output, wanted, others=held(linkage))
+        answers = linkage.input_for(output, wanted, others=held(linkage))
         expected = np.zeros(len(wanted), int)
         for lo, hi in arcs:
             theta = np.linspace(lo, hi, 20001)
@@ -123,7 +123,7 @@ def test_answers_ascend_in_one_turn_and_give_the_value_back(kind):
     for output in outputs(linkage):
         theta = inside(linkage, rng, 20)
         wanted = value_at(linkage, output, theta)
-        answers = linkage.crank_angle(output, wanted, others=held(linkage))
+        answers = linkage.input_for(output, wanted, others=held(linkage))
         given = np.isfinite(answers)
         assert (np.diff(given.astype(int)) <= 0).all()  # NaN only at the end
         assert (np.diff(answers)[given[:, 1:]] > 0).all()
@@ -131,7 +131,7 @@ def test_answers_ascend_in_one_turn_and_give_the_value_back(kind):
         back = difference(linkage, output, value_at(linkage, output, answers), wanted[:, None])
         size = math.pi if turned(linkage, output) else linkage.longest
         assert (np.abs(back[given]) < 1e-11 * size).all(), output
-        nearest = linkage.crank_angle(output, wanted, near=theta + 4 * math.pi,
+        nearest = linkage.input_for(output, wanted, near=theta + 4 * math.pi,
                                       others=held(linkage))
         away = np.abs(nearest - theta - 4 * math.pi)
         assert (away <= np.nanmin(np.abs(answers - theta[:, None]), axis=1) + 1e-12).all()
@@ -154,7 +154,7 @@ def test_answers_are_those_of_the_turn_that_the_change_point_begins(lengths, out
     theta = inside(linkage, np.random.default_rng(5), 40)
     theta = np.mod(theta + math.pi, 2 * math.pi) - math.pi
     wanted = value_at(linkage, output, theta)
-    answers = linkage.crank_angle(output, wanted)
+    answers = linkage.input_for(output, wanted)
     back = difference(linkage, output, value_at(linkage, output, answers), wanted[:, None])
     assert (np.abs(back[np.isfinite(answers)]) < 1e-13 * linkage.longest).all()
     away = np.nanmin(np.abs(answers - theta[:, None]), axis=1)
@@ -168,7 +168,7 @@ def test_a_pin_that_passes_the_pivot_breaks_the_output_off_and_not_the_answers(o
     lever = mechanisms.create('whitworth', a=100.0, b=100.0, c=60.0, d=400.0)
     theta = np.linspace(-3.1, 3.1, 40)
     wanted = value_at(lever, output, theta)
-    answers = lever.crank_angle(output, wanted)
+    answers = lever.input_for(output, wanted)
     assert (np.nanmin(np.abs(answers - theta[:, None]), axis=1) < 1e-7).all()
     back = difference(lever, output, value_at(lever, output, answers), wanted[:, None])
     assert (np.abs(back[np.isfinite(answers)]) < 1e-12 * lever.longest).all()
@@ -181,7 +181,7 @@ def test_a_guide_that_is_straight_up_to_rounding_stands_still_across_its_line(po
         f'P ground {pole}', 'O ground 0 0', 'A crank O r', 'B C D inversor P A 2.1 0.9'))
     values = guide.solve(np.linspace(*guide.reach()[0], 50)[1:-1])['C'][:, 'xy'.index(still)]
     assert np.ptp(values) < 1e-14
-    answers = guide.crank_angle(f'C.{still}', values)
+    answers = guide.input_for(f'C.{still}', values)
     assert answers.shape == (48, 1) and np.isnan(answers).all()
 
 
@@ -189,8 +189,8 @@ def test_the_inversor_s_height_gives_the_crank_by_its_tangent():
     linkage = mechanisms.create('peaucellier')
     height = np.linspace(-5.0, 5.0, 11)
     expected = 2 * np.arctan(2 * 3.0 * height / (9.0 ** 2 - 4.0 ** 2))
-    np.testing.assert_allclose(linkage.crank_angle('C.y', height)[:, 0], expected, rtol=1e-15)
-    assert linkage.crank_angle('C.y', 9.0).tolist() == pytest.approx([math.nan], nan_ok=True)
+    np.testing.assert_allclose(linkage.input_for('C.y', height)[:, 0], expected, rtol=1e-15)
+    assert linkage.input_for('C.y', 9.0).tolist() == pytest.approx([math.nan], nan_ok=True)
 
 
 @pytest.mark.parametrize('half', [1, -1])
@@ -199,32 +199,32 @@ def test_the_lever_s_servo_is_one_output_among_others(half):
         lever = mechanisms.create('slotted_lever', branches={'L': half}, **lengths)
         wanted = np.linspace(-3.0, 3.0, 41)
         near = np.linspace(-9.0, 9.0, 41)
-        np.testing.assert_allclose(lever.crank_angle('lever', wanted, near),
+        np.testing.assert_allclose(lever.input_for('lever', wanted, near),
                                    lever.servo_angle(wanted, near), atol=2e-14)
 
 
 def test_the_shape_is_that_of_the_values_with_the_answers_last():
     linkage = four_bar()
-    assert linkage.crank_angle('QB', 1.0).shape == (2,)
-    assert linkage.crank_angle('QB', [1.0]).shape == (1, 2)
-    assert linkage.crank_angle('QB', np.full((3, 2), 1.0)).shape == (3, 2, 2)
-    assert isinstance(linkage.crank_angle('QB', 1.0, near=0.0), float)
-    assert linkage.crank_angle('QB', [1.0, 1.1], near=0.0).shape == (2,)
-    assert linkage.crank_angle('QB', 1.0, near=np.zeros((3, 2))).shape == (3, 2)
+    assert linkage.input_for('QB', 1.0).shape == (2,)
+    assert linkage.input_for('QB', [1.0]).shape == (1, 2)
+    assert linkage.input_for('QB', np.full((3, 2), 1.0)).shape == (3, 2, 2)
+    assert isinstance(linkage.input_for('QB', 1.0, near=0.0), float)
+    assert linkage.input_for('QB', [1.0, 1.1], near=0.0).shape == (2,)
+    assert linkage.input_for('QB', 1.0, near=np.zeros((3, 2))).shape == (3, 2)
     for output in ('QB', 'B.x'):
-        assert linkage.crank_angle(output, []).shape[0] == 0
-        assert linkage.crank_angle(output, np.zeros((0, 2)), near=0.0).shape == (0, 2)
+        assert linkage.input_for(output, []).shape[0] == 0
+        assert linkage.input_for(output, np.zeros((0, 2)), near=0.0).shape == (0, 2)
         assert linkage.servo_for(output, [])[0].shape == (0,)
-    assert mechanisms.create('slotted_lever').crank_angle('lever', []).shape[0] == 0
-    assert linkage.crank_angle('QB', np.ones((3, 1)), near=np.zeros(2)).shape == (3, 2)
+    assert mechanisms.create('slotted_lever').input_for('lever', []).shape[0] == 0
+    assert linkage.input_for('QB', np.ones((3, 1)), near=np.zeros(2)).shape == (3, 2)
 
 
 @pytest.mark.parametrize('output, value', [
     ('QB', 3.0), ('B.y', 90.0), ('P.x', -200.0), ('A.x', 40.1), ('QB', math.nan)])
 def test_where_nothing_is_found_there_is_one_nan(output, value):
     linkage = four_bar()
-    assert np.isnan(linkage.crank_angle(output, value)).tolist() == [True]
-    assert math.isnan(linkage.crank_angle(output, value, near=1.0))
+    assert np.isnan(linkage.input_for(output, value)).tolist() == [True]
+    assert math.isnan(linkage.input_for(output, value, near=1.0))
 
 
 @pytest.mark.parametrize('kind, output', [
@@ -232,47 +232,47 @@ def test_where_nothing_is_found_there_is_one_nan(output, value):
 def test_an_output_that_never_changes_has_no_crank_angle(kind, output):
     linkage = mechanisms.create(kind)
     value = value_at(linkage, output, 0.3)
-    assert np.isnan(linkage.crank_angle(output, value)).tolist() == [True]
+    assert np.isnan(linkage.input_for(output, value)).tolist() == [True]
 
 
 def test_the_extreme_of_an_output_is_one_answer():
     lever = mechanisms.create('slotted_lever', a=80.0, b=160.0)
-    np.testing.assert_allclose(lever.crank_angle('lever', math.asin(0.5)), 2 * math.pi / 3,
+    np.testing.assert_allclose(lever.input_for('lever', math.asin(0.5)), 2 * math.pi / 3,
                                atol=3e-8)
     crank = mechanisms.create('slider_crank', a=40.0, b=120.0, c=0.0)
-    assert crank.crank_angle('block', 160.0).tolist() == [0.0]
-    assert crank.crank_angle('B.x', 80.0).tolist() == [-math.pi]
+    assert crank.input_for('block', 160.0).tolist() == [0.0]
+    assert crank.input_for('B.x', 80.0).tolist() == [-math.pi]
     drop = mechanisms.create('water_drop')
-    assert drop.crank_angle('P.y', 4.0).tolist() == pytest.approx([0.0], abs=1e-15)
+    assert drop.input_for('P.y', 4.0).tolist() == pytest.approx([0.0], abs=1e-15)
 
 
 def test_the_answer_nearest_is_taken_whole_turns_included():
     linkage = four_bar()
-    low, high = linkage.crank_angle('QB', 1.0)
-    assert linkage.crank_angle('QB', 1.0, near=low + 0.1) == low
-    assert linkage.crank_angle('QB', 1.0, near=high + 20 * math.pi) == pytest.approx(
+    low, high = linkage.input_for('QB', 1.0)
+    assert linkage.input_for('QB', 1.0, near=low + 0.1) == low
+    assert linkage.input_for('QB', 1.0, near=high + 20 * math.pi) == pytest.approx(
         high + 20 * math.pi)
 
 
 def test_angles_are_the_same_a_turn_further():
     linkage = four_bar()
-    np.testing.assert_allclose(linkage.crank_angle('QB', 1.0 + 2 * math.pi),
-                               linkage.crank_angle('QB', 1.0), atol=1e-14)
+    np.testing.assert_allclose(linkage.input_for('QB', 1.0 + 2 * math.pi),
+                               linkage.input_for('QB', 1.0), atol=1e-14)
 
 
 def test_the_crank_s_own_angle_is_answered_with_itself():
     for kind in ('jansen', 'peaucellier'):
         linkage = mechanisms.create(kind)
-        np.testing.assert_allclose(linkage.crank_angle('crank', [0.5, 7.0])[:, 0],
+        np.testing.assert_allclose(linkage.input_for('crank', [0.5, 7.0])[:, 0],
                                    [0.5, 7.0 - 2 * math.pi], atol=1e-15)
 
 
 def test_a_double_crank_s_follower_has_one_answer_everywhere():
     linkage = four_bar(a=5.0, b=7.0, c=6.0, d=2.0, p=1.0)
     follower = np.linspace(-math.pi, math.pi, 41)
-    answers = linkage.crank_angle('QB', follower)
+    answers = linkage.input_for('QB', follower)
     assert answers.shape == (41, 1) and np.isfinite(answers).all()
-    coupler = linkage.crank_angle('AB', linkage.joint_angles(follower)['AB'])
+    coupler = linkage.input_for('AB', linkage.joint_angles(follower)['AB'])
     assert np.isfinite(coupler).all(-1).any()
 
 
@@ -284,7 +284,7 @@ def test_an_answer_beside_a_tight_turn_is_not_missed():
     there = math.atan2(-0.8, 0.6)
     for theta in there + np.array([-3e-6, -5e-7, 4e-7, 2e-6]):
         wanted = float(lever.solve(theta)['T'][1])
-        answers = lever.crank_angle('T.y', wanted)
+        answers = lever.input_for('T.y', wanted)
         assert np.nanmin(np.abs(answers - theta)) < 1e-9
 
 
@@ -295,18 +295,18 @@ def test_lengths_of_any_size_have_the_same_answers():
             for kind in ('four_bar',) for scale in (size, 1.0))
         for output in ('QB', 'P.y', 'B.x', 'A.y'):
             scale = 1.0 if output == 'QB' else size
-            np.testing.assert_allclose(small.crank_angle(output, 1.0 * scale),
-                                       plain.crank_angle(output, 1.0), atol=1e-12)
+            np.testing.assert_allclose(small.input_for(output, 1.0 * scale),
+                                       plain.input_for(output, 1.0), atol=1e-12)
 
 
 def test_a_second_crank_is_held():
     linkage = mechanisms.create('five_bar')
     theta = np.array([0.1, 0.9, 1.5])
     height = linkage.solve([theta, np.full(3, 1.25)])['P'][:, 1]
-    answers = linkage.crank_angle('P.y', height, near=theta, others=(1.25,))
+    answers = linkage.input_for('P.y', height, near=theta, others=(1.25,))
     np.testing.assert_allclose(answers, theta, atol=1e-13)
-    with pytest.raises(ValueError, match='five_bar has 2 cranks'):
-        linkage.crank_angle('P.y', height)
+    with pytest.raises(ValueError, match='five_bar has 2 inputs'):
+        linkage.input_for('P.y', height)
 
 
 @pytest.mark.parametrize('output, problem', [
@@ -315,7 +315,7 @@ def test_a_second_crank_is_held():
     (None, 'no output None'), ('Q.x', 'Q.x of four_bar does not move with the first crank')])
 def test_a_wrong_output_is_refused_with_what_is_allowed(output, problem):
     with pytest.raises(ValueError, match=problem):
-        four_bar().crank_angle(output, 1.0)
+        four_bar().input_for(output, 1.0)
 
 
 # --- transmission angles and dead points --------------------------------------------------------

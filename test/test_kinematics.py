@@ -174,7 +174,7 @@ def walk(links, frames, angles, turn, side, ground):
 
 
 @pytest.mark.parametrize('name', [*(name for name in mechanisms.TYPES if len(
-    mechanisms.create(name).cranks) == 1), 'walker'])
+    mechanisms.create(name).inputs) == 1), 'walker'])
 def test_joint_angles_along_the_tree_lead_to_the_joints(graph, name):
     bench = Bench(graph, name, WALKER if name == 'walker' else {'mechanisms': [name]})
     machine = bench.node.scene.machines[name]
@@ -182,7 +182,7 @@ def test_joint_angles_along_the_tree_lead_to_the_joints(graph, name):
     frames = {link: {joint: (machine.scale * float(x), machine.scale * float(y))
                      for joint, (x, y) in frame.items()}
               for link, frame in linkage.frames.items()}
-    low, high = machine.crank.sweep or (-math.pi, math.pi)
+    low, high = machine.first.sweep or (-math.pi, math.pi)
     fixed = {link.joint for link in linkage.links if link.parent == 'ground'}
     for theta in np.linspace(low, high, 5).tolist():
         state = bench.joints_at(theta)

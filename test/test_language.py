@@ -50,7 +50,7 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P crank O 1 down', "'down' must be up"),
     ('P inversor Q A 3 1', 'expected "NAME NAME NAME inversor POLE PIN LENGTH LENGTH"'),
     ('P R dyad A Q 1 1 left', 'expected "NAME dyad'),
-    ('P teleport 0 0', 'expected NAME and one of the constructions ground, crank, dyad'),
+    ('P teleport 0 0', 'expected NAME and one of the constructions ground, crank, cylinder, dyad'),
     ('', 'expected NAME and one of the constructions'),
     ('9 ground 0 0', "'9' is no name for a joint"),
     ('P.x ground 0 0', "'P.x' is no name for a joint"),
@@ -173,7 +173,7 @@ def test_a_linkage_has_up_to_two_thousand_lines():
 
 
 def test_a_linkage_needs_a_crank():
-    with pytest.raises(ValueError, match='at least one crank line'):
+    with pytest.raises(ValueError, match='needs a line that drives it: crank or cylinder'):
         mechanisms.create('custom', joints=('O ground 0 0',))
 
 
@@ -460,7 +460,7 @@ OUTPUTS = {
     'rate': lambda text: BAR.joint_rates(0.5, (text,)),
     'transmission': lambda text: BAR.transmission_angles(0.5, (text,)),
     'function': lambda text: BAR.function((text,)),
-    'crank angle': lambda text: BAR.crank_angle(text, 0.5),
+    'crank angle': lambda text: BAR.input_for(text, 0.5),
     'changed dimension': lambda text: BAR.with_dimensions(**{text: 1.0}),
     'changed value': lambda text: BAR.with_dimensions(b=text),
 }
@@ -520,7 +520,7 @@ def test_what_passes_is_only_what_is_documented():
 def test_points_and_joints_are_names(names):
     for ask in (BAR.solve, BAR.velocity, BAR.joint_angles, BAR.joint_rates,
                 BAR.transmission_angles, lambda _, names: BAR.function(names),
-                lambda _, names: BAR.crank_angle(names, 0.5)):
+                lambda _, names: BAR.input_for(names, 0.5)):
         with pytest.raises(ValueError, match='must be a name or a list|custom has no') as e:
             ask(0.5, names)
         assert len(str(e.value)) < 300

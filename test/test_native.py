@@ -134,7 +134,7 @@ def test_it_is_compiled_once_for_all_mechanisms_of_a_type():
 
 def test_a_chain_of_operations_may_be_as_long_as_one_likes():
     # Each is used once, so that the code would nest them all, and Python stops at 200 parentheses.
-    end, value = expression.angle(0), 0.3
+    end, value = expression.argument(0), 0.3
     for _ in range(1000):
         end, value = 1.5 * expression.sine(end) + 0.25, 1.5 * math.sin(value) + 0.25
     pose = program.Program((end,)).bind({}, {})

@@ -75,7 +75,7 @@ def test_a_locus_that_is_no_curve_any_more_goes_for_whoever_comes_late_too(graph
     node = graph.start(Kinematics, CELL)
     picture = Picture(graph, 'cell')
     graph.until(lambda: picture().keys() == {2})
-    outlet = node._outlets['cell']
+    outlet = node._mechanisms['cell']
     assembly = type(outlet._model.assembly)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(assembly, 'locus', lambda *_: np.zeros((1, 2)))

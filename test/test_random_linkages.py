@@ -162,7 +162,8 @@ def test_the_measure_sees_a_flaw_in_the_last_digits_and_a_wrong_nan():
     assert not accuracy.broken(accuracy.judge(measure, thetas, found, True))
     truth = measure.at(thetas[0], True)
     moving = [output for output in found if measure.due(output, truth.states) == 'number'
-              and output.name not in (*subject.linkage.fixed, *subject.mechanism.cranks)]
+              and output.name not in (*subject.linkage.fixed, *(
+                  input_.name for input_ in subject.mechanism.inputs))]
     assert len(moving) > 10
     for output, value in ((output, found[output]) for output in moving):
         for flawed in (value * (1.0 + 1e-12) + 1e-12, np.full_like(value, np.nan)):

@@ -305,7 +305,7 @@ def test_every_trace_and_part_can_be_drawn(type_, trace):
 def test_the_crank_is_where_it_was_asked_to_be(crank):
     wheel = Cycle(machine('four_bar', **crank)).first
     for angle in np.linspace(-0.49, 0.99, 17):
-        assert math.remainder(wheel.angle(wheel.turns_to(angle)) - angle,
+        assert math.remainder(wheel.value(wheel.turns_to(angle)) - angle,
                               math.tau) == pytest.approx(0.0, abs=1e-12)
 
 
@@ -315,7 +315,7 @@ def test_several_cranks_turn_as_fast_as_they_were_told_to():
     assert cycle.turns == 2
     for turns in (0.0, 0.3, 1.9):
         wanted = math.tau * turns, 2.0 - 1.5 * math.tau * turns
-        thetas = cycle.pose(turns).thetas
+        thetas = cycle.pose(turns).inputs
         assert [math.remainder(t - w, math.tau) for t, w in zip(thetas, wanted)] == pytest.approx(
             [0.0, 0.0], abs=1e-12)
 

@@ -57,7 +57,7 @@ def test_joint_states_put_the_robot_where_the_markers_are(graph, name, library):
     markers = graph.listen(MarkerArray, 'm/markers')
     turn = graph.crank(['m_crank'])
     robot = library(graph.until(lambda: descriptions)[0].data)
-    frames = [f'm_{leg.prefix}{point}' for leg in machine.assembly().legs
+    frames = [f'm_{prefix}{point}' for prefix in machine.assembly().legs
               for point in machine.points]
     for theta in (-1.0, 0.0, 0.3, 1.1):
         state = turn([theta], joints)

@@ -8,10 +8,9 @@ import math
 import os
 
 from linkage_ros import mechanisms, scene
-from linkage_ros.linkage.crank_range import is_full_turn
 from linkage_ros.linkage.walker import Assembly
 from linkage_ros.scene import slider
-from linkage_ros.scene.crank_motion import Motion
+from linkage_ros.scene.motion import Motion
 import numpy as np
 import pytest
 
@@ -36,7 +35,7 @@ def places(assembly, theta, points):
 def whole_motion(machine):
     """Return all joints at angles all along the motion, shape (..., 2), moved by the pose."""
     assembly = machine.assembly()
-    low, high = machine.crank.sweep or (0.0, math.tau)
+    low, high = machine.first.sweep or (0.0, math.tau)
     return np.array([places(assembly, theta, machine.points)
                      for theta in np.linspace(low, high, 361)]) + machine.pose[0:3:2]
 
@@ -47,7 +46,7 @@ def test_without_parameters_the_scene_is_the_catalogue():
     for name, machine in machines.items():
         assert machine.linkage.type == name
         assert machine.linkage.dimensions == mechanisms.defaults(name)
-        assert machine.crank.speed == 1.0 and machine.crank.start == 0.0
+        assert machine.first.speed == 1.0 and machine.first.start == 0.0
     assert scene.read({}).rate == 50.0
 
 
@@ -178,7 +177,7 @@ def test_a_wrong_parameter_is_named_with_what_is_allowed(given, named):
 def test_a_whole_number_is_taken_for_the_number_that_it_is():
     machine = scene.read({'jansen.dimensions.m': 15, 'jansen.pose': [1, 0, 0, 0, 0, 0],
                           'jansen.crank.speed': 2}).machines['jansen']
-    for value in (machine.linkage.dimensions['m'], machine.pose[0], machine.crank.speed):
+    for value in (machine.linkage.dimensions['m'], machine.pose[0], machine.first.speed):
         assert type(value) is float
 
 
@@ -203,9 +202,9 @@ def test_a_crank_that_has_left_its_start_follows_a_sweep_that_does_not_hold_it()
     with pytest.raises(scene.SceneError, match='jansen.crank.start must be inside the sweep'):
         scene.read(moved, scene.read(given))
     after = scene.read(moved, scene.read(given), strict=False)
-    assert after.machines['jansen'].crank.sweep == (2.0, 3.0)
+    assert after.machines['jansen'].first.sweep == (2.0, 3.0)
     faster = scene.read({**moved, 'jansen.crank.speed': 2.0}, after)
-    assert faster.machines['jansen'].crank.speed == 2.0
+    assert faster.machines['jansen'].first.speed == 2.0
 
 
 def test_parameters_of_the_client_library_are_none_of_the_scenes_business():
@@ -215,15 +214,15 @@ def test_parameters_of_the_client_library_are_none_of_the_scenes_business():
 def test_a_crank_that_cannot_turn_swings_within_its_reach():
     machine = scene.read(CELL).machines['cell']
     (low, high), = machine.reach
-    assert machine.crank.sweep == pytest.approx((0.98 * low, 0.98 * high))
+    assert machine.first.sweep == pytest.approx((0.98 * low, 0.98 * high))
 
 
 def test_a_crank_swings_in_the_arc_that_its_start_is_in():
     stiff = {**CELL, 'cell.dimensions.r': 10.0}
     first, second = scene.read(stiff).machines['cell'].reach
     middle = 0.5 * (second[0] + second[1])
-    assert scene.read(stiff).machines['cell'].crank.sweep[1] < first[1]
-    crank = scene.read({**stiff, 'cell.crank.start': middle - math.tau}).machines['cell'].crank
+    assert scene.read(stiff).machines['cell'].first.sweep[1] < first[1]
+    crank = scene.read({**stiff, 'cell.crank.start': middle - math.tau}).machines['cell'].first
     assert second[0] < crank.sweep[0] < middle < crank.sweep[1] < second[1]
 
 
@@ -303,8 +302,8 @@ def test_nearly_all_of_a_sliders_travel_keeps_a_crank_turning(given):
                 fits.append(False)
                 continue
             machine, old = (next(iter(s.machines.values())) for s in (after, made))
-            fits.append(not is_full_turn(old.reach) or is_full_turn(machine.reach)
-                        or 'own.crank.sweep' in given)
+            turned, turns = (each.first.input.is_whole(each.reach) for each in (old, machine))
+            fits.append(not turned or turns or 'own.crank.sweep' in given)
     assert sum(fits) >= 0.9 * len(fits)
 
 
@@ -412,7 +411,7 @@ def test_an_end_of_the_reach_is_within_it_any_turn_and_nothing_beyond_is():
     assert legs.is_limited
     # What wrapping rounds is some 1e-15 rad; what a leg is asked for is not.
     for turn in (-math.tau, 0.0, math.tau):
-        for i, leg in enumerate(legs.legs):
+        for i, leg in enumerate(legs.legs.values()):
             for low, high in legs.reach:
                 for end, outwards in ((low, -1.0), (high, 1.0)):
                     crank = leg.lag + leg.side * (end - leg.start) + turn

@@ -113,11 +113,11 @@ def test_a_lever_is_one_computation_whatever_it_is_asked_by(half):
         for written in ('slotted_lever', 'written', 'with a ram'):
             linkage = lever if written == 'slotted_lever' else mechanisms.create(
                 'custom', joints=LEVERS[written][0], branches={'L': half}, **lengths)
-            np.testing.assert_array_equal(linkage.crank_angle('lever', wanted, near),
+            np.testing.assert_array_equal(linkage.input_for('lever', wanted, near),
                                           lever.servo_angle(wanted, near))
             np.testing.assert_array_equal(linkage.servo_for('lever', wanted, near),
                                           lever.servo(wanted, near))
-            every, found = linkage.crank_angle('lever', wanted), lever.servo_angle(wanted)
+            every, found = linkage.input_for('lever', wanted), lever.servo_angle(wanted)
             assert ((every == found[:, None]).any(axis=1) == np.isfinite(found)).all()
 
 
@@ -148,7 +148,7 @@ def test_the_value_at_an_end_is_had_at_that_end(kind, output):
         return (linkage.solve(theta, (joint,))[joint][..., 'xy'.index(axis)] if joint
                 else linkage.joint_angles(theta, (output,))[output])
 
-    extremes = linkage.crank_angle(output, np.max(value(np.linspace(-3.1, 3.1, 20001))))
+    extremes = linkage.input_for(output, np.max(value(np.linspace(-3.1, 3.1, 20001))))
     for low in (*rng.uniform(-9.0, 9.0, 20), *extremes[np.isfinite(extremes)]):
         ends = float(low), float(low) + 0.1
         for end in ends:

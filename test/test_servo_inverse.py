@@ -139,7 +139,7 @@ def test_a_link_is_turned_to_an_angle_by_the_answer_nearest_to_a_servo(call):
     (None, {'mechanism': 'arm', 'output': 'C.y', 'lever_angle': [0.1]}, "no mechanism 'arm'"),
     (None, {'mechanism': 'jansen', 'output': 'Z.y', 'lever_angle': [0.1]}, 'Z'),
     (None, {'mechanism': 'jansen', 'output': 'O.x', 'lever_angle': [0.1]}, 'O.x'),
-    ({'mechanisms': ['five_bar']}, {'output': 'P.y', 'lever_angle': [0.1]}, 'several cranks'),
+    ({'mechanisms': ['five_bar']}, {'output': 'P.y', 'lever_angle': [0.1]}, 'several inputs'),
 ])
 def test_an_output_that_cannot_be_asked_for_gets_the_reason(
         call, parameters, request_, message):

@@ -53,7 +53,7 @@ def test_norton_s_slider_cranks(lengths, theta, side, rod, slide):
     angle = degrees(place['A'] - place['B'])
     assert printed(angle % 360.0 if float(rod) > 180.0 else angle, rod)
     assert printed(linkage.joint_angles(math.radians(theta))['block'], slide)
-    assert linkage.crank_angle('block', place['B'][0], near=1.0) == pytest.approx(
+    assert linkage.input_for('block', place['B'][0], near=1.0) == pytest.approx(
         math.radians(theta))
 
 
@@ -93,7 +93,7 @@ def test_the_crank_and_slotted_lever_of_khurmi_and_gupta():
     lever = mechanisms.create('slotted_lever', a=120.0, b=240.0)
     (right, left), = lever.lever_reach()
     assert math.degrees(left) == pytest.approx(30.0)
-    forth = np.ptp([lever.crank_angle('lever', end * (1.0 - 1e-15), near=end)
+    forth = np.ptp([lever.input_for('lever', end * (1.0 - 1e-15), near=end)
                     for end in (right, left)])
     assert forth / (TURN - forth) == pytest.approx(2.0, abs=1e-6)
     assert 2.0 * 450.0 * math.sin(left) == pytest.approx(450.0)
@@ -104,7 +104,7 @@ def test_the_crank_and_slotted_lever_of_khurmi_and_gupta():
     (40.0, 20.0, 75.0, '2.000', '150.0')])  # crank 40 mm, ratio 2 and stroke 150 mm asked for
 def test_whitworth_s_quick_return_of_khurmi_and_gupta(a, b, c, ratio, stroke):
     linkage = mechanisms.create('whitworth', a=a, b=b, c=c, d=400.0)
-    left, right = (linkage.crank_angle('lever', end, near=0.0)
+    left, right = (linkage.input_for('lever', end, near=0.0)
                    for end in (0.5 * math.pi, -0.5 * math.pi))
     back = left - right
     ends = linkage.solve(np.array([left, right]), ('R',))['R'][:, 0]

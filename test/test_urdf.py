@@ -8,7 +8,7 @@ import re
 from xml.etree import ElementTree
 
 from linkage_ros import mechanisms, scene
-from linkage_ros.linkage.output_range import crank_reach, travels
+from linkage_ros.linkage.output_range import common_reach, travels
 from linkage_ros.linkage.walker import Assembly
 from linkage_ros.robot_model import urdf
 import numpy as np
@@ -52,7 +52,7 @@ CUTS = {'water_drop': 1, 'jansen': 3, 'peaucellier': 3, 'slotted_lever': 1,
 
 def drives(one):
     """Return crank angles [rad] all through the reach, a row for each pose."""
-    if len(one.linkage.cranks) == 1:
+    if len(one.linkage.inputs) == 1:
         return np.concatenate([np.linspace(*arc, 41) for arc in one.reach])[:, None]
     thetas = np.random.default_rng(0).uniform(-math.pi, math.pi, (200, 2))
     held = np.isfinite(list(one.linkage.solve(thetas.T).values())).all(axis=(0, 2))
@@ -64,10 +64,10 @@ def posed(one, thetas):
     assembly, points = one.assembly(), one.linkage.points
     solution = assembly.solution(points, assembly.joints)
     solution.solve(thetas.tolist())
-    positions = {f'm_{crank}': theta for crank, theta in zip(one.linkage.cranks, thetas)}
+    positions = {f'm_{input_}': theta for input_, theta in zip(one.inputs, thetas)}
     places = {}
-    for leg, row in zip(assembly.legs, solution.rows):
-        start = f'm_{leg.prefix}'
+    for prefix, row in zip(assembly.legs, solution.rows):
+        start = f'm_{prefix}'
         places.update(zip([start + point for point in points],
                           row[:2 * len(points)].reshape(-1, 2)))
         positions.update(zip([start + joint for joint in assembly.joints], row[2 * len(points):]))
@@ -134,8 +134,8 @@ def test_every_bar_is_a_rod_from_joint_to_joint(name):
     rods = [(robot.robot.get_transform(link.name) @ visual.origin @ np.array(
         [[0.0, 0.0, end * visual.geometry.cylinder.length, 1.0] for end in (-0.5, 0.5)]).T)[:3].T
         for link in robot.robot.robot.links for visual in link.visuals if visual.geometry.cylinder]
-    bars = [[in_space(one.pose, places[f'm_{leg.prefix}{end}']) for end in bar]
-            for leg in one.assembly().legs for bar in one.linkage.bars]
+    bars = [[in_space(one.pose, places[f'm_{prefix}{end}']) for end in bar]
+            for prefix in one.assembly().legs for bar in one.linkage.bars]
     near = TOLERANCE * one.scale * one.linkage.longest
     assert len(rods) == len(bars)
     assert all(any(np.abs(rod - bar).max() < near for rod in rods) for bar in bars)
@@ -190,7 +190,7 @@ def test_a_crank_of_mirrored_legs_reaches_as_far_as_both_do():
     end = math.acos(-0.3125)
     legs = Assembly(mechanisms.create('custom', joints=HALF_TURN), mirrored=True)
     assert np.array(legs.reach) == pytest.approx(np.array([(-end, end)]))
-    assert np.array(crank_reach(legs)) == pytest.approx(
+    assert np.array(common_reach(legs)) == pytest.approx(
         np.array([(-end, end - math.pi), (math.pi - end, end)]))
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple, Tuple
 
 from linkage_ros import scene
-from linkage_ros.scene.crank_motion import Motion
+from linkage_ros.scene.motion import Motion
 from sensor_msgs.msg import JointState
 import yaml
 
@@ -47,8 +47,7 @@ class Cranks:
 
     def __init__(self, name: str):
         machines = scene.read(SCENES[name]).machines
-        cranks = [machine.crank for machine in machines.values()]
-        self._motions = [Motion(c.speed, c.sweep, c.start) for c in cranks]
+        self._motions = [Motion.of(machine.first) for machine in machines.values()]
         self._message = JointState(name=[f'{machine}_crank' for machine in machines])
         self._count = 0
 

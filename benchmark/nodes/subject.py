@@ -20,7 +20,7 @@ import time
 from linkage_interfaces.srv import ServoInverse
 from linkage_ros import scene
 from linkage_ros.nodes import joint_state_reader, kinematics, message_layout, messages, scene_node
-from linkage_ros.nodes.kinematics import ANY, Kinematics, Outlet
+from linkage_ros.nodes.kinematics import ANY, Kinematics, MechanismPublisher
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -68,7 +68,7 @@ class Raw(Deaf):
     raw = True
 
 
-class FreshOutlet(Outlet):
+class FreshPublisher(MechanismPublisher):
     """Builds ordinary messages, as one writes it: new ones each time."""
 
     def _send(self, publisher, build, stamp):
@@ -144,11 +144,11 @@ class Fresh(Kinematics):
     """The same node with ordinary messages."""
 
     def __init__(self, **kwargs):
-        usual, kinematics.Outlet = kinematics.Outlet, FreshOutlet
+        usual, kinematics.MechanismPublisher = kinematics.MechanismPublisher, FreshPublisher
         try:
             super().__init__(**kwargs)
         finally:
-            kinematics.Outlet = usual
+            kinematics.MechanismPublisher = usual
 
 
 KINDS = {'kinematics': Kinematics, 'fresh': Fresh, 'floor': Floor, 'relay': Relay,

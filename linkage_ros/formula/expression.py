@@ -19,11 +19,12 @@ from typing import Any, Callable, Iterable, Iterator, Mapping, NamedTuple, Optio
 
 class Real:
     """
-    One operation on real numbers, or a leaf: a constant, a dimension or an angle that is given.
+    One operation on real numbers, or a leaf: a constant, a dimension or an argument.
 
-    `varies` tells whether the value depends on a crank angle; what does not is computed once
-    for each change of dimensions. `positive` marks what is known to be above zero. `rate` is the
-    rate where geometry knows it in fewer operations than differentiating the expression takes.
+    `varies` tells whether the value depends on an argument, such as a crank angle; what does not
+    is computed once for each change of dimensions. `positive` marks what is known to be above
+    zero. `rate` is the rate where geometry knows it in fewer operations than differentiating the
+    expression takes.
     """
 
     __slots__ = ('op', 'args', 'varies', 'positive', 'rate')
@@ -131,7 +132,7 @@ class Real:
 
 Number = Union[Real, float, int]
 
-_LEAVES = frozenset({'constant', 'dimension', 'angle'})
+_LEAVES = frozenset({'constant', 'dimension', 'argument'})
 
 _FOLDED: Mapping[str, Callable] = {
     'add': lambda x, y: x + y,
@@ -163,9 +164,9 @@ def dimension(name: str, positive: bool = True) -> Real:
     return Real('dimension', (name,), varies=False, positive=positive)
 
 
-def angle(index: int) -> Real:
-    """Return the leaf for an angle that is given, in rad: one crank, or a lever."""
-    return Real('angle', (index,), varies=True)
+def argument(index: int) -> Real:
+    """Return the leaf for what is given with each pose: an input, or a lever's angle."""
+    return Real('argument', (index,), varies=True)
 
 
 def sine(x: Real) -> Real:
@@ -343,7 +344,7 @@ def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
     node : Real
         What is differentiated.
     rates : dict
-        Angular velocity of each crank; cranks left out stand still.
+        Rate of each argument, by its index; what is left out stands still.
     known : dict
         Derivatives found so far, shared between calls.
 
@@ -407,7 +408,7 @@ def _product_rule(node: Real, _: Any, dx: Real, dy: Real) -> Real:
 
 
 _RULES: Mapping[str, Callable] = {
-    'angle': lambda n, rates: real(rates.get(n.args[0], 0.0)),
+    'argument': lambda n, rates: real(rates.get(n.args[0], 0.0)),
     'sin': lambda n, _, dx: cosine(n.args[0]) * dx,
     'cos': lambda n, _, dx: -(sine(n.args[0]) * dx),
     'add': lambda n, _, dx, dy: dx + dy,

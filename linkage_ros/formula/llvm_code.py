@@ -22,7 +22,7 @@ if not hasattr(llvm, 'create_pass_builder'):
 
 NUMBER, COUNT = ir.DoubleType(), ir.IntType(64)
 ZERO, NAN = ir.Constant(NUMBER, 0.0), ir.Constant(NUMBER, float('nan'))
-# Poses, the addresses of angles, constants and results, then the strides of results in numbers.
+# Poses, addresses of arguments, constants and results, then the strides of results in numbers.
 SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, *3 * (ctypes.c_void_p,),
                              *2 * (ctypes.c_int64,))
 
@@ -37,7 +37,7 @@ class Loop:
     Parameters
     ----------
     operations : sequence of (int, str, tuple)
-        Number, name and operands of each operation: numbers of others, of an angle, or a value.
+        Number, name and operands of each operation: others' numbers, an argument's, or a value.
     constants : sequence of int
         The numbers of what is given with each call.
     outputs : sequence of int
@@ -58,15 +58,15 @@ class Loop:
         self.run = SIGNATURE(self._engine.get_function_address('loop'))
 
     @staticmethod
-    def arguments(angles: np.ndarray, constants: np.ndarray, out: np.ndarray) -> tuple:
+    def arguments(given: np.ndarray, constants: np.ndarray, out: np.ndarray) -> tuple:
         """
         Return what to call `run` with, as long as the arrays live.
 
-        It solves at angles, shape (cranks, poses) and C-contiguous, and fills out, shape
-        (outputs, poses).
+        It solves at what is given, shape (arguments, poses) and C-contiguous, and fills out,
+        shape (outputs, poses).
         """
         by_output, by_pose = (stride // out.itemsize for stride in out.strides)
-        return angles.shape[1], *map(_address, (angles, constants, out)), by_pose, by_output
+        return given.shape[1], *map(_address, (given, constants, out)), by_pose, by_output
 
 
 def _address(array: np.ndarray) -> int:
@@ -78,8 +78,8 @@ def _module(operations, constants, outputs) -> ir.Module:
     pointer = NUMBER.as_pointer()
     loop = ir.Function(module, ir.FunctionType(
         ir.VoidType(), [COUNT, pointer, pointer, pointer, COUNT, COUNT]), 'loop')
-    poses, angles, given, out, by_pose, by_output = loop.args
-    for array in (angles, given, out):
+    poses, arguments, given, out, by_pose, by_output = loop.args
+    for array in (arguments, given, out):
         array.add_attribute('noalias')
     start, body, end = (loop.append_basic_block(name) for name in ('start', 'body', 'end'))
 
@@ -93,9 +93,9 @@ def _module(operations, constants, outputs) -> ir.Module:
     for number, name, operands in operations:
         if name == 'constant':
             known[number] = ir.Constant(NUMBER, operands[0])
-        elif name == 'angle':
+        elif name == 'argument':
             row = builder.mul(_count(operands[0]), poses)
-            known[number] = _load(builder, angles, builder.add(row, pose))
+            known[number] = _load(builder, arguments, builder.add(row, pose))
         else:
             known[number] = spell[name](*(known[operand] for operand in operands))
     for column, number in enumerate(outputs):

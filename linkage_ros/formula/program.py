@@ -187,7 +187,7 @@ class _Listing:
 
     def _operands(self, number: int) -> tuple:
         node, args = self.entries[number]
-        return args if node.varies and node.op != 'angle' else ()
+        return args if node.varies and node.op != 'argument' else ()
 
     def _live(self) -> list:
         live, waiting = set(), list(self.outputs)
@@ -231,7 +231,7 @@ class _Listing:
                 text[number], depth[number], reads[number] = f'k{number}', 0, set()
             elif node.op == 'constant':
                 text[number], depth[number], reads[number] = repr(node.value), 0, set()
-            elif node.op == 'angle':
+            elif node.op == 'argument':
                 text[number], depth[number], reads[number] = f'x{args[0]}', 0, set()
             else:
                 text[number] = dialect.templates[node.op].format(*(text[a] for a in args))
@@ -257,10 +257,10 @@ def _with_releases(lines: Sequence[Tuple[str, str, Set[str]]], kept: Set[str]) -
             yield 'del ' + ', '.join(done)
 
 
-def _python(listing: _Listing, dialect: _Dialect, angles: int,
+def _python(listing: _Listing, dialect: _Dialect, arguments: int,
             names: Tuple[str, ...] = ()) -> Callable:
     """
-    Return a function of the constants, and of what to do instead, to the function of the angles.
+    Return a function of constants, and of what to do instead, to the function of the arguments.
 
     That returns the outputs as a tuple or, where there are names, in pairs: an array (2,) each.
     What Python's floats raise for is left to `instead`.
@@ -275,7 +275,7 @@ def _python(listing: _Listing, dialect: _Dialect, angles: int,
         f'pack(pairs, 0, {", ".join(outputs)})',
         f'return {{{rows}}}',
     ] if names else [f'return ({"".join(code + ", " for code in outputs)})']
-    given = ', '.join(f'x{i}' for i in range(angles))
+    given = ', '.join(f'x{i}' for i in range(arguments))
     source = '\n'.join([
         f'def bind({"".join(f"k{n}, " for n in listing.constants)}instead=None):',
         f'    def pose({given}):',
@@ -294,25 +294,25 @@ class _Variant:
     """The code for one outcome of the conditions on dimensions."""
 
     def __init__(self, outputs: Sequence[Real], decided: Mapping[Real, bool],
-                 replaced: Mapping[Real, Real], angles: int):
+                 replaced: Mapping[Real, Real], arguments: int):
         self._listing = _Listing(outputs, decided, replaced)
-        self.angles, self.outputs = angles, len(outputs)
+        self.arguments, self.outputs = arguments, len(outputs)
         self.constants = [self._listing.entries[n][0] for n in self._listing.constants]
         self._placing: Dict[tuple, Callable] = {}
 
     def placing(self, names: tuple) -> Callable:
         """Return the code for one pose that returns the outputs in pairs, by name."""
         if names not in self._placing:
-            self._placing[names] = _python(self._listing, _FLOAT, self.angles, names)
+            self._placing[names] = _python(self._listing, _FLOAT, self.arguments, names)
         return self._placing[names]
 
     @cached_property
     def float(self) -> Callable:
-        return _python(self._listing, _FLOAT, self.angles)
+        return _python(self._listing, _FLOAT, self.arguments)
 
     @cached_property
     def array(self) -> Callable:
-        return _python(self._listing, _ARRAY, self.angles)
+        return _python(self._listing, _ARRAY, self.arguments)
 
     @cached_property
     def loop(self) -> Future:
@@ -338,23 +338,23 @@ class Program:
     ----------
     outputs : sequence of Real
         What is computed.
-    angles : int
-        How many angles are given.
+    arguments : int
+        How many arguments are given.
     replaced : mapping, optional
-        What stands for some angles in the outputs.
+        What stands for some arguments in the outputs.
 
     """
 
-    def __init__(self, outputs: Sequence[Real], angles: int = 1,
+    def __init__(self, outputs: Sequence[Real], arguments: int = 1,
                  replaced: Optional[Mapping[Real, Real]] = None):
         self._outputs = tuple(outputs)
-        self._angles = angles
+        self._arguments = arguments
         self._replaced = replaced or {}
         self._conditions = _conditions(self._outputs)
         self._variants: Dict[tuple, _Variant] = {}
 
     def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False) -> Pose:
-        """Return the outputs as functions of the angles; dimensions are floats or arrays."""
+        """Return the outputs as functions of the arguments; dimensions are floats or arrays."""
         swept = any(np.ndim(v) for v in dimensions.values())
         with np.errstate(all='ignore'):
             decisions = () if swept else tuple(
@@ -370,7 +370,7 @@ class Program:
         if decisions not in self._variants:
             decided = dict(zip(self._conditions, decisions))
             keep(self._variants, decisions, _Variant(
-                self._outputs, decided, self._replaced, self._angles))
+                self._outputs, decided, self._replaced, self._arguments))
         return self._variants[decisions]
 
 
@@ -389,7 +389,7 @@ def _conditions(outputs: Iterable[Real]) -> list:
 
 
 class Pose:
-    """The outputs of a program as a function of the angles, for dimensions that are set."""
+    """The outputs of a program as a function of the arguments, for dimensions that are set."""
 
     def __init__(self, variant: _Variant, constants: Sequence, shape: tuple, accelerate: bool):
         self._variant = variant
@@ -399,33 +399,33 @@ class Pose:
 
     @cached_property
     def at(self) -> Callable:
-        """The function from the angles, floats, to the outputs of one set of dimensions."""
+        """The function from the arguments, floats, to the outputs of one set of dimensions."""
         return self._variant.float(*self._constants, self._by_arrays)
 
     @cached_property
     def _given(self) -> np.ndarray:
         return np.array(self._constants)
 
-    def _by_arrays(self, *angles: float) -> tuple:
+    def _by_arrays(self, *arguments: float) -> tuple:
         """Return the outputs at one pose with inf or nan where Python's floats raise."""
-        return tuple(self._blocks([np.array([a]) for a in angles], 1)[:, 0].tolist())
+        return tuple(self._blocks([np.array([a]) for a in arguments], 1)[:, 0].tolist())
 
     def placer(self, names: tuple) -> Callable:
-        """Return the function from one angle, a float, to an array (2,) for each name."""
+        """Return the function from one argument, a float, to an array (2,) for each name."""
         def by_arrays(theta: float) -> Dict[str, np.ndarray]:
             return dict(zip(names, np.reshape(self._by_arrays(theta), (-1, 2))))
 
         return self._variant.placing(names)(*self._constants, by_arrays)
 
-    def __call__(self, *angles: Any) -> Any:
+    def __call__(self, *arguments: Any) -> Any:
         """Return the outputs at floats, as floats, or over arrays that are broadcast together."""
-        if not self.shape and set(map(type, angles)) == {float}:
-            return self.at(*angles)
-        return self.over(*angles)
+        if not self.shape and set(map(type, arguments)) == {float}:
+            return self.at(*arguments)
+        return self.over(*arguments)
 
-    def over(self, *angles: Any) -> np.ndarray:
+    def over(self, *arguments: Any) -> np.ndarray:
         """Return the outputs over arrays that are broadcast together, shape (outputs, *shape)."""
-        arrays: Sequence[np.ndarray] = [np.asarray(a, float) for a in angles]
+        arrays: Sequence[np.ndarray] = [np.asarray(a, float) for a in arguments]
         if self.shape:
             return self._swept(arrays)
         if len(arrays) > 1:
@@ -440,16 +440,17 @@ class Pose:
             out = self._plainly(flat, size)
         return out.reshape(self._variant.outputs, *shape)
 
-    def searched(self, *angles: Any) -> np.ndarray:
+    def searched(self, *arguments: Any) -> np.ndarray:
         """Return what `over` does for one set of dimensions, without code for single poses."""
-        angles = np.broadcast_arrays(*angles)
-        flat = [a.ravel() for a in angles]
-        return self._blocks(flat, angles[0].size).reshape(self._variant.outputs, *angles[0].shape)
+        arguments = np.broadcast_arrays(*arguments)
+        flat = [a.ravel() for a in arguments]
+        return self._blocks(flat, arguments[0].size).reshape(
+            self._variant.outputs, *arguments[0].shape)
 
     def batch(self, rows: np.ndarray) -> Batch:
         """Return poses to be solved again and again, into rows (poses, outputs)."""
         return Batch(self._plainly, self._variant.loop if self._accelerate else None,
-                     self._given, self._variant.angles, rows)
+                     self._given, self._variant.arguments, rows)
 
     def _plainly(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
         return self._one_by_one(given, size) if size < FEW else self._blocks(given, size)
@@ -470,10 +471,10 @@ class Pose:
                     row[block] = values
         return out
 
-    def _swept(self, angles: Sequence[np.ndarray]) -> np.ndarray:
-        shape = np.broadcast_shapes(self.shape, *map(np.shape, angles))
+    def _swept(self, arguments: Sequence[np.ndarray]) -> np.ndarray:
+        shape = np.broadcast_shapes(self.shape, *map(np.shape, arguments))
         with np.errstate(all='ignore'):
-            rows = self._variant.array(*self._constants)(*angles)
+            rows = self._variant.array(*self._constants)(*arguments)
         return np.array([np.broadcast_to(row, shape) for row in rows], float)
 
 
@@ -483,16 +484,16 @@ class Batch:
 
     Attributes
     ----------
-    given : float array (angles, poses)
-        Where the angles are put.
+    given : float array (arguments, poses)
+        Where the arguments are put.
     rows : float array (poses, outputs)
         What `solve` makes of them.
 
     """
 
     def __init__(self, plainly: Callable, loop: Optional[Future], constants: np.ndarray,
-                 angles: int, rows: np.ndarray):
-        self.given, self.rows = np.zeros((angles, len(rows))), rows
+                 arguments: int, rows: np.ndarray):
+        self.given, self.rows = np.zeros((arguments, len(rows))), rows
         self._plainly = plainly
         self._loop, self._constants = loop, constants
         self._run: Optional[Callable] = None

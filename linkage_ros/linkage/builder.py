@@ -15,19 +15,34 @@ from math import pi
 from typing import Dict, List, NamedTuple, Optional, Tuple
 
 from . import planar
+from .inputs import ANGLE, Input, LENGTH
 from ..formula.expression import (
-    angle,
     arctangent,
+    argument,
     Complex,
     cosine,
     cross,
+    dimension,
     Number,
     Real,
     real,
     sine,
+    where,
 )
 
 GROUND = 'ground'
+# Lengths may be counted in a unit of their own; this many metres long.
+UNIT = dimension('[m]')
+
+
+def in_metres(length: Real) -> Real:
+    """Return a length counted in metres."""
+    return where(abs(UNIT - 1.0) <= 0.0, length, length * UNIT)
+
+
+def in_own_unit(length: Real) -> Real:
+    """Return a length [m] counted in the linkage's own unit."""
+    return where(abs(UNIT - 1.0) <= 0.0, length, length / UNIT)
 
 
 class SketchError(ValueError):
@@ -52,7 +67,7 @@ class Link(NamedTuple):
 
 
 class Bar(NamedTuple):
-    """Two points at a constant distance [m], drawn as a line."""
+    """Two points at a constant distance [m]."""
 
     first: str
     second: str
@@ -75,7 +90,7 @@ class _Vector(NamedTuple):
 
 
 class Sketch:
-    """The joints, links and limits of a linkage, as expressions of its dimensions and angles."""
+    """The joints, links and limits of a linkage, as expressions of its dimensions and inputs."""
 
     def __init__(self) -> None:
         self.points: Dict[str, _Point] = {}
@@ -88,7 +103,9 @@ class Sketch:
         self.directions: Dict[str, Complex] = {}
         self.transmissions: Dict[str, Real] = {}
         self.folds: List[planar.Limit] = []
-        self.cranks: List[str] = []
+        self.inputs: List[Input] = []
+        self.arguments: List[Real] = []
+        self.cylinders: List[Tuple[str, str]] = []
         self._vectors: Dict[Tuple[str, str], _Vector] = {}
         self._ends: Dict[str, Tuple[str, str]] = {}
         self._kites: Dict[Tuple[str, str], planar.CrankArm] = {}
@@ -101,15 +118,42 @@ class Sketch:
     def crank(self, name: str, centre: str, length: Real, upright: bool = False) -> None:
         """Turn a crank [m] about a ground joint; upright: its zero is +y, not +x."""
         self._on_ground(centre)
-        link = f'crank{len(self.cranks) + 1}' if self.cranks else 'crank'
+        link = self._numbered('crank')
         zero = Complex(0.0, 1.0) if upright else Complex(1.0, 0.0)
-        turning = angle(len(self.cranks))
+        turning = self._driven(Input(link, ANGLE))
         crank = planar.Crank(self.points[centre].place, length, zero, turning)
-        self.cranks.append(link)
         self._hang(centre, name, crank.bar(), length, upright, link)
         self.joint_values[link] = turning
         self._place(name, centre, crank.bar(), link, length, ())
         self.points[name].crank = crank
+
+    def cylinder(self, name: str, base: str, pivot: str, bar: Real, side: float) -> None:
+        """Join a bar [m] from a pivot and a cylinder from a base, left of base -> pivot."""
+        shortest, longest = self._stroke(base, pivot, bar)
+        word = self._numbered('cylinder')
+        length = self._driven(Input(word, LENGTH, shortest, longest))
+        found = planar.dyad(self._plain_arm(base, pivot), length, bar, side, longest=longest)
+        self.limits += found.limits
+        link = self._hang(pivot, name, found.second, bar)
+        self._place(name, pivot, found.second, link, bar, (base,))
+        self.transmissions[name] = planar.transmission(found)
+        barrel = self._hang(base, name, found.first, None, name=self._numbered('barrel'))
+        self._slide(word, barrel, base, name, length, Complex(0.0, 0.0))
+        self.cylinders.append((base, name))
+
+    def _driven(self, input_: Input) -> Real:
+        """Add an input, and return what stands for it: an angle [rad], or a length."""
+        value = argument(len(self.inputs))
+        self.inputs.append(input_)
+        self.arguments.append(value)
+        return value if input_.turns else in_own_unit(value)
+
+    def _stroke(self, base: str, pivot: str, bar: Real) -> Tuple[Real, Real]:
+        """Return the shortest and the longest that a cylinder can be with a bar to a pivot."""
+        if self._are_together(base, pivot):
+            apart = self.distance(base, pivot)
+            return abs(apart - bar), apart + bar
+        return real(0.0), self.points[base].span + self.points[pivot].span + bar
 
     def dyad(self, name: str, first: str, second: str, to_first: Real, to_second: Real,
              side: float) -> None:
@@ -132,9 +176,9 @@ class Sketch:
     def line(self, name: str, first: str, second: str, distance: Real) -> None:
         """Add a point on the line of a bar, a distance [m] from first, towards second."""
         vector, base, link = self._bar_between(first, second)
-        self._place(name, first, vector * (distance / base), link, abs(distance), (second,))
-        if (first, second) in self._kites:
-            self.points[name].place = self._kites[first, second].beyond_kite(-(distance / base))
+        kite = self._kites.get((first, second))
+        self._place(name, first, vector * (distance / base), link, abs(distance), (second,),
+                    kite.beyond_kite(-(distance / base)) if kite else None)
         self._add_to_frame(name, first, second, link, Complex(distance / base, 0.0))
 
     def mirror(self, name: str, point: str, first: str, second: str) -> None:
@@ -147,8 +191,7 @@ class Sketch:
                 for end in (second, first)]
         place, from_second, from_first = planar.mirror(arm, self.points[point].place, ends)
         self._pair(name, first, second, planar.Dyad(from_first, from_second, ()),
-                   self.distance(first, point), self.distance(second, point), point)
-        self.points[name].place = place
+                   self.distance(first, point), self.distance(second, point), point, place=place)
         if isinstance(arm, planar.CrankArm) and pin and pin.centre is self.points[point].place:
             self._kites[first, name] = arm
 
@@ -171,8 +214,8 @@ class Sketch:
         self.limits += found.right.limits
         self._pair(right, pole, pin, found.right, long, short)
         link = self._hang(right, corner, found.left.second, short)
-        self._place(corner, right, found.left.second, link, short, ())
-        self.points[corner].place = self.points[pole].place + found.inverse
+        self._place(corner, right, found.left.second, link, short, (),
+                    self.points[pole].place + found.inverse)
         self._pair(left, pole, pin, found.left, long, short)
         link = self._hang(left, corner, found.right.second, short)
         self._bar(left, corner, found.right.second, short, link)
@@ -252,14 +295,24 @@ class Sketch:
     def arm(self, first: str, second: str) -> planar.Arm:
         """Return the arm from one joint to another."""
         ends = self.points[first], self.points[second]
-        if self._shared_link(first, second):
-            bar = self._bar_between(first, second)
-            return planar.Arm(ends[0].place, bar.vector, bar.length, bar.length)
         for (foot, pin), reverse in ((ends, False), (ends[::-1], True)):
             if pin.crank and foot.home == GROUND and foot.place is not pin.crank.centre:
                 return planar.CrankArm(foot.place, pin.crank, reverse)
+        return self._plain_arm(first, second)
+
+    def _plain_arm(self, first: str, second: str) -> planar.Arm:
+        """Return the arm from one joint to another by their coordinates."""
+        ends = self.points[first], self.points[second]
+        if self._are_together(first, second):
+            side = self._side(first, second)
+            return planar.Arm(ends[0].place, side.vector, side.length, side.length)
         return planar.Arm(ends[0].place, self._between(first, second),
                           ends[0].span + ends[1].span)
+
+    def _are_together(self, first: str, second: str) -> bool:
+        """Return whether two joints are on one link or on the ground."""
+        grounded = self.points[first].home == self.points[second].home == GROUND
+        return grounded or self._shared_link(first, second) is not None
 
     def _between(self, first: str, second: str) -> Complex:
         """Return the vector between two joints; bars from one joint to both keep more digits."""
@@ -277,17 +330,17 @@ class Sketch:
         return self._side(first, second).length
 
     def _pair(self, name: str, first: str, second: str, found: planar.Dyad, to_first: Real,
-              to_second: Real, *others: str) -> None:
+              to_second: Real, *others: str, place: Optional[Complex] = None) -> None:
         """Join the two bars of a dyad: the joint belongs to the first, the second is cut there."""
         link = self._hang(first, name, found.first, to_first)
-        self._place(name, first, found.first, link, to_first, (second, *others))
+        self._place(name, first, found.first, link, to_first, (second, *others), place)
         link = self._hang(second, name, found.second, to_second)
         self._bar(second, name, found.second, to_second, link)
         self.transmissions[name] = planar.transmission(found)
 
-    def _hang(self, joint: str, tip: str, bar: Complex, length: Number, upright: bool = False,
-              name: Optional[str] = None) -> str:
-        """Add a link that turns about a joint of its parent, and return its name."""
+    def _hang(self, joint: str, tip: str, bar: Complex, length: Optional[Number],
+              upright: bool = False, name: Optional[str] = None) -> str:
+        """Add a link that turns about a joint, its tip on it if that has a length; return it."""
         name = name or ('' if len(joint + tip) == 2 else '_').join((joint, tip))
         if name in self.joint_values:
             raise SketchError(f'its link {name} would have the name of another')
@@ -298,7 +351,9 @@ class Sketch:
                                real(pi / 2 if upright else 0.0), tip))
         self.directions[name] = bar
         self.joint_values[name] = arctangent(relative.y, relative.x)
-        self.frames[name] = {joint: Complex(0.0, 0.0), tip: Complex(length, 0.0)}
+        self.frames[name] = {joint: Complex(0.0, 0.0)}
+        if length is not None:
+            self.frames[name][tip] = Complex(length, 0.0)
         self._ends[name] = joint, tip
         return name
 
@@ -309,11 +364,16 @@ class Sketch:
         frame[name] = frame[first] + (frame[second] - frame[first]) * corner
 
     def _place(self, name: str, start: str, vector: Complex, link: str, length: Real,
-               others: Tuple[str, ...]) -> None:
-        """Place a joint at the end of a bar from another; it stands on others as well."""
+               others: Tuple[str, ...], place: Optional[Complex] = None) -> None:
+        """
+        Place a joint at the end of a bar from another; it stands on others as well.
+
+        A place that is known in a better way is given.
+        """
         origin = self.points[start]
         stands_on = frozenset().union(*({x} | self.points[x].stands_on for x in (start, *others)))
-        self.points[name] = _Point(origin.place + vector, link, origin.span + length, stands_on)
+        self.points[name] = _Point(place or origin.place + vector, link, origin.span + length,
+                                   stands_on)
         self._bar(start, name, vector, length, link)
 
     def _bar(self, first: str, second: str, vector: Complex, length: Number,

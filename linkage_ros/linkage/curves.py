@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Curves over the crank angle: where to sample them, where they change sign, where they turn round.
+Curves over an input: where to sample them, where they change sign, where they turn round.
 
 All that is looked for is refined at once, in brackets that are cut again and again, so that a
 curve is computed a few dozen times for however many results.
@@ -15,10 +15,10 @@ from typing import Callable, Sequence, Tuple
 
 import numpy as np
 
-Arc = Tuple[float, float]
-
 # Samples of a whole turn; and how often the distance to an end of an arc is halved for more.
 SAMPLES, HALVINGS = 360, 48
+# For extremes: samples of an arc, how many of the best are looked at, samples around each, zooms.
+EVEN, KEPT, AROUND, ZOOMS = 385, 4, 17, 10
 # Where a bracket is cut; an odd number of places, so that one is its middle.
 CUTS = np.arange(1, 16) / 16
 # Angles below this [rad] are zero: the rounding of any other angle is coarser.
@@ -106,3 +106,51 @@ def turns(values: Sequence[float], rates: Sequence[float], least: Sequence[float
         else:
             kept.append(i)
     return kept
+
+
+def extremes(curve: Callable, lo: float, hi: float, angular: np.ndarray) -> np.ndarray:
+    """
+    Return the least and the greatest value of outputs on an arc, and where they have it.
+
+    Parameters
+    ----------
+    curve : callable
+        From values of an input, shape (n,), to the outputs, shape (outputs, n).
+    lo, hi : float
+        The ends of the arc.
+    angular : bool array (outputs,)
+        Which outputs are angles [rad]; they are followed past -pi and pi.
+
+    Returns
+    -------
+    float array (outputs, 2, 2)
+        Of each output the least value and where, then the greatest value and where.
+
+    """
+    theta = np.linspace(lo, hi, EVEN)
+    value = curve(theta)
+    for i, known in zip(np.flatnonzero(angular), np.isfinite(value[angular])):
+        value[i, known] = np.unwrap(value[i, known])
+    # One search for the greatest of minus each output, one for the greatest of each.
+    row, sign = np.tile(np.arange(len(value)), 2), np.repeat([-1.0, 1.0], len(value))[:, None]
+    turn = np.where(angular, math.tau, 0.0)[row][:, None, None]
+    height = np.where(np.isfinite(value), value, np.nan)[row] * sign
+    beside = np.pad(np.nan_to_num(height, nan=-np.inf), ((0, 0), (1, 1)), constant_values=-np.inf)
+    peaks = (beside[:, 1:-1] >= beside[:, :-2]) & (beside[:, 1:-1] >= beside[:, 2:])
+    best = np.argsort(np.where(peaks, -beside[:, 1:-1], np.inf), axis=1)[:, :KEPT]
+    top = np.take_along_axis(value[row], best, 1)
+    at = theta[best]
+    low, high = theta[(best - 1).clip(0)], theta[(best + 1).clip(max=EVEN - 1)]
+    for _ in range(ZOOMS):
+        near = np.linspace(low, high, AROUND, axis=-1)
+        now = curve(near.ravel()).reshape(len(value), *near.shape)[row, np.arange(len(row))]
+        with np.errstate(invalid='ignore'):
+            now = now + turn * np.round((top[..., None] - now) / math.tau)
+        rank = np.where(np.isfinite(now), now * sign[..., None], -np.inf)
+        place = rank.argmax(axis=-1)[..., None]
+        top, at = (np.take_along_axis(x, place, -1)[..., 0] for x in (now, near))
+        low, high = (np.take_along_axis(near, (place + step).clip(0, AROUND - 1), -1)[..., 0]
+                     for step in (-1, 1))
+    place = np.where(np.isfinite(top), top * sign, -np.inf).argmax(axis=1)[:, None]
+    found = [np.take_along_axis(x, place, 1).reshape(2, -1) for x in (top, at)]
+    return np.stack(found).transpose(2, 1, 0)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Crank angles that bring about a wanted value of any output.
+Values of the input that bring about a wanted value of any output.
 
 The output is cut into branches on which it rises or falls all along: at its extremes, at the ends
 of the reach, and where the linkage passes a dead point. On a branch a value is found by Newton's
@@ -16,7 +16,8 @@ from typing import Callable, Iterable, List, NamedTuple, Sequence
 
 import numpy as np
 
-from .curves import Arc, LEAST, refined, sampled, turns
+from .curves import LEAST, refined, sampled, turns
+from .inputs import Arc, Input
 
 # Answers that are no further apart than this [rad] are one.
 CLOSE = 1e-13
@@ -30,43 +31,36 @@ STILL = 64.0
 MISSED = 1e-9
 
 
-def wrapped(theta):
-    """Return angles [rad] in [-pi, pi)."""
-    turned = theta - math.tau * np.floor((theta + math.pi) / math.tau)
-    turned = np.where((turned < -math.pi) | (turned >= math.pi), -math.pi, turned)
-    return np.where((theta >= -math.pi) & (theta < math.pi), theta, turned)
-
-
-def in_order(answers: np.ndarray) -> np.ndarray:
+def in_order(answers: np.ndarray, input_: Input) -> np.ndarray:
     """
-    Return crank angles, shape (candidates, n), as shape (n, answers).
+    Return values of an input, shape (candidates, n), as shape (n, answers).
 
-    Each row ascends in [-pi, pi), holds no angle twice, and is filled up with NaN.
+    Each row ascends, holds nothing twice, and is filled up with NaN; angles are in [-pi, pi).
     """
-    rows = np.sort(wrapped(np.where(np.abs(answers) < LEAST, 0.0, answers)), axis=0)
+    rows = np.sort(input_.wrapped(np.where(np.abs(answers) < LEAST, 0.0, answers)), axis=0)
     if len(rows) > 1:
         rows[1:][np.diff(rows, axis=0) <= CLOSE] = np.nan
         last = np.nanmax(rows, axis=0, initial=-np.inf)
-        again = (rows == last) & (last - rows[0] >= math.tau - CLOSE)
+        again = input_.turns & (rows == last) & (last - rows[0] >= math.tau - CLOSE)
         rows = np.sort(np.where(again, np.nan, rows), axis=0)
     most = int(np.isfinite(rows).sum(axis=0).max(initial=0))
     rows = rows[:max(most, 1)] if len(rows) else np.full((1, answers.shape[1]), np.nan)
     return np.moveaxis(rows, 0, -1)
 
 
-def nearest(answers: np.ndarray, near) -> np.ndarray:
-    """Return of answers, shape (..., k), the one nearest to an angle, whole turns included."""
+def nearest(answers: np.ndarray, near, input_: Input) -> np.ndarray:
+    """Return of answers, shape (..., k), the one nearest to a value, whole turns included."""
     near = np.asarray(near, float)[..., None]
-    theta = answers + math.tau * np.round((near - answers) / math.tau)
+    theta = input_.beside(answers, near)
     away = np.where(np.isnan(theta), np.inf, np.abs(theta - near))
     best = np.argmin(away, axis=-1)[..., None]
     return np.take_along_axis(np.broadcast_to(theta, away.shape), best, -1)[..., 0][()]
 
 
-def distinct(theta: Iterable[float]) -> List[float]:
-    """Return angles [rad] in [-pi, pi), in order, without those next to another."""
+def distinct(theta: Iterable[float], input_: Input) -> List[float]:
+    """Return values of an input in order, without those next to another."""
     found = np.array(list(theta), float)
-    return [x for x in in_order(found[:, None])[0].tolist() if x == x]
+    return [x for x in in_order(found[:, None], input_)[0].tolist() if x == x]
 
 
 class _Branch(NamedTuple):
@@ -84,11 +78,11 @@ class MonotoneBranches:
     Parameters
     ----------
     curve : callable
-        From crank angles, shape (n,), to the output and its rate, shape (2, n).
-    reach : sequence of (float, float)
-        The crank angles that can be assembled [rad].
+        From values of the input, shape (n,), to the output and its rate, shape (2, n).
+    arcs : sequence of (float, float)
+        Where the input may be; nowhere both sides of -pi or pi.
     marks : sequence of float
-        Crank angles [rad] next to which the output may change quickly or break off.
+        Values of the input next to which the output may change quickly or break off.
     angular : bool
         Whether the output is an angle, compared modulo a turn.
     rounding : float
@@ -96,18 +90,18 @@ class MonotoneBranches:
 
     """
 
-    def __init__(self, curve: Callable, reach: Sequence[Arc], marks: Sequence[float],
+    def __init__(self, curve: Callable, arcs: Iterable[Arc], marks: Sequence[float],
                  angular: bool, rounding: float):
         self._curve = curve
         self._angular = angular
         self._rounding = rounding
-        runs = [run for arc in _cut(reach, marks) for run in self._runs(*arc)]
+        runs = [run for arc in _cut(arcs, marks) for run in self._runs(*arc)]
         self._range = max((np.ptp(value) for _, value, *_ in runs), default=0.0)
         self._branches = [branch for run in runs for branch in self._branched(*run)] \
             if self._moves(runs) else []
 
     def answers(self, values: np.ndarray) -> np.ndarray:
-        """Return the crank angles [rad] for values, shape (n,), as shape (candidates, n)."""
+        """Return the values of the input for an output's, shape (n,), as (candidates, n)."""
         asked = [(branch, place, target[place]) for branch in self._branches
                  for target in self._targets(branch, values)
                  if len(place := np.flatnonzero(np.isfinite(target)))]
@@ -221,20 +215,11 @@ class MonotoneBranches:
         return np.where(least <= far, best, np.nan)
 
 
-def within_a_turn(lo: float, hi: float):
-    """Yield an arc [rad] in one or two parts within [-pi, pi]."""
-    for turn in (0.0, math.tau):
-        start, end = max(lo - turn, -math.pi), min(hi - turn, math.pi)
-        if start < end:
-            yield start, end
-
-
-def _cut(reach: Sequence[Arc], marks: Sequence[float]):
-    """Yield the reach as arcs within [-pi, pi], cut beside marks, which may be dead points."""
-    for lo, hi in reach:
-        for start, end in within_a_turn(lo, hi):
-            inside = [mark for mark in marks if start < mark < end]
-            yield from zip([start, *inside], [*inside, end])
+def _cut(arcs: Iterable[Arc], marks: Sequence[float]):
+    """Yield arcs, cut at marks, which may be dead points."""
+    for start, end in arcs:
+        inside = [mark for mark in marks if start < mark < end]
+        yield from zip([start, *inside], [*inside, end])
 
 
 def _bracketed(branch: _Branch, target: np.ndarray) -> tuple:

@@ -6,6 +6,7 @@ Linkages written down: one line a joint, in the order they are placed.
 
     O ground 0 0              a joint fixed to the ground at x y
     A crank O m [up]          on the crank circle of radius m about O, zero to the right [or up]
+    B cylinder P O r left     joined to O by a bar r and to P by a cylinder, left of P -> O
     B dyad A Q b c left       joined to A by a bar b and to Q by a bar c, left of A -> Q
     P rigid A B d e right     corner of a rigid triangle on bar AB, d from A, e from B
     P line A B d              on the line of bar AB, d from A; negative: on the other side of A
@@ -48,12 +49,14 @@ from ..formula.expression import dimension, Real
 from ..words import elided, listed, quoted
 
 _WORDS = {'left': LEFT, 'right': RIGHT, 'out': 1.0, 'in': -1.0, 'up': True}
-_JOINTS = ('CENTRE', 'FIRST', 'SECOND', 'POINT', 'CORNER', 'POLE', 'PIN', 'PIVOT', 'ORIGIN')
+_JOINTS = ('CENTRE', 'BASE', 'FIRST', 'SECOND', 'POINT', 'CORNER', 'POLE', 'PIN', 'PIVOT',
+           'ORIGIN')
 _NUMBERS = ('X', 'Y', 'LENGTH', 'DISTANCE', 'OFFSET', 'ANGLE')
 
-# What follows each word, in the order its construction takes it.
+# What follows each word, in the order its construction takes it. The words of INPUTS add one each.
 _FORMS = {
     'ground': 'ground X Y', 'crank': 'crank CENTRE LENGTH [up]',
+    'cylinder': 'cylinder BASE PIVOT LENGTH left|right',
     'dyad': 'dyad FIRST SECOND LENGTH LENGTH left|right',
     'rigid': 'rigid FIRST SECOND LENGTH LENGTH left|right',
     'line': 'line FIRST SECOND DISTANCE', 'mirror': 'mirror POINT FIRST SECOND',
@@ -62,6 +65,7 @@ _FORMS = {
     'slot': 'slot PIVOT PIN OFFSET out|in LENGTH',
     'slider': 'slider PIN LENGTH ORIGIN ANGLE out|in',
 }
+INPUTS = 'crank', 'cylinder'
 _NAME = re.compile(r'[A-Za-z][A-Za-z0-9_]{0,63}')
 # What a dimension cannot be called: words of arithmetic, and what `mechanisms.create` takes.
 _TAKEN = (*WORDS, 'joints', 'tracer', 'branches')
@@ -231,7 +235,7 @@ def check_numbers(lines: Iterable[Line], dimensions: Mapping) -> None:
 def branches(lines: Iterable[Line]) -> dict:
     """Return the assembly sign, +1 or -1, of each joint that can be assembled in two ways."""
     return {line.names[0]: int(_WORDS[arg])
-            for line in lines if line.word in ('dyad', 'slot', 'slider')
+            for line in lines if line.word != 'rigid'
             for kind, arg in line.arguments() if '|' in kind}
 
 

@@ -10,22 +10,21 @@ from functools import cached_property
 from importlib.util import find_spec
 from itertools import chain, cycle
 from types import MappingProxyType
-from typing import Callable, Mapping, Optional, Sequence, Tuple
+from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
 from . import joint_lines
 from .arguments import checked_dimensions, numbers
-from .builder import Sketch
-from .crank_range import arcs
-from ..formula.expression import angle, derivative, dimension, gated, Real, real, spin, where
+from .builder import in_metres, Sketch, UNIT
+from .input_range import arcs
+from ..formula.expression import argument, derivative, gated, Real, real, spin
 from ..formula.program import Batch, evaluate, keep, Pose, Program
 from ..words import listed, quoted
 
 # Lengths beyond these are counted in a power of two of their own, which changes no bit of a
 # result and keeps squares and products of lengths inside the range of float64.
 SMALL, LARGE = 1e-30, 1e30
-UNIT = dimension('[m]')
 
 
 def check_bars(linkage: Mechanism):
@@ -83,6 +82,20 @@ class Design:
         return joint_lines.branches(self.lines)
 
 
+class Leg(NamedTuple):
+    """
+    What tells one leg on the inputs from another.
+
+    Its own crank has turned by start + side (angle - lag) [rad]; its side is 1, or -1 if it is
+    mirrored; its size is a factor of every length.
+    """
+
+    lag: Any
+    start: Any
+    side: Any
+    size: Any
+
+
 class Structure:
     """A design drawn with its branches: what all mechanisms of that kind share."""
 
@@ -98,12 +111,12 @@ class Structure:
             'transmissions': self._transmissions, 'closures': self._closures,
             'output': self._output}
 
-    def program(self, kind: str, names: Tuple[str, ...], *crank: int) -> Program:
+    def program(self, kind: str, names: Tuple[str, ...], *by: int) -> Program:
         """Return the code for outputs of one kind; what they do not depend on is left out."""
-        key = (kind, names, *crank)
+        key = (kind, names, *by)
         if key not in self._programs:
-            outputs = self._outputs[kind](names, *crank)
-            keep(self._programs, key, Program(outputs, len(self.sketch.cranks)))
+            outputs = self._outputs[kind](names, *by)
+            keep(self._programs, key, Program(outputs, len(self.sketch.inputs)))
         return self._programs[key]
 
     def legs(self, points: Tuple[str, ...], joints: Tuple[str, ...],
@@ -118,14 +131,14 @@ class Structure:
         places = [self.sketch.points[n].place for n in names]
         return [in_metres(part) for place in places for part in (place.x, place.y)]
 
-    def _velocities(self, names, crank=0):
+    def _velocities(self, names, by=0):
         known = {}
-        return [self._due(derivative(part, {crank: 1.0}, known), part)
+        return [self._due(derivative(part, {by: 1.0}, known), part)
                 for part in self._points(names)]
 
     def _due(self, rate, value):
-        """Return a rate by one crank, NaN where other cranks leave no value to have it."""
-        alone = len(self.sketch.cranks) == 1 and rate.value is None
+        """Return a rate by one input, NaN where other inputs leave no value to have it."""
+        alone = len(self.sketch.inputs) == 1 and rate.value is None
         return rate if alone or not value.varies else gated(rate, abs(value), real(0.0))
 
     def _angles(self, names):
@@ -134,33 +147,38 @@ class Structure:
 
     def _parts(self, wanted):
         points, joints, rates = wanted
-        turning = [self._rates(rates, crank) for crank in range(len(self.sketch.cranks))]
+        turning = [self._rates(rates, by) for by in range(len(self.sketch.inputs))]
         return [*self._points(points), *self._angles(joints), *chain.from_iterable(turning)]
 
     def _legs(self, points, joints, moving):
-        cranks = len(self.sketch.cranks)
-        given = [angle(i) for i in range(2 * cranks + 5)]
-        speeds, (lag, start, across, side, size) = given[cranks:2 * cranks], given[2 * cranks:]
-        turning = [sum((rate * speed for rate, speed in zip(rates, speeds)), real(0.0))
-                   for rates in zip(*(self._rates(moving, crank) for crank in range(cranks)))]
+        inputs = self.sketch.inputs
+        given = [argument(i) for i in range(2 * len(inputs) + len(Leg._fields))]
+        values, speeds, leg = (given[:len(inputs)], given[len(inputs):2 * len(inputs)],
+                               Leg(*given[2 * len(inputs):]))
+        across = leg.side * leg.size
+        own = {own: leg.start + leg.side * (value - leg.lag) if input_.turns else value / leg.size
+               for own, value, input_ in zip(self.sketch.arguments, values, inputs)}
+        turning = [sum((rate * (speed if input_.turns else speed / leg.size)
+                        for rate, speed, input_ in zip(rates, speeds, inputs)), real(0.0))
+                   for rates in zip(*(self._rates(moving, by) for by in range(len(inputs))))]
         # A mirrored leg's own crank turns backwards, which mirrors its rates once more.
         outputs = [*(part * factor for part, factor in zip(self._points(points),
-                                                           cycle((across, size)))),
-                   *(value * (across if self._slides(name) else side)
+                                                           cycle((across, leg.size)))),
+                   *(value * (across if self._slides(name) else leg.side)
                      for name, value in zip(joints, self._angles(joints))),
-                   *(value * size if self._slides(name) else value
+                   *(value * leg.size if self._slides(name) else value
                      for name, value in zip(moving, turning))]
-        own = self.sketch.joint_values[self.sketch.cranks[0]]
-        return Program(outputs, len(given), {own: start + side * (given[0] - lag)})
+        return Program(outputs, len(given), own)
 
     def _slides(self, name):
         return any(x.name == name and x.kind == 'prismatic' for x in self.sketch.links)
 
-    def _rates(self, names, crank=0):
+    def _rates(self, names, by=0):
         known = {}
+        inputs = {x.name for x in self.sketch.inputs}
 
         def d(expression):
-            return derivative(expression, {crank: 1.0}, known)
+            return derivative(expression, {by: 1.0}, known)
 
         def turning(name):
             bar = self.sketch.directions.get(name)
@@ -170,7 +188,7 @@ class Structure:
             return turned.formula(*map(d, turned.of))
 
         def rate(link):
-            if link.kind == 'prismatic' or link.name in self.sketch.cranks:
+            if link.kind == 'prismatic' or link.name in inputs:
                 return d(self._angles([link.name])[0])
             return turning(link.name) - turning(link.parent)
 
@@ -191,13 +209,13 @@ class Structure:
                 if limit.margin.varies]
 
     def _closures(self, _):
-        """Return each closure and its rate by the first crank."""
+        """Return each closure and its rate by the first input."""
         known = {}
         return [part for limit in self.closures
                 for part in (limit.margin, derivative(limit.margin, {0: 1.0}, known))]
 
     def _output(self, name):
-        """Return an output, as `crank_angle` names it, and its rate by the first crank."""
+        """Return an output, as `input_for` names it, and its rate by the first input."""
         joint, _, axis = name.rpartition('.')
         if not joint:
             return self._angles([name]) + self._rates([name])
@@ -209,7 +227,7 @@ class Structure:
         return '.' not in output and not self._slides(output)
 
     def moves(self, output: str) -> bool:
-        """Return whether an output depends on the first crank."""
+        """Return whether an output depends on the first input."""
         rate = self._output(output)[1]
         return (rate.args[0] if rate.op == 'gated' else rate).value != 0.0
 
@@ -225,18 +243,25 @@ def _hashable(names):
                          f'got {quoted(names)}') from None
 
 
-def in_metres(length: Real) -> Real:
-    """Return a length counted in metres."""
-    return where(abs(UNIT - 1.0) <= 0.0, length, length * UNIT)
-
-
 class Mechanism:
     """
     A linkage whose dimensions are set.
 
-    A pose depends on the crank angle alone: any angle, in any order, gives the same numbers. Joint
+    A pose depends on the inputs alone: any value, in any order, gives the same numbers. Joint
     angles in arrays may differ by an ulp from those asked for one by one.
     Make one with `linkage_ros.mechanisms.create`.
+
+    Attributes
+    ----------
+    inputs : tuple of Input
+        What drives it: cranks by their angles [rad], cylinders by their lengths [m].
+    points, joints : tuple of str
+        The linkage's joints, and its moving links, whose joint angles there are.
+    bars : tuple of (str, str)
+        The joints at the ends of each bar.
+    lines : tuple of (str, str)
+        What is drawn as a line: the bars, and the cylinders.
+
     """
 
     def __init__(self, design: Design, structure: Structure, dimensions: Mapping,
@@ -248,8 +273,8 @@ class Mechanism:
         sketch = structure.sketch
         self.points = tuple(sketch.points)
         self.joints = tuple(sketch.joint_values)
-        self.cranks = tuple(sketch.cranks)
         self.bars = tuple((bar.first, bar.second) for bar in sketch.bars)
+        self.lines = (*self.bars, *sketch.cylinders)
         self._design = design
         self._structure = structure
         self._accelerate = accelerate
@@ -258,6 +283,9 @@ class Mechanism:
         self._poses: dict = {}
         self._placers: dict = {}
         self._found: dict = {}
+        self.inputs = tuple(input_._replace(low=self._metres(input_.low),
+                                            high=self._metres(input_.high))
+                            if not input_.turns else input_ for input_ in sketch.inputs)
         self.links = tuple(link._replace(zero=np.asarray(self._value(link.zero)).tolist())
                            for link in sketch.links)
 
@@ -268,7 +296,7 @@ class Mechanism:
     @cached_property
     def bar_lengths(self) -> Mapping:
         """The length [m] of each bar."""
-        return MappingProxyType({(bar.first, bar.second): self._value(in_metres(bar.length))
+        return MappingProxyType({(bar.first, bar.second): self._metres(bar.length)
                                  for bar in self._structure.sketch.bars})
 
     def line_of(self, *joints: str) -> joint_lines.Line:
@@ -284,9 +312,13 @@ class Mechanism:
     def frames(self) -> Mapping:
         """Where each link's joints lie [m], seen from the link: x along its bar."""
         return MappingProxyType({
-            link: {name: tuple(self._value(in_metres(x)) for x in (place.x, place.y))
+            link: {name: tuple(map(self._metres, (place.x, place.y)))
                    for name, place in frame.items()}
             for link, frame in self._structure.sketch.frames.items()})
+
+    def _metres(self, length: Real):
+        """Return the value [m] of a length of dimensions alone."""
+        return self._value(in_metres(length))
 
     def _value(self, expression: Real):
         with np.errstate(all='ignore'):
@@ -328,7 +360,8 @@ class Mechanism:
         Parameters
         ----------
         theta : float or array-like
-            Crank angle [rad]; for a linkage with several cranks a sequence of as many.
+            The input: a crank's angle [rad] or a cylinder's length [m]; for a linkage with several
+            inputs a sequence of as many.
         points : sequence of str, optional
             The joints wanted; only what they depend on is computed. Default: all.
 
@@ -344,26 +377,26 @@ class Mechanism:
             If a joint does not exist.
 
         """
-        if isinstance(theta, float) and len(self.cranks) == 1:
+        if isinstance(theta, float) and len(self.inputs) == 1:
             wanted = _hashable(points)
             place = self._placers.get(wanted) or self._placer(wanted)
             return place(theta)
         return self._vectors('points', theta, points)
 
     def _placer(self, wanted) -> Callable:
-        """Return what places joints at one crank angle, a float."""
+        """Return what places joints at one value of the input, a float."""
         names, pose = self._ready('points', wanted)
         if pose.shape:
             return lambda theta: self._vectors('points', theta, wanted)
         return keep(self._placers, wanted, pose.placer(names))
 
-    def velocity(self, theta, points: Optional[Sequence[str]] = None, crank: int = 0) -> dict:
+    def velocity(self, theta, points: Optional[Sequence[str]] = None, by: int = 0) -> dict:
         """
-        Differentiate the joints' places with respect to one crank's angle [m/rad].
+        Differentiate the joints' places by one of the inputs [m/rad, m/m].
 
         Takes, returns and raises what `solve` does; infinite or NaN at a dead point.
         """
-        return self._vectors('velocities', theta, points, crank)
+        return self._vectors('velocities', theta, points, by)
 
     def joint_angles(self, theta, joints: Optional[Sequence[str]] = None) -> dict:
         """
@@ -372,7 +405,7 @@ class Mechanism:
         Parameters
         ----------
         theta : float or array-like
-            Crank angle [rad].
+            What `solve` takes.
         joints : sequence of str, optional
             The links wanted, by name. Default: all.
 
@@ -380,7 +413,7 @@ class Mechanism:
         -------
         dict
             For each link an array of theta's shape: rad in (-pi, pi] counted from its `zero`,
-            the crank's as given, a slide [m]. NaN where it cannot be assembled.
+            an input as given, a slide [m]. NaN where it cannot be assembled.
 
         Raises
         ------
@@ -390,29 +423,29 @@ class Mechanism:
         """
         return self._scalars('angles', theta, joints)
 
-    def joint_rates(self, theta, joints: Optional[Sequence[str]] = None, crank: int = 0) -> dict:
-        """Differentiate the joint angles with respect to one crank's; see `joint_angles`."""
-        return self._scalars('rates', theta, joints, crank)
+    def joint_rates(self, theta, joints: Optional[Sequence[str]] = None, by: int = 0) -> dict:
+        """Differentiate the joint angles by one of the inputs; see `joint_angles`."""
+        return self._scalars('rates', theta, joints, by)
 
     def reach(self, *others: float) -> list:
         """
-        Return the angles of the first crank that can be assembled.
+        Return the values of the first input with which the linkage can be assembled.
 
         Parameters
         ----------
         *others : float
-            The angles [rad] at which further cranks are held, if there are any.
+            The values [rad or m] at which further inputs are held, if there are any.
 
         Returns
         -------
         list of (float, float)
-            Arcs (lo, hi) [rad] with lo in [-pi, pi) and hi > lo; a full turn is
-            [(-pi, pi)], a linkage that cannot be assembled at all [].
+            Arcs (lo, hi) of a crank [rad] with lo in [-pi, pi) and hi > lo; a full turn is
+            [(-pi, pi)]. Strokes (lo, hi) of a cylinder [m]. [] if it never can be assembled.
 
         Raises
         ------
         ValueError
-            If not every other crank is given, or a dimension is an array.
+            If not every other input is given, or a dimension is an array.
 
         """
         return list(self._remembered('reach', others, lambda: self._arcs(others)))
@@ -422,11 +455,13 @@ class Mechanism:
         if margins.shape:
             raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
                              'not for arrays')
-        if len(others) != len(self.cranks) - 1:
-            raise ValueError(f'{self.type} has {len(self.cranks)} cranks: the angle of each but '
+        if len(others) != len(self.inputs) - 1:
+            raise ValueError(f'{self.type} has {len(self.inputs)} inputs: the value of each but '
                              f'the first is needed, got {len(others)}')
-        return arcs(lambda theta: margins.searched(theta, *others),
-                    self._structure.sketch.limits, self._value)
+        first = self.inputs[0]
+        return [(lo * first.size, hi * first.size) for lo, hi in arcs(
+            lambda value: margins.searched(value * first.size, *others), first.counted(),
+            self._structure.sketch.limits, self._value)]
 
     def _remembered(self, what: str, about: tuple, find: Callable):
         """Return what was found before, or find it."""
@@ -441,9 +476,9 @@ class Mechanism:
         Returns
         -------
         callable
-            From the crank angle, a float [rad] (or as many as there are cranks), to a tuple of
+            From the input, a float [rad or m] (or as many as there are inputs), to a tuple of
             floats: x, y [m] of each point wanted, then the joint angles wanted, then the joint
-            rates by each crank, from one list of operations; NaN where it cannot be assembled.
+            rates by each input, from one list of operations; NaN where it cannot be assembled.
 
         Raises
         ------
@@ -459,7 +494,7 @@ class Mechanism:
     def legs(self, points: Tuple[str, ...], joints: Tuple[str, ...], moving: Tuple[str, ...],
              rows: np.ndarray) -> Batch:
         """
-        Return legs like this one on the same cranks, to be solved again and again.
+        Return legs like this one on the same inputs, to be solved again and again.
 
         An accelerated mechanism's are solved by machine code as soon as that is there, without
         waiting for it; the numbers are the same.
@@ -473,43 +508,42 @@ class Mechanism:
 
         Returns
         -------
-        compiler.Batch
-            For each leg is given: the angle of each crank [rad], the speed of each crank
-            [rad/s], its lag and its start [rad], its size times its side, its side, 1 or -1, and
-            its size. It counts the first crank's angle as start + side (angle - lag).
+        Batch
+            For each leg is given: the value of each input [rad or m], the speed of each input
+            [rad/s or m/s], and the numbers of its `Leg`.
 
         """
         program = self._structure.legs(points, joints, moving)
         return program.bind(self._lengths, self._evaluated, self._accelerate).batch(rows)
 
-    def _vectors(self, kind, theta, points, *crank):
-        names, pose = self._ready(kind, points, *crank)
-        values = pose.over(*self._each_crank(theta))
+    def _vectors(self, kind, theta, points, *by):
+        names, pose = self._ready(kind, points, *by)
+        values = pose.over(*self._each_input(theta))
         pairs = np.moveaxis(values.reshape(len(names), 2, *values.shape[1:]), 1, -1)
         return dict(zip(names, pairs))
 
-    def _scalars(self, kind, theta, joints, *crank):
-        names, pose = self._ready(kind, joints, *crank)
-        return dict(zip(names, pose.over(*self._each_crank(theta))))
+    def _scalars(self, kind, theta, joints, *by):
+        names, pose = self._ready(kind, joints, *by)
+        return dict(zip(names, pose.over(*self._each_input(theta))))
 
-    def _each_crank(self, theta):
-        if len(self.cranks) == 1:
+    def _each_input(self, theta):
+        if len(self.inputs) == 1:
             return (numbers('theta', theta),)
-        if not hasattr(theta, '__len__') or len(theta) != len(self.cranks):
-            raise ValueError(f'{self.type} has {len(self.cranks)} cranks: '
-                             'theta must be a sequence of as many angles')
+        if not hasattr(theta, '__len__') or len(theta) != len(self.inputs):
+            raise ValueError(f'{self.type} has {len(self.inputs)} inputs: '
+                             'theta must be a sequence of as many values')
         return [numbers('theta', each) for each in theta]
 
-    def _ready(self, kind: str, wanted, *crank: int) -> Tuple[Tuple[str, ...], Pose]:
+    def _ready(self, kind: str, wanted, *by: int) -> Tuple[Tuple[str, ...], Pose]:
         """Return the names that are wanted and the function that computes them."""
-        key = kind, _hashable(wanted), *crank
+        key = kind, _hashable(wanted), *by
         if key not in self._poses:
             names = self._names(kind, key[1])
-            keep(self._poses, key, (names, self._bound(kind, names, *crank)))
+            keep(self._poses, key, (names, self._bound(kind, names, *by)))
         return self._poses[key]
 
-    def _bound(self, kind: str, names, *crank: int) -> Pose:
-        program = self._structure.program(kind, names, *crank)
+    def _bound(self, kind: str, names, *by: int) -> Pose:
+        program = self._structure.program(kind, names, *by)
         return program.bind(self._lengths, self._evaluated, self._accelerate)
 
     def _names(self, kind, wanted) -> Tuple[str, ...]:

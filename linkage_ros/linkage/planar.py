@@ -68,21 +68,27 @@ class Crank:
         return with_spin(turned * self.length, Rate((self.angle,), lambda rate: rate))
 
 
+class CrankEnds(NamedTuple):
+    """A crank's angles theta where start cos^2 + end sin^2 of (theta + turn) / 2 vanishes."""
+
+    start: Real
+    end: Real
+    turn: Real
+    theta: Real
+
+
 class Limit(NamedTuple):
     """
     A margin that is negative, by more than the tolerance, where a linkage cannot be assembled.
 
-    For a crank arm the margin is start + (end - start) s^2 with theta' = theta + turn, and
-    `smooth` is its root with the sign that carries on through a change point.
+    That of a crank arm vanishes at `ends`, and `smooth` is its root with the sign that carries on
+    through a change point.
     """
 
     margin: Real
     tolerance: Real
     smooth: Optional[Real] = None
-    start: Optional[Real] = None
-    end: Optional[Real] = None
-    turn: Optional[Real] = None
-    crank: Optional[int] = None
+    ends: Optional[CrankEnds] = None
 
     def root(self) -> Real:
         """Return the root of the margin."""
@@ -106,25 +112,26 @@ class Arm:
 
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
-        margin = square(radius) - self.square
-        return self._limit(radius, size, 1.0, margin)
+        return self._limit(radius, size, 1.0, square(radius) - self.square)
 
     def beyond(self, radius: Real, size: Real) -> Limit:
         """Return the margin square - radius^2; the radius is made from lengths up to size."""
-        margin = self.square - square(radius)
-        return self._limit(radius, size, -1.0, margin)
+        return self._limit(radius, size, -1.0, self.square - square(radius))
 
     def mirrored(self, point: Complex) -> Complex:
         """Return the mirror image of a point in the line of the arm."""
         return point - self.vector.turned() * (2.0 * self.offset(point) / self.square)
 
-    def _with_rate(self, margin: Real, sign: float) -> Real:
-        return with_rate(margin, self.square, formula=lambda rate: -(sign * rate))
+    def _with_rate(self, margin: Real, radius: Real, sign: float) -> Real:
+        return with_rate(margin, self.square, radius, formula=lambda rate, growth: (
+            2.0 * radius * growth - rate) * sign)
 
     def _limit(self, radius: Real, size: Real, sign: float, margin: Real) -> Limit:
-        margin = self._with_rate(margin, sign)
+        margin = self._with_rate(margin, radius, sign)
         # At the limit the length is the radius: the square moves by that times what lengths do.
-        return Limit(margin, GRAZE * abs(radius) * (size + self._span))
+        # A tolerance is a constant: where a cylinder makes the radius, it is no longer than size.
+        bound = size if radius.varies else abs(radius)
+        return Limit(margin, GRAZE * bound * (size + self._span))
 
 
 class CrankArm(Arm):
@@ -193,13 +200,13 @@ class CrankArm(Arm):
         # The smaller gap is the one next to which the margin can vanish.
         margin = where(abs(start) <= abs(end), start + sign * gm * square(s),
                        end - sign * gm * square(h))
-        margin = self._with_rate(margin, sign)
+        margin = self._with_rate(margin, radius, sign)
         tolerance = GRAZE * abs(radius) * (size + self._g + self._m)
         gap, half = (start, s) if sign > 0.0 else (end, h)
         grown = square_root(gm) * self._first_sign(sign)
         smooth = where(abs(gap) <= tolerance, grown * half, root(margin, tolerance))
-        return Limit(margin, tolerance, smooth, start, end,
-                     arctangent(self._turn.y, self._turn.x), self._crank.angle.args[0])
+        return Limit(margin, tolerance, smooth, CrankEnds(
+            start, end, arctangent(self._turn.y, self._turn.x), self._crank.angle))
 
     def beyond_kite(self, k: Real) -> Complex:
         """
@@ -250,21 +257,25 @@ class Dyad(NamedTuple):
     limits: Tuple[Limit, ...]
 
 
-def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) -> Dyad:
+def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True,
+         longest: Optional[Real] = None) -> Dyad:
     """
     Return the RRR dyad on an arm: circles of radius first [m] and second [m] about its ends.
 
     The joint is foot + w (u + i v) with u = 1/2 + (r1 - r2)(r1 + r2) / 2|w|^2 and
     v = side sqrt((r1 + r2)^2 - |w|^2) sqrt(|w|^2 - (r1 - r2)^2) / 2|w|^2; left of the arm for
-    side = +1. At a change point of a crank arm the branch goes on smoothly if `smooth`.
+    side = +1. At a change point of a crank arm the branch goes on smoothly if `smooth`. Where the
+    first bar is a cylinder, its longest length [m] is given, and returned is its direction.
     """
-    size = first + second
-    limits = arm.within(size, size), arm.beyond(first - second, size)
+    radius = first + second
+    size = radius if longest is None else longest + second
+    limits = arm.within(radius, size), arm.beyond(first - second, size)
     roots = [x.smooth if smooth and x.smooth else x.root() for x in limits]
     twice = 2.0 * arm.square
     skew = (first - second) * (first + second) / twice
     u, v = 0.5 + skew, roots[0] * roots[1] / twice * side
     bars = arm.vector * Complex(u, v), arm.vector * Complex(skew - 0.5, v)
+    bars = bars if longest is None else (bars[0] / first, bars[1])
 
     turning = spin(arm.vector)
 
@@ -445,8 +456,8 @@ class CrankRail(Rail):
         tolerance = GRAZE * (rod + self._span)
         grown = square_root(2.0 * self._crank.length) * sign
         smooth = where(abs(gap) <= tolerance, grown * half, root(margin, tolerance))
-        return Limit(margin, tolerance, smooth, start, end,
-                     arctangent(self._turn.y, self._turn.x), self._crank.angle.args[0])
+        return Limit(margin, tolerance, smooth, CrankEnds(
+            start, end, arctangent(self._turn.y, self._turn.x), self._crank.angle))
 
 
 class Slider(NamedTuple):

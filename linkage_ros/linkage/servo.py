@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Servo angles: where the crank has to be for an output, at what reduction, and which is taken.
+Servo angles: where the input has to be for an output, at what reduction, and which is taken.
 
-The reduction, d output / d crank, grows without bound next to an end of the reach, where a crank
+The reduction, d output / d input, grows without bound next to an end of the reach, where a crank
 angle that is rounded no longer tells it. A lever that a crank pin moves by its slot has a closed
 form for both that starts from the lever, and keeps every digit next to its limits. About its pivot
 Q, seen along the ground line of length b from Q to the crank's centre O, with the crank a, the
@@ -30,8 +30,8 @@ from .builder import GROUND
 from .inverse import in_order
 from .planar import GRAZE
 from ..formula.expression import (
-    angle,
     arctangent,
+    argument,
     Complex,
     cosine,
     exact_sum,
@@ -59,7 +59,7 @@ Ends = Optional[Tuple[float, float]]
 
 
 class Answer(NamedTuple):
-    """A crank angle [rad] that an output allows if it is `held`, and d output / d crank there."""
+    """A value of the input that an output allows if it is `held`, and d output / d input there."""
 
     theta: Real
     rate: Real
@@ -69,43 +69,43 @@ class Answer(NamedTuple):
 class Mechanism(Analysed):
     """A linkage that is solved from its outputs, its levers by a closed form of their own."""
 
-    def crank_angle(self, output, value, near=None, others: Sequence[float] = ()):
-        """Return the crank angles that give an output a value; see `Analysed.crank_angle`."""
+    def input_for(self, output, value, near=None, others: Sequence[float] = ()):
+        """Return the values of the input that give an output a value; see `Analysed.input_for`."""
         swept = any(np.ndim(length) for length in self.dimensions.values())
         if swept or others or not self._has_lever(output):
-            return super().crank_angle(output, value, near, others)
+            return super().input_for(output, value, near, others)
         if near is not None:
             return self.servo_for(output, numbers('value', value), near)[0][()]
         theta, _ = self.servos(output, numbers('value', value))
-        answers = in_order(theta.reshape(-1, 2).T)
+        answers = in_order(theta.reshape(-1, 2).T, self.inputs[0])
         return answers.reshape(*theta.shape[:-1], answers.shape[-1])
 
     def servos(self, output: str, value) -> Tuple[np.ndarray, np.ndarray]:
         """
-        Return all crank angles that give an output a value, and d output / d crank there.
+        Return all values of the input that give an output a value, and d output / d input there.
 
         Parameters
         ----------
         output : str
-            What `crank_angle` takes, of a linkage with one crank.
+            What `input_for` takes, of a linkage with one input.
         value : float or array-like
             What the output is to be.
 
         Returns
         -------
         (array, array)
-            Crank angles in [-pi, pi] and rates, on a last axis that is filled up with NaN; a
-            lever's answer on the working branch comes first, else they ascend.
+            Crank angles in [-pi, pi] or lengths [m], and rates, on a last axis that is filled up
+            with NaN; a lever's answer on the working branch comes first, else they ascend.
 
         Raises
         ------
         ValueError
-            As `crank_angle` does.
+            As `input_for` does.
 
         """
         if not self._has_lever(output):
             value = np.where(np.isfinite(value), value, np.nan)
-            theta = np.asarray(self.crank_angle(output, value))
+            theta = np.asarray(self.input_for(output, value))
             return theta, self._rates_at(output, theta)
         found = np.moveaxis(self._solved_by(_lever_all, output).over(value), 0, -1)
         theta, rates = found[..., ::2], found[..., 1::2]
@@ -114,19 +114,19 @@ class Mechanism(Analysed):
 
     def servo_for(self, output: str, value, near=None, ends: Ends = None) -> Sequence:
         """
-        Return one crank angle that gives an output a value, and d output / d crank there.
+        Return one value of the input that gives an output a value, and d output / d input there.
 
         Parameters
         ----------
         output, value
             As for `servos`.
         near : float or array-like, optional
-            The answer nearest to this angle is taken, whole turns included. Default: of a lever
-            the one on the working branch, on which lever and crank turn the same way; of any
-            other output the least.
+            The answer nearest to this is taken, a crank's with whole turns included. Default: of
+            a lever the one on the working branch, on which lever and crank turn the same way; of
+            any other output the least.
         ends : (float, float), optional
-            The lowest and the highest angle [rad] that may be taken. Default: any with near,
-            otherwise those of one turn from -pi.
+            The lowest and the highest value [rad or m] that may be taken. Default: any; of a
+            crank without near, those of one turn from -pi.
 
         Returns
         -------
@@ -139,13 +139,17 @@ class Mechanism(Analysed):
         if lever and self._is_free:
             return self._solved_by(_lever_taken, output, *kind)(value, *limits)
         theta, rates = self.servos(output, value)
-        rounding = GRAZE * (math.pi if self._structure.turns(output) else self.longest)
-        choice = _choice(theta.shape[-1], lever, *kind)
-        return choice.over(*np.moveaxis(theta, -1, 0), *np.moveaxis(rates, -1, 0), rounding,
-                           *limits)
+        first = self.inputs[0]
+        size, rounding = first.size, GRAZE * (
+            math.pi if self._structure.turns(output) else self.longest)
+        choice = _choice(theta.shape[-1], lever, first.turns, *kind)
+        taken, rate = choice.over(*np.moveaxis(theta / size, -1, 0),
+                                  *np.moveaxis(rates * size, -1, 0), rounding,
+                                  *(np.divide(limit, size) for limit in limits))
+        return taken * size, rate / size
 
     def _has_lever(self, output) -> bool:
-        return (len(self.cranks) == 1 and isinstance(output, str)
+        return (len(self.inputs) == 1 and isinstance(output, str)
                 and output in _levers(self._structure))
 
     @property
@@ -159,7 +163,7 @@ class Mechanism(Analysed):
             self._structure, *args).bind(self._lengths, self._evaluated))
 
     def _rates_at(self, output, theta):
-        """Return d output / d crank."""
+        """Return d output / d input."""
         joint, _, axis = output.rpartition('.')
         if joint:
             return self.velocity(theta, (joint,))[joint][..., 'xy'.index(axis)]
@@ -181,7 +185,8 @@ def _lever(sketch, slide, half):
     crank, e = sketch.points[slide.tip].crank, sketch.frames[slide.name][slide.tip].y
     line = crank.centre - sketch.points[slide.joint].place
     a, b, along = crank.length, line.length(), line.direction()
-    bar = Complex(cosine(angle(0)), sine(angle(0))) * (Complex(0.0, 1.0) * along.conjugate())
+    lever = argument(0)
+    bar = Complex(cosine(lever), sine(lever)) * (Complex(0.0, 1.0) * along.conjugate())
     cos, sin = bar.x, bar.y
     # Next to a limit at +-90 degrees the gap is small: it is formed from what is small.
     upper = where(0.7 < sin, exact_sum(a, -e, -b) + b * square(cos) / (1.0 + sin),
@@ -209,36 +214,40 @@ def _lever_all(structure, name) -> Program:
 @lru_cache(maxsize=64)
 def _lever_taken(structure, name, follows, ended) -> Program:
     """Return the code for the crank angle that is taken for a lever's angle, and its rate."""
-    return _taken(_levers(structure)[name], True, real(GRAZE * math.pi), follows, ended, 1)
+    return _taken(_levers(structure)[name], True, True, real(GRAZE * math.pi), follows, ended, 1)
 
 
 @lru_cache(maxsize=256)
-def _choice(count, working, follows, ended):
-    """Return the code that takes one of some crank angles: from these, their rates, rounding."""
-    answers = [Answer(angle(i), angle(count + i), angle(i) <= angle(i)) for i in range(count)]
-    return _taken(answers, working, angle(2 * count), follows, ended, 2 * count + 1).bind({}, {})
+def _choice(count, working, turns, follows, ended):
+    """Return the code that takes one of some answers: from these, their rates, rounding."""
+    theta, rates = ([argument(start + i) for i in range(count)] for start in (0, count))
+    answers = [Answer(value, rate, value <= value) for value, rate in zip(theta, rates)]
+    return _taken(answers, working, turns, argument(2 * count), follows, ended,
+                  2 * count + 1).bind({}, {})
 
 
-def _taken(answers, working, rounding, follows, ended, given) -> Program:
+def _taken(answers, working, turns, rounding, follows, ended, given) -> Program:
     """
     Return the code for the answer that is taken, and its rate.
 
-    With `follows` it is the nearest to an angle, with `ended` between two: these are given from
+    With `follows` it is the nearest to a value, with `ended` between two: these are given from
     number `given` on. What is beyond an end by so little that the output, known up to `rounding`,
-    does not tell is at the end.
+    does not tell is at the end. If the input `turns`, whole turns are all one.
     """
-    near, ends = angle(given), (angle(given + follows), angle(given + follows + 1))
+    near, *ends = (argument(given + i) for i in (0, follows, follows + 1))
+    beside = _turned if turns else lambda theta, near: theta
     choices = []
     for rank, (theta, rate, held) in enumerate(answers):
-        place, misses = _turned(theta, near) if follows else theta, []
+        place, misses = beside(theta, near) if follows else theta, []
         if ended:
             speed = abs(rate)
             slack = ULPS * (4.0 + abs(ends[0]) + abs(ends[1])) + where(
                 rounding < CLOSE * speed, rounding / speed, CLOSE)
             low, high = ends[0] - slack, ends[1] + slack
-            first, last = (_turned(theta, end) for end in ends)
-            first = where(first < low, first + math.tau, first)
-            last = where(high < last, last - math.tau, last)
+            first, last = (beside(theta, end) for end in ends)
+            if turns:
+                first = where(first < low, first + math.tau, first)
+                last = where(high < last, last - math.tau, last)
             place = where(place < low, first, where(high < place, last, place)) \
                 if follows else first
             misses = [place < low, high < place]

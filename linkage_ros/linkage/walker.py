@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The legs that share one crank.
+The legs that share their inputs.
 
 Pair j of N has its left leg at theta - 2 pi j/N and its right leg, the mirror image x -> -x of a
 leg at pi - (theta - 2 pi j/N), on the same crank pin.
@@ -15,24 +15,22 @@ from typing import Callable, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from .crank_range import is_full_turn
+from .mechanism import Leg, Mechanism
 from ..formula.program import Batch
 
-# An angle this far [rad] beyond the reach may be its end, wrapped by a turn.
-WRAPPED = 1e-12
 LOCUS_POINTS = 361
 
 
 class Layout(NamedTuple):
     """
-    How the numbers of a solution follow each other: a row for each leg, then the drive.
+    How the numbers of a solution follow each other: a row for each leg, then the inputs.
 
-    A row holds so many coordinates, joint angles and joint velocities; the drive is the angle of
-    each crank and, where there are velocities, the speed of each.
+    A row holds so many coordinates, joint angles and joint velocities; of the inputs there are
+    the values and, where there are velocities, the speeds.
     """
 
     legs: int
-    cranks: int
+    inputs: int
     coordinates: int
     joints: int
     velocities: int
@@ -45,14 +43,14 @@ class Layout(NamedTuple):
     @property
     def size(self) -> int:
         """How many numbers there are."""
-        return self._rows_end() + self.cranks * (2 if self.velocities else 1)
+        return self._rows_end() + self.inputs * (2 if self.velocities else 1)
 
     def rows(self, values: np.ndarray) -> np.ndarray:
         """Return the rows, one for each leg."""
         return values[:self._rows_end()].reshape(self.legs, self.posed + self.velocities)
 
-    def drive(self, values: np.ndarray) -> np.ndarray:
-        """Return the cranks' angles and, where there are velocities, their speeds."""
+    def driven(self, values: np.ndarray) -> np.ndarray:
+        """Return the inputs' values and, where there are velocities, their speeds."""
         return values[self._rows_end():]
 
     def _rows_end(self) -> int:
@@ -77,39 +75,26 @@ class Solution:
     def __init__(self, layout: Layout, values: np.ndarray, batch: Batch):
         self.layout, self.values, self.rows = layout, values, batch.rows
         self._batch = batch
-        self._thetas = list(batch.given[:layout.cranks])
-        self._speeds = list(batch.given[layout.cranks:2 * layout.cranks])
-        self._drive = layout.drive(values)
-        self._pack: Callable = Struct(f'{self._drive.size}d').pack_into
+        self._inputs = list(batch.given[:layout.inputs])
+        self._speeds = list(batch.given[layout.inputs:2 * layout.inputs])
+        self._driven = layout.driven(values)
+        self._pack: Callable = Struct(f'{self._driven.size}d').pack_into
 
     def finish(self) -> None:
         """Wait for what makes the first solution slower than the others."""
         self._batch.finish()
 
-    def solve(self, thetas: Sequence[float], speeds: Sequence[float] = ()) -> None:
-        """Solve at crank angles [rad] and, if there are velocities, crank speeds [rad/s]."""
+    def solve(self, inputs: Sequence[float], speeds: Sequence[float] = ()) -> None:
+        """Solve at inputs [rad or m] and, if there are velocities, their speeds [per second]."""
         if not self.layout.velocities:
             speeds = ()
-        for row, theta in zip(self._thetas, thetas):
-            row.fill(theta)
+        for row, value in zip(self._inputs, inputs):
+            row.fill(value)
         for row, speed in zip(self._speeds, speeds):
             row.fill(speed)
         # Packing costs less than assigning to a part of an array.
-        self._pack(self._drive, 0, *thetas, *speeds)
+        self._pack(self._driven, 0, *inputs, *speeds)
         self._batch.solve()
-
-
-class Leg(NamedTuple):
-    """A leg: what its joints' names begin with, its lag [rad], and side +1, or -1 if mirrored."""
-
-    prefix: str
-    lag: float
-    side: float
-
-    @property
-    def start(self) -> float:
-        """Its own crank angle [rad] when the crank has turned by its lag."""
-        return 0.0 if self.side > 0.0 else math.pi
 
 
 class Assembly:
@@ -119,7 +104,7 @@ class Assembly:
     Parameters
     ----------
     linkage : Mechanism
-        One leg.
+        One leg; more need a single crank.
     leg_pairs : int
         Left legs, evenly spread over a turn of the crank.
     mirrored : bool
@@ -129,23 +114,31 @@ class Assembly:
     reach : sequence of (float, float), optional
         What linkage.reach() returns, where that is known.
 
+    Attributes
+    ----------
+    legs : dict
+        The legs, by what their joints' names begin with.
+    joints : tuple of str
+        The moving links that follow from the inputs.
+
     """
 
-    def __init__(self, linkage, leg_pairs: int = 1, mirrored: bool = False, scale: float = 1.0,
-                 reach: Optional[Sequence] = None):
+    def __init__(self, linkage: Mechanism, leg_pairs: int = 1, mirrored: bool = False,
+                 scale: float = 1.0, reach: Optional[Sequence] = None):
         lags = [math.tau * j / leg_pairs for j in range(leg_pairs)]
-        if leg_pairs == 1 and not mirrored:
-            legs = [Leg('', 0.0, 1.0)]
-        else:
-            sides = {'left': 1.0, 'right': -1.0} if mirrored else {'left': 1.0}
-            legs = [Leg(f'{side}{j}_', lag, sign)
-                    for j, lag in enumerate(lags) for side, sign in sides.items()]
+        sides = {'left': (0.0, 1.0), 'right': (math.pi, -1.0)}
+        if not mirrored:
+            del sides['right']
+        self.legs = {f'{side}{j}_': Leg(lag, start, sign, scale) for j, lag in enumerate(lags)
+                     for side, (start, sign) in sides.items()}
+        if len(self.legs) == 1:
+            self.legs = {'': Leg(0.0, 0.0, 1.0, scale)}
         self.linkage = linkage
-        self.legs = tuple(legs)
-        self.joints = tuple(name for name in linkage.joints if name not in linkage.cranks)
+        inputs = {input_.name for input_ in linkage.inputs}
+        self.joints = tuple(name for name in linkage.joints if name not in inputs)
         self.reach = linkage.reach() if reach is None else reach
-        # How far one of several cranks reaches depends on the others: only a pose tells.
-        self.is_limited = len(linkage.cranks) == 1 and not is_full_turn(self.reach)
+        # How far one of several inputs reaches depends on the others: only a pose tells.
+        self.is_limited = len(inputs) == 1 and not linkage.inputs[0].is_whole(self.reach)
         self._scale = scale
 
     @cached_property
@@ -158,30 +151,29 @@ class Assembly:
     def solution(self, points: Sequence[str] = (), joints: Sequence[str] = (),
                  rates: Sequence[str] = ()) -> Solution:
         """Return what solves all legs for points, joint angles and rates, and nothing else."""
-        layout = Layout(len(self.legs), len(self.linkage.cranks), 2 * len(points), len(joints),
+        layout = Layout(len(self.legs), len(self.linkage.inputs), 2 * len(points), len(joints),
                         len(rates))
         values = np.empty(layout.size)
         batch = self._fastest.legs(
             tuple(points), tuple(joints), tuple(rates), layout.rows(values))
-        batch.given[-5:].T[:] = [
-            (leg.lag, leg.start, self._scale * leg.side, leg.side, self._scale)
-            for leg in self.legs]
+        batch.given[2 * layout.inputs:].T[:] = list(self.legs.values())
         return Solution(layout, values, batch)
 
-    def within_reach(self, theta: float) -> np.ndarray:
-        """Return which legs can be assembled at a crank angle [rad], as far as reach tells."""
-        with np.errstate(invalid='ignore'):
-            angles = np.array([leg.start + leg.side * (theta - leg.lag) for leg in self.legs])
-            return np.any([(angles - lo + WRAPPED) % math.tau <= hi - lo + 2.0 * WRAPPED
-                           for lo, hi in self.reach], axis=0)
+    def within_reach(self, value: float) -> np.ndarray:
+        """Return which legs can be assembled at an input [rad or m], as far as reach tells."""
+        first = self.linkage.inputs[0]
+        if not first.turns:
+            return first.on(self.reach, [value / self._scale])
+        return first.on(self.reach, [leg.start + leg.side * (value - leg.lag)
+                                     for leg in self.legs.values()])
 
     def locus(self, name: str) -> np.ndarray:
         """
         Return the curve of a joint of the first leg, over its widest reach [m]: (n, 2).
 
-        Several cranks draw no one curve: there it is empty.
+        Several inputs draw no one curve: there it is empty.
         """
-        if len(self.linkage.cranks) > 1:
+        if len(self.linkage.inputs) > 1:
             return np.empty((0, 2))
         low, high = max(self.reach, key=lambda arc: arc[1] - arc[0])
         places = self.linkage.solve(np.linspace(low, high, LOCUS_POINTS), (name,))[name]

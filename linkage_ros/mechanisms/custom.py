@@ -29,8 +29,9 @@ def design(joints: Tuple[str, ...], tracer: Optional[str], names: Tuple[str, ...
 
     """
     lines = joint_lines.parse(joints)
-    if not any(line.word == 'crank' for line in lines):
-        raise ValueError('a linkage needs at least one crank line')
+    if not any(line.word in joint_lines.INPUTS for line in lines):
+        raise ValueError('a linkage needs a line that drives it: '
+                         f'{" or ".join(joint_lines.INPUTS)}')
     for line in lines:
         for name in joint_lines.lengths([line]):
             joint_lines.check_name(name)

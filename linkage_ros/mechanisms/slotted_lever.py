@@ -20,7 +20,7 @@ from typing import Any, Optional, Sequence
 from numpy.typing import ArrayLike
 
 from ..linkage import servo
-from ..linkage.crank_range import reachable_arcs
+from ..linkage.input_range import reachable_arcs
 from ..linkage.mechanism import Design
 
 DESIGN = Design('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 0.0}, tracer='L',

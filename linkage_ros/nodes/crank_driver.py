@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Node that turns the cranks of a scene."""
+"""Node that moves the inputs of a scene: turns its cranks, pushes and pulls its cylinders."""
 
 import sys
 from time import monotonic_ns
@@ -12,7 +12,7 @@ from sensor_msgs.msg import JointState
 from . import scene_node
 from .messages import JointStates
 from .. import scene
-from ..scene.crank_motion import Motion
+from ..scene.motion import Motion
 from ..words import listed
 
 # By how much the clock may run ahead of steady time between two messages [ns]: a clock is slewed.
@@ -23,12 +23,12 @@ LONGEST_PERIOD = 1e18
 
 
 class CrankDriver(scene_node.SceneNode):
-    """Publishes every crank's angle as a function of the node's time, on `crank_states`."""
+    """Publishes every input as a function of the node's time, on `crank_states`."""
 
     def __init__(self, **kwargs):
         super().__init__(scene.DRIVER, **kwargs)
         self._motions = {}
-        self._cranks = {}
+        self._drives = {}
         self._now = self._steady = None
         self._messages = JointStates()
         self._publisher = self.create_publisher(JointState, 'crank_states', 10)
@@ -38,17 +38,17 @@ class CrankDriver(scene_node.SceneNode):
         self.begin()
 
     def adopt(self, new):
-        """Let every crank go on as the scene says: from where it is, or from a new start."""
+        """Let every input go on as the scene says: from where it is, or from a new start."""
         now = 0 if self._now is None else self._settled().nanoseconds
-        cranks = {f'{name}_{link}': crank for name, machine in new.machines.items()
-                  for link, crank in machine.cranks.items()}
-        for name, crank in cranks.items():
-            old = self._cranks.get(name)
-            if old is None or old.start != crank.start:
-                self._motions[name] = Motion(crank.speed, crank.sweep, crank.start, now)
-            elif old != crank:
-                self._motions[name] = self._motions[name].changed(crank.speed, crank.sweep, now)
-            self._cranks[name] = crank
+        drives = {f'{name}_{input_}': drive for name, machine in new.machines.items()
+                  for input_, drive in machine.inputs.items()}
+        for name, drive in drives.items():
+            old = self._drives.get(name)
+            if old is None or old.start != drive.start:
+                self._motions[name] = Motion.of(drive, now)
+            elif (old.speed, old.sweep) != (drive.speed, drive.sweep):
+                self._motions[name] = self._motions[name].changed(drive.speed, drive.sweep, now)
+            self._drives[name] = drive
         self._pace(new.rate)
 
     def _pace(self, rate):
@@ -64,7 +64,7 @@ class CrankDriver(scene_node.SceneNode):
         return self.get_clock().now()
 
     def _settled(self):
-        """Return the time; where it jumps, every crank goes on from the angle that it reached."""
+        """Return the time; where it jumps, every input goes on from where it is."""
         time, steady = self._time(), monotonic_ns()
         now, simulated = time.nanoseconds, self.get_clock().ros_time_is_active
         reached = 0
@@ -82,13 +82,13 @@ class CrankDriver(scene_node.SceneNode):
         time = self._settled()
         now = time.nanoseconds
         if self._publisher.get_subscription_count():
-            angles, speeds = zip(*(motion.at(now) for motion in self._motions.values()))
+            values, speeds = zip(*(motion.at(now) for motion in self._motions.values()))
             self._publisher.publish(
-                self._messages.message(time.to_msg(), list(self._motions), angles, speeds))
+                self._messages.message(time.to_msg(), list(self._motions), values, speeds))
 
     def serves(self):
-        """Say which cranks it turns, how often."""
-        return f'turns {listed(self._motions, 200)} on crank_states at {self.scene.rate:g} Hz'
+        """Say which inputs it moves, how often."""
+        return f'moves {listed(self._motions, 200)} on crank_states at {self.scene.rate:g} Hz'
 
     def _wake(self):
         set_back = self._now is not None and self._time().nanoseconds < self._now

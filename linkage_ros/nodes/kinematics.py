@@ -39,17 +39,17 @@ NEVER = bytes(8)
 
 
 class Kinematics(scene_node.SceneNode):
-    """Solves the mechanisms at the angles on `crank_states`, as far as anyone listens."""
+    """Solves the mechanisms at the inputs on `crank_states`, as far as anyone listens."""
 
     def __init__(self, **kwargs):
         # A scene that cannot be read ends the node before there is anything to show.
-        self._outlets = {}
+        self._mechanisms = {}
         self._drawing, self._ended = Lock(), False
         super().__init__(scene.KINEMATICS, **kwargs)
-        self._outlets = {name: Outlet(self, name, machine.linkage.cranks)
+        self._mechanisms = {name: MechanismPublisher(self, name, list(machine.inputs))
                          for name, machine in self.scene.machines.items()}
-        self._inputs = {f'{name}_{crank}': (outlet, i) for name, outlet in self._outlets.items()
-                        for i, crank in enumerate(outlet.cranks)}
+        self._inputs = {f'{name}_{input_}': (shown, i) for name, shown in self._mechanisms.items()
+                        for i, input_ in enumerate(shown.inputs)}
         self._unheard, self._strangers = set(self._inputs), set()
         self._reader = joint_state_reader.Reader(self._routed)
         self._patience = self.create_timer(
@@ -67,7 +67,7 @@ class Kinematics(scene_node.SceneNode):
 
     def prepare(self, new):
         """Return what shows each mechanism: another for each that has changed."""
-        return {name: self._outlets[name].prepared(machine, new.frame_id)
+        return {name: self._mechanisms[name].prepared(machine, new.frame_id)
                 for name, machine in new.machines.items()}
 
     def adopt(self, prepared):
@@ -75,18 +75,18 @@ class Kinematics(scene_node.SceneNode):
         with self._drawing:
             for name, model in prepared.items():
                 if not self._ended:
-                    self._outlets[name].adopt(model)
+                    self._mechanisms[name].adopt(model)
 
     def say_goodbye(self):
         """Take what is drawn out of the picture, for good."""
         with self._drawing:
             self._ended = True
-            for outlet in self._outlets.values():
-                outlet.clear()
+            for shown in self._mechanisms.values():
+                shown.clear()
         # What has not arrived when a process ends is lost.
         until = time.monotonic() + FAREWELL
-        for outlet in self._outlets.values():
-            outlet.let_arrive(until)
+        for shown in self._mechanisms.values():
+            shown.let_arrive(until)
 
     def destroy_node(self):
         """Say goodbye where that is still possible, and end."""
@@ -110,8 +110,8 @@ class Kinematics(scene_node.SceneNode):
             return
         if stamp == NEVER:
             stamp = pack(self.get_clock().now().to_msg())
-        for outlet, places, known in routes:
-            outlet.turn(stamp, places, positions, speeds if known else ())
+        for shown, places, known in routes:
+            shown.turn(stamp, places, positions, speeds if known else ())
 
     def _routed(self, message):
         """Return the mechanisms that a message turns, where it says how far, and if how fast."""
@@ -119,11 +119,11 @@ class Kinematics(scene_node.SceneNode):
         routes = {}
         for name, place in dict(zip(message.name, range(len(message.position)))).items():
             if name in self._inputs:
-                outlet, i = self._inputs[name]
-                routes.setdefault(outlet, []).append((i, place))
+                shown, i = self._inputs[name]
+                routes.setdefault(shown, []).append((i, place))
                 self._hear(name)
         self._meet(message.name)
-        return [(outlet, places, known) for outlet, places in routes.items()]
+        return [(shown, places, known) for shown, places in routes.items()]
 
     def _hear(self, name):
         if len(self._unheard) == len(self._inputs):
@@ -154,10 +154,10 @@ class Kinematics(scene_node.SceneNode):
                 'cannot move')
 
 
-class Drive(NamedTuple):
-    """What a pose is made from: crank angles [rad], speeds [rad/s] if known, and who listens."""
+class InputState(NamedTuple):
+    """What a pose is made from: inputs [rad or m], speeds if known, and who listens."""
 
-    thetas: Tuple[float, ...]
+    values: Tuple[float, ...]
     speeds: Tuple[float, ...]
     joints: bool
     markers: bool
@@ -199,18 +199,18 @@ class Model:
     """
 
     def __init__(self, machine: scene.Machine, frame_id: str):
-        self.made_for = machine, frame_id
+        self.machine, self.made_for = machine, (machine, frame_id)
         self.robot = urdf.describe([machine], frame_id)
         self.assembly = machine.assembly()
-        self.cranks = [f'{machine.name}_{crank}' for crank in machine.linkage.cranks]
+        self.inputs = [f'{machine.name}_{input_}' for input_ in machine.inputs]
         self._points = machine.points
         self._joint_names = np.array([
-            [f'{machine.name}_{leg.prefix}{joint}' for joint in self.assembly.joints]
-            for leg in self.assembly.legs])
+            [f'{machine.name}_{prefix}{joint}' for joint in self.assembly.joints]
+            for prefix in self.assembly.legs])
         drawn = machine.name, frame_id, machine.pose
         size = urdf.size(machine)
         place = {point: i for i, point in enumerate(machine.points)}
-        bars = [(place[p], place[q]) for p, q in machine.linkage.bars
+        bars = [(place[p], place[q]) for p, q in machine.linkage.lines
                 if p in place and q in place]
         self.drawn = *drawn, bars, size
         self.marker_array = messages.Markers(*self.drawn)
@@ -228,22 +228,22 @@ class Model:
                 self._points if markers else (), names, names if moving else ())
         return self._solutions[wanted]
 
-    def solve(self, drive: Drive) -> Pose:
+    def solve(self, driven: InputState) -> Pose:
         """Solve the legs."""
-        solution = self.solution(*drive.wanted)
-        solution.solve(drive.thetas, drive.speeds)
+        solution = self.solution(*driven.wanted)
+        solution.solve(driven.values, driven.speeds)
         layout, values = solution.layout, solution.values
         held, moving = None, layout.velocities > 0
         if self.assembly.is_limited:
-            held = self.assembly.within_reach(drive.thetas[0])
+            held = self.assembly.within_reach(driven.values[0])
         # One sum, of squares, tells whether all values are finite; it is rarely asked which are.
         # It may overflow: unlike `dot`, `vdot` says nothing then.
         if not math.isfinite(np.vdot(values, values)):
             finite = np.isfinite(solution.rows[:, :layout.posed]).all(axis=1)
-            finite &= bool(np.isfinite(drive.thetas).all())
+            finite &= bool(np.isfinite(driven.values).all())
             held = finite if held is None else held & finite
             moving = moving and bool(np.isfinite(solution.rows[held, layout.posed:]).all()
-                                     and np.isfinite(drive.speeds).all())
+                                     and np.isfinite(driven.speeds).all())
         if held is not None and held.all():
             held = None
         return Pose(layout, values, held, moving)
@@ -260,11 +260,11 @@ class Model:
     def joint_message(self, pose: Pose, stamp) -> JointState:
         """Return the joint states of the legs that can be assembled."""
         legs = slice(None) if pose.held is None else pose.held
-        names = [*self.cranks, *self._joint_names[legs].ravel().tolist()]
-        layout, rows, drive = pose.layout, pose.rows(), pose.layout.drive(pose.values)
-        thetas, speeds = drive[:layout.cranks], drive[layout.cranks:]
+        names = [*self.inputs, *self._joint_names[legs].ravel().tolist()]
+        layout, rows, driven = pose.layout, pose.rows(), pose.layout.driven(pose.values)
+        values, speeds = driven[:layout.inputs], driven[layout.inputs:]
         return self.joint_state.message(
-            stamp, names, [*thetas, *rows[:, layout.coordinates:layout.posed].flat],
+            stamp, names, [*values, *rows[:, layout.coordinates:layout.posed].flat],
             [*speeds, *rows[:, layout.posed:].flat] if pose.moving else ())
 
     def marker_message(self, pose: Pose, stamp) -> MarkerArray:
@@ -273,21 +273,21 @@ class Model:
         return self.marker_array.message(stamp, places.reshape(len(places), -1, 2))
 
 
-class Outlet:
-    """The topics of one mechanism, and the last that was heard of each of its cranks."""
+class MechanismPublisher:
+    """The topics of one mechanism, and the last that was heard of each of its inputs."""
 
-    def __init__(self, node_, name: str, cranks: Sequence[str]):
-        self.name, self.cranks = name, cranks
+    def __init__(self, node_, name: str, inputs: Sequence[str]):
+        self.name, self.inputs = name, inputs
         self._joint_states = node_.create_publisher(JointState, f'{name}/joint_states', 10)
         self._markers = node_.create_publisher(MarkerArray, f'{name}/markers', 1)
         self._locus = node_.create_publisher(Marker, f'{name}/locus', LATCHED)
         self._description = node_.create_publisher(String, f'{name}/robot_description', LATCHED)
         # A logger of its own: what is throttled is the warnings of this mechanism alone.
         self._logger = node_.get_logger().get_child(name)
-        self._model, self._pose, self._drive = None, None, None
+        self._model, self._pose, self._driven = None, None, None
         self._stamp = NEVER
-        self._thetas = [None] * len(cranks)
-        self._speeds = [None] * len(cranks)
+        self._values = [None] * len(inputs)
+        self._speeds = [None] * len(inputs)
         # The markers in the picture, and whether the locus is.
         self._drawn, self._curved = frozenset(), False
 
@@ -296,11 +296,11 @@ class Outlet:
         if self._model and self._model.made_for == (machine, frame_id):
             return self._model
         model = Model(machine, frame_id)
-        if drive := self._drive:
-            model.solution(*drive.wanted).finish()
-            pose = model.solve(drive)
+        if driven := self._driven:
+            model.solution(*driven.wanted).finish()
+            pose = model.solve(driven)
             pose = pose._replace(held=None, moving=pose.layout.velocities > 0)
-            for publisher, build in self._listening(model, drive):
+            for publisher, build in self._listening(model, driven):
                 model.wire(publisher, build, pose, self._logger)
         return model
 
@@ -313,9 +313,9 @@ class Outlet:
             self._description.publish(String(data=model.robot))
         self._draw_locus(model)
         self._delete(self._drawn - model.marker_array.ids)
-        if drive := self._drive:
-            self._drive = None
-            self._show(self._stamp, drive.thetas, drive.speeds)
+        if driven := self._driven:
+            self._driven = None
+            self._show(self._stamp, driven.values, driven.speeds)
 
     def _draw_locus(self, model):
         if model.locus:
@@ -345,60 +345,62 @@ class Outlet:
     def turn(self, stamp: bytes, places: Sequence[Tuple[int, int]], positions: Sequence[float],
              speeds: Sequence[float]):
         """
-        Take over what a message says of the cranks, and show them as soon as all are known.
+        Take over what a message says of the inputs, and show them as soon as all are known.
 
         Parameters
         ----------
         stamp : bytes
             Its time, packed.
         places : sequence of (int, int)
-            For each crank that it tells of, the crank's place and the place in the message.
+            For each input that it tells of, the input's place and the place in the message.
         positions, speeds : sequence of float
-            The message's angles [rad] and speeds [rad/s], or no speeds.
+            The message's positions [rad or m] and speeds, or no speeds.
 
         """
         for i, place in places:
-            self._thetas[i] = positions[place]
+            self._values[i] = positions[place]
             self._speeds[i] = speeds[place] if speeds else None
-        if None not in self._thetas:
-            self._show(stamp, tuple(self._thetas),
+        if None not in self._values:
+            self._show(stamp, tuple(self._values),
                        () if None in self._speeds else tuple(self._speeds))
 
-    def _show(self, stamp, thetas, speeds):
+    def _show(self, stamp, values, speeds):
         """Publish what is listened to."""
-        drive = Drive(thetas, speeds, self._joint_states.get_subscription_count() > 0,
-                      self._markers.get_subscription_count() > 0)
-        if not (drive.joints or drive.markers):
+        driven = InputState(values, speeds, self._joint_states.get_subscription_count() > 0,
+                            self._markers.get_subscription_count() > 0)
+        if not (driven.joints or driven.markers):
             return
         self._stamp = stamp
-        if drive != self._drive:
-            # Once for each drive.
-            self._drive = drive
-            self._pose = self._model.solve(drive)
+        if driven != self._driven:
+            # What is said again is not solved again.
+            self._driven = driven
+            self._pose = self._model.solve(driven)
         held = self._pose.held
         if held is not None:
-            self._warn(thetas, held)
+            self._warn(values, held)
         if held is None or held.any():
-            for publisher, build in self._listening(self._model, drive):
+            for publisher, build in self._listening(self._model, driven):
                 self._send(publisher, build, stamp)
-            if drive.markers:
+            if driven.markers:
                 self._drawn = self._model.marker_array.ids
         else:
             self._delete(self._drawn)
 
-    def _listening(self, model, drive):
-        if drive.joints:
+    def _listening(self, model, driven):
+        if driven.joints:
             yield self._joint_states, model.joint_message
-        if drive.markers:
+        if driven.markers:
             yield self._markers, model.marker_message
 
-    def _warn(self, thetas, held):
-        legs = [f'{self.name}_{leg.prefix}'.rstrip('_')
-                for leg, placed in zip(self._model.assembly.legs, held) if not placed]
-        angles = ', '.join(f'{theta:.6g}' for theta in thetas)
+    def _warn(self, values, held):
+        legs = [f'{self.name}_{prefix}'.rstrip('_')
+                for prefix, placed in zip(self._model.assembly.legs, held) if not placed]
+        drives = self._model.machine.inputs.values()
+        at = ', '.join(f'{drive.input.quantity} {value:.6g} {drive.input.unit}'
+                       for drive, value in zip(drives, values))
+        reach = ', '.join(f'{scene.in_words(drive.reach)} {drive.input.unit}' for drive in drives)
         self._logger.warning(
-            f'{", ".join(legs)} cannot be assembled at crank angle {angles} rad; the reach is '
-            f'{scene.in_words(self._model.assembly.reach)} rad',
+            f'{", ".join(legs)} cannot be assembled at {at}; the reach is {reach}',
             throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
 
     def _send(self, publisher, build, stamp):

@@ -32,8 +32,6 @@ LEVER = 'lever'
 MOST_VALUES = 1_000_000
 # Values named, and letters of names allowed, in a message.
 MOST_NAMED, MOST = 5, 150
-# An extreme is looked for among so many samples, then so often next to the best of them.
-SAMPLES, ZOOMS = 721, 4
 ANY = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
@@ -42,8 +40,8 @@ class ServoInverse(scene_node.SceneNode):
 
     def __init__(self, **kwargs):
         super().__init__(scene.INVERSE, **kwargs)
-        self._turned = {}
-        self._reader = joint_state_reader.Reader(self._cranks_in)
+        self._heard = {}
+        self._reader = joint_state_reader.Reader(self._inputs_in)
         self.create_subscription(JointState, 'crank_states', self._turn, ANY, raw=True)
         self.create_service(ServoInverseType, 'servo_inverse', self.answer)
         self.begin()
@@ -61,13 +59,13 @@ class ServoInverse(scene_node.SceneNode):
     def adopt(self, new):
         """Forget what was asked about."""
         self._known = {}
-        self._cranks = {f'{name}_{crank}' for name, machine in new.machines.items()
-                        for crank in machine.cranks}
+        self._inputs = {f'{name}_{input_}' for name, machine in new.machines.items()
+                        for input_ in machine.inputs}
 
-    def _cranks_in(self, message):
-        """Return the names of the scene's cranks in a message, and their places."""
+    def _inputs_in(self, message):
+        """Return the names of the scene's inputs in a message, and their places."""
         return [(name, place) for place, name in enumerate(message.name[:len(message.position)])
-                if name in self._cranks]
+                if name in self._inputs]
 
     def _turn(self, text):
         try:
@@ -75,7 +73,7 @@ class ServoInverse(scene_node.SceneNode):
         except Unreadable:
             # `kinematics` says so.
             return
-        self._turned.update((name, turned.positions[place]) for name, place in turned.source)
+        self._heard.update((name, turned.positions[place]) for name, place in turned.source)
 
     def answer(self, request, response):
         """Fill in a response; what cannot be done is said in it, never raised."""
@@ -83,7 +81,7 @@ class ServoInverse(scene_node.SceneNode):
         try:
             key = request.mechanism, request.output
             asked = self._known.get(key) or Asked(_machine(self.scene, *key), request.output)
-            solve(asked, request, response, self._turned.get(asked.crank, math.inf))
+            solve(asked, request, response, self._heard.get(asked.input, math.inf))
             self._known[key] = asked
         except ValueError as problem:
             response.message = elided(str(problem), MESSAGE)
@@ -96,7 +94,7 @@ class ServoInverse(scene_node.SceneNode):
 
 def solve(asked, request, response, present=math.inf):
     """
-    Answer a request for values of an output, with the crank at a present angle [rad] if finite.
+    Answer a request for values of an output, with the input at a present value if that is finite.
 
     Raises
     ------
@@ -113,7 +111,8 @@ def solve(asked, request, response, present=math.inf):
         raise ValueError(f'servo_near must be empty or have one angle for each of the '
                          f'{len(wanted)} in lever_angle, not {len(near)}')
     if not all(-scene.FARTHEST <= theta <= scene.FARTHEST for theta in near):
-        raise ValueError(f'servo_near must be finite and within {scene.FARTHEST:g} rad of zero')
+        raise ValueError(f'servo_near must be finite and within {scene.FARTHEST:g} '
+                         f'{asked.unit} of zero')
     # One angle is the usual question, and floats answer it sooner than arrays.
     given = np.array if len(wanted) > 1 else itemgetter(0)
     known = present if abs(present) <= scene.FARTHEST else None
@@ -131,103 +130,94 @@ def _listed(found):
 
 class Asked:
     """
-    An output of a mechanism with one crank, and the crank angles that may be taken.
+    An output of a mechanism with one input, and the values of that that may be taken.
 
     That is a link's joint angle or slide, or a joint's coordinate; empty: the lever.
 
     Raises
     ------
     ValueError
-        If there are several cranks.
+        If there are several inputs.
 
     """
 
     def __init__(self, machine: scene.Machine, output: str):
         self._linkage, self._name = machine.linkage, output or LEVER
-        if len(self._linkage.cranks) > 1:
-            raise ValueError(f'{machine.name} has several cranks; only a linkage with one can be '
+        if len(machine.inputs) > 1:
+            raise ValueError(f'{machine.name} has several inputs; only a linkage with one can be '
                              'solved for an output')
-        self.crank = f'{machine.name}_{self._linkage.cranks[0]}'
+        self._drive = machine.first
+        self.input, self.unit = f'{machine.name}_{self._drive.input.name}', self._drive.input.unit
         self.what = 'lever angles' if self._name == LEVER else f'values of {self._name}'
-        self._joint, _, self._axis = self._name.partition('.')
         slides = [link.name for link in self._linkage.links if link.kind == 'prismatic']
-        self._turns = not self._axis and self._name not in slides
-        self._unit = 1.0 if self._turns else machine.scale
-        self._sweep, self._reach = machine.crank.ends, machine.reach
+        self._turns = '.' not in self._name and self._name not in slides
+        # Lengths of the linkage are to be scaled.
+        self._scale = 1.0 if self._turns else machine.scale
+        self._input_scale = 1.0 if self._drive.input.turns else machine.scale
 
     def servo(self, wanted, near):
-        """Return for each value the crank angle [rad] and d output / d crank angle there."""
-        theta, rate = self._linkage.servo_for(
-            self._name, wanted / self._unit, near, self._sweep)
-        return theta, rate * self._unit
+        """Return for each value the input [rad or m] and d output / d input there."""
+        unit, ends = self._input_scale, self._drive.ends
+        value, rate = self._linkage.servo_for(
+            self._name, wanted / self._scale, near if near is None else near / unit,
+            ends and (ends[0] / unit, ends[1] / unit))
+        return value * unit, rate * (self._scale / unit)
 
     def reason(self, value: float) -> str:
         """Return in words why a value cannot be had: which end of the sweep or reach forbids."""
         if not math.isfinite(value):
             return 'a value must be finite'
-        angles, _ = self._linkage.servos(self._name, value / self._unit)
-        angles = angles[np.isfinite(angles)]
-        if angles.size and self._sweep:
-            low, high = self._sweep
-            below = float(np.mod(low - angles, math.tau).min())
-            above = float(np.mod(angles - high, math.tau).min())
-            needed, end = (low - below, 'lower') if below < above else (high + above, 'upper')
-            return (f'{value:.6g} needs the crank at {needed:.6g} rad, outside '
-                    f'{self._where}: beyond its {end} end')
+        inputs, _ = self._linkage.servos(self._name, value / self._scale)
+        inputs = inputs[np.isfinite(inputs)] * self._input_scale
+        if inputs.size and self._drive.ends:
+            beyond = min((self._beyond(end, input_, name) for input_ in inputs.tolist()
+                          for end, name in zip(self._drive.ends, ('lower', 'upper'))))
+            return (f'{value:.6g} needs the {self._drive.input.name} at {beyond[1]:.6g} '
+                    f'{self.unit}, outside {self._where}: beyond its {beyond[2]} end')
         return self._out_of_range(value)
+
+    def _beyond(self, end, input_, name):
+        """Return how far beyond an end an input is, where that is, and the end's name."""
+        sign = 1.0 if name == 'upper' else -1.0
+        gap = sign * (input_ - end)
+        gap = gap % math.tau if self._drive.input.turns else gap if gap > 0.0 else math.inf
+        return gap, end + sign * gap, name
 
     @property
     def _where(self):
-        return f'crank.sweep {scene.in_words([self._sweep])}' if self._sweep else 'the reach'
+        ends = self._drive.ends
+        return f'{self._drive.input.name}.sweep {scene.in_words([ends])}' if ends else 'the reach'
 
     def _out_of_range(self, value):
         gaps = [gap for (low, _), (high, _) in self._spans for gap in (low - value, value - high)]
         nearest = int(np.argmin([gap % math.tau if self._turns else gap if gap > 0.0 else math.inf
                                  for gap in gaps]))
-        (_, theta), arc = self._spans[nearest // 2][nearest % 2], self._arcs[nearest // 2]
-        at = [end for end, limit in zip(('lower', 'upper'), arc)
-              if abs(limit - theta) < CLOSE and arc[1] - arc[0] < math.tau]
-        end = f', the {at[0]} end of {self._where}' if at else ''
+        (_, at), arc = self._spans[nearest // 2][nearest % 2], self._arcs[nearest // 2]
+        input_ = self._drive.input
+        end = [end for end, limit in zip(('lower', 'upper'), arc)
+               if abs(limit - at) < CLOSE * input_.size and not input_.is_whole([arc])]
+        end = f', the {end[0]} end of {self._where}' if end else ''
         spans = scene.in_words((low, high) for (low, _), (high, _) in self._spans)
         what = 'the lever' if self._name == LEVER else self._name
         return (f'{what} reaches {spans} {"rad" if self._turns else "m"}, its '
-                f'{("least", "greatest")[nearest % 2]} at the crank angle {theta:.6g} rad{end}')
+                f'{("least", "greatest")[nearest % 2]} at the {input_.quantity} {at:.6g} '
+                f'{self.unit}{end}')
 
     @property
     def _arcs(self):
-        """The crank angles that may be taken, no more than a turn."""
-        if self._sweep:
-            low, high = self._sweep
-            return [(low, min(high, low + math.tau))]
-        return self._reach
+        """Where the input may be, no more than a turn."""
+        if not self._drive.ends:
+            return self._drive.reach
+        low, high = self._drive.ends
+        return [(low, min(high, low + math.tau) if self._drive.input.turns else high)]
 
     @cached_property
     def _spans(self):
-        """The least and the greatest value on each arc, with their crank angles [rad]."""
-        return [tuple(self._extreme(arc, side) for side in (-1.0, 1.0)) for arc in self._arcs]
-
-    def _extreme(self, arc, side):
-        theta = np.linspace(*arc, SAMPLES)
-        value = self._value(theta)
-        for _ in range(ZOOMS):
-            best = int(np.nanargmax(side * value))
-            top = value[best]
-            theta = np.linspace(*theta[[max(best - 1, 0), min(best + 1, SAMPLES - 1)]], SAMPLES)
-            value = self._value(theta)
-            if self._turns:
-                value += math.tau * np.round((top - value[SAMPLES // 2]) / math.tau)
-        best = int(np.nanargmax(side * value))
-        return float(value[best]) * self._unit, float(theta[best])
-
-    def _value(self, theta):
-        if self._axis:
-            moved = self._linkage.solve(theta, (self._joint,))[self._joint]
-            return moved[..., 'xy'.index(self._axis)]
-        value = self._linkage.joint_angles(theta, (self._name,))[self._name]
-        if self._turns:
-            known = np.isfinite(value)
-            value[known] = np.unwrap(value[known])
-        return value
+        """The least and the greatest value on each arc, with the input there."""
+        unit = self._input_scale
+        found = self._linkage.extremes(self._name, [(low / unit, high / unit)
+                                                    for low, high in self._arcs])
+        return [[(value * self._scale, at * unit) for value, at in span] for span in found]
 
 
 def _machine(scene_, name, output):

@@ -111,13 +111,18 @@ def write(asked, picture, times):
 
 
 def moments(asked, picture):
-    """Return when to draw [turns of the first crank]."""
+    """Return when to draw [turns of the first input]."""
     first = picture.panels[0]
+    wheel = first.cycle.first
     if not asked.moving:
-        crank = first.cycle.first
-        return [0.0 if asked.angle is None else crank.turns_to(math.radians(asked.angle))]
+        if asked.angle is None:
+            return [0.0]
+        if not wheel.input.turns:
+            raise RequestError(f'--angle is for a crank: {first.machine.name} is driven by a '
+                               'length; it is drawn at its start')
+        return [wheel.turns_to(math.radians(asked.angle))]
     if not math.isfinite(picture.period):
-        raise RequestError(f'{first.machine.name}.crank.speed is 0: nothing moves')
+        raise RequestError(f'{first.machine.name}.{wheel.input.name}.speed is 0: nothing moves')
     turns = asked.turns or 1.0
     frames = asked.frames or max(round(turns * picture.period * (asked.fps or FPS)), 1)
     if frames > MOST_FRAMES:
@@ -135,7 +140,7 @@ def parser() -> Parser:
     made.add_argument('--out', metavar='FILE', type=Path, required=True,
                       help=f'what to write; ends in {", ".join(STILL + MOVING)}')
     made.add_argument('--data', metavar='FILE', type=Path,
-                      help='write what is drawn as CSV too: time [s], crank angles [rad] and '
+                      help='write what is drawn as CSV too: time [s], inputs [rad or m] and '
                       'joints [m], every digit')
     made.add_argument('--mechanisms', metavar='NAME,...', type=words, default=[],
                       help='draw only these of the scene')

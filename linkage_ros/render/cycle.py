@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Where a machine is, counted in turns of its first crank; no picture is drawn here.
+Where a machine is, counted in turns of its first input; no picture is drawn here.
 
-A turn is a whole turn of the crank or, if the crank swings, one swing to and fro.
+A turn is a whole turn of a crank or, of what moves to and fro, there and back.
 """
 
 import math
@@ -12,41 +12,42 @@ from typing import NamedTuple, Tuple
 
 import numpy as np
 
-from ..scene import Crank, in_words, Machine, SceneError
-from ..scene.crank_motion import Motion
+from ..scene import Drive, in_words, Machine, SceneError
+from ..scene.motion import Motion
 
 SAMPLES = 720  # of a turn
-MOST_TURNS = 24  # after which several cranks need not be where they started
+MOST_TURNS = 24  # after which several inputs need not be where they started
 
 
 class Pose(NamedTuple):
-    """Turns since the start, crank angles [rad], and all joints [m], (legs, joints, 2)."""
+    """Turns since the start, inputs [rad or m], and all joints [m], (legs, joints, 2)."""
 
     turns: float
-    thetas: Tuple[float, ...]
+    inputs: Tuple[float, ...]
     places: np.ndarray
 
 
 class Wheel:
     """
-    A crank, from its start through one turn, again and again.
+    An input, from its start through one turn, again and again.
 
     Attributes
     ----------
     period : float
-        Seconds of a turn; infinite for a crank that stands still.
+        Seconds of a turn; infinite for an input that stands still.
 
     """
 
-    def __init__(self, crank: Crank):
-        self._sweep = crank.sweep
-        self._sign = math.copysign(1.0, crank.speed)
-        self._start, _ = Motion(crank.speed, crank.sweep, crank.start).at(0)
-        self._turn = math.tau if crank.sweep is None else 2.0 * (crank.sweep[1] - crank.sweep[0])
-        self.period = self._turn / abs(crank.speed) if crank.speed else math.inf
+    def __init__(self, drive: Drive):
+        self.input = drive.input
+        self._sweep = sweep = drive.sweep
+        self._sign = math.copysign(1.0, drive.speed)
+        self._start, _ = Motion.of(drive).at(0)
+        self._turn = math.tau if sweep is None else 2.0 * (sweep[1] - sweep[0])
+        self.period = self._turn / abs(drive.speed) if drive.speed else math.inf
 
-    def angle(self, turns: float) -> float:
-        """Return the angle [rad], in [0, 2 pi) or in the sweep."""
+    def value(self, turns: float) -> float:
+        """Return the input, an angle in [0, 2 pi) or what is in the sweep."""
         travelled = self._sign * self._turn * (turns % 1.0)
         if self._sweep is None:
             return (self._start + travelled) % math.tau
@@ -54,16 +55,17 @@ class Wheel:
         place = (self._start - low + travelled) % self._turn
         return low + min(place, self._turn - place)
 
-    def turns_to(self, angle: float) -> float:
-        """Return when it is first at an angle [rad]; SceneError if it never is."""
-        ends = [angle]
+    def turns_to(self, value: float) -> float:
+        """Return when it is first at a value [rad or m]; SceneError if it never is."""
+        ends = [value]
         if self._sweep is not None:
             low, high = self._sweep
-            angle = low + (angle - low) % math.tau
-            if angle > high:
-                raise SceneError(f'the crank never is at {angle:.6g} rad: it swings inside '
-                                 f'{in_words([self._sweep])} rad')
-            ends = [angle, 2.0 * low - angle]
+            value = low + (value - low) % math.tau if self.input.turns else value
+            if not low <= value <= high:
+                unit = self.input.unit
+                raise SceneError(f'the {self.input.quantity} never is {value:.6g} {unit}: '
+                                 f'it stays inside {in_words([self._sweep])} {unit}')
+            ends = [value, 2.0 * low - value]
         return min(self._sign * (end - self._start) % self._turn for end in ends) / self._turn
 
 
@@ -74,9 +76,9 @@ class Cycle:
     Attributes
     ----------
     first : Wheel
-        The first crank.
+        The first input.
     turns : int
-        Turns of the first crank until all are where they started, or MOST_TURNS.
+        Turns of the first input until all are where they started, or MOST_TURNS.
     prefixes : tuple of str
         What the names of each leg's joints begin with.
     course : float array (turns * SAMPLES + 1, legs, joints, 2)
@@ -87,24 +89,24 @@ class Cycle:
     def __init__(self, machine: Machine):
         assembly = machine.assembly()
         self._solution = assembly.solution(points=machine.linkage.points)
-        self._wheels = [Wheel(crank) for crank in machine.cranks.values()]
+        self._wheels = [Wheel(drive) for drive in machine.inputs.values()]
         self.first = self._wheels[0]
         self._ratios = [1.0, *(at_once(self.first.period, wheel.period)
                                for wheel in self._wheels[1:])]
         self.turns = next((n for n in range(1, MOST_TURNS) if all(
             math.isclose(n * ratio, round(n * ratio)) for ratio in self._ratios)), MOST_TURNS)
-        self.prefixes = tuple(leg.prefix for leg in assembly.legs)
+        self.prefixes = tuple(assembly.legs)
         self.course = np.stack([self.pose(k / SAMPLES).places
                                 for k in range(self.turns * SAMPLES + 1)])
         self._locus = assembly.locus
 
     def pose(self, turns: float) -> Pose:
         """Return where everything is; NaN where it cannot be assembled."""
-        thetas = tuple(wheel.angle(turns * ratio)
+        inputs = tuple(wheel.value(turns * ratio)
                        for wheel, ratio in zip(self._wheels, self._ratios))
-        self._solution.solve(thetas)
+        self._solution.solve(inputs)
         rows = self._solution.rows.copy()
-        return Pose(turns, thetas, rows.reshape(len(rows), -1, 2))
+        return Pose(turns, inputs, rows.reshape(len(rows), -1, 2))
 
     def curve(self, joint: int, start: float, end: float) -> np.ndarray:
         """Return where a joint is between two times [turns], shape (n, legs, 2) [m]."""
@@ -121,7 +123,7 @@ class Cycle:
 
 
 def at_once(period: float, other: float) -> float:
-    """Return the turns of another crank in one turn of the first, from their periods [s]."""
+    """Return the turns of another input in one turn of the first, from their periods [s]."""
     if not math.isfinite(other):
         return 0.0
     return period / other if math.isfinite(period) else 1.0

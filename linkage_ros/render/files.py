@@ -127,7 +127,7 @@ def mp4(picture, times, fps, file: Path, progress):
 
 
 def data(picture, times, file: Path):
-    """Write what is drawn: time [s], crank angles [rad] and joints [m], a row a picture."""
+    """Write what is drawn: time [s], inputs [rad or m] and joints [m], a row a picture."""
     with replacing(file) as new, open(new, 'w', newline='') as lines:
         writer = csv.writer(lines, lineterminator='\n')
         writer.writerow(['time', *(name for panel in picture.panels for name in panel.columns())])

@@ -109,7 +109,8 @@ def guides(axes, machine, cycle, unit):
 
 def cranks(linkage):
     """Return the bars that are cranks, from the joint they turn about to their pin."""
-    return [(link.joint, link.tip) for link in linkage.links if link.name in linkage.cranks]
+    names = [input_.name for input_ in linkage.inputs if input_.turns]
+    return [(link.joint, link.tip) for link in linkage.links if link.name in names]
 
 
 def straight(curve):
@@ -128,7 +129,7 @@ class Legs:
     def __init__(self, axes, machine, cycle, parts, unit):
         linkage = machine.linkage
         index = {name: linkage.points.index(name) for name in machine.points}
-        shown = [bar for bar in linkage.bars if set(bar) <= set(index)]
+        shown = [bar for bar in linkage.lines if set(bar) <= set(index)]
         turning = cranks(linkage)
         self._bars, self._cranks = (
             np.array([[index[p], index[q]] for p, q in shown if ((p, q) in turning) is driven],
@@ -267,7 +268,7 @@ class Floor:
 
 
 class Headline:
-    """Above the axes: the name, the dimensions, the crank angle, and the lever's if it has one."""
+    """Above the axes: the name, the dimensions, the inputs, and a lever's angle."""
 
     def __init__(self, axes, machine, parts, unit, single):
         self._linkage = machine.linkage
@@ -281,7 +282,7 @@ class Headline:
         self.artists = []
         if 'title' in parts:
             fixed_lines.append(' ')
-            count = len(readings(self._linkage, (0.0, 0.0), self._short))
+            count = len(readings(self._linkage, [1.0] * len(machine.inputs), self._short))
             self.artists = [axes.annotate(
                 '', (k / count, 1.0), (0, 6), 'axes fraction', 'offset points', fontsize=size,
                 va='baseline', animated=True, in_layout=False) for k in range(count)]
@@ -289,16 +290,17 @@ class Headline:
 
     def show(self, pose):
         """Write what holds now."""
-        for text, reading in zip(self.artists, readings(self._linkage, pose.thetas, self._short)):
+        for text, reading in zip(self.artists, readings(self._linkage, pose.inputs, self._short)):
             text.set_text(reading)
 
 
-def readings(linkage, thetas, short=False):
-    """Return as texts the angles of the cranks, of a lever that one drives, and their ratios."""
+def readings(linkage, inputs, short=False):
+    """Return as texts the inputs, the angle of a lever that one drives, and their ratios."""
     if not hasattr(linkage, 'reduction'):
-        names = ['θ', *(f'θ{number}' for number in range(2, len(linkage.cranks) + 1))]
-        return [reading(name, theta) for name, theta in zip(names, thetas)]
-    theta = math.remainder(thetas[0], math.tau)
+        return [reading('θ' + input_.name[len('crank'):], value) if input_.turns
+                else f'{input_.name} = {value:.4g} m'
+                for input_, value in zip(linkage.inputs, inputs)]
+    theta = math.remainder(inputs[0], math.tau)
     lever = float(linkage.joint_angles(theta)['lever'])
     angles = [reading('θ', theta), reading('φ', lever)]
     if short:

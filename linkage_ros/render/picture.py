@@ -191,8 +191,8 @@ class Panel:
         name = self.machine.name
         joints = [f'{leg}{joint}_{axis}' for leg in self.cycle.prefixes
                   for joint in self.machine.points for axis in 'xy']
-        return [f'{name}_{part}' for part in (*self.machine.cranks, *joints)]
+        return [f'{name}_{part}' for part in (*self.machine.inputs, *joints)]
 
     def values(self):
-        """Return the crank angles [rad] and the joints [m] as they are shown."""
-        return [*self.pose.thetas, *self.pose.places[:, self._joints].ravel().tolist()]
+        """Return the inputs [rad or m] and the joints [m] as they are shown."""
+        return [*self.pose.inputs, *self.pose.places[:, self._joints].ravel().tolist()]

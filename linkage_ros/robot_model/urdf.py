@@ -29,9 +29,7 @@ from typing import Dict, Iterable, Optional, Sequence, Tuple
 from xml.etree import ElementTree
 
 from ..linkage.builder import GROUND
-from ..linkage.crank_range import is_full_turn
-from ..linkage.output_range import crank_reach, ground_frame, Travel, travels
-from ..linkage.walker import Leg
+from ..linkage.output_range import common_reach, ground_frame, Travel, travels
 from ..scene import Machine, SceneError
 
 # Colours that colour-blind people tell apart (Okabe and Ito, "Color Universal Design").
@@ -102,88 +100,94 @@ class _Model:
         self._bars = machine.linkage.bars
         self._frames = {GROUND: ground_frame(machine.linkage), **machine.linkage.frames}
         self._travels = {**travels(machine.linkage, machine.reach),
-                         'crank': _crank_travel(machine, self._assembly)}
+                         **_input_travels(machine, self._assembly)}
+        self._shared = len(self._assembly.legs) > 1 and self._links[0]
 
     def add_to(self, root: str):
         """Add ground, crank and legs."""
-        legs = self._assembly.legs
         self._robot.fix(root, self._link('', GROUND), self._machine.pose)
-        if len(legs) > 1:
-            self._hang(Leg('', 0.0, 1.0), self._links[0])
-        for leg in legs:
-            self._add(leg)
+        if self._shared:
+            self._hang('', 1.0, self._shared)
+        for prefix, leg in self._assembly.legs.items():
+            self._add(prefix, leg)
 
-    def _add(self, leg):
+    def _add(self, prefix, leg):
         ends: Counter[str] = Counter()
-        self._add_points(leg, GROUND, self._frames[GROUND], ends)
+        self._add_points(prefix, leg.side, GROUND, self._frames[GROUND], ends)
         for i, link in enumerate(self._links):
-            shared = link.name == 'crank' and leg.prefix
-            element = self._lag(leg) if shared else self._hang(leg, link)
-            self._draw(leg, link, element, BARS[i % len(BARS)])
+            element = (self._lag(prefix, leg, link) if link is self._shared
+                       else self._hang(prefix, leg.side, link))
+            self._draw(leg.side, link, element, BARS[i % len(BARS)])
             carried = [point for point in self._frames[link.name] if point != link.joint]
-            self._add_points(leg, link.name, carried, ends)
+            self._add_points(prefix, leg.side, link.name, carried, ends)
 
-    def _lag(self, leg):
+    def _lag(self, prefix, leg, crank):
         """Fix a leg's pins to the crank of all legs."""
-        return self._robot.fix(self._link('', 'crank'), self._link(leg.prefix, 'crank'),
+        return self._robot.fix(self._link('', crank.name), self._link(prefix, crank.name),
                                (0.0, 0.0, 0.0, 0.0, 0.0, -leg.lag))
 
-    def _hang(self, leg, link):
+    def _hang(self, prefix, side, link):
         """Add a link that moves on its parent; in a mirrored leg the other way round."""
-        prismatic, mirrored = link.kind == 'prismatic', leg.side < 0.0
+        prismatic, mirrored = link.kind == 'prismatic', side < 0.0
         zero = math.pi - link.zero if mirrored and link.parent == GROUND else link.zero
-        axis = (leg.side, 0.0, 0.0) if prismatic else (0.0, 0.0, 1.0)
+        axis = (side, 0.0, 0.0) if prismatic else (0.0, 0.0, 1.0)
         travel = self._travels.get(link.name)
         if travel and mirrored:
             travel = -travel[1], -travel[0]
         if travel and prismatic:
             travel = self._machine.scale * travel[0], self._machine.scale * travel[1]
-        place = self._place(leg, link.parent, link.joint)
+        place = self._place(side, link.parent, link.joint)
         return self._robot.move(
-            f'{self._machine.name}_{leg.prefix}{link.name}', link.kind,
-            self._link(leg.prefix, link.parent), self._link(leg.prefix, link.name),
+            f'{self._machine.name}_{prefix}{link.name}', link.kind,
+            self._link(prefix, link.parent), self._link(prefix, link.name),
             (*place, 0.0, 0.0, 0.0, zero), axis, travel)
 
-    def _draw(self, leg, link, element, colour):
+    def _draw(self, side, link, element, colour):
         """Add bars as rods, and a slide as a block."""
         frame, size = self._frames[link.name], self._size
         for first, second in self._bars:
             if first in frame and second in frame:
-                _draw_rod(element, colour, BAR * size, self._place(leg, link.name, first),
-                          self._place(leg, link.name, second))
+                _draw_rod(element, colour, BAR * size, self._place(side, link.name, first),
+                          self._place(side, link.name, second))
         if link.kind == 'prismatic':
-            _draw(element, colour, (*self._place(leg, link.name, link.tip), *[0.0] * 4),
+            _draw(element, colour, (*self._place(side, link.name, link.tip), *[0.0] * 4),
                   'box', size=_numbers(4.0 * JOINT * size, *[2.0 * JOINT * size] * 2))
 
-    def _add_points(self, leg, link, points, ends):
+    def _add_points(self, prefix, side, link, points, ends):
         """Add joints of a link as links of their own, those that it was cut off as well."""
         for point in points:
-            name = f'{self._machine.name}_{leg.prefix}{point}'
+            name = f'{self._machine.name}_{prefix}{point}'
             ends[point] += 1
             if ends[point] > 1:
                 name += f'_cut{ends[point] - 1 if ends[point] > 2 else ""}'
-            element = self._robot.fix(self._link(leg.prefix, link), name,
-                                      (*self._place(leg, link, point), *[0.0] * 4))
+            element = self._robot.fix(self._link(prefix, link), name,
+                                      (*self._place(side, link, point), *[0.0] * 4))
             _draw(element, JOINTS, [0.0] * 6, 'sphere', radius=_numbers(JOINT * self._size))
 
     def _link(self, prefix, name):
         return f'{self._machine.name}_{"" if name == GROUND else prefix}{name}_link'
 
-    def _place(self, leg, link, point):
+    def _place(self, side, link, point):
         """Return x, y [m] of a point of a link; the ground is mirrored in y, a link in its bar."""
         x, y = (self._machine.scale * value for value in self._frames[link][point])
-        return (leg.side * x, y) if link == GROUND else (x, leg.side * y)
+        return (side * x, y) if link == GROUND else (x, side * y)
 
 
-def _crank_travel(machine, assembly) -> Optional[Travel]:
-    """Return the outermost ends of the crank's reach [rad], in the turn that it is driven in."""
-    arcs = crank_reach(assembly)
-    if not arcs or is_full_turn(arcs):
-        return None
-    low, high = min(lo for lo, _ in arcs), max(hi for _, hi in arcs)
-    sweep = machine.crank.sweep
-    turns = math.tau * math.floor((sweep[1] - low) / math.tau) if sweep else 0.0
-    return low + turns, high + turns
+def _input_travels(machine, assembly) -> Dict[str, Optional[Travel]]:
+    """Return the outermost ends of each input's reach, unscaled; None: it turns all round."""
+    found: Dict[str, Optional[Travel]] = {}
+    for input_ in machine.linkage.inputs:
+        single = len(machine.inputs) == 1
+        arcs = common_reach(assembly) if single else [(input_.low, input_.high)]
+        if not arcs or input_.is_whole(arcs):
+            found[input_.name] = None
+            continue
+        low, high = min(lo for lo, _ in arcs), max(hi for _, hi in arcs)
+        sweep = machine.inputs[input_.name].sweep if input_.turns else None
+        # A crank is in the turn that it is driven in.
+        turns = math.tau * math.floor((sweep[1] - low) / math.tau) if sweep else 0.0
+        found[input_.name] = low + turns, high + turns
+    return found
 
 
 class _Robot:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Scenes: which mechanisms there are, how large, where, and how their cranks move.
+Scenes: which mechanisms there are, how large, where, and how their inputs move.
 
 The only place that knows the names of parameters. `read` turns given values into a Scene, or says
 in one sentence which parameter is wrong and what it may be; the scene's `parameters` are what a
@@ -20,24 +20,25 @@ from typing import Any, Dict, List, Optional, Tuple
 
 from .parameters import Field, Parameter, plain, SceneError, Values
 from .. import mechanisms
-from ..linkage.crank_range import is_full_turn
+from ..linkage.inputs import Arc, Input
 from ..linkage.mechanism import Mechanism
 from ..linkage.walker import Assembly
 from ..words import elided, listed, quoted
 
-__all__ = ['Crank', 'Machine', 'Parameter', 'Scene', 'SceneError', 'in_words', 'load', 'plain',
+__all__ = ['Drive', 'Machine', 'Parameter', 'Scene', 'SceneError', 'in_words', 'load', 'plain',
            'read']
 
 DRIVER, KINEMATICS, INVERSE = ALL = 'crank_driver', 'kinematics', 'servo_inverse'
 # Whose values of the parameters that several nodes act on count.
 OWNER = KINEMATICS
 
-# What a crank that swings by default leaves of its reach at each end, as a part of its width.
+# What an input that swings by default leaves of its reach at each end, as a part of its width.
 MARGIN = 0.01
+# The narrowest sweep, of a length as a part of its size.
 NARROWEST_SWEEP = 1e-6
 # Angles beyond this [rad] have lost digits that a crank needs.
 FARTHEST = 1e6
-FULL_TURN = ((-math.pi, math.pi),)
+FASTEST = 100.0
 
 # What the client library declares for itself.
 _ROS = re.compile(r'(use_sim_time|start_type_description_service|qos_overrides\..*)$')
@@ -70,41 +71,55 @@ MIRRORED = Field('bool', 'Whether each leg has a mirror image on the other side;
 POINTS = Field('string_array', 'Joints that are wanted in the markers.', readers=(KINEMATICS,))
 POSE = Field('double_array', "Pose of the linkage's plane in frame_id: "
              'x, y, z [m], roll, pitch, yaw [rad].', rule='six of them', readers=(KINEMATICS,))
-SPEED = Field('double', 'Speed of the crank [rad/s].', -100.0, 100.0, readers=(DRIVER,))
-START = Field('double', 'Crank angle at the start [rad]; a new one moves the crank there.',
-              -4.0 * math.pi, 4.0 * math.pi, readers=(DRIVER,))
-SWEEP = Field('double_array', 'Crank angles [rad] between which the crank swings; '
-              'empty: it turns all round, or swings through its reach.', readers=ALL,
+SPEED = Field('double', 'Speed of the {0} [{1}/s].', -FASTEST, FASTEST, readers=(DRIVER,))
+START = Field('double', 'Where the {0} starts [{1}]; a new value moves it there.',
+              readers=(DRIVER,))
+SWEEP = Field('double_array', 'Between which values [{1}] the {0} moves to and fro; '
+              'empty: through its reach, or all round.', readers=ALL,
               rule=f'the lower end and the higher end, within {FARTHEST:g} of zero, or none')
 
 
 @dataclass(frozen=True)
-class Crank:
+class Drive:
     """
-    How a crank moves: speed [rad/s], start [rad], and the ends of its swing [rad] or None.
+    How an input moves, an angle [rad] or a length [m], the scale included.
 
-    `ends` are those that were set, beyond which no answer lies either; None: all its reach.
+    Attributes
+    ----------
+    input : Input
+        What moves.
+    reach : tuple of (float, float)
+        Where it can be.
+    speed, start : float
+        How fast, and from where.
+    sweep : (float, float), optional
+        Between which ends it moves to and fro; None: it turns all round.
+    ends : (float, float), optional
+        The ends that were set, beyond which no answer lies either; None: all its reach.
+
     """
 
+    input: Input
+    reach: Tuple[Arc, ...]
     speed: float
     start: float
-    sweep: Optional[Tuple[float, float]]
-    ends: Optional[Tuple[float, float]] = None
+    sweep: Optional[Arc]
+    ends: Optional[Arc] = None
 
 
 @dataclass(frozen=True)
 class Machine:
-    """A mechanism in a scene: one leg, its reach and scale, its legs, its look and its cranks."""
+    """A mechanism in a scene: one leg, its reach and scale, its legs, its look and its inputs."""
 
     name: str
     linkage: Mechanism
-    reach: Tuple[Tuple[float, float], ...]
+    reach: Tuple[Arc, ...]
     scale: float
     leg_pairs: int
     mirrored: bool
     points: Tuple[str, ...]
     pose: Tuple[float, ...]
-    cranks: Mapping[str, Crank]
+    inputs: Mapping[str, Drive]
     given: Mapping[str, Any] = some(compare=False, repr=False)
     parameters: Tuple[Parameter, ...] = some(compare=False, repr=False)
 
@@ -114,12 +129,12 @@ class Machine:
             self.given[key] is value for key, value in given.items())
 
     @property
-    def crank(self) -> Crank:
-        """The first crank, for most linkages the only one."""
-        return self.cranks['crank']
+    def first(self) -> Drive:
+        """The first input, for most linkages the only one."""
+        return next(iter(self.inputs.values()))
 
     def assembly(self) -> Assembly:
-        """Return its legs on their crank."""
+        """Return its legs on their inputs."""
         return Assembly(self.linkage, self.leg_pairs, self.mirrored, self.scale, self.reach)
 
     @property
@@ -179,8 +194,8 @@ def read(given: Mapping[str, Any], before: Optional[Scene] = None, strict: bool 
     before : Scene, optional
         The scene that this one follows: what is given for a mechanism as before is not read again.
     strict : bool
-        Whether a start must be where its crank moves. Where others change the sweep or the reach
-        of a crank that has long left its start, it need not.
+        Whether a start must be where its input moves. Where others change the sweep or the reach
+        of an input that has long left its start, it need not.
 
     Raises
     ------
@@ -239,11 +254,12 @@ def _machine(name: str, given: Mapping[str, Any], old: Optional[Machine], strict
     scale = values.take(f'{name}.scale', SCALE, 1.0)
     leg_pairs, mirrored = _legs(name, linkage, values)
     points, pose = _points(name, linkage, values), _pose(name, values)
-    settled = old.cranks if old else {}
-    cranks = {crank: _crank(f'{name}.{crank}', reach, values, settled.get(crank), strict)
-              for crank in linkage.cranks}
+    settled = old.inputs if old else {}
+    inputs = {input_.name: _drive(name, *_scaled(input_, linkage, reach, scale), values,
+                                  settled.get(input_.name), strict)
+              for input_ in linkage.inputs}
     _refuse_unknown(values.left(), [parameter.name for parameter in values.parameters])
-    return Machine(name, linkage, reach, scale, leg_pairs, mirrored, points, pose, cranks, given,
+    return Machine(name, linkage, reach, scale, leg_pairs, mirrored, points, pose, inputs, given,
                    tuple(values.parameters))
 
 
@@ -257,8 +273,8 @@ def _linkage(name, type_, values):
         raise SceneError(f'{name}.dimensions: {error}') from None
     if not reach:
         lengths = listed(f'{key}={value:g}' for key, value in dimensions.items())
-        raise SceneError(f'{name}.dimensions must let the {type_} be assembled at some crank '
-                         f'angle, which {lengths} do not')
+        raise SceneError(f'{name}.dimensions must let the {type_} be assembled at some '
+                         f'{linkage.inputs[0].kind}, which {lengths} do not')
     return linkage, reach
 
 
@@ -301,8 +317,9 @@ def _built(design, dimensions, branches):
     own = {} if design.name in mechanisms.TYPES else {
         'joints': design.joints, 'tracer': design.tracer}
     linkage = mechanisms.create(design.name, branches=dict(branches), **own, **dict(dimensions))
-    # How far one of several cranks reaches depends on the others: only a pose tells.
-    return linkage, tuple(linkage.reach()) if len(linkage.cranks) == 1 else FULL_TURN
+    # How far one of several inputs reaches depends on the others: only a pose tells.
+    first, *others = linkage.inputs
+    return linkage, ((first.low, first.high),) if others else tuple(linkage.reach())
 
 
 def _legs(name, linkage, values):
@@ -319,10 +336,11 @@ def _legs(name, linkage, values):
 
 
 def _can_have_more_legs(linkage) -> bool:
-    crank, *others = (link for link in linkage.links if link.name in linkage.cranks)
-    if others or crank.zero:
+    first, *others = linkage.inputs
+    if others or not first.turns:
         return False
-    return linkage.solve(0.0, (crank.joint,))[crank.joint][0] == 0.0
+    crank = next(link for link in linkage.links if link.name == first.name)
+    return not crank.zero and linkage.solve(0.0, (crank.joint,))[crank.joint][0] == 0.0
 
 
 def _points(name, linkage, values):
@@ -340,40 +358,60 @@ def _pose(name, values):
     return pose
 
 
-def _crank(name, reach, values, old, strict) -> Crank:
-    speed = values.take(f'{name}.speed', SPEED, 1.0)
+def _scaled(input_: Input, linkage: Mechanism, reach: Tuple[Arc, ...],
+            scale: float) -> Tuple[Input, Tuple[Arc, ...]]:
+    """Return an input and its reach, a length times the scale."""
+    if len(linkage.inputs) > 1:
+        # How far one of several reaches depends on the others.
+        reach = ((input_.low, input_.high),)
+    if input_.turns:
+        return input_, reach
+    return (input_._replace(low=scale * input_.low, high=scale * input_.high),
+            tuple((scale * low, scale * high) for low, high in reach))
+
+
+def _drive(name: str, input_: Input, reach, values: Values, old: Optional[Drive],
+           strict: bool) -> Drive:
+    speed_field, start_field, sweep_field = (
+        _about(field, input_.name, input_.unit) for field in (SPEED, START, SWEEP))
+    if input_.turns:
+        start_field = replace(start_field, low=-4.0 * math.pi, high=4.0 * math.pi)
+    name = f'{name}.{input_.name}'
+    speed = values.take(f'{name}.speed', speed_field, _usual_speed(input_, reach))
     chosen = values.left(f'{name}.start')
-    start = values.take(f'{name}.start', START, 0.0)
-    sweep = values.take(f'{name}.sweep', SWEEP, ())
+    start = values.take(f'{name}.start', start_field, 0.0)
+    sweep = values.take(f'{name}.sweep', sweep_field, ())
     if sweep:
-        _check_sweep(f'{name}.sweep', sweep, reach)
-    elif is_full_turn(reach):
-        return Crank(speed, start, None)
+        _check_sweep(f'{name}.sweep', sweep, input_, reach)
+    elif input_.is_whole(reach):
+        return Drive(input_, reach, speed, start, None)
     arcs = [sweep] if sweep else reach
-    home = [arc for arc in arcs if _inside(start, start, arc)]
+    home = [arc for arc in arcs if input_.holds(arc, start, start)]
     low, high = (home or arcs)[0]
     trimmed = 0.0 if sweep else MARGIN * (high - low)
-    crank = Crank(speed, start, (low + trimmed, high - trimmed), tuple(sweep) or None)
-    settled = not strict or old and (old.start, old.sweep) == (crank.start, crank.sweep)
+    drive = Drive(input_, reach, speed, start, (low + trimmed, high - trimmed),
+                  tuple(sweep) or None)
+    settled = not strict or old and (old.start, old.sweep) == (drive.start, drive.sweep)
     if chosen and not home and not settled:
         raise SceneError(f'{name}.start must be inside the {"sweep" if sweep else "reach"} '
-                         f'{in_words(arcs)} rad, not {start}')
-    return crank
+                         f'{in_words(arcs)} {input_.unit}, not {start}')
+    return drive
 
 
-def _check_sweep(name, sweep, reach):
-    if (len(sweep) != 2 or not sweep[0] + NARROWEST_SWEEP <= sweep[1]
+def _usual_speed(input_: Input, reach) -> float:
+    """Return the speed where none is given: a stroke takes about three seconds."""
+    if input_.turns:
+        return 1.0
+    return float(f'{min(max(high - low for low, high in reach) / 3.0, FASTEST):.2g}')
+
+
+def _check_sweep(name, sweep, input_: Input, reach):
+    if (len(sweep) != 2 or not sweep[0] + NARROWEST_SWEEP * input_.size <= sweep[1]
             or max(map(abs, sweep)) > FARTHEST):
         raise SWEEP.error(name, sweep)
-    if not is_full_turn(reach) and not any(_inside(sweep[0], sweep[1], arc) for arc in reach):
-        raise SceneError(f'{name} must be inside the reach {in_words(reach)} rad, '
+    if not input_.is_whole(reach) and not any(input_.holds(arc, *sweep) for arc in reach):
+        raise SceneError(f'{name} must be inside the reach {in_words(reach)} {input_.unit}, '
                          f'not {quoted(list(sweep))}')
-
-
-def _inside(low, high, arc) -> bool:
-    """Return whether an arc holds another, up to whole turns."""
-    turns = math.tau * math.floor((high - arc[0]) / math.tau)
-    return arc[0] <= low - turns and high - turns <= arc[1]
 
 
 def _flattened(values, prefix=''):

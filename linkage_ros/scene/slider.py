@@ -18,7 +18,7 @@ import numpy as np
 
 from . import Machine, Scene
 from .parameters import Parameter
-from ..linkage.crank_range import Arc, is_full_turn
+from ..linkage.inputs import Arc
 from ..linkage.mechanism import Mechanism
 
 STOPS = 100
@@ -39,17 +39,21 @@ def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
     if field.kind != 'double':
         return None
     name, what, key = (parameter.name.split('.') + ['', ''])[:3]
-    if what == 'dimensions':
-        machine = scene.machines[name]
+    machine = scene.machines.get(name)
+    if machine and what == 'dimensions':
         return _length(machine.linkage, key, field.positive, _used(machine))
+    if machine and what in machine.inputs:
+        reach = machine.inputs[what].reach
+        return _whole_stops(value, min(low for low, _ in reach), max(high for _, high in reach))
     return _whole_stops(value, 0.1 * value, 10.1 * value)
 
 
 def _used(machine: Machine) -> Optional[Tuple[float, float]]:
-    """Return between which crank angles it has to be assembled; None: at one at least."""
-    if len(machine.linkage.cranks) > 1 or not is_full_turn(machine.reach):
+    """Return between which crank angles it has to be assembled; None: somewhere at least."""
+    first, *others = machine.inputs.values()
+    if others or not first.input.is_whole(first.reach):
         return None
-    return machine.crank.sweep or machine.reach[0]
+    return first.sweep or first.reach[0]
 
 
 @lru_cache(maxsize=16)
@@ -89,10 +93,10 @@ def _assembled(linkage: Mechanism, key: str, values: np.ndarray,
             return np.array([False])
         return np.concatenate([_assembled(linkage, key, values[i:i + 1], used)
                                for i in range(len(values))])
-    cranks = len(linkage.cranks)
-    low, high = used or (-math.pi, math.pi)
-    theta = np.linspace(low, high, ANGLES) if cranks == 1 else [
-        angles.ravel() for angles in np.meshgrid(*[np.linspace(low, high, FEW_ANGLES)] * cranks)]
+    many = ANGLES if len(linkage.inputs) == 1 else FEW_ANGLES
+    samples = [np.linspace(low, high, many) for low, high in (
+        used or (input_.low, input_.high) for input_ in linkage.inputs)]
+    theta = [each.ravel() for each in np.meshgrid(*samples)] if len(samples) > 1 else samples[0]
     placed = np.ones((len(values), 1), dtype=bool)
     for places in tried.solve(theta).values():
         placed = placed & np.isfinite(places).all(axis=-1)

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Which crank angles can be assembled.
+With which values of its first input a linkage can be assembled.
 
-The ends of the reach are the angles where a margin vanishes. For the dyad or slot of a crank they
-are closed forms of exactly rounded gaps; elsewhere they are bracketed. Between two neighbouring
-ends one pose decides for the whole arc, and at each end the linkage can still be assembled.
+The ends of the reach are where a margin vanishes. For the dyad or slot of a crank they are closed
+forms of exactly rounded gaps; elsewhere they are bracketed. Between two neighbouring ends one pose
+decides for the whole arc, and at each end the linkage can still be assembled.
 """
 
 from __future__ import annotations
@@ -16,26 +16,27 @@ from typing import Any, Callable, Iterable, List, Sequence
 
 import numpy as np
 
-from .curves import Arc, lowest, near_misses, refined, sampled
+from .curves import lowest, near_misses, refined, sampled
+from .inputs import Arc, CRANK, Input, NARROWEST
 from .planar import Limit
 
 # Samples of a whole turn in search of ends without a closed form, samples of an arc at least, and
 # how often arcs inside arcs are searched.
 SAMPLES, FEWEST, ROUNDS = 720, 33, 4
-# Arcs below this width [rad] are the rounding of one angle.
-NARROWEST = 2e-15
 # What margins may differ by from turn to turn, as a part of their size, and be the same.
 ALIKE = 1e-6
 
 
-def arcs(margins: Callable, limits: Sequence[Limit], value: Callable) -> List[Arc]:
+def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Callable) -> List[Arc]:
     """
-    Return the arcs (lo, hi) [rad] of the first crank on which every margin is at least zero.
+    Return the arcs (lo, hi) of the first input on which every margin is at least zero.
 
     Parameters
     ----------
     margins : callable
-        From crank angles, shape (n,), to margins, shape (limits, n).
+        From values of the input, shape (n,), to margins, shape (limits, n).
+    input_ : Input
+        The first input, counted in its size.
     limits : sequence of Limit
         What the margins belong to.
     value : callable
@@ -52,22 +53,21 @@ def arcs(margins: Callable, limits: Sequence[Limit], value: Callable) -> List[Ar
     def assembled(theta: Any) -> Any:
         return failing(theta) == len(limits)
 
-    ends = [end for limit in limits if limit.crank == 0
-            for end in _crank_ends(*map(value, (
-                limit.start, limit.end, limit.turn, limit.tolerance)))]
-    periodic = _is_periodic(margins)
-    if not periodic:
+    closed = [limit for limit in limits if limit.ends and limit.ends.theta.args[0] == 0]
+    ends = [end for limit in closed for end in _crank_ends(limit, value)]
+    periodic = input_.turns and _is_periodic(margins)
+    if input_.turns and not periodic:
         # What follows a turn later is another assembly: the arcs are those of [-pi, pi].
         ends.append(-math.pi)
-    if any(x.margin.varies and x.crank != 0 for x in limits):
-        ends += [end for arc in between(ends) for end in _limits(margins, failing, *arc)]
-    found = reachable_arcs(ends, assembled, joined=periodic)
-    return [_trimmed(assembled, *arc) for arc in found] if ends else found
+    if any(x.margin.varies and x not in closed for x in limits):
+        ends += [end for arc in input_.between(ends) for end in _limits(margins, failing, *arc)]
+    found = reachable_arcs(ends, assembled, input_, joined=periodic)
+    return found if input_.is_whole(found) else [_trimmed(assembled, *arc) for arc in found]
 
 
 def _limits(margins: Callable, failing: Callable, lo: float, hi: float) -> List[float]:
     """
-    Return the angles on an arc next to which a limit stops or starts to be the first not kept.
+    Return the values on an arc next to which a limit stops or starts to be the first not kept.
 
     What stands on a limited joint may be limited itself on part of a narrow arc: each arc that is
     found is searched again.
@@ -103,8 +103,6 @@ def _touches(margins: Callable, theta: np.ndarray) -> np.ndarray:
 
 def _trimmed(assembled: Callable, lo: float, hi: float) -> Arc:
     """Return an arc whose ends can be assembled."""
-    if hi - lo >= math.tau:
-        return lo, hi
     ends, middle = np.array([lo, hi]), np.full(2, 0.5 * (lo + hi))
     low, high = np.where(assembled(ends), ends, refined(assembled, middle, ends)[0]).tolist()
     return low, high
@@ -119,16 +117,16 @@ def _is_periodic(margins: Callable) -> bool:
 
 
 def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
-                   joined: bool = True) -> List[Arc]:
+                   input_: Input = CRANK, joined: bool = True) -> List[Arc]:
     """
-    Return the arcs between angles where reachability may change, in one where they touch.
+    Return the arcs between values where reachability may change, in one where they touch.
 
     They are joined across -pi and pi as well, unless that is not to be.
     """
-    parts = between(ends)
+    parts = input_.between(ends)
     held = [arc for arc in parts if bool(reachable(0.5 * (arc[0] + arc[1])))]
     if held == parts:
-        return [(-math.pi, math.pi)]
+        return [(input_.low, input_.high)]
     found: List[Arc] = []
     for lo, hi in held:
         if found and lo - found[-1][1] <= NARROWEST:
@@ -137,31 +135,19 @@ def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
             found.append((lo, hi))
     if joined and len(found) > 1 and found[0][0] + math.tau - found[-1][1] <= NARROWEST:
         found[-1] = found[-1][0], found.pop(0)[1] + math.tau
-    return [(lo - math.tau, hi - math.tau) if lo >= math.pi else (lo, hi) for lo, hi in found]
+    return [(lo - math.tau, hi - math.tau) if input_.turns and lo >= math.pi else (lo, hi)
+            for lo, hi in found]
 
 
-def is_full_turn(reach: Sequence[Arc]) -> bool:
-    """Return whether a reach is one arc of a whole turn."""
-    return len(reach) == 1 and reach[0][1] - reach[0][0] >= math.tau
-
-
-def _crank_ends(start: float, end: float, turn: float, tolerance: float) -> List[float]:
-    """Return the crank angles where start h^2 + end s^2 vanishes; theta' = theta + turn."""
+def _crank_ends(limit: Limit, value: Callable) -> List[float]:
+    """Return the crank angles at which a margin vanishes."""
+    if limit.ends is None:
+        return []
+    start, end, turn = map(value, limit.ends[:3])
+    tolerance = value(limit.tolerance)
     # A gap of nothing but rounding is a limit that is touched, and may be all there is.
     start, end = (0.0 if abs(gap) <= tolerance else gap for gap in (start, end))
     if start * end > 0.0:
         return []
     half = math.atan2(math.sqrt(abs(start)), math.sqrt(abs(end)))
     return [float(2.0 * half - turn), float(-2.0 * half - turn)]
-
-
-def between(ends: Iterable[float]) -> List[Arc]:
-    """Return the arcs of one turn between angles, in order, from the least in [-pi, pi)."""
-    marks: List[float] = []
-    for end in sorted(end - 2.0 * math.pi * math.floor((end + math.pi) / (2.0 * math.pi))
-                      for end in ends):
-        if not marks or end - marks[-1] > NARROWEST:
-            marks.append(end)
-    if not marks:
-        return [(-math.pi, math.pi)]
-    return list(zip(marks, marks[1:] + [marks[0] + 2.0 * math.pi]))

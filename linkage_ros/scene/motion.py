@@ -2,19 +2,22 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-A crank angle as a function of the clock.
+An input as a function of the clock.
 
-Angles are counted in whole steps of 2^-128 rad and time in whole nanoseconds, so nothing is lost
-however long a crank runs: the only rounding is that of the answer.
+Angles are counted in whole steps of 2^-160 rad, lengths of 2^-160 m, and time in whole
+nanoseconds, so nothing is lost however long an input moves: the only rounding is of the answer.
 """
+
+from __future__ import annotations
 
 import math
 from typing import Optional, Tuple
 
-STEPS = 1 << 128
-TURN = 62831853071795864769252867665590057683943387987502116 * STEPS // 10 ** 52
+from . import Drive
+from ..linkage.inputs import Arc
 
-Sweep = Optional[Tuple[float, float]]
+STEPS = 1 << 160
+TURN = 62831853071795864769252867665590057683943387987502116 * STEPS // 10 ** 52
 
 
 def _steps(value: float, per: int = 1) -> int:
@@ -24,27 +27,31 @@ def _steps(value: float, per: int = 1) -> int:
 
 class Motion:
     """
-    A crank that turns, or swings as a triangle wave, at a constant speed.
+    An input that turns, or moves to and fro as a triangle wave, at a constant speed.
 
     Its phase runs through one turn, or from the low end of the sweep to the high end and back.
 
     Parameters
     ----------
     speed : float
-        Speed [rad/s]; of a crank that swings, its sign is the direction from the start.
+        Speed [rad/s or m/s]; to and fro, its sign is the direction from the start.
     sweep : (float, float), optional
-        Ends of the swing [rad]; None: it turns all round.
+        Ends between which it moves to and fro [rad or m]; None: it turns all round.
     start : float
-        Angle at the time `since` [rad]; one outside the sweep is moved to the nearer end.
+        Where it is at the time `since` [rad or m]; outside the sweep it is at the nearer end.
     since : int
         Time [ns].
+    turns : bool
+        Whether it is the same a turn later.
 
     """
 
-    def __init__(self, speed: float, sweep: Sweep = None, start: float = 0.0, since: int = 0):
+    def __init__(self, speed: float, sweep: Optional[Arc] = None, start: float = 0.0,
+                 since: int = 0, turns: bool = True):
         self._speed = speed
         self._rate = _steps(speed, per=10 ** 9)
         self._sweep = sweep
+        self._turns = turns
         self._low, high = (0, TURN) if sweep is None else map(_steps, sweep)
         self._width = high - self._low
         self._period = TURN if sweep is None else 2 * self._width
@@ -52,7 +59,7 @@ class Motion:
         self._since = since
 
     def at(self, now: int) -> Tuple[float, float]:
-        """Return the angle [rad], in [0, 2 pi) or in the sweep, and its speed [rad/s]."""
+        """Return the value, an angle in [0, 2 pi) or what is in the sweep, and its speed."""
         travelled, ahead = self._fold(self._phase_at(now))
         angle = (self._low + travelled) / STEPS
         if self._sweep is None and angle >= math.tau:
@@ -60,9 +67,14 @@ class Motion:
             angle = 0.0
         return angle, self._speed if ahead else -self._speed or 0.0
 
-    def changed(self, speed: float, sweep: Sweep, now: int) -> 'Motion':
+    @classmethod
+    def of(cls, drive: Drive, since: int = 0) -> Motion:
+        """Return how an input moves from its start."""
+        return cls(drive.speed, drive.sweep, drive.start, since, drive.input.turns)
+
+    def changed(self, speed: float, sweep: Optional[Arc], now: int) -> Motion:
         """Return the motion that takes over from this one at a time [ns], without a jump."""
-        taken = Motion(speed, sweep, since=now)
+        taken = Motion(speed, sweep, since=now, turns=self._turns)
         phase = self._phase_at(now)
         if sweep == self._sweep:
             taken._phase = phase
@@ -72,7 +84,7 @@ class Motion:
         taken._phase = place if ahead or sweep is None else -place
         return taken
 
-    def moved(self, before: int, now: int) -> 'Motion':
+    def moved(self, before: int, now: int) -> Motion:
         """Return the motion that is at `now` [ns] where this one is at `before` [ns]."""
         motion = self.changed(self._speed, self._sweep, before)
         motion._since = now
@@ -91,6 +103,6 @@ class Motion:
         if self._sweep is None:
             return angle % TURN
         half = self._width // 2
-        if not 0 <= angle - self._low <= self._width:
+        if self._turns and not 0 <= angle - self._low <= self._width:
             angle = (angle - self._low - half + TURN // 2) % TURN - TURN // 2 + self._low + half
         return min(max(angle - self._low, 0), self._width)

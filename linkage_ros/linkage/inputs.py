@@ -1,0 +1,141 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+What drives a linkage: a crank by its angle, a cylinder by its length.
+
+An angle is the same a turn later, a length is not: that is known here and nowhere else.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Iterable, Iterator, List, NamedTuple, Sequence, Tuple
+
+import numpy as np
+
+Arc = Tuple[float, float]
+
+ANGLE, LENGTH = 'angle', 'length'
+
+# Values beyond an end of the reach by no more than this [rad] may be that end, rounded.
+ROUNDED = 1e-12
+# Arcs below this width [rad] are the rounding of one angle.
+NARROWEST = 2e-15
+
+
+class Input(NamedTuple):
+    """
+    A number that a pose follows from.
+
+    Attributes
+    ----------
+    name : str
+        What users call it: 'crank', 'cylinder2'.
+    kind : str
+        ANGLE [rad] or LENGTH [m].
+    low, high : float
+        Between which values all poses lie: of an angle one turn, of a length its longest stroke.
+
+    """
+
+    name: str
+    kind: str = ANGLE
+    low: Any = -math.pi
+    high: Any = math.pi
+
+    @property
+    def turns(self) -> bool:
+        """Whether it is the same a turn later."""
+        return self.kind == ANGLE
+
+    @property
+    def quantity(self) -> str:
+        """What it is, for messages: 'crank angle'."""
+        return f'{self.name} {self.kind}'
+
+    @property
+    def unit(self) -> str:
+        """What it is counted in, for messages."""
+        return 'rad' if self.turns else 'm'
+
+    @property
+    def size(self) -> float:
+        """The power of two [m] that a length is counted in to be about as large as an angle."""
+        return 1.0 if self.turns else 2.0 ** (math.frexp(self.high)[1] - 2)
+
+    def counted(self) -> Input:
+        """Return the same input counted in its size."""
+        return self._replace(low=self.low / self.size, high=self.high / self.size)
+
+    def wrapped(self, value: Any) -> Any:
+        """Return values within [low, high) where they turn, else as they are."""
+        return wrapped(value) if self.turns else value
+
+    def beside(self, value: Any, near: Any) -> Any:
+        """Return values plus the whole turns that take them next to others."""
+        if not self.turns:
+            return value + 0.0 * near
+        return value + math.tau * np.round((near - value) / math.tau)
+
+    def apart(self, value: Any, other: Any) -> Any:
+        """Return how far values are from others, whole turns aside."""
+        return abs(self.wrapped(value - other))
+
+    def is_whole(self, arcs: Sequence[Arc]) -> bool:
+        """Return whether it turns all round on some arcs."""
+        return self.turns and len(arcs) == 1 and arcs[0][1] - arcs[0][0] >= math.tau
+
+    def is_cut(self, value: float) -> bool:
+        """Return whether a value is where a turn is cut open, -pi or pi."""
+        return self.turns and abs(value) == math.pi
+
+    def on(self, arcs: Sequence[Arc], value: Any) -> Any:
+        """Return whether values lie on arcs, whole turns and rounding aside."""
+        value, slack = np.asarray(value), ROUNDED * self.size
+        with np.errstate(invalid='ignore'):
+            ahead = [value - low + slack for low, _ in arcs]
+            ahead = [gap % math.tau for gap in ahead] if self.turns else ahead
+            return np.any([(gap >= 0.0) & (gap <= high - low + 2.0 * slack)
+                           for gap, (low, high) in zip(ahead, arcs)], axis=0)
+
+    def holds(self, arc: Arc, low: float, high: float) -> bool:
+        """Return whether an arc holds another, whole turns aside."""
+        turns = math.tau * math.floor((high - arc[0]) / math.tau) if self.turns else 0.0
+        return arc[0] <= low - turns and high - turns <= arc[1]
+
+    def within(self, low: float, high: float) -> Iterator[Arc]:
+        """Yield an arc, in two where it crosses pi."""
+        if not self.turns:
+            yield low, high
+            return
+        for turn in (0.0, math.tau):
+            start, end = max(low - turn, -math.pi), min(high - turn, math.pi)
+            if start < end:
+                yield start, end
+
+    def between(self, ends: Iterable[float]) -> List[Arc]:
+        """Return the arcs between values, in order; the last of a turn ends where it began."""
+        marks: List[float] = []
+        inside = map(_into_the_turn, ends) if self.turns else (
+            end for end in (self.low, *ends, self.high) if self.low <= end <= self.high)
+        for end in sorted(inside):
+            if not marks or end - marks[-1] > NARROWEST:
+                marks.append(end)
+        if not marks:
+            return [(self.low, self.high)]
+        return list(zip(marks, marks[1:] + [marks[0] + math.tau] * self.turns))
+
+
+CRANK = Input('crank')
+
+
+def wrapped(theta: Any) -> Any:
+    """Return angles [rad] in [-pi, pi)."""
+    turned = theta - math.tau * np.floor((theta + math.pi) / math.tau)
+    turned = np.where((turned < -math.pi) | (turned >= math.pi), -math.pi, turned)
+    return np.where((theta >= -math.pi) & (theta < math.pi), theta, turned)
+
+
+def _into_the_turn(theta: float) -> float:
+    return theta - math.tau * math.floor((theta + math.pi) / math.tau)
