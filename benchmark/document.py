@@ -12,7 +12,8 @@ BEGIN, END = '<!-- measured -->', '<!-- end of what is measured -->'
 def write(page, text):
     """Replace what a page of docs/ says between the marks."""
     before, _, rest = (DOCS / page).read_text().partition(BEGIN)
-    (DOCS / page).write_text(f'{before}{BEGIN}\n\n{text}\n{END}{rest.partition(END)[2]}')
+    after = rest.partition(END)[2]
+    (DOCS / page).write_text(f'{before}{BEGIN}\n\n{text.rstrip()}\n\n{END}{after}')
 
 
 def written(page):

@@ -38,9 +38,12 @@ def main():
     parser.add_argument('--document', action='store_true', help='write the table to docs/')
     parser.add_argument('--budget', type=float, default=1.5, metavar='SECONDS',
                         help='for each engine at each number of poses')
+    parser.add_argument('--tables', action='store_true',
+                        help='run nothing, show the last results')
     options = parser.parse_args()
-    result = run(options.budget)
-    RESULTS.write_text(json.dumps(result, indent=1) + '\n')
+    if not options.tables:
+        RESULTS.write_text(json.dumps(run(options.budget), indent=1) + '\n')
+    result = json.loads(RESULTS.read_text())
     if options.document:
         document.write('architecture.md', table(result))
     print(table(result))
@@ -71,10 +74,11 @@ def table(result):
     for row in result['rows']:
         times = [f'{row[f"us_{batch}"]:#.2g}' if f'us_{batch}' in row else ''
                  for batch in BATCHES]
+        make = 1e3 * row['make_s']
         failed = sum(count for name, count in row.items() if name.startswith('failed_'))
         lines.append('| ' + ' | '.join((
-            row['engine'], *times, f'{1e3 * row["make_s"]:.2g}', f'{row["median_uL"]:.2g}',
-            f'{row["max_uL"]:.2g}', f'{failed}')) + ' |')
+            row['engine'], *times, f'{make:.0f}' if make > 1 else f'{make:.1g}',
+            f'{row["median_uL"]:.2g}', f'{row["max_uL"]:.2g}', f'{failed}')) + ' |')
     about = result['machine']
     packages = ', '.join(f'{name} {number}' for name, number in about['packages'].items())
     return '\n'.join([*lines, '', f'{about["date"]}, {about["cpu"]}, one core; Python '
