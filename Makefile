@@ -55,6 +55,7 @@ demo: build ## Run the nodes, measure what they send, draw it to demo/out/
 bench: build $(venv)/.tools .venv-bench/.installed ## Measure run time against error, stability, and the nodes
 	@.venv-bench/bin/python benchmark/run.py
 	@.venv-bench/bin/python benchmark/stability.py
+	@.venv-bench/bin/python -m benchmark.engines
 	@$(in_ros) python -m benchmark.nodes --quick
 
 .PHONY: pictures

@@ -40,8 +40,10 @@ SIGNS = {r'\btheta\b': 'θ', r'\bphi\b': 'φ', r'\bpi\b': 'π', r'\bsqrt ?(?=[\d
          r'\^2\b': '²', r'\+-': '±', '->': '→'}
 
 # Where the formulas of the words are.
-FORMULAS = {'dyad': planar.dyad, 'rigid': planar.triangle, 'mirror': planar.mirror,
-            'inversor': planar.inversor, 'slot': planar.slot, 'slider': planar.slider}
+FORMULAS = {
+    'dyad': planar.dyad, 'rigid': planar.triangle, 'mirror': planar.mirror,
+    'inversor': planar.inversor, 'slot': planar.slot, 'slider': planar.slider,
+}
 
 
 def write(folder: Path):

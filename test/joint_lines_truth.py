@@ -305,8 +305,8 @@ class Linkage:
         self.placed = [name for line in self.lines for name in line.names]
         self.numbers = self.values()
         self.longest = max((abs(number) for line, row in zip(self.lines, self.numbers)
-                            for number in (row[:1] if line.word == 'slider' else row)),
-                           default=mpfr(1))
+                            for kind, number in zip(re.sub('[js]', '', _FORMS[line.word]), row)
+                            if kind == 'n'), default=mpfr(1))
         self._links()
         self._stand()
         self._templates = {}
@@ -355,7 +355,7 @@ class Linkage:
                 self._body(i, joints[0], names[0])
             elif line.word == 'slider':
                 self._body(i, joints[0], names[0])
-            elif line.word in ('rigid', 'line'):
+            elif line.word in LAID:
                 self.body_of(*joints).append(names[0])
 
     def _body(self, _, first, second):
@@ -391,9 +391,7 @@ class Linkage:
             return mpc(self._bar(numbers, body[0], name))
         i = next(i for i, line in enumerate(self.lines) if name in line.names)
         first, second = (self._template(numbers, body, joint) for joint in self.lines[i].joints)
-        if self.lines[i].word == 'line':
-            return first + (second - first) / abs(second - first) * numbers[i][0]
-        return meet(DIGITS, first, numbers[i][0], second, numbers[i][1], self.lines[i].side)[0]
+        return LAID[self.lines[i].word](first, second, numbers[i], self.lines[i].side)
 
     def _bar(self, numbers, first, second):
         """Return the length that is written, or follows, for a bar."""
@@ -426,13 +424,9 @@ class Linkage:
         """Return the numbers of every line, those of templates turned into what is laid on."""
         rows = []
         for line, row in zip(self.lines, numbers):
-            if line.word in ('rigid', 'line'):
+            if line.word in LAID:
                 base = self.base(numbers, *line.joints)
-                if line.word == 'line':
-                    row = (mpc(row[0] / base),)
-                else:
-                    corner, gap = meet(DIGITS, mpc(0), row[0], mpc(base), row[1], line.side)
-                    row = (corner / base, gap)
+                row = (LAID[line.word](mpc(0), mpc(base), row, line.side) / base,)
             elif line.word == 'slider':
                 row = (row[0], DIGITS.turned(row[1]), row[1])
             rows.append(row)
@@ -443,7 +437,7 @@ class Linkage:
         """Return rows and turns for `FLOATS`, lengths in units of the longest, and that unit."""
         unit, rows = self.longest, []
         for line, row in zip(self.lines, self.prepared(self.numbers)):
-            if line.word in ('rigid', 'line'):
+            if line.word in LAID:
                 rows.append((complex(row[0]),))
             elif line.word == 'slider':
                 rows.append((float(row[0] / unit), complex(row[1]), float(row[2])))
@@ -555,6 +549,21 @@ def meet(do, p, radius_p, q, radius_q, side):
     return p + do.divided(meeting, across), square / (radius_p * radius_q) ** 2
 
 
+def _corner(first, second, row, side):
+    return meet(DIGITS, first, row[0], second, row[1], side)[0]
+
+
+def _on_line(first, second, row, _):
+    return first + (second - first) / abs(second - first) * row[0]
+
+
+# The words for a point of a link, and where on the drawing of the link its numbers put it.
+LAID = {
+    'rigid': _corner,
+    'line': _on_line,
+}
+
+
 def _turned(do, vector):
     return vector * do.point(0, 1)
 
@@ -585,7 +594,7 @@ def draw(do, linkage, rows, thetas, way=None, turns=None, moved=None):
                 side = side * _dyad_passes(do, way[i], angle_of[pin], turns[i])
             points[name], gaps[name] = meet(do, at[0], row[0], at[1], row[1], side)
             arms[name] = abs(at[1] - at[0])
-        elif word in ('rigid', 'line'):
+        elif word in LAID:
             points[name] = at[0] + (at[1] - at[0]) * row[0]
         elif word == 'mirror':
             arm, spoke = at[2] - at[1], at[0] - at[1]

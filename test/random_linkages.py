@@ -19,8 +19,11 @@ import numpy as np
 DEGENERATE = 0.35
 # How far from exactly degenerate.
 NEAR = (0.0, 0.0, 0.0, 1e-16, 1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9)
-WORDS = ('dyad', 'rigid', 'line', 'mirror', 'parallelogram', 'inversor', 'slot', 'slider')
-LIKELY = np.array((6, 2, 2, 2, 1, 1, 2, 2), float)
+# The words, and how often they come up.
+WORDS = {
+    'dyad': 6, 'rigid': 2, 'line': 2, 'mirror': 2, 'parallelogram': 1, 'inversor': 1, 'slot': 2,
+    'slider': 2,
+}
 
 
 class Design(NamedTuple):
@@ -100,7 +103,7 @@ class _Writer:
         for _ in range(10 * moving):
             if len(self._place) - len(self._fixed) >= moving + cranks:
                 break
-            word = rng.choice(WORDS, p=LIKELY / LIKELY.sum())
+            word = rng.choice(list(WORDS), p=np.array(list(WORDS.values())) / sum(WORDS.values()))
             getattr(self, f'_{word}')()
         branches = {}
         for line in self._lines:

@@ -5,18 +5,25 @@
 
 from fractions import Fraction
 import math
+from pathlib import Path
+import shutil
+import subprocess
+import sys
 
 from accuracy import broken, case_of, judge, summary
+import linkage_checks as checks
 from linkage_ros import mechanisms
 from linkage_ros.mechanisms.four_bar import grashof
 import numpy as np
 import pytest
+from random_linkages import Design
 import reference
+import reference_wider
 from reference_wider import HELD
 import stress
 
-WIDER = ['four_bar', 'slider_crank', 'hoeken', 'chebyshev_lambda', 'watt', 'klann', 'whitworth',
-         'pantograph', 'five_bar']
+# Those with a reference of their own, beside the one that draws every joint line.
+WIDER = [kind for kind in reference_wider.PLACE if kind in mechanisms.TYPES]
 
 
 def held(linkage):
@@ -42,8 +49,34 @@ def ends(linkage):
     return [end for arc in linkage.reach(*held(linkage)) for end in arc][:4]
 
 
-def test_the_catalogue_keeps_its_first_four_and_lists_the_others_behind():
-    assert list(mechanisms.TYPES) == [*mechanisms.CATALOGUE, *WIDER]
+def test_the_catalogue_is_what_is_in_its_folder_the_first_four_in_front():
+    files = sorted(Path(mechanisms.__file__).parent.glob('[a-z]*.py'))
+    others = [file.stem for file in files if file.stem not in ('custom', *mechanisms.CATALOGUE)]
+    assert list(mechanisms.TYPES) == [*mechanisms.CATALOGUE, *others]
+
+
+@pytest.mark.parametrize('text, said', [
+    ('', "module 'linkage_ros.mechanisms.broken' has no attribute 'DESIGN'"),
+    ('DESIGN = Design()', "name 'Design' is not defined"),
+    ('DESIGN = ', 'invalid syntax'),
+    (Path(mechanisms.TYPES['watt'].__file__).read_text(),
+     "must have the name of its design, 'watt'")])
+def test_a_file_that_is_no_mechanism_is_named(tmp_path, text, said):
+    package = tmp_path / 'linkage_ros'
+    shutil.copytree(Path(mechanisms.__file__).parents[1], package)
+    (package / 'mechanisms' / 'broken.py').write_text(text)
+    ended = subprocess.run([sys.executable, '-c', 'import linkage_ros.mechanisms'], cwd=tmp_path,
+                           capture_output=True, text=True, timeout=60)
+    error = ended.stderr.splitlines()[-1]
+    assert error.startswith('ImportError: linkage_ros.mechanisms.broken ') and said in error
+
+
+@pytest.mark.parametrize('kind', list(mechanisms.TYPES))
+def test_every_mechanism_holds_what_any_linkage_must(kind):
+    design = Design(mechanisms.design(kind).joints, mechanisms.create(kind).dimensions, {})
+    found = [problem for seed in range(5)
+             for problem in checks.problems(design, np.random.default_rng(seed))[0]]
+    assert not found, found[0]
 
 
 @pytest.mark.parametrize('kind', WIDER)

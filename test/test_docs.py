@@ -3,6 +3,7 @@
 
 """The pages: what they link to is there, what they say to type works, and nothing is left out."""
 
+import json
 from pathlib import Path
 import re
 import shlex
@@ -101,6 +102,14 @@ def test_the_page_of_a_mechanism_has_all_of_it(catalogue, type_):
     for line in mechanisms.design(type_).joints:
         assert line.split(maxsplit=1)[1].split()[-1] in page
     exec(compile(re.findall(r'```python\n(.*?)```', page, re.DOTALL)[0], type_, 'exec'), {})
+
+
+def test_the_table_of_engines_is_that_of_the_last_run(monkeypatch):
+    pytest.importorskip('mpmath')
+    monkeypatch.syspath_prepend(ROOT)
+    from benchmark import document, engines
+    result = json.loads(engines.RESULTS.read_text())
+    assert document.written('architecture.md') == engines.table(result)
 
 
 def test_text_of_a_docstring_is_taken_for_text(catalogue):

@@ -9,6 +9,7 @@ measure from `joint_lines_accuracy`, what is asked from `linkage_checks`.
 """
 
 from collections import Counter
+from itertools import count, islice
 import math
 
 import gmpy2
@@ -25,6 +26,8 @@ import stress
 
 WORDS = {'ground', 'crank', *random_linkages.WORDS}
 LONG, BATCH = 1000, 25
+# Lengths of the linkage in which every construction moves.
+MOVING = {'a': 1.0, 'b': 3.0, 'c': 2.5, 'd': 3.2, 'e': 1.5, 'f': 2.0, 'g': 3.5, 'h': 4.0}
 
 
 def problems(seeds, asked):
@@ -68,6 +71,17 @@ def test_a_thousand_random_linkages_hold(batch):
     assert not found, report(found)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize('word', random_linkages.WORDS)
+def test_linkages_of_each_word_hold(word):
+    def has_word(seed):
+        joints = random_linkages.design(np.random.default_rng(seed)).joints
+        return word in (read(text).word for text in joints)
+
+    found = problems(islice(filter(has_word, count(5000)), 10), all_of_them)
+    assert not found, report(found)
+
+
 # --- that the check is a check ------------------------------------------------------------------
 
 def test_every_word_comes_up_and_a_third_is_degenerate():
@@ -89,8 +103,7 @@ def test_every_word_comes_up_and_a_third_is_degenerate():
 @precisely
 def test_the_drawing_agrees_with_the_other_reference(kind):
     if kind == 'custom':
-        joints = reference_wider.MOVING
-        lengths = {'a': 1.0, 'b': 3.0, 'c': 2.5, 'd': 3.2, 'e': 1.5, 'f': 2.0, 'g': 3.5, 'h': 4.0}
+        joints, lengths = reference_wider.MOVING, MOVING
     else:
         design = mechanisms.design(kind)
         joints, lengths = design.joints, mechanisms.create(kind).dimensions
@@ -154,8 +167,8 @@ def test_floats_and_digits_draw_the_same():
 
 
 def test_the_measure_sees_a_flaw_in_the_last_digits_and_a_wrong_nan():
-    rng = np.random.default_rng(9)
-    subject = checks.Subject(random_linkages.design(rng), rng)
+    subject = checks.Subject(random_linkages.Design(reference_wider.MOVING, MOVING, {}),
+                             np.random.default_rng(9))
     thetas = np.array([[0.7, *subject.held]])
     found = accuracy.answers(subject.mechanism, thetas, subject.poses, True)
     measure = subject.measure()

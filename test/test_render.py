@@ -142,7 +142,7 @@ def test_the_bars_in_the_data_are_as_long_as_in_the_original_document(tmp_path):
         assert math.dist(*ends) == pytest.approx(length, rel=1e-13)
 
 
-@pytest.mark.parametrize('type_', [t for t in mechanisms.TYPES])
+@pytest.mark.parametrize('type_', list(mechanisms.TYPES))
 def test_both_directions_have_one_scale_and_nothing_is_cut_off(type_):
     one = machine(type_)
     picture = picture_of(one, size=(640, 400))
@@ -257,8 +257,9 @@ def test_the_floor_moves_as_the_foot_that_stands_on_it():
 
 
 def test_a_line_is_drawn_where_the_curve_is_one():
-    straight = [t for t in mechanisms.TYPES if t != 'five_bar'
-                and layers.straight(Cycle(machine(t)).locus(machine(t))) is not None]
+    curves = {t: Cycle(machine(t)).locus(machine(t)) for t in (
+        'peaucellier', 'slider_crank', 'whitworth', 'jansen', 'hoeken', 'watt', 'pantograph')}
+    straight = [t for t, curve in curves.items() if layers.straight(curve) is not None]
     assert straight == ['peaucellier', 'slider_crank', 'whitworth']
 
 

@@ -24,14 +24,13 @@ import time
 from types import SimpleNamespace
 
 from . import report
+from .. import document
 
 sys.path.insert(0, str(Path(__file__).parents[2] / 'test'))
 
 from domains import Domain  # noqa: E402
 
 ROS = [SimpleNamespace(package=name) for name in ('ros-rclpy', 'ros-rmw-fastrtps-cpp')]
-DOCUMENT = Path(__file__).parents[2] / 'docs' / 'performance.md'
-BEGIN, END = '<!-- measured -->', '<!-- end of what is measured -->'
 RESULTS = Path(__file__).parents[1] / 'results' / 'nodes.json'
 
 
@@ -51,8 +50,7 @@ def main():
     options.output.write_text(json.dumps(result, indent=1) + '\n')
     tables = report.document(result)
     if options.document:
-        before, _, rest = DOCUMENT.read_text().partition(BEGIN)
-        DOCUMENT.write_text(f'{before}{BEGIN}\n\n{tables}\n{END}{rest.partition(END)[2]}')
+        document.write('performance.md', tables)
     print(tables)
 
 

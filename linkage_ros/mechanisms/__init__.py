@@ -13,27 +13,14 @@ The catalogue: mechanisms by the names that users type.
 """
 
 from functools import lru_cache
-from types import MappingProxyType
-from typing import Iterable, Mapping, Optional, Sequence, Tuple
+from importlib import import_module
+import pkgutil
+from types import MappingProxyType, ModuleType
+from typing import Dict, Iterable, Mapping, Optional, Sequence, Tuple
 
 from numpy.typing import ArrayLike
 
-from . import (
-    chebyshev_lambda,
-    custom,
-    five_bar,
-    four_bar,
-    hoeken,
-    jansen,
-    klann,
-    pantograph,
-    peaucellier,
-    slider_crank,
-    slotted_lever,
-    water_drop,
-    watt,
-    whitworth,
-)
+from . import custom
 from ..linkage.arguments import checked_branches, checked_dimensions
 from ..linkage.mechanism import Design, Structure
 from ..linkage.servo import Mechanism
@@ -42,12 +29,28 @@ from ..words import quoted
 # What a scene shows when it names no mechanism.
 CATALOGUE = 'water_drop', 'jansen', 'peaucellier', 'slotted_lever'
 
-TYPES = MappingProxyType({m.DESIGN.name: m for m in (
-    water_drop, jansen, peaucellier, slotted_lever,
-    four_bar, slider_crank, hoeken, chebyshev_lambda, watt, klann, whitworth, pantograph,
-    five_bar)})
-
 CUSTOM = 'custom'
+
+
+def _found() -> Dict[str, ModuleType]:
+    """Return the modules of this folder by the type that each is: those of CATALOGUE first."""
+    names = [module.name for module in pkgutil.iter_modules(__path__) if module.name != CUSTOM]
+    return {name: _module(name) for name in dict.fromkeys((*CATALOGUE, *sorted(names)))}
+
+
+def _module(name: str) -> ModuleType:
+    """Import a mechanism; raise ImportError, with its name, for what is none."""
+    try:
+        module = import_module(f'{__name__}.{name}')
+        called = module.DESIGN.name
+    except Exception as error:
+        raise ImportError(f'{__name__}.{name} is no mechanism: {error}') from error
+    if called != name:
+        raise ImportError(f'{__name__}.{name} must have the name of its design, {quoted(called)}')
+    return module
+
+
+TYPES = MappingProxyType(_found())
 
 
 @lru_cache(maxsize=32)

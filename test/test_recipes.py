@@ -1,0 +1,78 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The recipes of docs/architecture.md, followed to the letter in a copy of the repository."""
+
+from pathlib import Path
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / 'docs' / 'architecture.md'
+# What is made, or belongs to no release.
+MADE = re.compile(r'\..*|__pycache__|(build|install|log)(-.*)?|out|_build')
+
+
+def steps(title):
+    """Return the numbered steps of a recipe, each with the code under it."""
+    recipe = PAGE.read_text().partition(f'### {title}\n')[2].partition('\n##')[0]
+    found = []
+    for step in re.split(r'^\d+\. ', recipe, flags=re.MULTILINE)[1:]:
+        text, _, rest = step.partition('```')
+        indent = len(text) - len(text.rstrip(' '))
+        language, _, code = rest.partition('```')[0].partition('\n')
+        lines = [line[indent:] for line in code.rstrip(' ').splitlines()]
+        found.append((' '.join(text.split()), language, '\n'.join(lines) + '\n'))
+    return found
+
+
+def follow(folder, text, language, code):
+    """Do a step: run its commands, or put its code into its file."""
+    if language == 'console':
+        for command in code.splitlines():
+            run(folder, shlex.split(command.removeprefix('$ ')))
+        return
+    file = folder / re.match('`(.*?)`', text)[1]
+    where = re.search('(before|after) `(.*?)`', text, re.IGNORECASE)
+    if not where:
+        assert not file.exists(), f'{text}: the file is there, so where does the code belong?'
+        file.write_text(code)
+        return
+    lines = file.read_text().splitlines(keepends=True)
+    at, = [i for i, line in enumerate(lines) if where[2] in line]
+    space = '\n\n' if code.startswith('def ') else '\n' if 'def ' in code else ''
+    lines.insert(at + (where[1].lower() == 'after'), code + space)
+    file.write_text(''.join(lines))
+
+
+def run(folder, command):
+    """Run a command line with this Python, which must end well."""
+    assert command[0] == 'python'
+    ended = subprocess.run([sys.executable, *command[1:]], cwd=folder, text=True, timeout=300,
+                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    assert ended.returncode == 0, f'{" ".join(command)}\n{ended.stdout[-5000:]}'
+    return ended.stdout
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('title', ['A mechanism', 'A construction'])
+def test_a_recipe_can_be_followed_to_the_letter(tmp_path, title):
+    copy = shutil.copytree(ROOT, tmp_path / 'copy', ignore=lambda _, names: [
+        name for name in names if MADE.fullmatch(name)])
+    for step in steps(title):
+        follow(copy, *step)
+
+
+def test_every_step_of_a_recipe_names_a_file_that_is_there():
+    text = PAGE.read_text().partition('## Recipes\n')[2]
+    new = {f'`{code}`' for code in ('linkage_ros/mechanisms/roberts.py', 'config/roberts.yaml')}
+    named = set(re.findall(r'`[\w/]+\.\w+`', re.sub(r' *```.*?```', '', text, flags=re.DOTALL)))
+    assert new < named
+    for name in sorted(named - new):
+        path = name.strip('`')
+        assert any((ROOT / folder / path).exists() for folder in ('', 'linkage_ros')), path
