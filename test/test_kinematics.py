@@ -479,3 +479,43 @@ def test_what_comes_while_the_node_is_kept_waiting_is_not_lost(graph):
     graph.until(lambda: answers and answers[-1].header.stamp.sec == 1080)
     stamps = [message.header.stamp.sec for message in answers if message.header.stamp.sec > 1000]
     assert stamps == list(range(1031, 1081))
+
+
+BOOM = {'mechanisms': ['boom'], 'boom.type': 'custom', 'boom.scale': 2.0, 'boom.joints': [
+    'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C line O B 1.6',
+    'D rigid O B 0.6 0.7 left', 'E cylinder D B 0.4 left']}
+
+
+def test_a_linkage_with_two_cylinders_follows_both_lengths(graph):
+    graph.start(CrankDriver, {**BOOM, 'boom.cylinder.speed': 0.3, 'boom.cylinder2.speed': -0.1,
+                              'boom.cylinder2.start': 1.1})
+    graph.start(Kinematics, BOOM)
+    states = graph.listen(JointState, 'boom/joint_states')
+    drawn = graph.listen(MarkerArray, 'boom/markers')
+    pairs = graph.until(lambda: [(s, m) for s in states for m in drawn
+                                 if s.header.stamp == m.markers[0].header.stamp][:20])
+    for state, message in pairs:
+        lengths = dict(zip(state.name, state.position))
+        speeds = dict(zip(state.name, state.velocity))
+        place = dict(zip('OPBCDE', places(message.markers[-1])))
+        for name, ends in (('cylinder', 'PB'), ('cylinder2', 'DE')):
+            assert math.dist(*map(place.get, ends)) == pytest.approx(lengths[f'boom_{name}'])
+        assert (speeds['boom_cylinder'], abs(speeds['boom_cylinder2'])) == (0.3, 0.1)
+        assert math.dist(place['O'], place['B']) == pytest.approx(2.2)
+        # The law of cosines in the triangle of base, boom and cylinder, differentiated.
+        area = abs(place['P'][0] * place['B'][1] - place['P'][1] * place['B'][0])
+        assert abs(speeds['boom_OB']) == pytest.approx(0.3 * lengths['boom_cylinder'] / area)
+        lines = places(message.markers[0]).reshape(-1, 2, 2)
+        assert any((line == [place['P'], place['B']]).all() for line in lines)
+
+
+def test_a_length_that_cannot_be_is_said_in_metres(graph):
+    alone = {**BOOM, 'boom.joints': BOOM['boom.joints'][:4]}
+    graph.start(Kinematics, alone)
+    heard, drawn = graph.listen(Log, '/rosout'), graph.listen(MarkerArray, 'boom/markers')
+    push = graph.crank(['boom_cylinder'])
+    push([2.0], drawn)
+    with pytest.raises(AssertionError, match='in time'):
+        push([9.0], [], seconds=0.3)
+    graph.until(lambda: [m for m in heard if 'boom cannot be assembled at cylinder length 9 m; '
+                         'the reach is [1.12297, 3.27703] m' in m.msg])

@@ -17,7 +17,7 @@ import stress
 
 native = pytest.importorskip('linkage_ros.formula.llvm_code')
 
-TYPES = [kind for kind in mechanisms.TYPES if len(mechanisms.create(kind).cranks) == 1]
+TYPES = [kind for kind in mechanisms.TYPES if len(mechanisms.create(kind).inputs) == 1]
 
 
 def angles(linkage):

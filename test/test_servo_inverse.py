@@ -4,6 +4,7 @@
 """The servo service: right answers, or the reason why there is none."""
 
 import array
+import cmath
 import math
 import re
 from types import SimpleNamespace
@@ -29,7 +30,7 @@ GRIPPER = {
                        'B dyad A Q rod finger left', 'T rigid Q B 0.09 0.06 right'],
     'gripper.dimensions.base': 0.04, 'gripper.dimensions.drive': 0.02,
     'gripper.dimensions.rod': 0.045, 'gripper.dimensions.finger': 0.05}
-KINDS = [kind for kind in mechanisms.TYPES if len(mechanisms.create(kind).cranks) == 1]
+KINDS = [kind for kind in mechanisms.TYPES if len(mechanisms.create(kind).inputs) == 1]
 
 
 @pytest.fixture
@@ -374,3 +375,20 @@ def test_the_handler_never_raises(graph):
     broken = SimpleNamespace(mechanism='', lever_angle=None, servo_near='x')
     response = node.answer(broken, Service.Response())
     assert not response.success and response.message
+
+
+def test_a_cylinders_length_is_answered_in_metres(call):
+    boom = {'mechanisms': ['boom'], 'boom.type': 'custom', 'boom.scale': 2.0, 'boom.joints': [
+        'O ground 0 0', 'P ground 0.5 0', 'B cylinder P O 1.1 right']}
+    wanted = [0.3, 1.2, 3.0]
+    response = call(boom, output='OB', lever_angle=wanted)
+    assert response.success
+    for angle, length, ratio in zip(wanted, response.servo_angle, response.reduction):
+        assert length == pytest.approx(abs(2.2 * cmath.exp(1j * angle) - 1.0))
+        assert ratio == pytest.approx(length / (2.2 * 1.0 * math.sin(angle)))
+    missed = call({**boom, 'boom.cylinder.sweep': [1.5, 2.0]}, output='OB', lever_angle=[3.0])
+    assert missed.message == ('values of OB 3 cannot be reached; 3 needs the cylinder at 3.19311 m, '
+                              'outside cylinder.sweep [1.5, 2]: beyond its upper end')
+    high = call({**boom, 'boom.cylinder.sweep': [1.5, 2.0]}, output='B.y', lever_angle=[2.19])
+    assert 'B.y reaches [' in high.message and 'm, its greatest at the cylinder length' in \
+        high.message

@@ -317,8 +317,9 @@ class Mechanism:
             for link, frame in self._structure.sketch.frames.items()})
 
     def _metres(self, length: Real):
-        """Return the value [m] of a length of dimensions alone."""
-        return self._value(in_metres(length))
+        """Return the value [m] of a length of dimensions alone: a float, or an array."""
+        value = self._value(in_metres(length))
+        return value if np.ndim(value) else float(value)
 
     def _value(self, expression: Real):
         with np.errstate(all='ignore'):

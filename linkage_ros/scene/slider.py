@@ -44,7 +44,8 @@ def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
         return _length(machine.linkage, key, field.positive, _used(machine))
     if machine and what in machine.inputs:
         reach = machine.inputs[what].reach
-        return _whole_stops(value, min(low for low, _ in reach), max(high for _, high in reach))
+        ends = [value, *(end for arc in reach for end in arc)]
+        return _whole_stops(value, min(ends), max(ends))
     return _whole_stops(value, 0.1 * value, 10.1 * value)
 
 

@@ -1,0 +1,193 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A linkage that a length drives does all that one driven by an angle does."""
+
+import math
+
+from linkage_ros import mechanisms, scene
+from linkage_ros.linkage.inputs import LENGTH
+from linkage_ros.render.cycle import Cycle
+from linkage_ros.scene import slider
+import mpmath
+import numpy as np
+import pytest
+
+# A boom O-B on a cylinder P-B; a bar Q-D keeps the bucket C-D nearly level.
+BOOM = ('O ground 0 0', 'P ground g -h', 'B cylinder P O r right', 'C line O B 1.5*r',
+        'Q ground 0 0.3*g', 'D dyad C Q 0.3*g 1.5*r right')
+LENGTHS = {'g': 0.5, 'h': 0.25, 'r': 1.0486}
+SCENE = {'mechanisms': ['boom'], 'boom.type': 'custom', 'boom.joints': list(BOOM),
+         **{f'boom.dimensions.{name}': value for name, value in LENGTHS.items()}}
+
+
+def boom(**changed):
+    return mechanisms.create('custom', joints=BOOM, **{**LENGTHS, **changed})
+
+
+def boom_angle(length, g, h, r):
+    """Return where the boom points [rad], in 60 digits: the law of cosines at O."""
+    g, h, r, s = map(mpmath.mpf, (g, h, r, length))
+    base = mpmath.hypot(g, h)
+    return mpmath.acos((base ** 2 + r ** 2 - s ** 2) / (2 * base * r)) - mpmath.atan2(h, g)
+
+
+def strokes(linkage, count=25):
+    low, high = linkage.reach()[0]
+    return np.linspace(low + 1e-3 * (high - low), high - 1e-3 * (high - low), count)
+
+
+def test_the_input_is_a_length_with_a_stroke():
+    input_, = boom().inputs
+    base = math.hypot(LENGTHS['g'], LENGTHS['h'])
+    assert (input_.name, input_.kind, input_.unit) == ('cylinder', LENGTH, 'm')
+    assert (input_.low, input_.high) == pytest.approx((LENGTHS['r'] - base, LENGTHS['r'] + base))
+
+
+@pytest.mark.parametrize('size', [1e-150, 1e-6, 1.0, 3e7, 1e150])
+def test_a_boom_turns_by_the_law_of_cosines(size):
+    lengths = {name: size * value for name, value in LENGTHS.items()}
+    linkage = boom(**lengths)
+    for length in strokes(linkage):
+        with mpmath.workdps(60):
+            angle = boom_angle(length, **lengths)
+            rate = mpmath.diff(lambda s: boom_angle(s, **lengths), length,
+                               h=mpmath.mpf(length) / mpmath.mpf(2) ** 80)
+        sensitivity = abs(float(rate)) * length * 2.0 ** -52 + 1e-15
+        assert abs(linkage.joint_angles(length)['OB'] - float(angle)) < 8 * sensitivity
+        assert linkage.joint_rates(length)['OB'] == pytest.approx(float(rate), rel=1e-9)
+        x, y = linkage.solve(length)['B'] / lengths['r']
+        assert math.hypot(x - mpmath.cos(angle), y - mpmath.sin(angle)) < 8 * sensitivity
+
+
+def test_the_cylinder_is_as_long_as_it_says_and_points_along_itself():
+    linkage = boom()
+    for length in strokes(linkage):
+        place = linkage.solve(length)
+        x, y = place['B'] - place['P']
+        assert math.hypot(x, y) == pytest.approx(length, rel=1e-14)
+        found = linkage.joint_angles(length)
+        assert found['barrel'] == pytest.approx(math.atan2(y, x), abs=1e-14)
+        assert found['cylinder'] == length
+
+
+@pytest.mark.parametrize('shape', [(), (1,), (3, 2), (0,)])
+def test_arrays_functions_and_machine_code_say_the_same(shape):
+    linkage = boom()
+    length = np.resize(strokes(linkage, 6), shape)
+    points = linkage.solve(length)
+    quick = linkage.accelerated().solve(length)
+    rates, speeds = linkage.joint_rates(length), linkage.velocity(length)
+    pose = linkage.function(None, linkage.joints, linkage.joints)
+    for name, place in points.items():
+        assert place.shape == (*shape, 2) == speeds[name].shape
+        np.testing.assert_array_equal(quick[name], place)
+    for index in np.ndindex(shape):
+        values = pose(float(length[index]))
+        assert values[2:4] == tuple(points['P'][index])
+        assert values[-1] == rates['QD'][index]
+
+
+def test_a_rate_is_a_difference_by_the_length():
+    linkage, step = boom(), 1e-6
+    length = strokes(linkage)
+    before, after = (linkage.solve(length + sign * step)['D'] for sign in (-1, 1))
+    np.testing.assert_allclose(linkage.velocity(length)['D'], (after - before) / (2 * step),
+                               rtol=1e-6, atol=1e-7)
+
+
+def test_the_reach_is_a_stroke_and_its_ends_are_dead_points():
+    linkage = mechanisms.create('custom', joints=BOOM[:3], **LENGTHS)
+    base, r = math.hypot(LENGTHS['g'], LENGTHS['h']), LENGTHS['r']
+    assert linkage.reach() == [pytest.approx((r - base, r + base), rel=1e-15)]
+    assert linkage.dead_points() == list(linkage.reach()[0])
+    assert linkage.distance_to_dead_point(r - base + 0.125) == pytest.approx(0.125)
+    for end in linkage.reach()[0]:
+        assert np.isfinite(linkage.solve(end)['B']).all()
+        beyond = end + math.copysign(1e-12, end - r)
+        assert np.isnan(linkage.solve(beyond)['B']).all()
+    angle = linkage.transmission_angles(strokes(linkage))['B']
+    assert angle.min() > 0.0 and angle.max() < math.pi
+
+
+def test_what_hangs_on_a_cylinder_limits_its_stroke():
+    linkage = boom(g=0.3)
+    low, high = linkage.inputs[0].low, linkage.inputs[0].high
+    length = np.linspace(low, high, 4001)
+    placed = np.isfinite(linkage.solve(length)['D']).all(axis=1)
+    held = linkage.inputs[0].on(linkage.reach(), length)
+    assert placed.any() and np.count_nonzero(placed != held) <= 2
+
+
+@pytest.mark.parametrize('output', ['OB', 'D.y', 'barrel', 'CD'])
+def test_the_inverse_finds_every_length_that_gives_an_output(output):
+    linkage = boom()
+    for length in strokes(linkage, 9):
+        joint, _, axis = output.rpartition('.')
+        value = (linkage.solve(length)[joint]['xy'.index(axis)] if joint
+                 else linkage.joint_angles(length)[output])
+        answers = linkage.input_for(output, value)
+        assert np.nanmin(abs(answers - length)) < 1e-9
+        near, rate = linkage.servo_for(output, value, near=length, ends=(0.4, 1.7))
+        assert near == pytest.approx(length, abs=1e-9) and rate != 0.0
+    assert np.isnan(linkage.servo_for('D.y', 99.0)[0])
+
+
+def test_several_cylinders_are_several_inputs():
+    machine = scene.load('config/excavator.yaml').machines['excavator']
+    assert list(machine.inputs) == ['cylinder', 'cylinder2', 'cylinder3']
+    lengths = [0.9, 1.3, 1.1]
+    place = {name: complex(*at) for name, at in machine.linkage.solve(lengths).items()}
+    for (base, rod), length in zip(('PB', 'CD', 'FG'), lengths):
+        assert abs(place[base] - place[rod]) == pytest.approx(length, rel=1e-14)
+    for (first, second), length in machine.linkage.bar_lengths.items():
+        assert abs(place[first] - place[second]) == pytest.approx(length, rel=1e-13)
+    bucket = machine.linkage.velocity(lengths, by=2)
+    assert not bucket['A'].any() and bucket['T'].any()
+
+
+def test_a_scene_counts_lengths_in_metres_scaled():
+    machine = scene.read({**SCENE, 'boom.scale': 10.0, 'boom.cylinder.speed': 0.5,
+                          'boom.cylinder.start': 9.0}).machines['boom']
+    drive = machine.first
+    assert drive.reach[0] == pytest.approx(np.multiply(10.0, boom().reach()[0]))
+    assert drive.start == 9.0 and drive.sweep[0] > drive.reach[0][0]
+    solution = machine.assembly().solution(('B', 'P'), ('OB',), ('OB',))
+    solution.solve([9.0], [0.5])
+    *places, angle, speed = solution.rows[0]
+    assert math.dist(places[:2], places[2:]) == pytest.approx(9.0)
+    assert angle == boom().joint_angles(0.9)['OB']
+    assert speed == pytest.approx(0.05 * boom().joint_rates(0.9)['OB'])
+
+
+@pytest.mark.parametrize('name, value, text', [
+    ('cylinder.start', 9.0, r'boom.cylinder.start must be inside the reach \[.*\] m, not 9'),
+    ('cylinder.sweep', [0.1, 1.0], r'boom.cylinder.sweep must be inside the reach \[.*\] m'),
+    ('cylinder.sweep', [1.0, 1.0], 'boom.cylinder.sweep must be .* lower end'),
+    ('cylinder.speed', 1e3, 'boom.cylinder.speed must be .* from -100 to 100'),
+    ('crank.speed', 1.0, 'boom.crank.speed is not a parameter')])
+def test_a_bad_value_of_a_cylinder_is_refused(name, value, text):
+    with pytest.raises(scene.SceneError, match=text):
+        scene.read({**SCENE, f'boom.{name}': value})
+
+
+def test_its_parameters_say_metres_and_have_sliders():
+    read = scene.read(SCENE)
+    about = {parameter.name: parameter for parameter in read.parameters}
+    assert about['boom.cylinder.speed'].field.meaning == 'Speed of the cylinder [m/s].'
+    low, high = slider.ends(read, about['boom.cylinder.start'])
+    (least, greatest), = read.machines['boom'].first.reach
+    assert low <= least and high == pytest.approx(greatest, abs=0.03)
+
+
+def test_a_picture_follows_the_stroke_there_and_back():
+    machine = scene.read({**SCENE, 'boom.cylinder.start': 0.9}).machines['boom']
+    cycle = Cycle(machine)
+    assert cycle.pose(0.0).inputs == (0.9,)
+    low, high = machine.first.sweep
+    lengths = [cycle.pose(turns).inputs[0] for turns in np.linspace(0.0, 1.0, 101)]
+    assert low <= min(lengths) < low + 0.03 and high - 0.03 < max(lengths) <= high
+    assert np.isfinite(cycle.course).all()
+    assert cycle.pose(cycle.first.turns_to(1.0)).inputs[0] == pytest.approx(1.0)
+    with pytest.raises(scene.SceneError, match='the cylinder length never is 9 m'):
+        cycle.first.turns_to(9.0)
