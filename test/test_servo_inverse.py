@@ -377,18 +377,26 @@ def test_the_handler_never_raises(graph):
     assert not response.success and response.message
 
 
+BOOM = {'mechanisms': ['boom'], 'boom.type': 'custom', 'boom.scale': 2.0, 'boom.joints': [
+    'O ground 0 0', 'P ground 0.5 0', 'B cylinder P O 1.1 right']}
+
+
 def test_a_cylinders_length_is_answered_in_metres(call):
-    boom = {'mechanisms': ['boom'], 'boom.type': 'custom', 'boom.scale': 2.0, 'boom.joints': [
-        'O ground 0 0', 'P ground 0.5 0', 'B cylinder P O 1.1 right']}
     wanted = [0.3, 1.2, 3.0]
-    response = call(boom, output='OB', lever_angle=wanted)
+    response = call(BOOM, output='OB', lever_angle=wanted)
     assert response.success
     for angle, length, ratio in zip(wanted, response.servo_angle, response.reduction):
         assert length == pytest.approx(abs(2.2 * cmath.exp(1j * angle) - 1.0))
         assert ratio == pytest.approx(length / (2.2 * 1.0 * math.sin(angle)))
-    missed = call({**boom, 'boom.cylinder.sweep': [1.5, 2.0]}, output='OB', lever_angle=[3.0])
-    assert missed.message == ('values of OB 3 cannot be reached; 3 needs the cylinder at 3.19311 m, '
-                              'outside cylinder.sweep [1.5, 2]: beyond its upper end')
-    high = call({**boom, 'boom.cylinder.sweep': [1.5, 2.0]}, output='B.y', lever_angle=[2.19])
-    assert 'B.y reaches [' in high.message and 'm, its greatest at the cylinder length' in \
-        high.message
+
+
+@pytest.mark.parametrize('output, wanted, text', [
+    ('OB', 3.0, 'values of OB 3 cannot be reached; 3 needs the cylinder at 3.19311 m, outside '
+                'cylinder.sweep [1.5, 2]: beyond its upper end'),
+    ('B.y', 2.19, 'values of B.y 2.19 cannot be reached; 2.19 needs the cylinder at 2.32829 m'),
+    ('B.y', 9.0, 'values of B.y 9 cannot be reached; B.y reaches [1.272, 1.9984] m'),
+    ('B.y', 9.0, 'm, its greatest at the cylinder length 2 m, the upper end of cylinder.sweep')])
+def test_a_length_that_cannot_be_had_is_explained_in_metres(call, output, wanted, text):
+    response = call({**BOOM, 'boom.cylinder.sweep': [1.5, 2.0]}, output=output,
+                    lever_angle=[wanted])
+    assert not response.success and text in response.message

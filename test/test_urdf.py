@@ -16,7 +16,8 @@ import pytest
 from robots import LIBRARIES, Yourdfpy
 
 TOLERANCE = 1e-12
-SLIDES = {'slide', 'block', 'cylinder', 'left0_block', 'left1_block', 'right0_block', 'right1_block'}
+SLIDES = {'slide', 'block', 'cylinder', 'left0_block', 'left1_block', 'right0_block',
+          'right1_block'}
 POSE = [0.3, -0.2, 0.92, math.pi / 2.0, 0.4, -1.1]
 GRIPPER = ['O ground 0 0', 'Q ground 0.08 0', 'A crank O 0.03', 'B dyad A Q 0.07 0.05 left',
            'P rigid A B 0.04 0.06 right', 'T rigid B Q 0.07 0.09 left']
@@ -148,7 +149,8 @@ def test_every_bar_is_a_rod_from_joint_to_joint(name):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize('name', [name for name in MACHINES if not re.match('five.bar|boom and', name)])
+@pytest.mark.parametrize('name', [
+    name for name in MACHINES if not re.match('five.bar|boom and', name)])
 def test_limits_hold_every_position_and_hardly_more(name):
     one = MACHINES[name]()
     at = [posed(one, np.array([theta]))[0] for arc in one.first.reach
