@@ -9,32 +9,30 @@ Numbers come from the linkage's own closures and outputs, each with its exact ra
 
 from __future__ import annotations
 
-from itertools import repeat
 import math
-from typing import Callable, Optional, Sequence, Tuple
+from typing import Any, Callable, List, Optional, Sequence, Tuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .arguments import numbers
-from .curves import extremes, refined, sampled
+from .curves import extremes
+from .dead_points import NEAR, near_zeros, NearZero
 from .inputs import Arc
 from .inverse import distinct, in_order, MonotoneBranches, nearest
-from .mechanism import Mechanism
+from .mechanism import Inputs, Mechanism
 from .planar import GRAZE
 from ..words import listed, quoted
 
-# How near to zero a closure comes, as a part of its size, for the output to change quickly there.
-NEAR = 1e-2
 # Dead points nearer to an end of the reach than this [rad] are that end.
 ONE = 1e-9
-# A closure whose size is less than so many times its rounding never leaves zero.
-FLAT = 256.0
 
 
 class Analysed(Mechanism):
     """A mechanism that also answers questions about its motion."""
 
-    def input_for(self, output: str, value, near=None, others: Sequence[float] = ()):
+    def input_for(self, output: str, value: ArrayLike, near: Optional[ArrayLike] = None,
+                  others: Sequence[float] = ()) -> Any:
         """
         Return the values of the first input that give an output the value that is wanted.
 
@@ -98,11 +96,11 @@ class Analysed(Mechanism):
         """
         self._check_output(output)
         pose, angular = self._bound('output', output), np.array([self._structure.turns(output)])
-        return [tuple(map(tuple, extremes(lambda value: pose.searched(value)[:1], *arc,
-                                          angular)[0].tolist()))
-                for arc in (self.reach() if arcs is None else arcs)]
+        found = [extremes(lambda value: pose.searched(value)[:1], low, high, angular)[0].tolist()
+                 for low, high in (self.reach() if arcs is None else arcs)]
+        return [(tuple(least), tuple(greatest)) for least, greatest in found]
 
-    def transmission_angles(self, theta, joints: Optional[Sequence[str]] = None) -> dict:
+    def transmission_angles(self, theta: Inputs, joints: Optional[Sequence[str]] = None) -> dict:
         """
         Return the angle at which each joint passes on its force.
 
@@ -160,7 +158,7 @@ class Analysed(Mechanism):
         """
         return [dead * self.inputs[0].size for dead in self._dead_points(others)]
 
-    def distance_to_dead_point(self, theta, *others: float):
+    def distance_to_dead_point(self, theta: ArrayLike, *others: float) -> Any:
         """
         Return how far the first input is from the nearest dead point.
 
@@ -184,76 +182,44 @@ class Analysed(Mechanism):
 
     # From here on the first input is counted in its size.
 
-    def _counted_reach(self, others) -> list:
+    def _counted_reach(self, others: Tuple[float, ...]) -> List[Arc]:
         """Return the reach in arcs, none of them on both sides of -pi or pi."""
         first = self.inputs[0]
         return [part for lo, hi in self.reach(*others)
                 for part in first.within(lo / first.size, hi / first.size)]
 
-    def _curve(self, kind, name, others) -> Callable:
+    def _curve(self, kind: str, name: Any, others: Tuple[float, ...]) -> Callable:
         """Return the function from the first input to numbers, and each one's rate by it."""
         pose, size = self._bound(kind, name), self.inputs[0].size
 
-        def curve(theta):
-            rows = pose.searched(theta * size, *others)
+        def curve(value: np.ndarray) -> np.ndarray:
+            rows = pose.searched(value * size, *others)
             rows[1::2] *= size
             return rows
         return curve
 
-    def _dead_points(self, others):
+    def _dead_points(self, others: Tuple[float, ...]) -> List[float]:
         first = self.inputs[0].counted()
         # At -pi and pi a reach may only be cut, and a dead point there is found as a touch.
         ends = [end for arc in self._counted_reach(others) for end in arc
                 if not first.is_cut(end)]
-        touched = [theta for theta, gap, rounding, _ in self._near_closures(others)
-                   if gap <= rounding and all(first.apart(theta, end) > ONE for end in ends)]
+        touched = [near.value for near in self._near_zeros(others)
+                   if near.gap <= near.rounding
+                   and all(first.apart(near.value, end) > ONE for end in ends)]
         return distinct([*ends, *touched], first)
 
-    def _near_closures(self, others) -> list:
-        """
-        Return the values next to which a dyad stretches or folds, or nearly does.
+    def _near_zeros(self, others: Tuple[float, ...]) -> List[NearZero]:
+        """Return where a dyad stretches or folds, or nearly does."""
+        closures, folds = self._structure.closures, self._structure.built.folds
 
-        Each with how near the closure comes to zero, its rounding and its size.
-        """
-        return self._remembered('near closures', others, lambda: [
-            found for arc in self._counted_reach(others)
-            for found in self._near_closures_on(*arc, others)])
+        def find() -> List[NearZero]:
+            reach = self._counted_reach(others) if closures else []
+            rounding = np.array([2.0 * float(self._value(x.tolerance)) for x in closures])
+            return [near for arc in reach for near in near_zeros(
+                self._curve('closures', (), others), arc, self.inputs[0], rounding,
+                np.array([x in folds for x in closures]))]
 
-    def _near_closures_on(self, lo, hi, others):
-        curve = self._curve('closures', (), others)
-        rounding = [2.0 * float(self._value(x.tolerance)) for x in self._structure.closures]
-        if not rounding:
-            return
-        theta = sampled(lo, hi)
-        values, rates = self._split(curve(theta))
-        size = np.fmax.reduce(np.abs(values), axis=1, initial=0.0)
-        # An arm vanishes where it is as short as rounding makes it. What is never more than
-        # rounding, as the area of a kite that always lies flat, tells nothing.
-        rounding = np.where(size > FLAT * np.array(rounding),
-                            np.array(rounding) + GRAZE ** 2 * size, -np.inf)
-        for place in (0, -1):
-            if self.inputs[0].is_cut(theta[place]):
-                yield from zip(repeat(theta[place]), abs(values[:, place]), rounding, size)
-        folds = [x in self._structure.sketch.folds for x in self._structure.closures]
-        searched = ((_crossings(values, folds), values),
-                    (_approaches(theta, values, rates, NEAR * size[:, None]), rates))
-        for kind, ((row, place), sampled_) in enumerate(searched):
-            def unchanged(angles, kind=kind, row=row, start=sampled_[row, place] >= 0.0):
-                now = self._split(curve(angles.ravel()))[kind]
-                now = now.reshape(-1, *angles.shape)[row, np.arange(len(row))]
-                return (now >= 0.0) == start[:, None]
-
-            found, _ = refined(unchanged, theta[place], theta[place + 1])
-            gaps = np.abs(self._split(curve(found))[0][row, np.arange(len(row))])
-            # A fold that changes sign vanishes between two neighbouring angles.
-            yield from ((angle, gap if kind else 0.0, rounding[i], size[i])
-                        for angle, gap, i in zip(found.tolist(), gaps.tolist(), row.tolist())
-                        if rounding[i] > 0.0)
-
-    @staticmethod
-    def _split(rows):
-        """Return the closures and their rates."""
-        return rows[0::2], rows[1::2]
+        return self._remembered('near zeros', others, find)
 
     def _inverse(self, output: str, others: Tuple[float, ...]) -> Callable:
         """Return the function from values of an output, shape (n,), to candidates (k, n)."""
@@ -261,15 +227,15 @@ class Analysed(Mechanism):
         return self._remembered('inverse', (output, *others),
                                 lambda: self._branches(output, others).answers)
 
-    def _branches(self, output, others):
+    def _branches(self, output: str, others: Tuple[float, ...]) -> MonotoneBranches:
         angular = self._structure.turns(output)
-        marks = distinct((theta for theta, gap, _, size in self._near_closures(others)
-                          if gap <= NEAR * size), self.inputs[0].counted())
+        marks = distinct((near.value for near in self._near_zeros(others)
+                          if near.gap <= NEAR * near.size), self.inputs[0].counted())
         return MonotoneBranches(
             self._curve('output', output, others), self._counted_reach(others), marks, angular,
             GRAZE * (math.pi if angular else self.longest))
 
-    def _check_output(self, output):
+    def _check_output(self, output: str) -> None:
         allowed = (*self.joints, *(f'{name}.{axis}' for name in self.points for axis in 'xy'))
         if output not in allowed:
             raise ValueError(f'{self.type} has no output {quoted(output)}; '
@@ -277,22 +243,3 @@ class Analysed(Mechanism):
         if not self._structure.moves(output):
             raise ValueError(f'{output} of {self.type} does not move with '
                              f'{self.inputs[0].name}')
-
-
-def _crossings(values, folds) -> tuple:
-    """Return row and place of the samples after which one of the folds changes sign."""
-    above = values >= 0.0
-    return np.nonzero((above[:, 1:] != above[:, :-1]) & np.array(folds)[:, None]
-                      & np.isfinite(values[:, 1:]) & np.isfinite(values[:, :-1]))
-
-
-def _approaches(theta, values, rates, near) -> tuple:
-    """Return row and place of the samples after which a closure turns away close to zero."""
-    sign = np.sign(values[:, :-1])
-    with np.errstate(all='ignore'):
-        before, after = sign * rates[:, :-1], sign * rates[:, 1:]
-        # Where the tangents meet a smooth curve between two samples is lower than it gets.
-        ahead = (sign * (values[:, 1:] - values[:, :-1]) - after * np.diff(theta)) / (
-            before - after)
-        bound = sign * values[:, :-1] + before * ahead
-        return np.nonzero((before < 0.0) & (after >= 0.0) & ~(bound > near))

@@ -9,12 +9,13 @@ from typing import Any, Optional
 
 import numpy as np
 
+from .design import Design
 from ..words import listed, quoted
 
 SHORTEST, LONGEST = 1e-300, 1e300
 
 
-def checked_dimensions(design, given: Mapping[str, Any]) -> dict:
+def checked_dimensions(design: Design, given: Mapping[str, Any]) -> dict:
     """Return all dimensions of a design, defaults filled in; raise ValueError for a bad one."""
     for name in given:
         if name not in design.dimensions:
@@ -31,8 +32,8 @@ def checked_dimensions(design, given: Mapping[str, Any]) -> dict:
     return lengths
 
 
-def _checked(design, name, value):
-    def error(rule):
+def _checked(design: Design, name: str, value: Any) -> Any:
+    def error(rule: str) -> ValueError:
         return ValueError(f'{design.name}: dimension {name} must {rule}, got {quoted(value)}')
 
     try:
@@ -58,7 +59,7 @@ def numbers(name: str, value: Any) -> np.ndarray:
                          f'got {quoted(value)}') from None
 
 
-def _numbers(value) -> np.ndarray:
+def _numbers(value: Any) -> np.ndarray:
     """Return numbers as an array; raise for what only could be converted to some."""
     given = np.asarray(value)
     if given.dtype.kind not in 'iufO' or not given.size:
@@ -69,7 +70,7 @@ def _numbers(value) -> np.ndarray:
     return given.astype(float)
 
 
-def checked_branches(design, given: Optional[Mapping[str, int]]) -> dict:
+def checked_branches(design: Design, given: Optional[Mapping[str, int]]) -> dict:
     """Return all assembly signs of a design; raise ValueError for a bad one."""
     if given is not None and not isinstance(given, Mapping):
         raise ValueError(f'{design.name}: branches must be a mapping from joint to +1 or -1, '

@@ -45,7 +45,7 @@ def in_own_unit(length: Real) -> Real:
     return where(abs(UNIT - 1.0) <= 0.0, length, length / UNIT)
 
 
-class SketchError(ValueError):
+class ConstructionError(ValueError):
     """A construction that cannot be on the joints it is given."""
 
 
@@ -89,7 +89,7 @@ class _Vector(NamedTuple):
     link: str
 
 
-class Sketch:
+class Builder:
     """The joints, links and limits of a linkage, as expressions of its dimensions and inputs."""
 
     def __init__(self) -> None:
@@ -253,14 +253,14 @@ class Sketch:
 
     def _on_ground(self, name: str) -> None:
         if self.points[name].home != GROUND:
-            raise SketchError(f'joint {name} must be on the ground')
+            raise ConstructionError(f'joint {name} must be on the ground')
 
     def _bar_between(self, first: str, second: str) -> _Vector:
         """Return the vector between two joints of one link."""
         if (first, second) not in self._vectors:
             link = self._shared_link(first, second)
             if not link:
-                raise SketchError(f'{first} and {second} are not joints of one moving link')
+                raise ConstructionError(f'{first} and {second} are not joints of one moving link')
             bar, frame = self._vectors[self._ends[link]], self.frames[link]
             across = frame[second] - frame[first]
             self._vectors[first, second] = _Vector(
@@ -343,7 +343,7 @@ class Sketch:
         """Add a link that turns about a joint, its tip on it if that has a length; return it."""
         name = name or ('' if len(joint + tip) == 2 else '_').join((joint, tip))
         if name in self.joint_values:
-            raise SketchError(f'its link {name} would have the name of another')
+            raise ConstructionError(f'its link {name} would have the name of another')
         parent = self.points[joint].home
         zero = Complex(0.0, 1.0) if upright else Complex(1.0, 0.0)
         relative = bar * self.directions.get(parent, zero).conjugate()

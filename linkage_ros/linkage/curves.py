@@ -11,7 +11,7 @@ curve is computed a few dozen times for however many results.
 from __future__ import annotations
 
 import math
-from typing import Callable, Sequence, Tuple
+from typing import Callable, Tuple
 
 import numpy as np
 
@@ -91,7 +91,7 @@ def near_misses(values: np.ndarray) -> np.ndarray:
                 & (sign * inner <= 2.0 * bent))
 
 
-def turns(values: Sequence[float], rates: Sequence[float], least: Sequence[float]) -> list:
+def turns(values: np.ndarray, rates: np.ndarray, least: np.ndarray) -> np.ndarray:
     """
     Return the samples after which a curve turns round, by more than what is least at each.
 
@@ -105,7 +105,7 @@ def turns(values: Sequence[float], rates: Sequence[float], least: Sequence[float
             kept.pop()
         else:
             kept.append(i)
-    return kept
+    return np.array(kept, np.intp)
 
 
 def extremes(curve: Callable, lo: float, hi: float, angular: np.ndarray) -> np.ndarray:

@@ -12,9 +12,10 @@ method kept inside a bracket, to the last digit.
 from __future__ import annotations
 
 import math
-from typing import Callable, Iterable, List, NamedTuple, Sequence
+from typing import Any, Callable, Iterable, Iterator, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .curves import LEAST, refined, sampled, turns
 from .inputs import Arc, Input
@@ -48,7 +49,7 @@ def in_order(answers: np.ndarray, input_: Input) -> np.ndarray:
     return np.moveaxis(rows, 0, -1)
 
 
-def nearest(answers: np.ndarray, near, input_: Input) -> np.ndarray:
+def nearest(answers: np.ndarray, near: ArrayLike, input_: Input) -> Any:
     """Return of answers, shape (..., k), the one nearest to a value, whole turns included."""
     near = np.asarray(near, float)[..., None]
     theta = input_.beside(answers, near)
@@ -61,6 +62,9 @@ def distinct(theta: Iterable[float], input_: Input) -> List[float]:
     """Return values of an input in order, without those next to another."""
     found = np.array(list(theta), float)
     return [x for x in in_order(found[:, None], input_)[0].tolist() if x == x]
+
+
+_Run = Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 class _Branch(NamedTuple):
@@ -116,7 +120,7 @@ class MonotoneBranches:
                 row[place] = np.where(target >= branch.value[-1] - near, branch.theta[-1], part)
         return found
 
-    def _runs(self, lo, hi):
+    def _runs(self, lo: float, hi: float) -> Iterator[_Run]:
         """Yield samples as angles, values, rates and rounding, cut where there is no value."""
         theta = sampled(lo, hi)
         theta[[0, -1]] = self._unbroken(theta[[0, -1]], theta[[1, -2]], theta[len(theta) // 2])
@@ -135,7 +139,7 @@ class MonotoneBranches:
                 values = np.unwrap(value[0, run]) if self._angular else value[0, run]
                 yield theta[run], values, rate[0, run], noise[run]
 
-    def _unbroken(self, ends, beside, middle):
+    def _unbroken(self, ends: np.ndarray, beside: np.ndarray, middle: float) -> np.ndarray:
         """Return the ends of an arc, or where the output breaks off right before them."""
         values = self._curve(np.array([*ends, *beside, middle]))[0]
         start, size = values[2:4], BROKEN * (math.pi if self._angular else np.ptp(values[2:]))
@@ -144,7 +148,7 @@ class MonotoneBranches:
                 self._curve(x.ravel())[0].reshape(x.shape) - start[:, None])) > size),
                 beside, np.nextafter(ends, 2.0 * ends - beside))[0]
 
-    def _moves(self, runs) -> bool:
+    def _moves(self, runs: Sequence[_Run]) -> bool:
         """Return whether the output changes by more than rounding."""
         if not runs:
             return False
@@ -152,10 +156,11 @@ class MonotoneBranches:
         noise = STILL * (noise + np.median(noise)) + self._rounding
         return bool(np.any(np.abs(self._difference(values - np.median(values))) > noise))
 
-    def _branched(self, theta, value, rate, noise):
+    def _branched(self, theta: np.ndarray, value: np.ndarray, rate: np.ndarray,
+                  noise: np.ndarray) -> Iterator[_Branch]:
         least = 4.0 * (noise + self._rounding)
         with np.errstate(invalid='ignore'):
-            places = np.array(turns(value, rate, least), int)
+            places = turns(value, rate, least)
             rising = rate[places] >= 0.0
             ends, _ = refined(lambda x: (self._curve(x.ravel())[1] >= 0.0).reshape(
                 x.shape) == rising[:, None], theta[places], theta[places + 1])
@@ -172,10 +177,10 @@ class MonotoneBranches:
             sign = 1.0 if value[last] >= value[first] else -1.0
             yield _Branch(theta[part], np.maximum.accumulate(sign * value[part]), sign)
 
-    def _difference(self, gap):
+    def _difference(self, gap: Any) -> Any:
         return gap - math.tau * np.round(gap / math.tau) if self._angular else gap
 
-    def _targets(self, branch, values):
+    def _targets(self, branch: _Branch, values: np.ndarray) -> Iterator[np.ndarray]:
         """Yield the values as the branch counts them; NaN where it does not hold them."""
         lo, hi = branch.value[0], branch.value[-1]
         values, slack = branch.sign * values, self._rounding
@@ -189,7 +194,8 @@ class MonotoneBranches:
             held = (target >= lo - slack) & (target <= hi + slack)
             yield np.where(held, np.clip(target, lo, hi), np.nan)
 
-    def _solved(self, lo, hi, target, sign):
+    def _solved(self, lo: np.ndarray, hi: np.ndarray, target: np.ndarray,
+                sign: np.ndarray) -> np.ndarray:
         """Return where the output meets its targets, by Newton's method inside a bracket."""
         theta, step = 0.5 * (lo + hi), hi - lo
         best, least, steepest = theta, np.full(theta.shape, np.inf), np.zeros(theta.shape)
@@ -215,7 +221,7 @@ class MonotoneBranches:
         return np.where(least <= far, best, np.nan)
 
 
-def _cut(arcs: Iterable[Arc], marks: Sequence[float]):
+def _cut(arcs: Iterable[Arc], marks: Sequence[float]) -> Iterator[Arc]:
     """Yield arcs, cut at marks, which may be dead points."""
     for start, end in arcs:
         inside = [mark for mark in marks if start < mark < end]

@@ -43,7 +43,7 @@ from typing import Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple, U
 import numpy as np
 
 from .arithmetic import Formula, IN_RANGE, in_range, WORDS
-from .builder import Sketch, SketchError
+from .builder import Builder, ConstructionError
 from .planar import LEFT, RIGHT
 from ..formula.expression import dimension, Real
 from ..words import elided, listed, quoted
@@ -262,15 +262,15 @@ def has_literal_lengths(lines: Iterable[Line]) -> bool:
                for line in lines for kind, number in line.numbers())
 
 
-def draw(sketch: Sketch, lines: Iterable[Line], symbols: Mapping[str, Real],
+def draw(builder: Builder, lines: Iterable[Line], symbols: Mapping[str, Real],
          signs: Mapping[str, int]) -> None:
     """Place the joints of a linkage, one line after the other."""
     for line in lines:
         args = [_argument(line, kind, arg, symbols, signs) for kind, arg in line.arguments()]
         names = line.names if len(line.names) > 1 else line.names[0]
         try:
-            getattr(sketch, line.word)(names, *args)
-        except SketchError as error:
+            getattr(builder, line.word)(names, *args)
+        except ConstructionError as error:
             raise line.error(error) from None
 
 

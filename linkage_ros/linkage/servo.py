@@ -20,15 +20,18 @@ from __future__ import annotations
 
 from functools import lru_cache, reduce
 import math
-from typing import NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .analysis import Analysed
 from .arguments import numbers
-from .builder import GROUND
+from .builder import Builder, GROUND, Link
+from .inputs import Arc
 from .inverse import in_order
-from .planar import GRAZE
+from .planar import Crank, GRAZE
+from .quantities import Structure
 from ..formula.expression import (
     arctangent,
     argument,
@@ -44,7 +47,7 @@ from ..formula.expression import (
     square,
     where,
 )
-from ..formula.program import Program
+from ..formula.program import Pose, Program
 
 # Angles nearer than this [rad] may be one, if the output does not tell them apart.
 CLOSE = 1e-7
@@ -69,7 +72,8 @@ class Answer(NamedTuple):
 class Mechanism(Analysed):
     """A linkage that is solved from its outputs, its levers by a closed form of their own."""
 
-    def input_for(self, output, value, near=None, others: Sequence[float] = ()):
+    def input_for(self, output: str, value: ArrayLike, near: Optional[ArrayLike] = None,
+                  others: Sequence[float] = ()) -> Any:
         """Return the values of the input that give an output a value; see `Analysed.input_for`."""
         swept = any(np.ndim(length) for length in self.dimensions.values())
         if swept or others or not self._has_lever(output):
@@ -80,7 +84,7 @@ class Mechanism(Analysed):
         answers = in_order(theta.reshape(-1, 2).T, self.inputs[0])
         return answers.reshape(*theta.shape[:-1], answers.shape[-1])
 
-    def servos(self, output: str, value) -> Tuple[np.ndarray, np.ndarray]:
+    def servos(self, output: str, value: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
         """
         Return all values of the input that give an output a value, and d output / d input there.
 
@@ -104,7 +108,7 @@ class Mechanism(Analysed):
 
         """
         if not self._has_lever(output):
-            value = np.where(np.isfinite(value), value, np.nan)
+            value = np.where(np.isfinite(np.asarray(value)), value, np.nan)
             theta = np.asarray(self.input_for(output, value))
             return theta, self._rates_at(output, theta)
         found = np.moveaxis(self._solved_by(_lever_all, output).over(value), 0, -1)
@@ -112,7 +116,8 @@ class Mechanism(Analysed):
         theta = theta if self._is_free else _inside(theta, self.reach())
         return theta, np.where(np.isnan(theta), np.nan, rates)
 
-    def servo_for(self, output: str, value, near=None, ends: Ends = None) -> Sequence:
+    def servo_for(self, output: str, value: ArrayLike, near: Optional[ArrayLike] = None,
+                  ends: Ends = None) -> Sequence:
         """
         Return one value of the input that gives an output a value, and d output / d input there.
 
@@ -135,7 +140,7 @@ class Mechanism(Analysed):
 
         """
         lever, kind = self._has_lever(output), (near is not None, ends is not None)
-        limits = ((near,) if kind[0] else ()) + (ends or ())
+        limits: Tuple[Any, ...] = ((near,) if kind[0] else ()) + (ends or ())
         if lever and self._is_free:
             return self._solved_by(_lever_taken, output, *kind)(value, *limits)
         theta, rates = self.servos(output, value)
@@ -148,21 +153,21 @@ class Mechanism(Analysed):
                                   *(np.divide(limit, size) for limit in limits))
         return taken * size, rate / size
 
-    def _has_lever(self, output) -> bool:
+    def _has_lever(self, output: str) -> bool:
         return (len(self.inputs) == 1 and isinstance(output, str)
                 and output in _levers(self._structure))
 
     @property
     def _is_free(self) -> bool:
         """Whether nothing but its lever's slot limits the crank."""
-        return len(self._structure.sketch.limits) == 1
+        return len(self._structure.built.limits) == 1
 
-    def _solved_by(self, draw, *args):
+    def _solved_by(self, draw: Callable, *args: Any) -> Pose:
         """Return the code that solves for a lever in some way."""
         return self._remembered(draw.__name__, args, lambda: draw(
             self._structure, *args).bind(self._lengths, self._evaluated))
 
-    def _rates_at(self, output, theta):
+    def _rates_at(self, output: str, theta: np.ndarray) -> np.ndarray:
         """Return d output / d input."""
         joint, _, axis = output.rpartition('.')
         if joint:
@@ -171,19 +176,21 @@ class Mechanism(Analysed):
 
 
 @lru_cache(maxsize=32)
-def _levers(structure) -> dict:
+def _levers(structure: Structure) -> Dict[str, List[Answer]]:
     """Return for each lever that the crank's pin moves both answers to its angle."""
-    sketch = structure.sketch
-    links = {link.name: link for link in sketch.links}
-    return {slide.parent: list(_lever(sketch, slide, structure.branches[links[slide.parent].tip]))
-            for slide in sketch.links if slide.kind == 'prismatic' and slide.parent != GROUND
-            and links[slide.parent].parent == GROUND and sketch.points[slide.tip].crank}
+    built = structure.built
+    links = {link.name: link for link in built.links}
+    return {slide.parent: list(_lever(built, crank, slide,
+                                      structure.branches[links[slide.parent].tip]))
+            for slide in built.links if slide.kind == 'prismatic' and slide.parent != GROUND
+            and links[slide.parent].parent == GROUND
+            and (crank := built.points[slide.tip].crank)}
 
 
-def _lever(sketch, slide, half):
+def _lever(built: Builder, crank: Crank, slide: Link, half: int) -> Iterator[Answer]:
     """Yield both crank angles for a lever's angle, that on the working branch first."""
-    crank, e = sketch.points[slide.tip].crank, sketch.frames[slide.name][slide.tip].y
-    line = crank.centre - sketch.points[slide.joint].place
+    e = built.frames[slide.name][slide.tip].y
+    line = crank.centre - built.points[slide.joint].place
     a, b, along = crank.length, line.length(), line.direction()
     lever = argument(0)
     bar = Complex(cosine(lever), sine(lever)) * (Complex(0.0, 1.0) * along.conjugate())
@@ -205,20 +212,20 @@ def _lever(sketch, slide, half):
 
 
 @lru_cache(maxsize=32)
-def _lever_all(structure, name) -> Program:
+def _lever_all(structure: Structure, name: str) -> Program:
     """Return the code for both crank angles for a lever's angle, each with its rate."""
     return Program([gated(part, where(answer.held, 1.0, -1.0), 0.0)
                     for answer in _levers(structure)[name] for part in answer[:2]])
 
 
 @lru_cache(maxsize=64)
-def _lever_taken(structure, name, follows, ended) -> Program:
+def _lever_taken(structure: Structure, name: str, follows: bool, ended: bool) -> Program:
     """Return the code for the crank angle that is taken for a lever's angle, and its rate."""
     return _taken(_levers(structure)[name], True, True, real(GRAZE * math.pi), follows, ended, 1)
 
 
 @lru_cache(maxsize=256)
-def _choice(count, working, turns, follows, ended):
+def _choice(count: int, working: bool, turns: bool, follows: bool, ended: bool) -> Pose:
     """Return the code that takes one of some answers: from these, their rates, rounding."""
     theta, rates = ([argument(start + i) for i in range(count)] for start in (0, count))
     answers = [Answer(value, rate, value <= value) for value, rate in zip(theta, rates)]
@@ -226,7 +233,8 @@ def _choice(count, working, turns, follows, ended):
                   2 * count + 1).bind({}, {})
 
 
-def _taken(answers, working, turns, rounding, follows, ended, given) -> Program:
+def _taken(answers: Sequence[Answer], working: bool, turns: bool, rounding: Real, follows: bool,
+           ended: bool, given: int) -> Program:
     """
     Return the code for the answer that is taken, and its rate.
 
@@ -261,12 +269,12 @@ def _taken(answers, working, turns, rounding, follows, ended, given) -> Program:
                    given + follows + 2 * ended)
 
 
-def _turned(theta, near):
+def _turned(theta: Real, near: Real) -> Real:
     """Return an angle plus the whole turns that take it next to another."""
     return theta + math.tau * nearest_integer((near - theta) / math.tau)
 
 
-def _inside(theta, arcs):
+def _inside(theta: np.ndarray, arcs: Sequence[Arc]) -> np.ndarray:
     """Return angles [rad] that lie on arcs, those beyond an end by rounding at it; NaN others."""
     kept = np.full(theta.shape, np.nan)
     for low, high in arcs:

@@ -15,7 +15,8 @@ from typing import Callable, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from .mechanism import Leg, Mechanism
+from .mechanism import Mechanism
+from .quantities import Leg
 from ..formula.program import Batch
 
 LOCUS_POINTS = 361
@@ -142,7 +143,7 @@ class Assembly:
         self._scale = scale
 
     @cached_property
-    def _fastest(self):
+    def _fastest(self) -> Mechanism:
         try:
             return self.linkage.accelerated()
         except ImportError:

@@ -22,7 +22,8 @@ from numpy.typing import ArrayLike
 
 from . import custom
 from ..linkage.arguments import checked_branches, checked_dimensions
-from ..linkage.mechanism import Design, Structure
+from ..linkage.design import Design
+from ..linkage.quantities import Structure
 from ..linkage.servo import Mechanism
 from ..words import quoted
 

@@ -11,7 +11,8 @@ from typing import Any, Iterable, List, Optional, Tuple
 import numpy as np
 
 from ..linkage import joint_lines
-from ..linkage.mechanism import check_bars, Design, Mechanism
+from ..linkage.design import check_bars, Design
+from ..linkage.mechanism import Mechanism
 from ..words import listed, quoted
 
 MOST_LINES = 2000

@@ -13,7 +13,7 @@ Source: Norton, "Design of Machinery", sec. 2.13 (Grashof's condition) and 4.5 (
 from math import fsum
 
 from ..linkage import servo
-from ..linkage.mechanism import Design
+from ..linkage.design import Design
 
 DESIGN = Design('four_bar', {'a': 40.0, 'b': 120.0, 'c': 80.0, 'd': 100.0, 'p': 60.0},
                 tracer='P', signed=frozenset('p'), joints=(

@@ -20,8 +20,8 @@ from typing import Any, Optional, Sequence
 from numpy.typing import ArrayLike
 
 from ..linkage import servo
+from ..linkage.design import Design
 from ..linkage.input_range import reachable_arcs
-from ..linkage.mechanism import Design
 
 DESIGN = Design('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 0.0}, tracer='L',
                 signed=frozenset('e'), joints=(

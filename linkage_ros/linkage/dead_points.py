@@ -1,0 +1,106 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Where a linkage stretches or folds: values of an input at which a closure is zero, or nearly.
+
+A closure is what vanishes there: the margin of a limit, or the area of a kite or parallelogram.
+"""
+
+from __future__ import annotations
+
+from typing import Callable, Iterator, NamedTuple, Tuple
+
+import numpy as np
+
+from .curves import refined, sampled
+from .inputs import Arc, Input
+from .planar import GRAZE
+
+# How near to zero a closure comes, as a part of its size, for outputs to change quickly there.
+NEAR = 1e-2
+# A closure whose size is less than so many times its rounding never leaves zero.
+FLAT = 256.0
+
+Places = Tuple[np.ndarray, ...]
+
+
+class NearZero(NamedTuple):
+    """A value of an input, how near a closure comes to zero there, its rounding and its size."""
+
+    value: float
+    gap: float
+    rounding: float
+    size: float
+
+
+def near_zeros(curve: Callable, arc: Arc, input_: Input, rounding: np.ndarray,
+               folds: np.ndarray) -> Iterator[NearZero]:
+    """
+    Yield where closures come near to zero on an arc.
+
+    Parameters
+    ----------
+    curve : callable
+        From values of the input, shape (n,), to each closure and its rate, shape (2 closures, n).
+    arc : (float, float)
+        Where the input may be, counted in its size.
+    input_ : Input
+        What is moved.
+    rounding : float array (closures,)
+        What a closure is rounded to.
+    folds : bool array (closures,)
+        Which of them change sign at a zero; others end the reach there, or turn back.
+
+    """
+    def split(value: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        rows = curve(value)
+        return rows[0::2], rows[1::2]
+
+    theta = sampled(*arc)
+    values, rates = split(theta)
+    size = np.fmax.reduce(np.abs(values), axis=1, initial=0.0)
+    # An arm vanishes where it is as short as rounding makes it. What is never more than rounding,
+    # as the area of a kite that always lies flat, tells nothing.
+    rounding = np.where(size > FLAT * rounding, rounding + GRAZE ** 2 * size, -np.inf)
+    for end in (0, -1):
+        if input_.is_cut(theta[end]):
+            yield from map(NearZero, [float(theta[end])] * len(size),
+                           np.abs(values[:, end]).tolist(), rounding.tolist(), size.tolist())
+    searched = ((_crossings(values, folds), values),
+                (_approaches(theta, values, rates, NEAR * size[:, None]), rates))
+    for kind, ((row, place), samples) in enumerate(searched):
+        chosen = np.arange(len(row))
+
+        def unchanged(angles: np.ndarray, kind: int = kind, row: np.ndarray = row,
+                      chosen: np.ndarray = chosen,
+                      start: np.ndarray = samples[row, place] >= 0.0) -> np.ndarray:
+            now = split(angles.ravel())[kind].reshape(-1, *angles.shape)[row, chosen]
+            return (now >= 0.0) == start[:, None]
+
+        found, _ = refined(unchanged, theta[place], theta[place + 1])
+        # A fold that changes sign vanishes between two neighbouring values.
+        gaps = np.abs(split(found)[0][row, chosen]) if kind else np.zeros(len(row))
+        kept = rounding[row] > 0.0
+        yield from map(NearZero, found[kept].tolist(), gaps[kept].tolist(),
+                       rounding[row][kept].tolist(), size[row][kept].tolist())
+
+
+def _crossings(values: np.ndarray, folds: np.ndarray) -> Places:
+    """Return row and place of the samples after which one of the folds changes sign."""
+    above = values >= 0.0
+    return np.nonzero((above[:, 1:] != above[:, :-1]) & folds[:, None]
+                      & np.isfinite(values[:, 1:]) & np.isfinite(values[:, :-1]))
+
+
+def _approaches(theta: np.ndarray, values: np.ndarray, rates: np.ndarray,
+                near: np.ndarray) -> Places:
+    """Return row and place of the samples after which a closure turns away close to zero."""
+    sign = np.sign(values[:, :-1])
+    with np.errstate(all='ignore'):
+        before, after = sign * rates[:, :-1], sign * rates[:, 1:]
+        # Where the tangents meet a smooth curve between two samples is lower than it gets.
+        ahead = (sign * (values[:, 1:] - values[:, :-1]) - after * np.diff(theta)) / (
+            before - after)
+        bound = sign * values[:, :-1] + before * ahead
+        return np.nonzero((before < 0.0) & (after >= 0.0) & ~(bound > near))

@@ -1,0 +1,72 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a type of mechanism is: its joint lines, and the dimensions that it usually has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Callable, FrozenSet, List, Mapping, Tuple, TYPE_CHECKING
+
+import numpy as np
+
+from . import joint_lines
+
+if TYPE_CHECKING:
+    from .mechanism import Mechanism
+
+
+def check_bars(linkage: Mechanism) -> None:
+    """Raise ValueError, with its line, for a bar that has no length."""
+    for (first, second), length in linkage.bar_lengths.items():
+        size = np.asarray(length)
+        if not np.all((size > 0.0) & np.isfinite(size)):
+            raise linkage.line_of(first, second).error(
+                f'the bar {first}-{second} must be longer than zero, got {length:g}'
+                if not size.ndim else f'the bar {first}-{second} must be longer than zero')
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """
+    What a type of mechanism is.
+
+    Parameters
+    ----------
+    name : str
+        The name that users type.
+    dimensions : mapping
+        Defaults [m].
+    joints : tuple of str
+        One line a joint, as `joint_lines` reads them.
+    tracer : str
+        The joint whose curve is the locus.
+    signed : frozenset
+        Dimensions that may be zero or negative.
+    check : callable
+        From a mechanism of this type; raises ValueError for dimensions that cannot be.
+
+    """
+
+    name: str
+    dimensions: Mapping[str, float]
+    joints: Tuple[str, ...]
+    tracer: str
+    signed: FrozenSet[str] = frozenset()
+    check: Callable = check_bars
+
+    @cached_property
+    def lines(self) -> List[joint_lines.Line]:
+        """The joints as constructions."""
+        return joint_lines.parse(self.joints)
+
+    @cached_property
+    def has_literal_lengths(self) -> bool:
+        """Whether a length is written as a number, so that all count in metres."""
+        return joint_lines.has_literal_lengths(self.lines)
+
+    @property
+    def branches(self) -> dict:
+        """The assembly sign, +1 or -1, of each joint that has two."""
+        return joint_lines.branches(self.lines)
