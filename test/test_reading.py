@@ -154,8 +154,8 @@ def test_any_number_of_sources_is_learnt(reader, sources):
 
 def test_more_sources_than_are_remembered_cost_no_more_than_reading_each(reader, monkeypatch):
     learnt = Counter()
-    make = joint_state_reader.Layout.__init__
-    monkeypatch.setattr(joint_state_reader.Layout, '__init__', lambda self, *args: (
+    make = joint_state_reader._Source.__init__
+    monkeypatch.setattr(joint_state_reader._Source, '__init__', lambda self, *args: (
         learnt.update([self.__class__]) or make(self, *args)))
     texts = [serialize_message(message([f'robot{i}_crank'])) for i in range(1000)]
     for _ in range(20):
@@ -169,7 +169,7 @@ def test_what_is_remembered_is_bounded_whatever_comes(reader):
         text = serialize_message(message(['a' * (i % 7), f'{i:09}'][i % 2:]))
         reader.read(text)
         reader.read(text)
-    kept = [layout for alike in reader._layouts.values() for layouts in alike.values()
+    kept = [layout for alike in reader._sources.values() for layouts in alike.values()
             for layout in layouts.values()]
     assert len(kept) == len(reader._used) <= joint_state_reader.SOURCES
     assert len(reader._met) <= 2 * joint_state_reader.SOURCES
@@ -195,15 +195,16 @@ def test_a_name_that_is_no_text_excludes_its_source_alone(reader):
 @pytest.mark.parametrize('joints', [1, 10, 100, 1000, 10_000])
 def test_what_is_learnt_grows_with_the_joints_alone(joints):
     text = serialize_message(message([f'joint{i}' for i in range(joints)]))
-    turned = joint_state_reader.Reader(lambda made: made.name).read(text)
+    read = deserialize_message(text, JointState)
+    numbers = joint_state_reader.Reader(lambda made: made.name).read(text)
     calls = Counter()
     sys.setprofile(lambda _, event, __: calls.update([event]))
     try:
-        layout = joint_state_reader._layout(text, turned)
+        layout = joint_state_reader._Source(text, read, numbers)
     finally:
         sys.setprofile(None)
-    assert layout.take(text) == turned
-    assert calls.total() < 200 + 20 * joints
+    assert layout.take(text) == numbers
+    assert calls.total() < 250 + 20 * joints
 
 
 def outcome(read, text):
