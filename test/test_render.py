@@ -17,7 +17,7 @@ import pytest
 for module in ('matplotlib', 'tqdm', 'yaml'):
     pytest.importorskip(module)
 
-from linkage_ros import mechanisms, scene  # noqa: E402
+from linkage_ros import mechanisms, palette, scene  # noqa: E402
 from linkage_ros.render import (  # noqa: E402
     files,
     layers,
@@ -181,7 +181,7 @@ def test_a_gif_keeps_the_colours_that_colour_blind_people_tell_apart(tmp_path):
     file = rendered(tmp_path, '--frames', '3', ending='gif')
     with Image.open(file) as image:
         seen = {colour for _, colour in image.convert('RGB').getcolors(1 << 16)}
-    wanted = [layers.BLUE, layers.ORANGE, layers.GREEN, layers.VERMILLION, 'white']
+    wanted = [palette.BLUE, palette.ORANGE, palette.GREEN, palette.VERMILION, 'white']
     assert {tuple(round(255 * c) for c in to_rgb(colour)) for colour in wanted} <= seen
 
 

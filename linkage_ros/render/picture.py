@@ -14,11 +14,11 @@ import numpy as np
 from . import layers
 from .cycle import Cycle
 from .parts import USUAL
+from ..palette import FRAME, GRID
 
 DOTS_PER_INCH = 100
 CROWDED = 'the size is too small for what is drawn: choose a larger one, or hide a part'
 PADDING = 0.1  # inches, around everything
-FRAME, GRID = '#b0b0b0', '#e6e6e6'
 READABLE = 24  # poses in which the joints' names keep clear of the links
 
 
