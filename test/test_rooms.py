@@ -5,6 +5,7 @@
 
 import ast
 from pathlib import Path
+import re
 
 import pytest
 
@@ -16,6 +17,7 @@ WITH_ROS = ('nodes', 'web')
 ROS = ('rclpy', 'builtin_interfaces', 'geometry_msgs', 'rcl_interfaces', 'sensor_msgs', 'std_msgs',
        'visualization_msgs', 'linkage_interfaces')
 MODULES = sorted(PACKAGE.rglob('*.py'))
+PAGE = PACKAGE / 'web' / 'page'
 
 
 def room(module):
@@ -53,3 +55,10 @@ def test_a_module_imports_nothing_from_above(module):
 @pytest.mark.parametrize('module', MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_a_module_begins_with_what_it_is_for(module):
     assert ast.get_docstring(ast.parse(module.read_text()))
+
+
+def test_every_colour_is_in_the_palette():
+    files = [path for path in PAGE.iterdir() if path.suffix in ('.css', '.js', '.svg')]
+    for file in (*MODULES, *files):
+        colours = re.findall("#[0-9a-f]{6}|'#[0-9a-f]{3}'", file.read_text())
+        assert not colours or file == PACKAGE / 'palette.py', f'{file.name} has {colours}'

@@ -33,7 +33,7 @@ from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
 from linkage_ros.web import server  # noqa: E402
 from linkage_ros.web.feed import Feed  # noqa: E402
-from linkage_ros.web.stage import LATCHED  # noqa: E402
+from linkage_ros.web.scene_view import LATCHED  # noqa: E402
 from linkage_ros.web.viewer import Viewer  # noqa: E402
 from rcl_interfaces.msg import (  # noqa: E402
     Parameter as ParameterMessage,  # noqa: E402
@@ -672,20 +672,28 @@ def address(lever):
     return lever.viewer.url
 
 
-async def status(url, **headers):
-    """Return the status and the headers of an answer."""
+async def answer(url, **headers):
+    """Return the status, the headers and the text of an answer."""
     async with aiohttp.ClientSession() as session:
         async with session.get(url, headers=headers) as response:
-            return response.status, response.headers
+            return response.status, response.headers, await response.text()
+
+
+async def status(url, **headers):
+    """Return the status of an answer."""
+    return (await answer(url, **headers))[0]
 
 
 @pytest.mark.parametrize('name', ['', *sorted(path.name for path in PAGE.iterdir())])
 def test_the_page_is_served_with_nothing_from_outside(address, name):
-    code, headers = asyncio.run(status(address + name))
+    code, headers, served = asyncio.run(answer(address + name))
     assert code == 200
     assert headers['Content-Security-Policy'].startswith("default-src 'self'")
     assert headers['X-Content-Type-Options'] == 'nosniff'
     text = (PAGE / (name or 'index.html')).read_text()
+    for colour, code in server.COLOURS.items():
+        text = re.sub(rf'\${colour}\b', code, text)
+    assert served == text
     named = re.findall(r"""(?:src|href|from|url\()\s*=?\s*["']([^"']+)["']""", text)
     assert all((PAGE / one).is_file() for one in named)
     addresses = set(re.findall(r'https?://[^\s"\'`]+', text))
@@ -694,7 +702,7 @@ def test_the_page_is_served_with_nothing_from_outside(address, name):
 
 @pytest.mark.parametrize('name', ['%2e%2e%2fserver.py', 'server.py', 'none.html', 'page/main.js'])
 def test_only_the_page_is_served(address, name):
-    assert asyncio.run(status(address + name))[0] == 404
+    assert asyncio.run(status(address + name)) == 404
 
 
 @pytest.mark.parametrize('host, own', [
@@ -704,7 +712,7 @@ def test_only_the_page_is_served(address, name):
 ])
 def test_a_foreign_host_is_refused(address, host, own):
     host = host.format(port=address.split(':')[2].strip('/'))
-    assert asyncio.run(status(address, Host=host))[0] == (200 if own else 403)
+    assert asyncio.run(status(address, Host=host)) == (200 if own else 403)
 
 
 @pytest.mark.parametrize('origin', [
@@ -747,7 +755,7 @@ def test_a_signal_ends_the_viewer_while_somebody_looks(tmp_path, stop):
     async def use():
         async def up():
             try:
-                return (await status(url))[0] == 200
+                return await status(url) == 200
             except aiohttp.ClientConnectionError:
                 return False
 

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The way from the web's thread to a node, whose entities only the executor's thread touches."""
+"""Calls from the web server's thread to the node, which only the executor's thread may touch."""
 
 import asyncio
 from queue import Empty, SimpleQueue

@@ -8,10 +8,10 @@ import struct
 import numpy as np
 from visualization_msgs.msg import Marker
 
+from .bridge import SECONDS_BETWEEN_WARNINGS
 from ..nodes.message_layout import deserialized, MessageLayout, NoLayout
 
 KINDS = {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'strip', Marker.SPHERE_LIST: 'joints'}
-SECONDS_BETWEEN_WARNINGS = 5.0
 NO_POINTS = np.empty(0)
 
 

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of other nodes, as the page shows and sets them."""
+"""The parameters of the scene's nodes, as the page's sliders show and set them."""
 
 import asyncio
 from dataclasses import dataclass
