@@ -79,7 +79,7 @@ class MessageLayout:
         Where the stamps are.
     numbers : list of (int, int)
         For each sequence of float64 or points where its numbers begin, and how many they are.
-    fixed : uint8 array
+    fixed : bytearray
         A mask of the bytes that are neither number nor padding.
 
     Raises
@@ -90,40 +90,26 @@ class MessageLayout:
     """
 
     def __init__(self, text: bytes, message):
-        walk = _Walk(text)
-        try:
-            walk.over(message)
-        except struct.error:
-            raise NoLayout('it ends too early') from None
         if text[:len(LITTLE_ENDIAN)] != LITTLE_ENDIAN:
             raise NoLayout('its encoding is another')
-        self.stamps, self.numbers = walk.stamps, walk.numbers
-        self.fixed = np.frombuffer(walk.fixed, np.uint8)
-        self._text = np.frombuffer(text, np.uint8)
+        self.stamps: List[int] = []
+        self.numbers: List[Tuple[int, int]] = []
+        self.fixed = bytearray(len(text))
+        self._text, self._place = text, 0
+        self._pass(1, HEADER)
+        self._walk(message)
 
     def fits(self, text: bytes) -> bool:
         """Return whether a message differs in nothing but stamps, numbers and padding."""
-        return len(text) == len(self.fixed) and not (
-            (np.frombuffer(text, np.uint8) ^ self._text) & self.fixed).any()
+        first, second, fixed = (np.frombuffer(each, np.uint8)
+                                for each in (self._text, text, self.fixed))
+        return len(text) == len(self._text) and not ((first ^ second) & fixed).any()
 
     def read(self, text: bytes) -> List[np.ndarray]:
         """Return the numbers of a message that fits, an array for each sequence."""
         return [np.frombuffer(text, '<f8', count, place) for place, count in self.numbers]
 
-
-class _Walk:
-    """A way through the bytes of a message; `fixed` masks those that are no number or padding."""
-
-    def __init__(self, text):
-        self._text = text
-        self.fixed = bytearray(len(text))
-        self.stamps: List[int] = []
-        self.numbers: List[Tuple[int, int]] = []
-        self._place = 0
-        self._pass(1, HEADER)
-
-    def over(self, message):
-        """Go over all fields of a message."""
+    def _walk(self, message):
         for name, kind in message.get_fields_and_field_types().items():
             self._field(kind, getattr(message, name))
 
@@ -137,7 +123,7 @@ class _Walk:
         elif kind.startswith('sequence<'):
             self._sequence(kind[len('sequence<'):-1], value)
         else:
-            self.over(value)
+            self._walk(value)
 
     def _sequence(self, kind, values):
         count = self._count()

@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 import math
 
+from linkage_interfaces.srv import ServoInverse
 import numpy as np
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.qos import (
@@ -21,12 +22,6 @@ from visualization_msgs.msg import Marker, MarkerArray
 from .bridge import NoAnswer
 from .feed import Feed
 from .settings import is_number, RemoteNode, Setting, shortened
-
-try:
-    from linkage_interfaces.srv import ServoInverse
-except ImportError:
-    # Without the service's type there is a picture, but no lever to drag.
-    ServoInverse = None
 
 MARKERS, LOCUS, LIST = '/markers', '/locus', '/list_parameters'
 MARKERS_TYPE, LOCUS_TYPE = 'visualization_msgs/msg/MarkerArray', 'visualization_msgs/msg/Marker'
@@ -255,7 +250,7 @@ class SceneView:
         owners = {key: [name for name, _ in publishers] for key, publishers in marked}
         spaces = {_space(node) for names in owners.values() for node in names}
         nodes = [node for node in nodes if _space(node) in spaces]
-        levers = [name for name in levers if _space(name) in spaces and ServoInverse]
+        levers = [name for name in levers if _space(name) in spaces]
         await self._bridge.ask(self._open, list(owners), nodes, levers)
         names = sorted({key.rsplit('/', 1)[1] for key in owners})
         found = dict(zip(nodes, await asyncio.gather(
