@@ -4,8 +4,8 @@
 """
 Joint states read from their bytes, which costs a tenth of deserialising them.
 
-Of each source, whose messages differ in numbers alone, two messages are deserialised; from then on
-its numbers are taken from where the layout of the second says that they lie.
+Of each source, whose messages differ in numbers alone, the first message is deserialised; the
+numbers of the others are taken from where the layout of that one says that they lie.
 """
 
 from array import array
@@ -18,9 +18,9 @@ from sensor_msgs.msg import JointState
 from .message_layout import deserialized, HEADER, MessageLayout, NoLayout, pack
 
 # So many sources are remembered, of messages that are no longer [bytes]; of those that are of one
-# length, so many arrangements of names. Where there are more sources, one in so many messages is
-# looked at to learn it, as that costs more than it saves if the source is soon forgotten.
-SOURCES, LONGEST, ARRANGEMENTS, SAMPLED = 256, 1 << 16, 4, 64
+# length, so many arrangements of names. Where there are more, one in so many messages is learnt:
+# that costs more than it saves if the source is soon forgotten.
+SOURCES, LONGEST, ARRANGEMENTS, SAMPLED = 256, 1 << 16, 4, 256
 
 
 class JointStateNumbers(NamedTuple):
@@ -47,14 +47,14 @@ class Reader:
         self._understand = understand
         # By length, then by the bytes that count: a mask, and the sources by those bytes.
         self._sources = {}
-        # Those that are known, and those that were met and whether they are worth learning: the
-        # latest last.
-        self._used, self._met = OrderedDict(), OrderedDict()
+        # The same ones, the latest used last.
+        self._used = OrderedDict()
         self._missed = 0
 
     def read(self, text: bytes) -> JointStateNumbers:
         """Return what a message says; raise Unreadable if that cannot be told."""
-        if alike := self._sources.get(len(text)):
+        alike = self._sources.get(len(text), {})
+        if alike:
             number = int.from_bytes(text, 'little')
             for mask, sources in alike.items():
                 if source := sources.get(number & mask):
@@ -64,35 +64,23 @@ class Reader:
         said = JointStateNumbers(pack(message.header.stamp), self._understand(message),
                                  tuple(message.position), tuple(message.velocity))
         self._missed += 1
-        crowded = len(self._used) == SOURCES or len(self._met) == 2 * SOURCES
+        crowded = len(self._used) == SOURCES or len(alike) == ARRANGEMENTS
         if len(text) <= LONGEST and not (crowded and self._missed % SAMPLED):
-            self._meet(text, message, said)
+            self._learn(text, message, said)
         return said
 
-    def _meet(self, text, message, said):
-        """Learn a source that is met again."""
-        source = hash((len(text), text[:HEADER], message.header.frame_id, *message.name,
-                       len(said.positions), len(said.velocities), len(message.effort)))
-        worth_it = self._met.pop(source, None)
-        if worth_it and self._learn(text, message, said):
-            return
-        self._met[source] = worth_it is None
-        if len(self._met) > 2 * SOURCES:
-            self._met.popitem(last=False)
-
-    def _learn(self, text, message, said) -> bool:
+    def _learn(self, text, message, said):
         try:
             source = _Source(text, message, said)
         except NoLayout:
-            return False
+            return
         alike = self._sources.get(source.size, {})
         if source.mask not in alike and len(alike) == ARRANGEMENTS:
-            return False
+            return
         if len(self._used) == SOURCES:
             self._forget(self._used.popitem(last=False)[0])
         self._sources.setdefault(source.size, {}).setdefault(source.mask, {})[source.same] = source
         self._used[source] = True
-        return True
 
     def _forget(self, source):
         alike = self._sources[source.size]

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The command line: what to draw, how, and where to."""
+"""The command `render`: what to draw, how, and where to, from the command line."""
 
 import argparse
 import math

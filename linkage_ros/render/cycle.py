@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Where a machine is, counted in turns of its first input; no picture is drawn here.
+How a mechanism moves in pictures: where its joints are after so many turns of its first input.
 
 A turn is a whole turn of a crank or, of what moves to and fro, there and back.
 """

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What a picture is made of: each layer adds artists to axes, and moves them.
+The layers of a picture, drawn with Matplotlib: traces, guides, legs, floor, headline and names.
 
-`artists` are those that move, in the order they are drawn.
+Each adds artists to axes and moves them; `artists` are those that move, in the order they are drawn.
 """
 
 import math

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Pictures of machines at any time; needs Matplotlib, but neither a screen nor ROS."""
+"""Pictures of mechanisms side by side at any time, with Matplotlib and without a screen."""
 
 import math
 import warnings
