@@ -232,6 +232,15 @@ def test_a_foot_stands_on_the_lowest_part_of_its_curve():
     assert np.hypot(*np.diff(standing, axis=0).T).max() < 2.0  # one piece
 
 
+def test_any_motion_is_drawn_in_place_of_the_solved_one():
+    leg, motion = machine('jansen'), Cycle(machine('jansen', dimensions__m=14.0))
+    picture = picture_of(leg, motions=[motion])
+    picture.show(0.3)
+    values = picture.panels[0].values()[1:]
+    assert values == motion.pose(0.3).places.ravel().tolist()
+    assert values != Cycle(leg).pose(0.3).places.ravel().tolist()
+
+
 def test_the_floor_moves_as_the_foot_that_stands_on_it():
     walker = machine('jansen', leg_pairs=3)
     picture = picture_of(walker, parts=USUAL | {'floor'})
@@ -337,8 +346,8 @@ def test_several_cranks_turn_as_fast_as_they_were_told_to():
     (['jansen.yaml', '--out', 'a.gif', '--angle', '30'], '--angle is for .png and .svg only'),
     (['jansen.yaml', '--out', 'a.gif', '--fps', '60'], '--fps must be at most 50'),
     (['jansen.yaml', '--out', 'a.gif', '--fps', 'x'], 'number'),
-    (['jansen.yaml', '--out', 'a.gif', '--turns', '0'], 'above 0'),
-    (['jansen.yaml', '--out', 'a.gif', '--turns', 'nan'], 'above 0'),
+    (['jansen.yaml', '--out', 'a.gif', '--turns', '0'], 'from 0.001'),
+    (['jansen.yaml', '--out', 'a.gif', '--turns', 'nan'], 'from 0.001'),
     (['jansen.yaml', '--out', 'a.gif', '--turns', '999'], 'frames, more than'),
     (['jansen.yaml', '--out', 'a.gif', '--loop', '-1'], 'from 0'),
     (['jansen.yaml', '--out', 'a.png', '--size', '7x7'], '64'),

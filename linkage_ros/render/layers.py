@@ -4,7 +4,7 @@
 """
 The layers of a picture, drawn with Matplotlib: traces, guides, legs, floor, headline and names.
 
-Each adds artists to axes and moves them; `artists` are those that move, in the order they are drawn.
+Each adds artists to axes and moves them; `artists` are those that move, in drawing order.
 """
 
 import math

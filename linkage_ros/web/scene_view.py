@@ -21,7 +21,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from .bridge import NoAnswer
 from .feed import Feed
-from .settings import is_number, RemoteNode, Setting, shortened
+from .settings import is_number, RemoteNode, Setting
+from ..words import quoted
 
 MARKERS, LOCUS, LIST = '/markers', '/locus', '/list_parameters'
 MARKERS_TYPE, LOCUS_TYPE = 'visualization_msgs/msg/MarkerArray', 'visualization_msgs/msg/Marker'
@@ -135,7 +136,7 @@ class SceneView:
             asked = {}
             for name, value in values.items():
                 if name not in mechanism.settings:
-                    raise Refused(f'{mechanism.name} has no parameter {shortened(name)}')
+                    raise Refused(f'{mechanism.name} has no parameter {quoted(name)}')
                 setting = mechanism.settings[name]
                 try:
                     parameter = setting.asked(f'{mechanism.name}.{name}', value)
@@ -169,7 +170,7 @@ class SceneView:
         if mechanism.lever is None:
             raise Refused(f'{mechanism.name} has no lever that a servo_inverse node knows')
         if not is_number(angle):
-            raise ValueError(f'angle must be a finite number, not {shortened(angle)}')
+            raise ValueError(f'angle must be a finite number, not {quoted(angle)}')
         answer = await self._asked(mechanism, [angle])
         reason = answer.message
         if not answer.success:
@@ -184,7 +185,7 @@ class SceneView:
 
     def _find(self, key):
         if key not in self._mechanisms:
-            raise Refused(f'there is no mechanism {shortened(key)}; '
+            raise Refused(f'there is no mechanism {quoted(key)}; '
                           f'there are: {", ".join(self._mechanisms)}')
         return self._mechanisms[key]
 

@@ -18,8 +18,8 @@ from urllib.parse import urlsplit
 from aiohttp import web, WSCloseCode
 
 from .scene_view import Refused, SCENE
-from .settings import shortened
 from .. import palette
+from ..words import quoted
 
 PAGE = files(__package__) / 'page'
 KINDS = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript',
@@ -275,7 +275,7 @@ class Client:
                 return {}
             if op == 'drag':
                 return await self._view.drag(said['mechanism'], said['angle'])
-            return {'reason': f'unknown request {shortened(op)}'}
+            return {'reason': f'unknown request {quoted(op)}'}
         except Refused as reason:
             return {'reason': str(reason)}
         except KeyError as error:
