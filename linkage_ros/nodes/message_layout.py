@@ -79,7 +79,7 @@ class MessageLayout:
         Where the stamps are.
     numbers : list of (int, int)
         For each sequence of float64 or points where its numbers begin, and how many they are.
-    fixed : bytearray
+    fixed : uint8 array
         A mask of the bytes that are neither number nor padding.
 
     Raises
@@ -94,16 +94,15 @@ class MessageLayout:
             raise NoLayout('its encoding is another')
         self.stamps: List[int] = []
         self.numbers: List[Tuple[int, int]] = []
-        self.fixed = bytearray(len(text))
-        self._text, self._place = text, 0
+        self._fixed, self._text, self._place = bytearray(len(text)), text, 0
         self._pass(1, HEADER)
         self._walk(message)
+        self._bytes, self.fixed = (np.frombuffer(each, np.uint8) for each in (text, self._fixed))
 
     def fits(self, text: bytes) -> bool:
         """Return whether a message differs in nothing but stamps, numbers and padding."""
-        first, second, fixed = (np.frombuffer(each, np.uint8)
-                                for each in (self._text, text, self.fixed))
-        return len(text) == len(self._text) and not ((first ^ second) & fixed).any()
+        return len(text) == len(self._text) and not (
+            (np.frombuffer(text, np.uint8) ^ self._bytes) & self.fixed).any()
 
     def read(self, text: bytes) -> List[np.ndarray]:
         """Return the numbers of a message that fits, an array for each sequence."""
@@ -147,7 +146,7 @@ class MessageLayout:
         self._place = end = place + size
         if end > len(self._text):
             raise NoLayout('it ends too early')
-        self.fixed[place:end] = mask * size
+        self._fixed[place:end] = mask * size
         return place
 
 
