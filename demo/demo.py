@@ -19,10 +19,13 @@ sys.path.append(str(HERE.parent / 'test'))
 try:
     from domains import Domain
     from linkage_ros import scene
+    from linkage_ros.render import files
+    from linkage_ros.render.parts import USUAL, USUAL_IN_MOTION
+    from linkage_ros.render.picture import Picture
     from listener import Listener
     from motion import lever_error, Motion
     from nodes import DemoError, Nodes
-    import pictures
+    import numpy as np
     from tqdm import tqdm
 except ImportError as error:
     sys.exit(f'demo: {error}; `make demo` installs and builds what is needed')
@@ -30,7 +33,9 @@ except ImportError as error:
 SCENE = HERE.parent / 'config' / 'all.yaml'
 OUT = HERE / 'out'
 SECONDS = 10.0
-ANIMATED_SECONDS = 2.0 * math.pi
+
+PORTRAIT_SIZE, PORTRAIT_ANGLE = (720, 720), 1.0
+ANIMATION_SIZE, ANIMATED_SECONDS, FRAMES_PER_SECOND, COLOURS = (1040, 300), 2.0 * math.pi, 12.0, 24
 
 # Lever angles [degrees] for the service; the last is out of reach.
 LEVER_ANGLES = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)
@@ -108,13 +113,23 @@ def report_answer(machine, answer):
 
 
 def draw(motions):
-    """Draw the pictures."""
+    """Draw each mechanism to a picture, and all of them moving side by side, as they were sent."""
     OUT.mkdir(exist_ok=True)
     print()
     for motion in tqdm(motions, 'portraits', unit='picture'):
-        pictures.portrait(motion, OUT / f'{motion.machine.name}.png')
-    pictures.animation(motions, OUT / 'all.gif', ANIMATED_SECONDS,
-                       lambda times: tqdm(times, 'animation', unit='frame'))
+        picture = Picture([motion.machine], PORTRAIT_SIZE, 'whole', USUAL, [motion])
+        shown_at = motion.turns_to(PORTRAIT_ANGLE)
+        picture.arrange([shown_at])
+        files.still(picture, shown_at, OUT / f'{motion.machine.name}.png')
+    # All at the same time.
+    for motion in motions:
+        motion.start = max(other.times[0] for other in motions)
+    picture = Picture([motion.machine for motion in motions], ANIMATION_SIZE, 'whole',
+                      USUAL_IN_MOTION - {'axes'}, motions)
+    times = np.arange(0.0, ANIMATED_SECONDS, 1.0 / FRAMES_PER_SECOND) / picture.period
+    picture.arrange(times)
+    files.gif(picture, times, FRAMES_PER_SECOND, 0, COLOURS, OUT / 'all.gif',
+              lambda times: tqdm(times, 'animation', unit='frame'))
     print(f'\nPictures: {OUT}')
     for file in sorted(OUT.iterdir()):
         print(f'  {file.name}')

@@ -1,17 +1,20 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What one mechanism sent, as arrays, and what can be measured on it."""
+"""What one mechanism sent, as arrays: what can be measured on it, and how it is drawn."""
 
 import math
 
+from linkage_ros.render.cycle import Configuration, Wheel
 from nodes import DemoError
 import numpy as np
 
 
 class Motion:
     """
-    What one mechanism sent.
+    What one mechanism sent, which moves in a picture as it did when it was sent.
+
+    Times are turns of the first input since the start, which is the first message's stamp.
 
     Attributes
     ----------
@@ -20,33 +23,39 @@ class Motion:
     joint_states : int
         Number of joint state messages.
     times : float array (n,)
-        Stamps of the marker messages [s].
+        Stamps of the markers that have joint states too [s].
     bars : float array (n, legs * bars, 2, 2)
         Ends of each bar [m].
-    points : float array (n, legs, points, 2)
+    course : float array (n, legs, points, 2)
         The joints [m].
-    locus : float array (m, 2)
-        The traced curve [m].
+    period : float
+        Seconds of a turn.
+    prefixes : tuple of str
+        One for each leg.
 
     """
 
     def __init__(self, machine, joint_states, markers, locus):
-        if not joint_states or not markers:
+        states = {seconds(state.header.stamp): dict(zip(state.name, state.position))
+                  for state in joint_states}
+        both = [message.markers for message in markers
+                if seconds(message.markers[0].header.stamp) in states]
+        if not both:
             raise DemoError(f'{machine.name} sent no messages while it was listened to')
-        links, joints = zip(*(message.markers for message in markers))
+        links, joints = zip(*both)
         self.machine = machine
         self.joint_states = len(joint_states)
         self.times = np.array([seconds(marker.header.stamp) for marker in links])
+        self.start = self.times[0]
         self.bars = np.array([places(marker) for marker in links])
         self.bars = self.bars.reshape(len(links), -1, 2, 2)
-        self.points = np.array([places(marker) for marker in joints])
-        self.points = self.points.reshape(len(joints), -1, len(machine.points), 2)
-        self.locus = places(locus)
-
-    @property
-    def traced(self) -> np.ndarray:
-        """The traced joint of the first leg [m], shape (n, 2)."""
-        return self.points[:, 0, self.machine.points.index(self.machine.tracer)]
+        self.inputs = [tuple(states[time][f'{machine.name}_{name}'] for name in machine.inputs)
+                       for time in self.times]
+        self.course = np.array([places(marker) for marker in joints])
+        self.course = self.course.reshape(len(joints), -1, len(machine.points), 2)
+        self.period = Wheel(next(iter(machine.inputs.values()))).period
+        self.prefixes = ('',) * self.course.shape[1]
+        self._locus = places(locus)
 
     @property
     def rate(self) -> float:
@@ -56,7 +65,7 @@ class Motion:
     @property
     def extent(self) -> np.ndarray:
         """Width and height of the traced curve [m]."""
-        return np.ptp(self.locus, axis=0)
+        return np.ptp(self._locus, axis=0)
 
     def length_error(self) -> float:
         """Return the largest error of a bar's length, as a part of the longest bar."""
@@ -66,8 +75,29 @@ class Motion:
         lengths = np.hypot(*np.moveaxis(ends[..., 1, :] - ends[..., 0, :], -1, 0))
         return float(np.max(np.abs(lengths - true)) / (scale * linkage.longest))
 
-    def at(self, time: float) -> int:
-        """Return the index of the latest marker message at a time [s]."""
+    def turns_to(self, theta: float) -> float:
+        """Return when the first input, a crank, was nearest to an angle [rad]."""
+        nearest = np.argmin([abs(math.remainder(first - theta, math.tau))
+                             for first, *_ in self.inputs])
+        return (self.times[nearest] - self.start) / self.period
+
+    def pose(self, turns: float) -> Configuration:
+        """Return where everything was."""
+        latest = self._latest(turns)
+        return Configuration(turns, self.inputs[latest], self.course[latest])
+
+    def curve(self, joint: int, start: float, end: float) -> np.ndarray:
+        """Return where a joint was between two times, shape (n, legs, 2) [m]."""
+        return self.course[self._latest(start):self._latest(end) + 1, :, joint]
+
+    def locus(self, _) -> np.ndarray:
+        """Return the traced curve [m], shape (n, 2)."""
+        return self._locus
+
+    def _latest(self, turns):
+        """Return the index of the latest message at a time."""
+        # A time may be rounded.
+        time = self.start + turns * self.period + 1e-6
         return max(int(np.searchsorted(self.times, time, side='right')) - 1, 0)
 
 

@@ -14,9 +14,9 @@ import re
 import sys
 import textwrap
 
-from linkage_ros import mechanisms, scene
+from linkage_ros import mechanisms, palette, scene
 from linkage_ros.linkage import joint_lines, planar
-from linkage_ros.render import files, layers
+from linkage_ros.render import files
 from linkage_ros.render.command import parser
 from linkage_ros.render.cycle import Cycle
 from linkage_ros.render.parts import USUAL
@@ -300,8 +300,8 @@ def family(type_):
         difference = part * (value or max(defaults.values()))
         panel.set_title(name, fontsize=11)
         panel.set(xticks=[], yticks=[])
-        for sign, colour, dashes in ((-1, layers.BLUE, '--'), (0, layers.DARK, '-'),
-                                     (1, layers.VERMILLION, '-.')):
+        for sign, colour, dashes in ((-1, palette.BLUE, '--'), (0, palette.DARK, '-'),
+                                     (1, palette.VERMILION, '-.')):
             curve = traced(type_, {name: value + sign * difference})
             panel.plot(*curve.T, color=colour, ls=dashes, lw=1.6)
         frame(panel, panel.lines[1].get_xydata(), part == CHANGE)

@@ -17,7 +17,7 @@ import pytest
 for module in ('matplotlib', 'tqdm', 'yaml'):
     pytest.importorskip(module)
 
-from linkage_ros import mechanisms, scene  # noqa: E402
+from linkage_ros import mechanisms, palette, scene  # noqa: E402
 from linkage_ros.render import (  # noqa: E402
     files,
     layers,
@@ -181,7 +181,7 @@ def test_a_gif_keeps_the_colours_that_colour_blind_people_tell_apart(tmp_path):
     file = rendered(tmp_path, '--frames', '3', ending='gif')
     with Image.open(file) as image:
         seen = {colour for _, colour in image.convert('RGB').getcolors(1 << 16)}
-    wanted = [layers.BLUE, layers.ORANGE, layers.GREEN, layers.VERMILLION, 'white']
+    wanted = [palette.BLUE, palette.ORANGE, palette.GREEN, palette.VERMILION, 'white']
     assert {tuple(round(255 * c) for c in to_rgb(colour)) for colour in wanted} <= seen
 
 
@@ -230,6 +230,15 @@ def test_a_foot_stands_on_the_lowest_part_of_its_curve():
     assert standing[:, 1].max() - low < 0.1 * (high - low)
     assert np.ptp(standing[:, 0]) > 0.7 * np.ptp(curve[:, 0])
     assert np.hypot(*np.diff(standing, axis=0).T).max() < 2.0  # one piece
+
+
+def test_any_motion_is_drawn_in_place_of_the_solved_one():
+    leg, motion = machine('jansen'), Cycle(machine('jansen', dimensions__m=14.0))
+    picture = picture_of(leg, motions=[motion])
+    picture.show(0.3)
+    values = picture.panels[0].values()[1:]
+    assert values == motion.pose(0.3).places.ravel().tolist()
+    assert values != Cycle(leg).pose(0.3).places.ravel().tolist()
 
 
 def test_the_floor_moves_as_the_foot_that_stands_on_it():
@@ -337,8 +346,8 @@ def test_several_cranks_turn_as_fast_as_they_were_told_to():
     (['jansen.yaml', '--out', 'a.gif', '--angle', '30'], '--angle is for .png and .svg only'),
     (['jansen.yaml', '--out', 'a.gif', '--fps', '60'], '--fps must be at most 50'),
     (['jansen.yaml', '--out', 'a.gif', '--fps', 'x'], 'number'),
-    (['jansen.yaml', '--out', 'a.gif', '--turns', '0'], 'above 0'),
-    (['jansen.yaml', '--out', 'a.gif', '--turns', 'nan'], 'above 0'),
+    (['jansen.yaml', '--out', 'a.gif', '--turns', '0'], 'from 0.001'),
+    (['jansen.yaml', '--out', 'a.gif', '--turns', 'nan'], 'from 0.001'),
     (['jansen.yaml', '--out', 'a.gif', '--turns', '999'], 'frames, more than'),
     (['jansen.yaml', '--out', 'a.gif', '--loop', '-1'], 'from 0'),
     (['jansen.yaml', '--out', 'a.png', '--size', '7x7'], '64'),
@@ -346,7 +355,7 @@ def test_several_cranks_turn_as_fast_as_they_were_told_to():
     (['jansen.yaml', '--out', 'a.png', '--hide', 'legs'], 'legs is no part'),
     (['jansen.yaml', '--out', 'a.png', '--trace', 'x'], 'growing'),
     (['jansen.yaml', '--out', 'a.png', '--mechanisms', 'x'], 'allowed: jansen'),
-    (['peaucellier.yaml', '--out', 'a.png', '--angle', '180'], 'swings inside'),
+    (['peaucellier.yaml', '--out', 'a.png', '--angle', '180'], 'stays inside'),
     (['bad.yaml', '--out', 'a.png'], 'leg.type must be'),
     (['picture.png', '--out', 'a.png'], 'picture.png'),
     (['still.yaml', '--out', 'a.gif'], 'nothing moves'),

@@ -5,17 +5,19 @@
 
 import ast
 from pathlib import Path
+import re
 
 import pytest
 
 PACKAGE = Path(__file__).parents[1] / 'linkage_ros'
 # From the ground up: a module imports from its own room and from those below.
-ROOMS = ('words', 'formula', 'linkage', 'mechanisms', 'scene', 'command', 'robot_model', 'render',
-         'nodes', 'web')
+ROOMS = ('words', 'palette', 'formula', 'linkage', 'mechanisms', 'scene', 'command', 'robot_model',
+         'render', 'nodes', 'web')
 WITH_ROS = ('nodes', 'web')
 ROS = ('rclpy', 'builtin_interfaces', 'geometry_msgs', 'rcl_interfaces', 'sensor_msgs', 'std_msgs',
        'visualization_msgs', 'linkage_interfaces')
 MODULES = sorted(PACKAGE.rglob('*.py'))
+PAGE = PACKAGE / 'web' / 'page'
 
 
 def room(module):
@@ -53,3 +55,10 @@ def test_a_module_imports_nothing_from_above(module):
 @pytest.mark.parametrize('module', MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_a_module_begins_with_what_it_is_for(module):
     assert ast.get_docstring(ast.parse(module.read_text()))
+
+
+def test_every_colour_is_in_the_palette():
+    files = [path for path in PAGE.iterdir() if path.suffix in ('.css', '.js', '.svg')]
+    for file in (*MODULES, *files):
+        colours = re.findall("#[0-9a-f]{6}|'#[0-9a-f]{3}'", file.read_text())
+        assert not colours or file == PACKAGE / 'palette.py', f'{file.name} has {colours}'

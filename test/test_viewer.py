@@ -26,14 +26,15 @@ pytest.importorskip('rclpy')
 pytest.importorskip('linkage_interfaces')
 
 import browser  # noqa: E402
+from geometry_msgs.msg import Point  # noqa: E402
 from linkage_ros import mechanisms  # noqa: E402
-from linkage_ros.nodes import messages  # noqa: E402
+from linkage_ros.nodes import message_layout, messages  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
-from linkage_ros.web import server  # noqa: E402
+from linkage_ros.web import feed, server  # noqa: E402
 from linkage_ros.web.feed import Feed  # noqa: E402
-from linkage_ros.web.stage import LATCHED  # noqa: E402
+from linkage_ros.web.scene_view import LATCHED  # noqa: E402
 from linkage_ros.web.viewer import Viewer  # noqa: E402
 from rcl_interfaces.msg import (  # noqa: E402
     Parameter as ParameterMessage,  # noqa: E402
@@ -46,7 +47,8 @@ from rclpy.logging import get_logger  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from ros_harness import Graph, Process  # noqa: E402
-from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+from std_msgs.msg import ColorRGBA  # noqa: E402
+from visualization_msgs.msg import Marker, MarkerArray, UVCoordinate  # noqa: E402
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / 'linkage_ros' / 'web' / 'page'
@@ -672,20 +674,28 @@ def address(lever):
     return lever.viewer.url
 
 
-async def status(url, **headers):
-    """Return the status and the headers of an answer."""
+async def answer(url, **headers):
+    """Return the status, the headers and the text of an answer."""
     async with aiohttp.ClientSession() as session:
         async with session.get(url, headers=headers) as response:
-            return response.status, response.headers
+            return response.status, response.headers, await response.text()
+
+
+async def status(url, **headers):
+    """Return the status of an answer."""
+    return (await answer(url, **headers))[0]
 
 
 @pytest.mark.parametrize('name', ['', *sorted(path.name for path in PAGE.iterdir())])
 def test_the_page_is_served_with_nothing_from_outside(address, name):
-    code, headers = asyncio.run(status(address + name))
+    code, headers, served = asyncio.run(answer(address + name))
     assert code == 200
     assert headers['Content-Security-Policy'].startswith("default-src 'self'")
     assert headers['X-Content-Type-Options'] == 'nosniff'
     text = (PAGE / (name or 'index.html')).read_text()
+    for colour, code in server.COLOURS.items():
+        text = re.sub(rf'\${colour}\b', code, text)
+    assert served == text
     named = re.findall(r"""(?:src|href|from|url\()\s*=?\s*["']([^"']+)["']""", text)
     assert all((PAGE / one).is_file() for one in named)
     addresses = set(re.findall(r'https?://[^\s"\'`]+', text))
@@ -694,7 +704,7 @@ def test_the_page_is_served_with_nothing_from_outside(address, name):
 
 @pytest.mark.parametrize('name', ['%2e%2e%2fserver.py', 'server.py', 'none.html', 'page/main.js'])
 def test_only_the_page_is_served(address, name):
-    assert asyncio.run(status(address + name))[0] == 404
+    assert asyncio.run(status(address + name)) == 404
 
 
 @pytest.mark.parametrize('host, own', [
@@ -704,7 +714,7 @@ def test_only_the_page_is_served(address, name):
 ])
 def test_a_foreign_host_is_refused(address, host, own):
     host = host.format(port=address.split(':')[2].strip('/'))
-    assert asyncio.run(status(address, Host=host))[0] == (200 if own else 403)
+    assert asyncio.run(status(address, Host=host)) == (200 if own else 403)
 
 
 @pytest.mark.parametrize('origin', [
@@ -747,7 +757,7 @@ def test_a_signal_ends_the_viewer_while_somebody_looks(tmp_path, stop):
     async def use():
         async def up():
             try:
-                return (await status(url))[0] == 200
+                return await status(url) == 200
             except aiohttp.ClientConnectionError:
                 return False
 
@@ -814,25 +824,41 @@ def unpacked(text):
 
 
 def test_what_is_read_without_unpacking_is_what_unpacking_gives():
-    feed = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    topic = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
     looks = []
     for text in (walker(1), walker(2), walker(3), walker(4, legs=1), walker(5),
                  walker(6, width=2.0), walker(7, frame='earth'), walker(8), FILLED, FILLED):
-        feed.newest = text
-        look, records = feed.drawn()
+        topic.newest = text
+        look, records = topic.drawn()
         assert records == unpacked(text)
         looks.append(look[0]['width'])
     assert looks[5] == 2.0 * looks[0] == 2.0 * looks[7]
 
 
+def test_from_its_second_message_on_a_topic_is_not_unpacked_whatever_else_is_in_it(monkeypatch):
+    looked = []
+    monkeypatch.setattr(feed, 'deserialized', lambda *args: (
+        looked.append(args) or message_layout.deserialized(*args)))
+    topic = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    for step in range(5):
+        message = deserialize_message(walker(step), MarkerArray)
+        message.markers.insert(1, Marker(
+            ns='odd', type=Marker.TRIANGLE_LIST, text='abc', points=[Point(x=float(step))] * 3,
+            colors=[ColorRGBA(r=0.5)] * 3, uv_coordinates=[UVCoordinate(u=0.5)]))
+        message.markers[1].mesh_file.data = b'abcde'
+        topic.newest = serialize_message(message)
+        assert topic.drawn()[1] == unpacked(walker(step))
+    assert len(looked) == 1
+
+
 def test_markers_that_are_gone_are_drawn_no_more():
-    feed = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
-    feed.newest = walker(1)
-    assert set(feed.drawn()[0]) == {0, 1}
+    topic = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    topic.newest = walker(1)
+    assert set(topic.drawn()[0]) == {0, 1}
     one = deserialize_message(walker(2), MarkerArray)
     one.markers = [marker for marker in one.markers if marker.type == Marker.SPHERE_LIST]
-    feed.newest = serialize_message(one)
-    looks, records = feed.drawn()
+    topic.newest = serialize_message(one)
+    looks, records = topic.drawn()
     assert [look['kind'] for look in looks.values()] == ['joints']
     assert records.endswith(struct.pack('<II', 1, 0))
 
@@ -867,12 +893,12 @@ def swapped(message):
 
 
 def test_markers_in_the_other_byte_order_are_drawn_alike():
-    feed = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    topic = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
     for step in (1, 2, 3):
         text = walker(step)
-        feed.newest = swapped(deserialize_message(text, MarkerArray))
-        assert feed.newest[4:] != text[4:]
-        assert feed.drawn()[1] == unpacked(text)
+        topic.newest = swapped(deserialize_message(text, MarkerArray))
+        assert topic.newest[4:] != text[4:]
+        assert topic.drawn()[1] == unpacked(text)
 
 
 def spoilt(part, number):
@@ -902,10 +928,10 @@ def hostile(rng, text):
 
 def test_of_what_cannot_be_drawn_nothing_stays():
     rng = np.random.default_rng(5)
-    feed = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    topic = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
     for step, text in enumerate(hostile(rng, walker(0))):
-        for feed.newest in (text, walker(step)):
-            looks, records = feed.drawn()
+        for topic.newest in (text, walker(step)):
+            looks, records = topic.drawn()
             json.dumps(looks, allow_nan=False)
             at, read = 0, {}
             while at < len(records):
@@ -919,13 +945,13 @@ def test_of_what_cannot_be_drawn_nothing_stays():
 
 
 def test_markers_with_ever_new_ids_are_not_gathered():
-    feed = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    topic = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
     for step in range(50):
         message = deserialize_message(walker(step), MarkerArray)
         for marker in message.markers:
             marker.id += 2 * step
-        feed.newest = serialize_message(message)
-        looks, records = feed.drawn()
+        topic.newest = serialize_message(message)
+        looks, records = topic.drawn()
         assert len(looks) == 2 and len(records) == len(unpacked(walker(step)))
 
 

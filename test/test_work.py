@@ -179,7 +179,7 @@ def test_a_patched_message_reads_like_one_that_is_built(count):
 
 def test_what_cannot_be_patched_is_published_as_an_ordinary_message(graph, monkeypatch):
     def refuse(*_):
-        raise message_layout.NoTemplate('not on this middleware')
+        raise message_layout.NoLayout('not on this middleware')
 
     monkeypatch.setattr(message_layout.Template, '_check', refuse)
     graph.start(Kinematics, WALKER)

@@ -14,7 +14,7 @@ from itertools import cycle, islice
 import statistics
 import time
 
-from linkage_ros.nodes.joint_state_reader import Reader, Turned
+from linkage_ros.nodes.joint_state_reader import JointStateNumbers, Reader
 from linkage_ros.nodes.message_layout import pack
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
@@ -28,11 +28,11 @@ ROUNDS, NUMBERS = 7, 100_000
 class Plain:
     """Deserialises every message."""
 
-    def read(self, text: bytes) -> Turned:
+    def read(self, text: bytes) -> JointStateNumbers:
         """Return what a message says."""
         message = deserialize_message(text, JointState)
-        return Turned(pack(message.header.stamp), message.name, tuple(message.position),
-                      tuple(message.velocity))
+        return JointStateNumbers(pack(message.header.stamp), message.name,
+                                 tuple(message.position), tuple(message.velocity))
 
 
 def texts(sources, joints):

@@ -2,15 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Messages that are serialised once and patched in place.
+Where the numbers lie in the bytes of a message, to read and write them without the rest.
 
-Where the values of a message lie among its bytes is found by serialising values that occur nowhere
-else, so nothing here knows a message type or the wire format. What was found is tried before it is
-used: a patched message has to read back equal to one that is built.
+From one message of a publisher to its next only numbers change: its stamps, and the float64 in its
+sequences. Where they lie follows from the lengths that stand between them (CDR, as it is on the
+wire). Whoever uses a layout tries it first: what it reads or writes has to be what an ordinary
+message says.
 """
 
 import struct
-from typing import Callable
+from typing import Callable, List, Tuple
 
 from builtin_interfaces.msg import Time
 import numpy as np
@@ -19,12 +20,16 @@ from rclpy.serialization import deserialize_message, serialize_message
 # The bytes that say how a message is encoded; what follows is aligned from its end.
 HEADER = 4
 LEAD = bytes(8 - HEADER)
+LITTLE_ENDIAN = b'\0\1'
 # Of fewer bytes no message is made. A middleware that takes the sender's word for how many of them
 # are padding looks beyond the end, and may end the process.
 SHORTEST = 8
 
-_STAMP = struct.Struct('=iI')
-SENTINEL = Time(sec=0x5EC0_1234, nanosec=0x2A0C_4321)
+_STAMP, _COUNT = struct.Struct('<iI'), struct.Struct('<I')
+_SIZES = {'boolean': 1, 'octet': 1, 'uint8': 1, 'int8': 1, 'uint16': 2, 'int16': 2, 'uint32': 4,
+          'int32': 4, 'float': 4, 'uint64': 8, 'int64': 8, 'double': 8}
+# What is made of float64 alone, and of how many.
+_DOUBLES = {'double': 1, 'geometry_msgs/Point': 3}
 
 
 def pack(stamp: Time) -> bytes:
@@ -53,8 +58,96 @@ def deserialized(text: bytes, kind: type):
         raise Unreadable(' '.join(str(error).split())[:200]) from None
 
 
-class NoTemplate(Exception):
-    """A message that cannot be patched in place."""
+class NoLayout(Exception):
+    """A message whose numbers cannot be read or written in place; the text says why."""
+
+
+class MessageLayout:
+    """
+    Where the numbers lie in a message, and which other bytes count.
+
+    Parameters
+    ----------
+    text : bytes
+        A message, serialised.
+    message : ROS message
+        The same; of types without arrays of fixed size and without wide strings.
+
+    Attributes
+    ----------
+    stamps : list of int
+        Where the stamps are.
+    numbers : list of (int, int)
+        For each sequence of float64 or points where its numbers begin, and how many they are.
+    fixed : uint8 array
+        A mask of the bytes that are neither number nor padding.
+
+    Raises
+    ------
+    NoLayout
+        If it is encoded otherwise.
+
+    """
+
+    def __init__(self, text: bytes, message):
+        if text[:len(LITTLE_ENDIAN)] != LITTLE_ENDIAN:
+            raise NoLayout('its encoding is another')
+        self.stamps: List[int] = []
+        self.numbers: List[Tuple[int, int]] = []
+        self._fixed, self._text, self._place = bytearray(len(text)), text, 0
+        self._pass(1, HEADER)
+        self._walk(message)
+        self._bytes, self.fixed = (np.frombuffer(each, np.uint8) for each in (text, self._fixed))
+
+    def fits(self, text: bytes) -> bool:
+        """Return whether a message differs in nothing but stamps, numbers and padding."""
+        return len(text) == len(self._text) and not (
+            (np.frombuffer(text, np.uint8) ^ self._bytes) & self.fixed).any()
+
+    def read(self, text: bytes) -> List[np.ndarray]:
+        """Return the numbers of a message that fits, an array for each sequence."""
+        return [np.frombuffer(text, '<f8', count, place) for place, count in self.numbers]
+
+    def _walk(self, message):
+        for name, kind in message.get_fields_and_field_types().items():
+            self._field(kind, getattr(message, name))
+
+    def _field(self, kind, value):
+        if kind == 'string':
+            self._pass(1, self._count())
+        elif kind in _SIZES:
+            self._pass(_SIZES[kind], _SIZES[kind])
+        elif kind == 'builtin_interfaces/Time':
+            self.stamps.append(self._pass(4, _STAMP.size, b'\0'))
+        elif kind.startswith('sequence<'):
+            self._sequence(kind[len('sequence<'):-1], value)
+        else:
+            self._walk(value)
+
+    def _sequence(self, kind, values):
+        count = self._count()
+        if count != len(values):
+            raise NoLayout('its bytes are another message')
+        if kind in _DOUBLES:
+            count *= _DOUBLES[kind]
+            self.numbers.append((self._pass(8 if count else 1, 8 * count, b'\0'), count))
+        elif kind in _SIZES:
+            self._pass(_SIZES[kind], count * _SIZES[kind])
+        else:
+            for value in values:
+                self._field(kind, value)
+
+    def _count(self):
+        return _COUNT.unpack_from(self._text, self._pass(4, 4))[0]
+
+    def _pass(self, alignment, size, mask=b'\xff'):
+        """Go on by some bytes; return where they begin, at a multiple after the header."""
+        place = self._place + (HEADER - self._place) % alignment
+        self._place = end = place + size
+        if end > len(self._text):
+            raise NoLayout('it ends too early')
+        self._fixed[place:end] = mask * size
+        return place
 
 
 class Template:
@@ -64,33 +157,36 @@ class Template:
     Parameters
     ----------
     build : callable
-        From a stamp and `count` floats, an array, to a message that shows some of them.
+        From a stamp and `count` floats, an array, to a message that shows some of them, and else
+        no numbers in its sequences but zero.
     count : int
         How many values the message is made from.
 
     Raises
     ------
-    NoTemplate
+    NoLayout
         If a patched message reads differently from one that is built.
 
     """
 
     def __init__(self, build: Callable, count: int):
-        values = distinct(count)
-        message = build(SENTINEL, values)
+        # Made of 1, 2, 3 and so on, a message says itself which of its numbers is which value.
+        message = build(Time(sec=1), np.arange(1.0, count + 1.0))
         text = serialize_message(message)
+        layout = MessageLayout(text, message)
         # Numbers lie at multiples of 8 after the header; in memory too they are quicker there.
         self._bytes = bytearray(LEAD + text + bytes(-(len(text) - HEADER) % 8))
-        self._stamps = [slice(place, place + _STAMP.size)
-                        for place in places(self._bytes, pack(SENTINEL))]
         self._message = memoryview(self._bytes)[len(LEAD):len(LEAD) + len(text)]
+        self._stamps = [slice(len(LEAD) + place, len(LEAD) + place + _STAMP.size)
+                        for place in layout.stamps if any(text[place:place + _STAMP.size])]
         self._numbers = np.frombuffer(self._bytes, float, offset=len(LEAD) + HEADER)
-        # Every number comes from one table: the values, then what the message has said so far.
-        self._table = np.concatenate([values, self._numbers])
-        self._values = self._table[:count]
-        found = {value: i for i, value in enumerate(values.tolist())}
-        self._sources = np.array([found.get(number, count + slot)
-                                  for slot, number in enumerate(self._numbers.tolist())], int)
+        # Every number comes from one table: zero, the values, then what the message says besides.
+        self._table = np.concatenate([np.zeros(count + 1), self._numbers])
+        self._values = self._table[1:count + 1]
+        self._sources = np.arange(count + 1, len(self._table))
+        for place, size in layout.numbers:
+            start = (place - HEADER) // 8
+            self._sources[start:start + size] = self._numbers[start:start + size]
         self._check(build, type(message), count)
 
     def patched(self, stamp: bytes, values: np.ndarray) -> bytes:
@@ -106,7 +202,7 @@ class Template:
         built = serialize_message(build(stamp, values))
         if deserialize_message(self.patched(pack(stamp), values), kind) != deserialize_message(
                 built, kind):
-            raise NoTemplate('a patched message does not read back as it was written')
+            raise NoLayout('a patched message does not read back as it was written')
 
 
 class Wire:
@@ -129,7 +225,7 @@ class Wire:
         self._build = build
         try:
             self._template = Template(build, count)
-        except NoTemplate as reason:
+        except NoLayout as reason:
             self._template = None
             logger.warning(f'{publisher.topic_name}: {reason}; publishing ordinary messages',
                            once=True)
@@ -140,17 +236,3 @@ class Wire:
             self._publisher.publish(self._template.patched(stamp, values))
         else:
             self._publisher.publish(self._build(unpack(stamp), values))
-
-
-def distinct(count: int) -> np.ndarray:
-    """Return numbers of which no other bytes of a message are made."""
-    return -1.2345678901234567e+201 * (1.0 + np.arange(count) / (count + 1.0))
-
-
-def places(text: bytearray, wanted: bytes) -> list:
-    """Return where some bytes stand."""
-    found, place = [], text.find(wanted)
-    while place >= 0:
-        found.append(place)
-        place = text.find(wanted, place + 1)
-    return found

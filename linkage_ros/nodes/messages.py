@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Messages from numbers; a message that is published again and again is made once."""
+"""Joint states and markers of a mechanism as messages, from the numbers that were solved."""
 
 from array import array
 import math
@@ -13,12 +13,12 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-# Colours that colour-blind people tell apart (Okabe and Ito, "Color Universal Design").
-BLUE, ORANGE, GREEN = (0.0, 0.447, 0.698), (0.902, 0.624, 0.0), (0.0, 0.62, 0.451)
+from .. import palette
 
-# Widths of what is drawn, as parts of the longest bar.
-LINK, JOINT, LOCUS = 1 / 40, 1 / 20, 1 / 100
-LINKS_ID, JOINTS_ID, LOCUS_ID = 0, 1, 2
+# How each marker is drawn, by its id: type, colour and width as a part of the longest bar.
+LINKS_ID, JOINTS_ID, LOCUS_ID = range(3)
+LOOKS = ((Marker.LINE_LIST, palette.LINK, 1 / 40), (Marker.SPHERE_LIST, palette.JOINT, 1 / 20),
+         (Marker.LINE_STRIP, palette.LOCUS, 1 / 100))
 
 
 class JointStates:
@@ -62,9 +62,8 @@ class Markers:
 
     def __init__(self, name: str, frame_id: str, pose, bars, size: float):
         self._ends = np.array(bars, int).reshape(-1)
-        self._links = _marker(name, LINKS_ID, Marker.LINE_LIST, frame_id, pose, BLUE, LINK * size)
-        self._joints = _marker(
-            name, JOINTS_ID, Marker.SPHERE_LIST, frame_id, pose, ORANGE, JOINT * size)
+        self._links, self._joints = (_marker(name, id_, frame_id, pose, size)
+                                     for id_ in (LINKS_ID, JOINTS_ID))
         markers = [self._links, self._joints] if bars else [self._joints]
         self._message = MarkerArray(markers=markers)
         self.ids = frozenset(marker.id for marker in markers)
@@ -89,7 +88,7 @@ class Markers:
 
 def locus(name: str, frame_id: str, pose, places: np.ndarray, size: float) -> Marker:
     """Return the curve through places [m], shape (n, 2); without a stamp it holds at any time."""
-    marker = _marker(name, LOCUS_ID, Marker.LINE_STRIP, frame_id, pose, GREEN, LOCUS * size)
+    marker = _marker(name, LOCUS_ID, frame_id, pose, size)
     marker.points = [Point(x=x, y=y) for x, y in places.tolist()]
     return marker
 
@@ -107,13 +106,14 @@ def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
                       z=cr * cp * sy - sr * sp * cy, w=cr * cp * cy + sr * sp * sy)
 
 
-def _marker(name, id_, type_, frame_id, pose, colour, width) -> Marker:
+def _marker(name, id_, frame_id, pose, size) -> Marker:
+    type_, colour, width = LOOKS[id_]
     marker = Marker(ns=name, id=id_, type=type_, action=Marker.ADD)
     marker.header.frame_id = frame_id
     x, y, z, *angles = pose
     marker.pose = Pose(position=Point(x=x, y=y, z=z), orientation=quaternion(*angles))
-    marker.scale.x = width
+    marker.scale.x = width * size
     if type_ == Marker.SPHERE_LIST:
-        marker.scale.y = marker.scale.z = width
-    marker.color = ColorRGBA(**dict(zip('rgb', colour)), a=1.0)
+        marker.scale.y = marker.scale.z = width * size
+    marker.color = ColorRGBA(**dict(zip('rgb', palette.rgb(colour))), a=1.0)
     return marker

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""`python -m linkage_ros.render`."""
+"""Runs the command `render` as `python -m linkage_ros.render`."""
 
 import sys
 

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The command line: what to draw, how, and where to."""
+"""The command `render`: what to draw, how, and where to, from the command line."""
 
 import argparse
 import math
@@ -156,43 +156,31 @@ def parser() -> Parser:
     made.add_argument('--size', metavar='WxH', type=size, default=(720, 720),
                       help='pixels (default: 720x720)')
     still = made.add_argument_group('for .png and .svg')
-    still.add_argument('--angle', metavar='DEG', type=number(-math.inf, math.inf),
+    still.add_argument('--angle', metavar='DEG', type=within(float, -math.inf, math.inf),
                        help="the first mechanism's crank angle (default: where it starts)")
     moving = made.add_argument_group('for .gif and .mp4')
-    moving.add_argument('--turns', metavar='N', type=number(0.0, 1000.0),
+    moving.add_argument('--turns', metavar='N', type=within(float, 0.001, 1000.0),
                         help="turns of the first mechanism's crank, or swings to and fro "
                         '(default: 1)')
-    moving.add_argument('--fps', metavar='N', type=number(0.0, FASTEST),
+    moving.add_argument('--fps', metavar='N', type=within(float, 0.001, FASTEST),
                         help=f'frames a second (default: {FPS:g})')
-    moving.add_argument('--frames', metavar='N', type=whole(1, MOST_FRAMES),
+    moving.add_argument('--frames', metavar='N', type=within(int, 1, MOST_FRAMES),
                         help="frames in all (default: as many as the crank's speed takes)")
-    moving.add_argument('--loop', metavar='N', type=whole(0, 65536),
+    moving.add_argument('--loop', metavar='N', type=within(int, 0, 65536),
                         help='how often a .gif plays (default: 0, again and again)')
-    moving.add_argument('--colours', metavar='N', type=whole(2, MOST_COLOURS),
+    moving.add_argument('--colours', metavar='N', type=within(int, 2, MOST_COLOURS),
                         help=f'colours of a .gif: fewer make it smaller (default: {MOST_COLOURS})')
     return made
 
 
-def number(low, high):
-    """Return a reader of numbers above low and not above high."""
+def within(kind, low, high):
+    """Return a reader of finite numbers of a kind from low to high."""
     def read(text):
-        value = float(text)
-        if not (low < value <= high and math.isfinite(value)):
-            raise argparse.ArgumentTypeError(f'must be above {low:g} and at most {high:g}, '
-                                             f'not {text}')
+        value = kind(text)
+        if not (low <= value <= high and math.isfinite(value)):
+            raise argparse.ArgumentTypeError(f'must be from {low:g} to {high:g}, not {text}')
         return value
-    read.__name__ = 'number'
-    return read
-
-
-def whole(low, high):
-    """Return a reader of whole numbers from low to high."""
-    def read(text):
-        value = int(text)
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f'must be from {low} to {high}, not {text}')
-        return value
-    read.__name__ = 'whole number'
+    read.__name__ = 'whole number' if kind is int else 'number'
     return read
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Where a machine is, counted in turns of its first input; no picture is drawn here.
+How a mechanism moves in pictures: where its joints are after so many turns of its first input.
 
 A turn is a whole turn of a crank or, of what moves to and fro, there and back.
 """
@@ -19,7 +19,7 @@ SAMPLES = 720  # of a turn
 MOST_TURNS = 24  # after which several inputs need not be where they started
 
 
-class Pose(NamedTuple):
+class Configuration(NamedTuple):
     """Turns since the start, inputs [rad or m], and all joints [m], (legs, joints, 2)."""
 
     turns: float
@@ -77,6 +77,8 @@ class Cycle:
     ----------
     first : Wheel
         The first input.
+    period : float
+        Seconds of its turn.
     turns : int
         Turns of the first input until all are where they started, or MOST_TURNS.
     prefixes : tuple of str
@@ -91,7 +93,8 @@ class Cycle:
         self._solution = assembly.solution(points=machine.linkage.points)
         self._wheels = [Wheel(drive) for drive in machine.inputs.values()]
         self.first = self._wheels[0]
-        self._ratios = [1.0, *(at_once(self.first.period, wheel.period)
+        self.period = self.first.period
+        self._ratios = [1.0, *(at_once(self.period, wheel.period)
                                for wheel in self._wheels[1:])]
         self.turns = next((n for n in range(1, MOST_TURNS) if all(
             math.isclose(n * ratio, round(n * ratio)) for ratio in self._ratios)), MOST_TURNS)
@@ -100,13 +103,13 @@ class Cycle:
                                 for k in range(self.turns * SAMPLES + 1)])
         self._locus = assembly.locus
 
-    def pose(self, turns: float) -> Pose:
+    def pose(self, turns: float) -> Configuration:
         """Return where everything is; NaN where it cannot be assembled."""
         inputs = tuple(wheel.value(turns * ratio)
                        for wheel, ratio in zip(self._wheels, self._ratios))
         self._solution.solve(inputs)
         rows = self._solution.rows.copy()
-        return Pose(turns, inputs, rows.reshape(len(rows), -1, 2))
+        return Configuration(turns, inputs, rows.reshape(len(rows), -1, 2))
 
     def curve(self, joint: int, start: float, end: float) -> np.ndarray:
         """Return where a joint is between two times [turns], shape (n, legs, 2) [m]."""

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Pictures and data into files: the same bytes each time, and never half a file."""
+"""Writes pictures as PNG, SVG, GIF or MP4 and their data as CSV: the same bytes each time."""
 
 from contextlib import contextmanager
 import csv

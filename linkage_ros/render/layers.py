@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What a picture is made of: each layer adds artists to axes, and moves them.
+The layers of a picture, drawn with Matplotlib: traces, guides, legs, floor, headline and names.
 
-`artists` are those that move, in the order they are drawn.
+Each adds artists to axes and moves them; `artists` are those that move, in drawing order.
 """
 
 import math
@@ -17,11 +17,7 @@ from matplotlib.patheffects import withStroke
 import numpy as np
 
 from .cycle import SAMPLES
-
-# Colours that colour-blind people tell apart (Okabe and Ito, "Color Universal Design").
-BLUE, ORANGE, GREEN, VERMILLION = '#0072b2', '#e69f00', '#009e73', '#d55e00'
-DARK, GREY = '#222222', '#8a8a8a'
-LINK, CRANK, TRACE, GUIDE = BLUE, ORANGE, VERMILLION, GREEN
+from ..palette import CRANK, DARK, FLOOR, GREY, GUIDE, LINK, TRACE, TRACK
 
 FADED = 0.3  # turns after which a fading trace is gone
 STANCE = 0.06  # of a foot curve's height: a foot lower than that is on the ground
@@ -103,7 +99,7 @@ def guides(axes, machine, cycle, unit):
     for link in linkage.links:
         if link.kind == 'prismatic' and link.parent == 'ground':
             track = straight(first_leg[:, linkage.points.index(link.tip)])
-            axes.plot(*np.transpose(track), color='#d0d0d0', lw=14 * unit, zorder=1,
+            axes.plot(*np.transpose(track), color=TRACK, lw=14 * unit, zorder=1,
                       solid_capstyle='round')
 
 
@@ -234,7 +230,6 @@ class Floor:
     """What the lowest foot walks on: it moves as far as the foot that stands on it."""
 
     MARKS = 9  # in a turn's way
-    COLOUR = '#b5a27c'
 
     def __init__(self, axes, machine, cycle, unit):
         tracer = machine.linkage.points.index(machine.tracer)
@@ -247,7 +242,7 @@ class Floor:
         self._spacing = turn / self.MARKS if turn > 0.1 * stride else 0.5 * stride
         self._tracer = tracer
         self._axes = axes
-        style = {'color': self.COLOUR, 'zorder': 1, 'animated': True, 'capstyle': 'round'}
+        style = {'color': FLOOR, 'zorder': 1, 'animated': True, 'capstyle': 'round'}
         self._line = LineCollection([], lw=3 * unit, **style)
         self._marks = LineCollection([], lw=2 * unit, **style)
         self.artists = [self._line, self._marks]

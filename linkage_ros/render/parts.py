@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What users name when they say what a picture shows."""
+"""The names of what a picture can show, as the command line takes them."""
 
 TRACES = ('whole', 'growing', 'fading', 'stance', 'none')
 PARTS = ('axes', 'title', 'dimensions', 'labels', 'links', 'joints', 'guides', 'floor')

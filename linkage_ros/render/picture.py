@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Pictures of machines at any time; needs Matplotlib, but neither a screen nor ROS."""
+"""Pictures of mechanisms side by side at any time, with Matplotlib and without a screen."""
 
 import math
 import warnings
@@ -14,11 +14,11 @@ import numpy as np
 from . import layers
 from .cycle import Cycle
 from .parts import USUAL
+from ..palette import FRAME, GRID
 
 DOTS_PER_INCH = 100
 CROWDED = 'the size is too small for what is drawn: choose a larger one, or hide a part'
 PADDING = 0.1  # inches, around everything
-FRAME, GRID = '#b0b0b0', '#e6e6e6'
 READABLE = 24  # poses in which the joints' names keep clear of the links
 
 
@@ -40,10 +40,13 @@ class Picture:
         One of parts.TRACES.
     parts : collection of str
         What of parts.PARTS to draw.
+    motions : sequence, optional
+        How each machine moves, if not as its Cycle does: whatever has a cycle's `period`,
+        `prefixes`, `course`, `pose`, `curve` and `locus`.
 
     """
 
-    def __init__(self, machines, size=(720, 720), trace='whole', parts=USUAL):
+    def __init__(self, machines, size=(720, 720), trace='whole', parts=USUAL, motions=None):
         width, height = size
         self.figure = Figure((width / DOTS_PER_INCH, height / DOTS_PER_INCH), DOTS_PER_INCH,
                              layout='constrained', facecolor='white')
@@ -54,11 +57,12 @@ class Picture:
         rows = math.ceil(count / columns)
         unit = min(max(min(width / columns, height / rows) / 720, 0.4), 2.0)
         axes = self.figure.subplots(rows, columns, squeeze=False).flat
-        self.panels = [Panel(one, machine, trace, parts, unit, count == 1)
-                       for one, machine in zip(axes, machines)]
+        self.panels = [Panel(one, machine, motion, trace, parts, unit, count == 1)
+                       for one, machine, motion in zip(
+                           axes, machines, motions or map(Cycle, machines))]
         for unused in axes[count:]:
             unused.remove()
-        self.period = self.panels[0].cycle.first.period
+        self.period = self.panels[0].cycle.period
         self._still = None
 
     def arrange(self, times):
@@ -108,16 +112,16 @@ class Picture:
 
     def _turns(self, panel, turns):
         """Return the turns of one mechanism in the time of so many turns of the first."""
-        if panel is self.panels[0] or panel.cycle.first.period == self.period:
+        if panel is self.panels[0] or panel.cycle.period == self.period:
             return turns
-        return self.seconds(turns) / panel.cycle.first.period
+        return self.seconds(turns) / panel.cycle.period
 
 
 class Panel:
     """One mechanism on its axes."""
 
-    def __init__(self, axes, machine, trace, parts, unit, single):
-        self.machine, self.cycle = machine, Cycle(machine)
+    def __init__(self, axes, machine, cycle, trace, parts, unit, single):
+        self.machine, self.cycle = machine, cycle
         self._axes = axes
         self._margin = 14 + 30 * unit  # pixels, for pivots, slots and names
         self._joints = [machine.linkage.points.index(name) for name in machine.points]

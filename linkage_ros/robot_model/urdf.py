@@ -28,14 +28,14 @@ import math
 from typing import Dict, Iterable, Optional, Sequence, Tuple
 from xml.etree import ElementTree
 
+from .. import palette
 from ..linkage.builder import GROUND
 from ..linkage.output_range import common_reach, ground_frame, Travel, travels
 from ..scene import Machine, SceneError
 
-# Colours that colour-blind people tell apart (Okabe and Ito, "Color Universal Design").
-COLOURS = {'orange': (0.902, 0.624, 0.0), 'blue': (0.0, 0.447, 0.698), 'green': (0.0, 0.62, 0.451),
-           'vermilion': (0.835, 0.369, 0.0), 'sky': (0.337, 0.706, 0.914),
-           'purple': (0.8, 0.475, 0.655), 'grey': (0.25, 0.25, 0.25)}
+COLOURS = {'orange': palette.ORANGE, 'blue': palette.BLUE, 'green': palette.GREEN,
+           'vermilion': palette.VERMILION, 'sky': palette.SKY, 'purple': palette.PURPLE,
+           'grey': palette.DARK}
 *BARS, JOINTS = COLOURS
 
 # Radii of bars and joints, as parts of the longest bar.
@@ -198,9 +198,9 @@ class _Robot:
         self._root = root
         self.owner: Optional[str] = None
         self._owners: Dict[Tuple[str, str], Optional[str]] = {}
-        for colour, rgb in COLOURS.items():
+        for colour, code in COLOURS.items():
             material = ElementTree.SubElement(self._element, 'material', name=colour)
-            ElementTree.SubElement(material, 'color', rgba=_numbers(*rgb, 1.0))
+            ElementTree.SubElement(material, 'color', rgba=_numbers(*palette.rgb(code), 1.0))
         self._named('link', root)
 
     def fix(self, parent: str, child: str, pose: Sequence[float]) -> ElementTree.Element:

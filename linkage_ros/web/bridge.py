@@ -1,10 +1,9 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The way from the web's thread to a node, whose entities only the executor's thread touches."""
+"""Calls from the web server's thread to the node, which only the executor's thread may touch."""
 
 import asyncio
-from queue import Empty, SimpleQueue
 
 SECONDS_TO_ANSWER = 3.0
 SECONDS_BETWEEN_TRIES = 0.02
@@ -34,7 +33,6 @@ class Bridge:
     def __init__(self, node):
         self.node = node
         self.loop = None
-        self._tasks = SimpleQueue()
 
     def ask(self, function, *args):
         """
@@ -47,17 +45,24 @@ class Bridge:
 
         """
         future = self.loop.create_future()
-        self._tasks.put((function, args, future))
-        self._wake()
+
+        def work():
+            try:
+                self.hand_over(_settle, future, function(*args))
+            except Exception as error:
+                # Raised where it was asked for, not in the executor, which would end.
+                self.hand_over(_settle, future, None, error)
+
+        self._start(work)
         return future
 
-    def _wake(self):
+    def _start(self, work):
         # Unlike a guard condition, a task works with every executor.
         executor = self.node.executor
         if executor is not None:
-            executor.create_task(self._work)
+            executor.create_task(work)
         else:
-            self.loop.call_later(SECONDS_BETWEEN_TRIES, self._wake)
+            self.loop.call_later(SECONDS_BETWEEN_TRIES, self._start, work)
 
     async def call(self, client, request):
         """Return a service's response; raise NoAnswer if there is none in time."""
@@ -88,24 +93,11 @@ class Bridge:
         finally:
             self.ask(client.remove_pending_request, asked)
 
-    def _work(self):
-        while True:
-            try:
-                function, args, future = self._tasks.get_nowait()
-            except Empty:
-                return
-            try:
-                self.hand_over(_settle, future, function(*args))
-            except Exception as error:
-                # Raised where it was asked for, not in the executor, which would end.
-                self.hand_over(_fail, future, error)
 
-
-def _settle(future, result):
-    if not future.done():
+def _settle(future, result, error=None):
+    if future.done():
+        return
+    if error is None:
         future.set_result(result)
-
-
-def _fail(future, error):
-    if not future.done():
+    else:
         future.set_exception(error)

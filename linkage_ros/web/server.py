@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The page's server: plain files and one WebSocket, in a thread of its own."""
+"""The web server of the viewer's page: its files and a WebSocket for each open page."""
 
 import asyncio
 from concurrent.futures import Future
@@ -11,17 +11,22 @@ import ipaddress
 import json
 import logging
 import socket
+from string import Template
 from threading import Thread
 from urllib.parse import urlsplit
 
 from aiohttp import web, WSCloseCode
 
-from .settings import shortened
-from .stage import Refused, SCENE
+from .scene_view import Refused, SCENE
+from .. import palette
+from ..words import quoted
 
 PAGE = files(__package__) / 'page'
 KINDS = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript',
          '.svg': 'image/svg+xml'}
+# Where the colours of the palette are filled in, by their names in small letters.
+COLOURED = ('.css', '.svg')
+COLOURS = {name.lower(): colour for name, colour in vars(palette).items() if name.isupper()}
 HEADERS = {
     'Content-Security-Policy':
         "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
@@ -48,7 +53,7 @@ class Server:
 
     Parameters
     ----------
-    stage : Stage
+    view : SceneView
         What is shown.
     bridge : Bridge
         Is given the event loop.
@@ -64,11 +69,11 @@ class Server:
 
     """
 
-    def __init__(self, stage, bridge, host: str, port: int):
-        self._stage = stage
+    def __init__(self, view, bridge, host: str, port: int):
+        self._view = view
         self._bridge = bridge
         self._host = host
-        self._visitors = set()
+        self._clients = set()
         started = Future()
         self._thread = Thread(target=lambda: asyncio.run(self._serve(port, started)),
                               name='web', daemon=True)
@@ -82,7 +87,7 @@ class Server:
         return f'http://{f"[{host}]" if ":" in host else host}:{self.port}/'
 
     def stop(self):
-        """Send everybody home and end the thread."""
+        """Close all connections and end the thread."""
         if self._thread.is_alive():
             self._loop.call_soon_threadsafe(self._stopping.set)
             self._thread.join()
@@ -90,10 +95,10 @@ class Server:
     async def _serve(self, port, started):
         self._bridge.loop = asyncio.get_running_loop()
         app = web.Application(middlewares=[self._guard])
-        app.add_routes([web.get('/', _file), web.get('/socket', self._visit),
+        app.add_routes([web.get('/', _file), web.get('/socket', self._connect),
                         web.get('/{name}', _file)])
         logger = logging.Logger('web', logging.WARNING)
-        logger.addHandler(Sentence(self._bridge.warn))
+        logger.addHandler(OneLineHandler(self._bridge.warn))
         runner = web.AppRunner(
             app, access_log=None, logger=logger, shutdown_timeout=SECONDS_TO_CLOSE)
         await runner.setup()
@@ -106,7 +111,7 @@ class Server:
         stopping = asyncio.Event()
         started.set_result((self._bridge.loop, stopping, runner.addresses[0][1]))
         await stopping.wait()
-        await asyncio.gather(*(visitor.close() for visitor in self._visitors))
+        await asyncio.gather(*(client.close() for client in self._clients))
         await runner.cleanup()
 
     @web.middleware
@@ -139,19 +144,19 @@ class Server:
         # An address in figures cannot be made to lead elsewhere.
         return address.is_loopback or self._host in ('', '0.0.0.0', '::')
 
-    async def _visit(self, request):
+    async def _connect(self, request):
         socket_ = Socket(
             timeout=SECONDS_TO_CLOSE, max_msg_size=MOST_BYTES, heartbeat=20.0, compress=False)
         await socket_.prepare(request)
-        visitor = Visitor(self._stage, socket_, self._bridge.warn)
-        self._visitors.add(visitor)
+        client = Client(self._view, socket_, self._bridge.warn)
+        self._clients.add(client)
         try:
-            await visitor.stay()
+            await client.serve()
         except (ConnectionError, asyncio.TimeoutError):
             # It has left, or does not read.
             pass
         finally:
-            self._visitors.discard(visitor)
+            self._clients.discard(client)
             transport = request.transport
             if transport and transport.get_write_buffer_size():
                 # A connection that is closed would wait for ever until this is read.
@@ -159,7 +164,7 @@ class Server:
         return socket_
 
 
-class Sentence(logging.Handler):
+class OneLineHandler(logging.Handler):
     """Says in one sentence what is logged, for what others send is no traceback of ours."""
 
     def __init__(self, say):
@@ -182,16 +187,16 @@ class Socket(web.WebSocketResponse):
         return await asyncio.wait_for(closing, 2 * SECONDS_TO_CLOSE)
 
 
-class Visitor:
+class Client:
     """
-    A browser that looks.
+    The page in one browser.
 
     It is sent what is new, the newest only, and as often as it has drawn what it was sent; each
-    request is answered. Nothing is gathered for one that does not read, which is sent home.
+    request is answered. Nothing is gathered for one that does not read: it is disconnected.
     """
 
-    def __init__(self, stage, socket_, warn):
-        self._stage = stage
+    def __init__(self, view, socket_, warn):
+        self._view = view
         self._socket = socket_
         self._warn = warn
         self._texts = {}
@@ -211,7 +216,7 @@ class Visitor:
         self._offered.add(feed.topic)
         self._news.set()
 
-    async def stay(self):
+    async def serve(self):
         """
         Serve the browser until it leaves.
 
@@ -221,7 +226,7 @@ class Visitor:
             If it leaves without a word, or does not read.
 
         """
-        self._stage.enter(self)
+        self._view.add(self)
         tasks = [asyncio.ensure_future(doing)
                  for doing in (self._hear(), self._answer(), self._send())]
         try:
@@ -229,13 +234,13 @@ class Visitor:
             for task in done:
                 task.result()
         finally:
-            self._stage.leave(self)
+            self._view.remove(self)
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
 
     async def close(self):
-        """Send the browser home."""
+        """Tell the browser that the viewer ends."""
         with suppress(asyncio.TimeoutError):
             await self._socket.close(
                 code=WSCloseCode.GOING_AWAY, message=b'the viewer ended')
@@ -266,11 +271,11 @@ class Visitor:
         op = said['op']
         try:
             if op == 'set':
-                await self._stage.set(said['mechanism'], dict(said['values']))
+                await self._view.set(said['mechanism'], dict(said['values']))
                 return {}
             if op == 'drag':
-                return await self._stage.drag(said['mechanism'], said['angle'])
-            return {'reason': f'unknown request {shortened(op)}'}
+                return await self._view.drag(said['mechanism'], said['angle'])
+            return {'reason': f'unknown request {quoted(op)}'}
         except Refused as reason:
             return {'reason': str(reason)}
         except KeyError as error:
@@ -300,7 +305,7 @@ class Visitor:
 
     async def _send_picture(self):
         offered, self._offered = self._offered, set()
-        drawn = [feed.drawn() for feed in self._stage.feeds() if feed.topic in offered]
+        drawn = [feed.drawn() for feed in self._view.feeds() if feed.topic in offered]
         for looks, _ in drawn:
             for number, look in looks.items():
                 if self._looks.get(number) != look:
@@ -352,8 +357,10 @@ async def _file(request):
     path = {file.name: file for file in PAGE.iterdir()}.get(name)
     if path is None:
         raise web.HTTPNotFound(text=f'There is no {name!r}.\n')
-    response = web.Response(body=path.read_bytes(), charset='utf-8',
-                            content_type=KINDS[name[name.rfind('.'):]])
+    ending, text = name[name.rfind('.'):], path.read_text('utf-8')
+    if ending in COLOURED:
+        text = Template(text).substitute(COLOURS)
+    response = web.Response(text=text, charset='utf-8', content_type=KINDS[ending])
     # What follows before the answer was read would be gathered without bound.
     response.force_close()
     return response

@@ -1,12 +1,11 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of other nodes, as the page shows and sets them."""
+"""The parameters of the scene's nodes, as the page's sliders show and set them."""
 
 import asyncio
 from dataclasses import dataclass
 import math
-import reprlib
 import sys
 
 from rcl_interfaces.srv import (
@@ -17,11 +16,10 @@ from rcl_interfaces.srv import (
 )
 from rclpy.parameter import Parameter, parameter_value_to_python
 
+from ..words import quoted
+
 SERVICES = {'list_parameters': ListParameters, 'describe_parameters': DescribeParameters,
             'get_parameters': GetParameters, 'set_parameters_atomically': SetParametersAtomically}
-
-# A text from JSON for a message: of a long one only its ends.
-shortened = reprlib.repr
 
 
 class RemoteNode:
@@ -101,7 +99,7 @@ class Setting:
         """Return a parameter message with a value from JSON; ValueError if it cannot hold it."""
         if not HOLDS.get(self._type, lambda _: False)(value):
             allowed = self.descriptor.additional_constraints or f'a {self._type.name.lower()}'
-            raise ValueError(f'{full_name} must be {allowed}, not {shortened(value)}')
+            raise ValueError(f'{full_name} must be {allowed}, not {quoted(value)}')
         if self._type == Parameter.Type.DOUBLE:
             value = float(value)
         return Parameter(full_name, self._type, value).to_parameter_msg()

@@ -18,7 +18,7 @@ except ImportError as error:
     raise ImportError('viewer needs aiohttp: apt install python3-aiohttp, or pip install '
                       'aiohttp') from error
 from .bridge import Bridge
-from .stage import Stage
+from .scene_view import SceneView
 
 VIEWER = 'viewer'
 PORT = 8020
@@ -56,7 +56,7 @@ class Viewer(Node):
         port = self._declared('port', PORT, 'Port to listen at; 0: any that is free.',
                               integer_range=[IntegerRange(from_value=0, to_value=65535, step=1)])
         bridge = Bridge(self)
-        return Server(Stage(bridge), bridge, host, port)
+        return Server(SceneView(bridge), bridge, host, port)
 
     def _declared(self, name, default, description, **ranges):
         return self.declare_parameter(name, default, ParameterDescriptor(

@@ -9,9 +9,9 @@ import { Picture } from './picture.js';
 const RETRY = 1000;
 
 /** The WebSocket to the viewer; open only while the page can be seen. */
-class Wire {
-  constructor(hear) {
-    this.hear = hear;
+class Connection {
+  constructor(handlers) {
+    this.handlers = handlers;
     this.asked = new Map();
     this.next = 1;
     document.addEventListener('visibilitychange', () => document.hidden ? this.close() : this.open());
@@ -23,17 +23,17 @@ class Wire {
     const socket = this.socket = new WebSocket(`ws${location.protocol.slice(4)}//${location.host}/socket`);
     socket.binaryType = 'arraybuffer';
     socket.onmessage = ({ data }) => {
-      if (data instanceof ArrayBuffer) return this.hear.frame(data);
+      if (data instanceof ArrayBuffer) return this.handlers.frame(data);
       const message = JSON.parse(data);
-      if (message.op !== 'answer') return this.hear[message.op](message);
+      if (message.op !== 'answer') return this.handlers[message.op](message);
       this.asked.get(message.id)?.(message);
       this.asked.delete(message.id);
     };
-    socket.onopen = () => this.hear.opened();
+    socket.onopen = () => this.handlers.opened();
     socket.onclose = () => {
       if (this.socket !== socket) return;
       this.close();
-      this.hear.closed();
+      this.handlers.closed();
       setTimeout(() => this.open(), RETRY);
     };
   }
@@ -101,7 +101,7 @@ const picture = new Picture(document.getElementById('picture'), {
   drag: (mechanism, angle) => panel.drag(mechanism.key, angle),
 });
 
-const wire = new Wire({
+const connection = new Connection({
   opened() {
     for (const mechanism of mechanisms.values()) mechanism.markers.clear();
     status.textContent = 'connected';
@@ -153,12 +153,12 @@ const wire = new Wire({
       }
       at += 8 + 12 * count;
     }
-    draw(() => wire.tell({ op: 'drawn' }));
+    draw(() => connection.tell({ op: 'drawn' }));
     frames += 1;
   },
 });
 
-const panel = new Panel(document.getElementById('panel'), wire);
+const panel = new Panel(document.getElementById('panel'), connection);
 
 /** Draw once before the next refresh of the screen, then do what is to be done after it. */
 function draw(after) {
@@ -183,10 +183,10 @@ function show(key) {
     button.onclick = () => show(value);
     return button;
   }));
-  const cast = [...mechanisms.values()].filter(mechanism => !key || mechanism.key === key);
-  picture.show(cast);
-  panel.show(cast, several && !key);
-  naming.hidden = cast.length !== 1 || cast[0].legs > 1;
+  const selected = [...mechanisms.values()].filter(mechanism => !key || mechanism.key === key);
+  picture.show(selected);
+  panel.show(selected, several && !key);
+  naming.hidden = selected.length !== 1 || selected[0].legs > 1;
   draw();
 }
 
@@ -198,7 +198,7 @@ names.onchange = () => {
 new ResizeObserver(() => draw()).observe(picture.canvas);
 
 setInterval(() => {
-  if (wire.socket?.readyState === WebSocket.OPEN) status.textContent = `${frames} pictures/s`;
+  if (connection.socket?.readyState === WebSocket.OPEN) status.textContent = `${frames} pictures/s`;
   frames = 0;
   panel.check(performance.now());
 }, 1000);

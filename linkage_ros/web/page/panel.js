@@ -203,10 +203,10 @@ class Switch {
 
 /** The sliders of one mechanism. */
 class Section {
-  constructor(mechanism, wire, folded) {
+  constructor(mechanism, connection, folded) {
     const { key, name, settings, lever } = mechanism;
     this.mechanism = mechanism;
-    this.wire = wire;
+    this.connection = connection;
     this.controls = new Map();
     this.still = element('p', { className: 'still', hidden: true });
     const parts = [this.title(mechanism), this.still];
@@ -263,7 +263,7 @@ class Section {
       title: `${meaning}\nMay be: ${allowed}.`, unit: /\[([^\]]+)\]/.exec(meaning)?.[1] ?? '',
       scale: law(setting),
     };
-    const request = value => this.wire.ask(
+    const request = value => this.connection.ask(
       { op: 'set', mechanism: this.mechanism.key, values: { [name]: value } });
     if (fixed) return null;
     if (kind === 'bool') return new Switch(described, request);
@@ -276,7 +276,7 @@ class Section {
       label: 'lever', unit: 'rad', kind: 'double', value: 0, digits: 3, low: -RIGHT_ANGLE, high: RIGHT_ANGLE, scale: LINEAR,
       title: 'Lever angle [rad]. Drag it here or in the picture: the servo_inverse service says\n'
         + 'which crank angle puts the lever there, and the crank is stopped at it.',
-    }, angle => this.wire.ask({ op: 'drag', mechanism: this.mechanism.key, angle }));
+    }, angle => this.connection.ask({ op: 'drag', mechanism: this.mechanism.key, angle }));
     this.lever.told = ({ servo, reduction }) => {
       this.lever.answer.hidden = servo === undefined;
       if (servo === undefined) return;
@@ -298,9 +298,9 @@ function folding(title, rows, open) {
 
 /** All sections that are shown. */
 export class Panel {
-  constructor(place, wire) {
+  constructor(place, connection) {
     this.place = place;
-    this.wire = wire;
+    this.connection = connection;
     this.sections = new Map();
     this.built = '';
   }
@@ -311,7 +311,7 @@ export class Panel {
       key, lever, [...settings.values()].map(({ value, ...rest }) => rest)])]);
     if (built !== this.built) {
       this.built = built;
-      this.sections = new Map(mechanisms.map(one => [one.key, new Section(one, this.wire, folded)]));
+      this.sections = new Map(mechanisms.map(one => [one.key, new Section(one, this.connection, folded)]));
       this.place.replaceChildren(...[...this.sections.values()].map(section => section.element));
       return;
     }

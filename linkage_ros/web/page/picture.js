@@ -10,7 +10,9 @@ const GRAB = 18;
 const LINE = 18;
 const MOST_LINES = 100;
 const FONT = "13px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
-const REFUSED = '#d55e00';
+
+/** A colour of the style sheet, which the server fills in. */
+const paint = name => getComputedStyle(document.documentElement).getPropertyValue(name);
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
@@ -185,8 +187,8 @@ export class Picture {
     const [right, top] = this.from(width, 0);
     context.font = FONT;
     context.lineWidth = 1;
-    context.strokeStyle = '#e6eaee';
-    context.fillStyle = '#5a6673';
+    context.strokeStyle = paint('--grid');
+    context.fillStyle = paint('--faint');
     context.textAlign = 'center';
     context.textBaseline = 'bottom';
     for (const value of multiples(step, left, right)) {
@@ -266,7 +268,7 @@ export class Picture {
     context.lineJoin = 'round';
     context.lineWidth = 4;
     context.strokeStyle = 'white';
-    context.fillStyle = '#1c2530';
+    context.fillStyle = paint('--ink');
     context.strokeText(words, x, y);
     context.fillText(words, x, y);
   }
@@ -374,7 +376,7 @@ export class Picture {
     const { context } = this;
     context.setLineDash([6, 6]);
     context.lineWidth = 2;
-    context.strokeStyle = this.grabbed.refused ? REFUSED : '#5a6673';
+    context.strokeStyle = this.grabbed.refused ? paint('--refused') : paint('--faint');
     this.line(...this.at(lever.places[2 * lever.pivot], lever.places[2 * lever.pivot + 1]), ...this.grabbed.pointer);
     context.setLineDash([]);
   }

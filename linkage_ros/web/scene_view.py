@@ -1,13 +1,14 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The running scene as the page sees it: found in the graph, drawn, and set by services."""
+"""The running scene for the page: found in the ROS graph, drawn, and changed by services."""
 
 import asyncio
 from contextlib import suppress
 from dataclasses import dataclass
 import math
 
+from linkage_interfaces.srv import ServoInverse
 import numpy as np
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.qos import (
@@ -20,13 +21,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from .bridge import NoAnswer
 from .feed import Feed
-from .settings import is_number, RemoteNode, Setting, shortened
-
-try:
-    from linkage_interfaces.srv import ServoInverse
-except ImportError:
-    # Without the service's type there is a picture, but no lever to drag.
-    ServoInverse = None
+from .settings import is_number, RemoteNode, Setting
+from ..words import quoted
 
 MARKERS, LOCUS, LIST = '/markers', '/locus', '/list_parameters'
 MARKERS_TYPE, LOCUS_TYPE = 'visualization_msgs/msg/MarkerArray', 'visualization_msgs/msg/Marker'
@@ -47,8 +43,8 @@ class Refused(Exception):
 
 
 @dataclass
-class Cast:
-    """A mechanism on the stage: its topics' beginning, its settings and its lever's service."""
+class ShownMechanism:
+    """A mechanism on the page: the start of its topics, its settings, its lever's service."""
 
     key: str
     settings: dict
@@ -65,9 +61,9 @@ class Cast:
                 'settings': [setting.described() for setting in self.settings.values()]}
 
 
-class Stage:
+class SceneView:
     """
-    All mechanisms of the graph, while somebody looks; empty and silent while nobody does.
+    All mechanisms of the graph, while a page is open; without one nothing is subscribed to.
 
     Everything but what is handed to the bridge runs in the web's thread.
 
@@ -78,19 +74,19 @@ class Stage:
 
     Attributes
     ----------
-    audience : list
-        Whoever looks: `tell(key, message)` hears what is new, `offer(feed)` what can be drawn.
+    clients : list
+        Open pages: `tell(key, message)` hears what is new, `offer(feed)` what can be drawn.
 
     """
 
     def __init__(self, bridge):
-        self.audience = []
+        self.clients = []
         self._bridge = bridge
         self._setting = asyncio.Lock()
         self._seen = None
-        self._cast = {}
-        self._looking = None
-        self._lowering = None
+        self._mechanisms = {}
+        self._watching = None
+        self._stopping = None
         # What follows is changed in the executor's thread alone.
         self._nodes = {}
         self._levers = {}
@@ -98,27 +94,27 @@ class Stage:
         self._numbers = {}
         self._events = None
 
-    def enter(self, visitor):
-        """Let somebody look; the first one raises the curtain."""
-        self.audience.append(visitor)
-        if self._lowering:
-            self._lowering.cancel()
-        if self._looking is None:
-            self._looking = asyncio.ensure_future(self._look())
+    def add(self, client):
+        """Show a client the scene, which is watched from the first client on."""
+        self.clients.append(client)
+        if self._stopping:
+            self._stopping.cancel()
+        if self._watching is None:
+            self._watching = asyncio.ensure_future(self._watch())
             return
-        self._show(visitor)
+        self._show(client)
 
-    def leave(self, visitor):
-        """Let somebody go; after the last one the curtain falls, unless it was only a reload."""
-        self.audience.remove(visitor)
-        if not self.audience:
+    def remove(self, client):
+        """Forget a client; after the last one watching ends, unless it was only a reload."""
+        self.clients.remove(client)
+        if not self.clients:
             # A node that is still to answer would wait for a client that is gone.
-            self._lowering = self._bridge.loop.call_later(SECONDS_TO_LINGER, self._lower)
+            self._stopping = self._bridge.loop.call_later(SECONDS_TO_LINGER, self._stop)
 
-    def _lower(self):
-        self._looking.cancel()
-        self._looking = self._lowering = None
-        self._seen, self._cast = None, {}
+    def _stop(self):
+        self._watching.cancel()
+        self._watching = self._stopping = None
+        self._seen, self._mechanisms = None, {}
         self._bridge.ask(self._close)
 
     def feeds(self):
@@ -136,14 +132,14 @@ class Stage:
 
         """
         async with self._setting:
-            cast = self._find(key)
+            mechanism = self._find(key)
             asked = {}
             for name, value in values.items():
-                if name not in cast.settings:
-                    raise Refused(f'{cast.name} has no parameter {shortened(name)}')
-                setting = cast.settings[name]
+                if name not in mechanism.settings:
+                    raise Refused(f'{mechanism.name} has no parameter {quoted(name)}')
+                setting = mechanism.settings[name]
                 try:
-                    parameter = setting.asked(f'{cast.name}.{name}', value)
+                    parameter = setting.asked(f'{mechanism.name}.{name}', value)
                 except ValueError as error:
                     raise Refused(str(error)) from None
                 asked.setdefault(setting.node, []).append(parameter)
@@ -170,16 +166,16 @@ class Stage:
             The service's answer, and why the lever is not at the angle, if it is not.
 
         """
-        cast = self._find(key)
-        if cast.lever is None:
-            raise Refused(f'{cast.name} has no lever that a servo_inverse node knows')
+        mechanism = self._find(key)
+        if mechanism.lever is None:
+            raise Refused(f'{mechanism.name} has no lever that a servo_inverse node knows')
         if not is_number(angle):
-            raise ValueError(f'angle must be a finite number, not {shortened(angle)}')
-        answer = await self._asked(cast, [angle])
+            raise ValueError(f'angle must be a finite number, not {quoted(angle)}')
+        answer = await self._asked(mechanism, [angle])
         reason = answer.message
         if not answer.success:
-            angle = await self._nearest(cast, angle)
-            answer = await self._asked(cast, [angle])
+            angle = await self._nearest(mechanism, angle)
+            answer = await self._asked(mechanism, [angle])
         if not answer.success:
             raise Refused(reason)
         servo, reduction = answer.servo_angle[0], answer.reduction[0]
@@ -188,54 +184,54 @@ class Stage:
                 'reduction': reduction if math.isfinite(reduction) else None}
 
     def _find(self, key):
-        if key not in self._cast:
-            raise Refused(f'there is no mechanism {shortened(key)}; '
-                          f'there are: {", ".join(self._cast)}')
-        return self._cast[key]
+        if key not in self._mechanisms:
+            raise Refused(f'there is no mechanism {quoted(key)}; '
+                          f'there are: {", ".join(self._mechanisms)}')
+        return self._mechanisms[key]
 
-    async def _asked(self, cast, angles):
+    async def _asked(self, mechanism, angles):
         try:
-            return await self._bridge.call(cast.lever, ServoInverse.Request(
-                mechanism=cast.name, lever_angle=angles))
+            return await self._bridge.call(mechanism.lever, ServoInverse.Request(
+                mechanism=mechanism.name, lever_angle=angles))
         except NoAnswer as error:
             raise Refused(str(error)) from None
 
-    async def _nearest(self, cast, angle):
+    async def _nearest(self, mechanism, angle):
         """Return the nearest angle that a lever reaches, seen ever closer on a finer scale."""
         low, high, nearest = -math.pi, math.pi, 0.0
         for _ in range(CLOSER_LOOKS):
             away = np.linspace(low, high, SAMPLES)
-            reached = away[(await self._asked(cast, (angle + away).tolist())).reachable]
+            reached = away[(await self._asked(mechanism, (angle + away).tolist())).reachable]
             if not len(reached):
                 break
             nearest = float(min(reached, key=abs))
             low, high = nearest, nearest - math.copysign((high - low) / (SAMPLES - 1), nearest)
         return angle + nearest
 
-    def _show(self, visitor):
-        visitor.tell(SCENE, {'op': 'scene', 'mechanisms': [
-            cast.described() for cast in self._cast.values()]})
+    def _show(self, client):
+        client.tell(SCENE, {'op': 'scene', 'mechanisms': [
+            mechanism.described() for mechanism in self._mechanisms.values()]})
         for feed in self.feeds():
-            visitor.offer(feed)
+            client.offer(feed)
 
-    async def _look(self):
+    async def _watch(self):
         await self._bridge.ask(self._listen)
         while True:
             try:
-                await self._look_once()
+                await self._look()
             except Exception as error:
                 # What other nodes say of themselves is anything; the next look may find it well.
                 self._seen = None
                 self._bridge.warn(f'the scene cannot be read: {error!r}')
             await asyncio.sleep(SECONDS_BETWEEN_LOOKS)
 
-    async def _look_once(self):
-        seen = await self._bridge.ask(self._survey)
+    async def _look(self):
+        seen = await self._bridge.ask(self._graph)
         if seen != self._seen:
             self._seen = seen
             await self._change(*seen)
 
-    def _survey(self):
+    def _graph(self):
         """Return what there is in the graph: marker topics, nodes with parameters, services."""
         node = self._bridge.node
         topics = dict(node.get_topic_names_and_types())
@@ -252,17 +248,18 @@ class Stage:
         return tuple(shown for shown in marked if shown[1]), nodes, levers
 
     async def _change(self, marked, nodes, levers):
-        homes = {key: [name for name, _ in publishers] for key, publishers in marked}
-        spaces = {_space(node) for names in homes.values() for node in names}
+        owners = {key: [name for name, _ in publishers] for key, publishers in marked}
+        spaces = {_space(node) for names in owners.values() for node in names}
         nodes = [node for node in nodes if _space(node) in spaces]
-        levers = [name for name in levers if _space(name) in spaces and ServoInverse]
-        await self._bridge.ask(self._open, list(homes), nodes, levers)
-        names = sorted({key.rsplit('/', 1)[1] for key in homes})
+        levers = [name for name in levers if _space(name) in spaces]
+        await self._bridge.ask(self._open, list(owners), nodes, levers)
+        names = sorted({key.rsplit('/', 1)[1] for key in owners})
         found = dict(zip(nodes, await asyncio.gather(
             *(self._parameters(node, names) for node in nodes))))
-        self._cast = {key: self._found(key, home, found) for key, home in homes.items()}
-        for visitor in self.audience:
-            self._show(visitor)
+        self._mechanisms = {key: self._mechanism(key, own_nodes, found)
+                            for key, own_nodes in owners.items()}
+        for client in self.clients:
+            self._show(client)
 
     async def _parameters(self, node, prefixes):
         try:
@@ -272,23 +269,23 @@ class Stage:
             self._seen = None
             return {}
 
-    def _found(self, key, home, found) -> Cast:
+    def _mechanism(self, key, own_nodes, found) -> ShownMechanism:
         """Return a mechanism with what the nodes of its namespace say of it, its own first."""
-        cast = Cast(key, {})
-        spaces = {_space(node) for node in home}
-        prefix = f'{cast.name}.'
+        mechanism = ShownMechanism(key, {})
+        spaces = {_space(node) for node in own_nodes}
+        prefix = f'{mechanism.name}.'
         near = [node for node in found if _space(node) in spaces]
-        for node in sorted(near, key=lambda node: node not in home):
+        for node in sorted(near, key=lambda node: node not in own_nodes):
             for full, (descriptor, value) in found[node].items():
                 name = full[len(prefix):]
-                if full.startswith(prefix) and name not in cast.settings:
+                if full.startswith(prefix) and name not in mechanism.settings:
                     with suppress(ValueError):
-                        cast.settings[name] = Setting(name, node, descriptor, value)
-        type_ = cast.settings.get('type')
+                        mechanism.settings[name] = Setting(name, node, descriptor, value)
+        type_ = mechanism.settings.get('type')
         if type_ and type_.value == 'slotted_lever':
-            cast.lever = next((client for name, client in self._levers.items()
-                               if _space(name) in spaces), None)
-        return cast
+            mechanism.lever = next((client for name, client in self._levers.items()
+                                    if _space(name) in spaces), None)
+        return mechanism
 
     def _listen(self):
         self._events = self._bridge.node.create_subscription(
@@ -300,15 +297,15 @@ class Stage:
         """Make what these need that is not there yet, and destroy what nobody needs."""
         topics = {f'{key}{ending}': (key, type_, qos) for key in keys for ending, type_, qos in (
             (MARKERS, MarkerArray, NEWEST), (LOCUS, Marker, LATCHED))}
-        self._keep(nodes, levers, topics)
+        self._drop_others(nodes, levers, topics)
         for name in set(nodes) - set(self._nodes):
             self._nodes[name] = RemoteNode(self._bridge, name)
         for name in set(levers) - set(self._levers):
             self._levers[name] = self._bridge.node.create_client(ServoInverse, name)
         for name in set(topics) - set(self._feeds):
-            self._feeds[name] = self._fed(name, *topics[name])
+            self._feeds[name] = self._feed(name, *topics[name])
 
-    def _fed(self, name, key, type_, qos):
+    def _feed(self, name, key, type_, qos):
         def number(i):
             return self._numbers.setdefault((name, i), len(self._numbers))
 
@@ -316,9 +313,9 @@ class Stage:
         logger = self._bridge.node.get_logger().get_child(name.strip('/'))
         feed = Feed(name, key, type_, number, logger)
         return feed, self._bridge.node.create_subscription(
-            type_, name, lambda raw: self._take(feed, raw), qos, raw=True)
+            type_, name, lambda raw: self._receive(feed, raw), qos, raw=True)
 
-    def _keep(self, nodes, levers, topics):
+    def _drop_others(self, nodes, levers, topics):
         """Destroy all but these."""
         node = self._bridge.node
         for name in set(self._nodes) - set(nodes):
@@ -329,30 +326,31 @@ class Stage:
             node.destroy_subscription(self._feeds.pop(name)[1])
 
     def _close(self):
-        self._keep((), (), ())
+        self._drop_others((), (), ())
         self._numbers = {}
         if self._events is not None:
             self._bridge.node.destroy_subscription(self._events)
             self._events = None
 
-    def _take(self, feed, raw):
+    def _receive(self, feed, raw):
         feed.newest = raw
         self._bridge.hand_over(self._offer, feed)
 
     def _offer(self, feed):
-        for visitor in self.audience:
-            visitor.offer(feed)
+        for client in self.clients:
+            client.offer(feed)
 
     def _notice(self, event):
         """Pass on a change that anybody made."""
-        for cast in self._cast.values():
-            prefix = f'{cast.name}.'
+        for mechanism in self._mechanisms.values():
+            prefix = f'{mechanism.name}.'
             for parameter in (*event.new_parameters, *event.changed_parameters):
+                name = parameter.name[len(prefix):]
                 if parameter.name.startswith(prefix):
-                    self._notice_one(cast, event.node, parameter.name[len(prefix):], parameter)
+                    self._notice_one(mechanism, event.node, name, parameter)
 
-    def _notice_one(self, cast, node, name, parameter):
-        setting = cast.settings.get(name)
+    def _notice_one(self, mechanism, node, name, parameter):
+        setting = mechanism.settings.get(name)
         if setting is None or parameter.value.type != setting.message.type:
             if node in self._nodes:
                 self._seen = None
@@ -360,8 +358,8 @@ class Stage:
         if node != setting.node:
             return
         setting.message = parameter.value
-        for visitor in self.audience:
-            visitor.tell((cast.key, name), {'op': 'value', 'mechanism': cast.key,
+        for client in self.clients:
+            client.tell((mechanism.key, name), {'op': 'value', 'mechanism': mechanism.key,
                                             'name': name, 'value': setting.value})
 
 

@@ -1,0 +1,24 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The colours of all that is drawn: markers, pictures, robot models and the viewer's page."""
+
+from typing import Tuple
+
+# Colours that colour-blind people tell apart (Okabe and Ito, "Color Universal Design").
+BLUE, ORANGE, GREEN, VERMILION = '#0072b2', '#e69f00', '#009e73', '#d55e00'
+SKY, PURPLE = '#56b4e9', '#cc79a7'
+# From text to what is hardly seen.
+DARK, FAINT, GREY, FRAME, TRACK, GRID, SHADE = (
+    '#222222', '#606060', '#8a8a8a', '#b0b0b0', '#d0d0d0', '#e6e6e6', '#f4f4f4')
+
+# What they show: in markers a joint and the locus, in pictures a crank, the tracer and guides.
+LINK, JOINT, LOCUS = BLUE, ORANGE, GREEN
+CRANK, TRACE, GUIDE, FLOOR = ORANGE, VERMILION, GREEN, '#b5a27c'
+# Vermilion that can be read as text.
+REFUSED = '#a84300'
+
+
+def rgb(colour: str) -> Tuple[float, ...]:
+    """Return red, green and blue, each from 0 to 1, in three digits."""
+    return tuple(round(int(colour[i:i + 2], 16) / 255, 3) for i in (1, 3, 5))
