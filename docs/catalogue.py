@@ -178,7 +178,7 @@ def dimensions(design):
         word = re.compile(rf'\b{name}\b')
         used = [line.text for line in design.lines
                 if any(kind not in ('FIRST', 'SECOND') and word.search(arg)
-                       for kind, arg in line.arguments() if arg not in placed(design))]
+                       for kind, arg, _ in line.arguments if arg not in placed(design))]
         yield f'`{name}`', f'{default:g}', ', '.join(f'`{text}`' for text in used)
 
 

@@ -200,7 +200,7 @@ class Analysed(Mechanism):
 
     def _dead_points(self, others: Tuple[float, ...]) -> List[float]:
         first = self.inputs[0].counted()
-        # At -pi and pi a reach may only be cut, and a dead point there is found as a touch.
+        # Where a reach may only be cut off, a dead point is found as a touch.
         ends = [end for arc in self._counted_reach(others) for end in arc
                 if not first.is_cut(end)]
         touched = [near.value for near in self._near_zeros(others)
@@ -216,7 +216,7 @@ class Analysed(Mechanism):
             reach = self._counted_reach(others) if closures else []
             rounding = np.array([2.0 * float(self._value(x.tolerance)) for x in closures])
             return [near for arc in reach for near in near_zeros(
-                self._curve('closures', (), others), arc, self.inputs[0], rounding,
+                self._curve('closures', (), others), arc, self.inputs[0].counted(), rounding,
                 np.array([x in folds for x in closures]))]
 
         return self._remembered('near zeros', others, find)

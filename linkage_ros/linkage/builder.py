@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
-from typing import Dict, List, NamedTuple, Optional, Tuple
+from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 from . import planar
 from .inputs import ANGLE, Input, LENGTH
@@ -66,6 +66,14 @@ class Link(NamedTuple):
     tip: str
 
 
+class Gear(NamedTuple):
+    """What takes an input's place: another input, times a ratio, plus an offset [rad or m]."""
+
+    input: str
+    ratio: Real
+    offset: Real
+
+
 class Bar(NamedTuple):
     """Two points at a constant distance [m]."""
 
@@ -107,7 +115,8 @@ class Builder:
         self.arguments: List[Real] = []
         self.cylinders: List[Tuple[str, str]] = []
         self._vectors: Dict[Tuple[str, str], _Vector] = {}
-        self._ends: Dict[str, Tuple[str, str]] = {}
+        self._axes: Dict[str, _Vector] = {}
+        self._driven: Dict[str, Tuple[Input, Real]] = {}
         self._kites: Dict[Tuple[str, str], planar.CrankArm] = {}
 
     def ground(self, name: str, x: Number, y: Number) -> None:
@@ -115,38 +124,88 @@ class Builder:
         place = Complex(x, y)
         self.points[name] = _Point(place, GROUND, abs(place.x) + abs(place.y))
 
-    def crank(self, name: str, centre: str, length: Real, upright: bool = False) -> None:
-        """Turn a crank [m] about a ground joint; upright: its zero is +y, not +x."""
-        self._on_ground(centre)
+    def crank(self, name: str, centre: str, length: Real, up: bool = False,
+              zero: Optional[str] = None, geared: Optional[Gear] = None) -> None:
+        """Turn a crank [m] about a joint; its zero is +x, or +y if `up`, or towards a joint."""
         link = self._numbered('crank')
-        zero = Complex(0.0, 1.0) if upright else Complex(1.0, 0.0)
-        turning = self._driven(Input(link, ANGLE))
-        crank = planar.Crank(self.points[centre].place, length, zero, turning)
-        self._hang(centre, name, crank.bar(), length, upright, link)
+        turning = self._drive(Input(link, ANGLE), geared)
+        if zero is None:
+            self._on_ground(centre, '; or its zero is towards a joint of its link')
+            parent, along = GROUND, Complex(0.0, 1.0) if up else Complex(1.0, 0.0)
+            start = real(pi / 2 if up else 0.0)
+        else:
+            parent, along, start = self._direction(centre, zero)
+        crank = planar.Crank(self.points[centre].place, length, along, turning)
+        bar = crank.bar() if parent == GROUND else planar.turned(along, turning) * length
+        self._hang(centre, name, bar, length, link, parent, start)
         self.joint_values[link] = turning
-        self._place(name, centre, crank.bar(), link, length, ())
-        self.points[name].crank = crank
+        self._place(name, centre, bar, link, length, () if zero is None else (zero,))
+        if parent == GROUND:
+            self.points[name].crank = crank
 
-    def cylinder(self, name: str, base: str, pivot: str, bar: Real, side: float) -> None:
+    def cylinder(self, name: str, base: str, pivot: str, bar: Real, side: float,
+                 geared: Optional[Gear] = None) -> None:
         """Join a bar [m] from a pivot and a cylinder from a base, left of base -> pivot."""
         shortest, longest = self._stroke(base, pivot, bar)
         word = self._numbered('cylinder')
-        length = self._driven(Input(word, LENGTH, shortest, longest))
+        length = self._drive(Input(word, LENGTH, shortest, longest), geared)
         found = planar.dyad(self._plain_arm(base, pivot), length, bar, side, longest=longest)
         self.limits += found.limits
         link = self._hang(pivot, name, found.second, bar)
         self._place(name, pivot, found.second, link, bar, (base,))
         self.transmissions[name] = planar.transmission(found)
-        barrel = self._hang(base, name, found.first, None, name=self._numbered('barrel'))
-        self._slide(word, barrel, base, name, length, Complex(0.0, 0.0))
+        barrel = self._hang(base, name, found.first, None, self._numbered('barrel'))
+        self._slide(word, barrel, base, name, length, found.first)
         self.cylinders.append((base, name))
 
-    def _driven(self, input_: Input) -> Real:
-        """Add an input, and return what stands for it: an angle [rad], or a length."""
-        value = argument(len(self.inputs))
-        self.inputs.append(input_)
-        self.arguments.append(value)
-        return value if input_.turns else in_own_unit(value)
+    def carriage(self, name: str, origin: str, towards: str, low: Real, high: Real,
+                 geared: Optional[Gear] = None) -> None:
+        """Drive a joint along the line from a joint towards another of one link, low to high."""
+        parent, along, direction = self._direction(origin, towards)
+        word = self._numbered('carriage')
+        place = self._drive(Input(word, LENGTH, low, high), geared)
+        self._slide(word, parent, origin, name, place, along, direction)
+        start = self.points[origin]
+        self.points[name] = _Point(
+            start.place + along * place, word, start.span + abs(low) + abs(high),
+            frozenset((origin, towards)) | start.stands_on | self.points[towards].stands_on)
+
+    def block(self, name: str, joint: str, along: Real, across: Real) -> None:
+        """Add a joint to the block that slides with a joint: along its line, and to its left."""
+        link = next((x.name for x in self.links
+                     if x.kind == 'prismatic' and x.tip == joint and x.name in self._axes), None)
+        if link is None:
+            raise ConstructionError(f'{joint} is no joint of a block')
+        offset = Complex(along, across)
+        self._place(name, joint, self._axes[link].vector * offset, link, offset.length(), ())
+        self.frames[link][name] = self.frames[link][joint] + offset
+
+    def _drive(self, input_: Input, geared: Optional[Gear]) -> Real:
+        """Return what stands for an input, an angle [rad] or a length: a new one, or geared."""
+        if geared is None:
+            leaf = argument(len(self.inputs))
+            self.inputs.append(input_)
+            self.arguments.append(leaf)
+            value = leaf if input_.turns else in_own_unit(leaf)
+        else:
+            other, driving = self._driven.get(geared.input, (None, None))
+            if other is None or driving is None or other.turns != input_.turns:
+                alike = [name for name, (x, _) in self._driven.items() if x.turns == input_.turns]
+                raise ConstructionError(f'it cannot be geared to {geared.input}; there are: '
+                                        f'{", ".join(alike) or "none"}')
+            value = geared.ratio * driving + geared.offset
+        self._driven[input_.name] = input_, value
+        return value
+
+    def _direction(self, origin: str, towards: str) -> Tuple[str, Complex, Real]:
+        """Return the link of two joints, the direction between them, and its angle seen there."""
+        side = self._side(origin, towards)
+        along = planar.unit(side.vector, side.length)
+        seen = along
+        if side.link != GROUND:
+            frame = self.frames[side.link]
+            seen = frame[towards] - frame[origin]
+        return side.link, along, arctangent(seen.y, seen.x)
 
     def _stroke(self, base: str, pivot: str, bar: Real) -> Tuple[Real, Real]:
         """Return the shortest and the longest that a cylinder can be with a bar to a pivot."""
@@ -183,15 +242,11 @@ class Builder:
 
     def mirror(self, name: str, point: str, first: str, second: str) -> None:
         """Mirror a joint in the line of two others: the far corner of a kite."""
-        arm, pin = self.arm(second, first), self.points[first].crank
-        area = arm.offset(self.points[point].place)
-        self.folds.append(planar.Limit(area, planar.GRAZE * self.distance(first, point)
-                                       * self.distance(second, point)))
+        pin = self.points[first].crank
         ends = [(self.points[end].place, self._side(end, point).vector)
                 for end in (second, first)]
-        place, from_second, from_first = planar.mirror(arm, self.points[point].place, ends)
-        self._pair(name, first, second, planar.Dyad(from_first, from_second, ()),
-                   self.distance(first, point), self.distance(second, point), point, place=place)
+        arm = self._reflect(name, first, second, self.points[point].place, ends,
+                            self.distance(first, point), self.distance(second, point), point)
         if isinstance(arm, planar.CrankArm) and pin and pin.centre is self.points[point].place:
             self._kites[first, name] = arm
 
@@ -205,6 +260,26 @@ class Builder:
                                    for side in (to_second, to_first))
         self._pair(name, first, second, planar.Dyad(from_first, from_second, ()),
                    to_second.length, to_first.length, corner)
+
+    def antiparallelogram(self, name: str, corner: str, first: str, second: str) -> None:
+        """Join two bars as long as those from a corner, but crossed."""
+        to_first, to_second = (self._side(corner, end) for end in (first, second))
+        opposite = self.points[first].place + to_second.vector
+        ends = [(self.points[second].place, to_first.vector),
+                (self.points[first].place, to_second.vector)]
+        self._reflect(name, first, second, opposite, ends, to_second.length, to_first.length,
+                      corner)
+
+    def _reflect(self, name: str, first: str, second: str, point: Complex,
+                 ends: Sequence[Tuple[Complex, Complex]], to_first: Real, to_second: Real,
+                 *others: str) -> planar.Arm:
+        """Join two bars at the mirror image of a point; `ends` has the second end first."""
+        arm = self.arm(second, first)
+        self.folds.append(planar.Limit(arm.offset(point), planar.GRAZE * to_first * to_second))
+        place, from_second, from_first = planar.mirror(arm, point, ends)
+        self._pair(name, first, second, planar.Dyad(from_first, from_second, ()), to_first,
+                   to_second, *others, place=place)
+        return arm
 
     def inversor(self, names: Tuple[str, str, str], pole: str, pin: str, long: Real,
                  short: Real) -> None:
@@ -222,38 +297,48 @@ class Builder:
 
     def slot(self, tip: str, pivot: str, pin: str, offset: Real, half: float,
              length: Real) -> None:
-        """Turn a lever of this length [m] about a ground joint by a pin in its slot."""
-        self._on_ground(pivot)
+        """Turn a lever of this length [m] about a joint by a pin in its slot."""
         found = planar.slot(self.arm(pivot, pin), offset, half)
         self.limits.append(found.limit)
-        lever = self._hang(pivot, tip, found.along, length, True, self._numbered('lever'))
+        start = real(pi / 2) if self.points[pivot].home == GROUND else real(0.0)
+        lever = self._hang(pivot, tip, found.along, length, self._numbered('lever'), start=start)
         self._place(tip, pivot, found.along * length, lever, length, (pin,))
+        self._axes[lever] = self._vectors[pivot, tip]
         self.transmissions[tip] = arctangent(abs(found.slide), offset)
-        self._slide('slide', lever, pivot, pin, found.slide, Complex(0.0, offset))
+        self._slide(self._numbered('slide'), lever, pivot, pin, found.slide, found.along)
+        self.frames[self.links[-1].name][pin] = Complex(0.0, offset)
 
-    def slider(self, name: str, pin: str, rod: Real, origin: str, direction: Real,
+    def slider(self, name: str, pin: str, rod: Real, origin: str, direction: Union[Real, str],
                side: float) -> None:
-        """Join a rod [m] from a joint to a block on a line through a ground joint."""
-        self._on_ground(origin)
-        along = Complex(cosine(direction), sine(direction))
+        """
+        Join a rod [m] from a joint to a block on a line through another.
+
+        The line has an angle [rad] on the ground, or goes towards a joint of the same link.
+        """
+        if isinstance(direction, str):
+            parent, along, angle = self._direction(origin, direction)
+        else:
+            self._on_ground(origin)
+            parent, along, angle = GROUND, Complex(cosine(direction), sine(direction)), direction
         rail = self._rail(pin, origin, along)
         found = planar.slider(rail, rod, side)
         self.limits += found.limits
         link = self._hang(pin, name, found.rod, rod)
-        self._place(name, pin, found.rod, link, rod, (origin,))
+        others = (origin, direction) if isinstance(direction, str) else (origin,)
+        self._place(name, pin, found.rod, link, rod, others)
         self.transmissions[name] = arctangent(abs(found.reach), rail.height)
-        self._slide('block', GROUND, origin, name, found.place, Complex(0.0, 0.0), direction)
+        self._slide(self._numbered('block'), parent, origin, name, found.place, along, angle)
 
     def _rail(self, pin: str, origin: str, along: Complex) -> planar.Rail:
-        """Return a joint as seen from a line through a ground joint."""
+        """Return a joint as seen from a line through another."""
         start, end = self.points[origin], self.points[pin]
-        if end.crank:
+        if end.crank and not along.x.varies and start.home == GROUND:
             return planar.CrankRail(end.crank, start.place, along, start.span + end.span)
         return planar.Rail(end.place, start.place, along, start.span + end.span)
 
-    def _on_ground(self, name: str) -> None:
+    def _on_ground(self, name: str, otherwise: str = '') -> None:
         if self.points[name].home != GROUND:
-            raise ConstructionError(f'joint {name} must be on the ground')
+            raise ConstructionError(f'joint {name} must be on the ground{otherwise}')
 
     def _bar_between(self, first: str, second: str) -> _Vector:
         """Return the vector between two joints of one link."""
@@ -261,7 +346,7 @@ class Builder:
             link = self._shared_link(first, second)
             if not link:
                 raise ConstructionError(f'{first} and {second} are not joints of one moving link')
-            bar, frame = self._vectors[self._ends[link]], self.frames[link]
+            bar, frame = self._axes[link], self.frames[link]
             across = frame[second] - frame[first]
             self._vectors[first, second] = _Vector(
                 bar.vector * (across / bar.length), across.length(), link)
@@ -284,13 +369,14 @@ class Builder:
         taken = sum(link.name.rstrip('0123456789') == word for link in self.links)
         return f'{word}{taken + 1}' if taken else word
 
-    def _slide(self, word: str, parent: str, joint: str, tip: str, place: Real, local: Complex,
+    def _slide(self, name: str, parent: str, joint: str, tip: str, place: Real, along: Complex,
                direction: Number = 0.0) -> None:
-        """Add a link that slides along its parent."""
-        name = self._numbered(word)
+        """Add a link that slides in a direction, seen from its parent, and has its tip at zero."""
         self.links.append(Link(name, parent, joint, 'prismatic', real(direction), tip))
         self.joint_values[name] = place
-        self.frames[name] = {tip: local}
+        self.directions[name] = along
+        self.frames[name] = {tip: Complex(0.0, 0.0)}
+        self._axes[name] = _Vector(along, real(1.0), name)
 
     def arm(self, first: str, second: str) -> planar.Arm:
         """Return the arm from one joint to another."""
@@ -338,23 +424,28 @@ class Builder:
         self._bar(second, name, found.second, to_second, link)
         self.transmissions[name] = planar.transmission(found)
 
-    def _hang(self, joint: str, tip: str, bar: Complex, length: Optional[Number],
-              upright: bool = False, name: Optional[str] = None) -> str:
-        """Add a link that turns about a joint, its tip on it if that has a length; return it."""
+    def _hang(self, joint: str, tip: str, bar: Complex, length: Optional[Real],
+              name: Optional[str] = None, parent: Optional[str] = None,
+              start: Optional[Real] = None) -> str:
+        """
+        Add a link that turns about a joint, and return its name.
+
+        Its tip is on it if that has a length [m]. Its angle is counted from `start` [rad], seen
+        from its parent: the link that the joint belongs to, unless another is given.
+        """
         name = name or ('' if len(joint + tip) == 2 else '_').join((joint, tip))
         if name in self.joint_values:
             raise ConstructionError(f'its link {name} would have the name of another')
-        parent = self.points[joint].home
-        zero = Complex(0.0, 1.0) if upright else Complex(1.0, 0.0)
+        parent, start = parent or self.points[joint].home, start or real(0.0)
+        zero = Complex(0.0, 1.0) if start.value else Complex(1.0, 0.0)
         relative = bar * self.directions.get(parent, zero).conjugate()
-        self.links.append(Link(name, parent, joint, 'revolute',
-                               real(pi / 2 if upright else 0.0), tip))
+        self.links.append(Link(name, parent, joint, 'revolute', start, tip))
         self.directions[name] = bar
         self.joint_values[name] = arctangent(relative.y, relative.x)
         self.frames[name] = {joint: Complex(0.0, 0.0)}
         if length is not None:
             self.frames[name][tip] = Complex(length, 0.0)
-        self._ends[name] = joint, tip
+            self._axes[name] = _Vector(bar, length, name)
         return name
 
     def _add_to_frame(self, name: str, first: str, second: str, link: str,

@@ -87,8 +87,8 @@ class Input(NamedTuple):
         return self.turns and len(arcs) == 1 and arcs[0][1] - arcs[0][0] >= math.tau
 
     def is_cut(self, value: float) -> bool:
-        """Return whether a value is where a turn is cut open, -pi or pi."""
-        return self.turns and abs(value) == math.pi
+        """Return whether the input is cut off at a value: a turn at pi, a stroke at its end."""
+        return value in (self.low, self.high)
 
     def on(self, arcs: Sequence[Arc], value: Any) -> Any:
         """Return whether values lie on arcs, whole turns and rounding aside."""

@@ -6,7 +6,9 @@ Linkages written down: one line a joint, in the order they are placed.
 
     O ground 0 0              a joint fixed to the ground at x y
     A crank O m [up]          on the crank circle of radius m about O, zero to the right [or up]
+    B crank A m zero C        the same about any joint, zero towards C of the same link
     B cylinder P O r left     joined to O by a bar r and to P by a cylinder, left of P -> O
+    S carriage G along H 0 b  driven along the line G -> H of one link, from 0 to b behind G
     B dyad A Q b c left       joined to A by a bar b and to Q by a bar c, left of A -> Q
     P rigid A B d e right     corner of a rigid triangle on bar AB, d from A, e from B
     P line A B d              on the line of bar AB, d from A; negative: on the other side of A
@@ -15,6 +17,9 @@ Linkages written down: one line a joint, in the order they are placed.
     B C D inversor P A a b    Peaucellier cell from pole P to pin A: long bars a, rhombus b
     L slot Q A e out d        tip, d from Q, of a lever about Q; A in its slot, e to its left
     S slider A r G p out      block on a line through G in direction p [rad], on a rod r from A
+    S slider A r G along H out    the same on the line G -> H of any link
+    T block S x y             on the block of S, x ahead of it and y to its left
+    C antiparallelogram B A D     corner opposite B where the bars cross that a parallelogram has
 
 A joint's name begins with a letter, and a letter, digit or underscore follows; so does a
 dimension's. `left` and `right` are as seen along the first two joints; `out` is the half of a slot
@@ -38,34 +43,43 @@ from __future__ import annotations
 
 from functools import lru_cache
 import re
-from typing import Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple, Union
+from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple, Union
 
 import numpy as np
 
 from .arithmetic import Formula, IN_RANGE, in_range, WORDS
-from .builder import Builder, ConstructionError
+from .builder import Builder, ConstructionError, Gear
 from .planar import LEFT, RIGHT
 from ..formula.expression import dimension, Real
 from ..words import elided, listed, quoted
 
-_WORDS = {'left': LEFT, 'right': RIGHT, 'out': 1.0, 'in': -1.0, 'up': True}
+_WORDS = {'left': LEFT, 'right': RIGHT, 'out': 1.0, 'in': -1.0}
 _JOINTS = ('CENTRE', 'BASE', 'FIRST', 'SECOND', 'POINT', 'CORNER', 'POLE', 'PIN', 'PIVOT',
-           'ORIGIN')
-_NUMBERS = ('X', 'Y', 'LENGTH', 'DISTANCE', 'OFFSET', 'ANGLE')
+           'ORIGIN', 'JOINT', 'TOWARDS')
+_NUMBERS = ('X', 'Y', 'LENGTH', 'DISTANCE', 'OFFSET', 'ANGLE', 'RATIO')
+# What is no length: its power of one.
+_PLAIN = ('ANGLE', 'RATIO')
 
-# What follows each word, in the order its construction takes it. The words of INPUTS add one each.
+# What follows each word, in the order its construction takes it; in brackets what may follow. The
+# words of INPUTS add an input each, unless it is geared to another.
 _FORMS = {
-    'ground': 'ground X Y', 'crank': 'crank CENTRE LENGTH [up]',
-    'cylinder': 'cylinder BASE PIVOT LENGTH left|right',
-    'dyad': 'dyad FIRST SECOND LENGTH LENGTH left|right',
-    'rigid': 'rigid FIRST SECOND LENGTH LENGTH left|right',
-    'line': 'line FIRST SECOND DISTANCE', 'mirror': 'mirror POINT FIRST SECOND',
-    'parallelogram': 'parallelogram CORNER FIRST SECOND',
-    'inversor': 'inversor POLE PIN LENGTH LENGTH',
-    'slot': 'slot PIVOT PIN OFFSET out|in LENGTH',
-    'slider': 'slider PIN LENGTH ORIGIN ANGLE out|in',
+    'ground': ('ground X Y',),
+    'crank': ('crank CENTRE LENGTH [up] [zero JOINT] [geared INPUT RATIO ANGLE]',),
+    'cylinder': ('cylinder BASE PIVOT LENGTH left|right [geared INPUT RATIO DISTANCE]',),
+    'carriage': ('carriage ORIGIN along TOWARDS DISTANCE DISTANCE [geared INPUT RATIO DISTANCE]',),
+    'block': ('block JOINT X Y',),
+    'dyad': ('dyad FIRST SECOND LENGTH LENGTH left|right',),
+    'rigid': ('rigid FIRST SECOND LENGTH LENGTH left|right',),
+    'line': ('line FIRST SECOND DISTANCE',),
+    'mirror': ('mirror POINT FIRST SECOND',),
+    'parallelogram': ('parallelogram CORNER FIRST SECOND',),
+    'antiparallelogram': ('antiparallelogram CORNER FIRST SECOND',),
+    'inversor': ('inversor POLE PIN LENGTH LENGTH',),
+    'slot': ('slot PIVOT PIN OFFSET out|in LENGTH',),
+    'slider': ('slider PIN LENGTH ORIGIN ANGLE out|in',
+               'slider PIN LENGTH ORIGIN along TOWARDS out|in'),
 }
-INPUTS = 'crank', 'cylinder'
+INPUTS = 'crank', 'cylinder', 'carriage'
 _NAME = re.compile(r'[A-Za-z][A-Za-z0-9_]{0,63}')
 # What a dimension cannot be called: words of arithmetic, and what `mechanisms.create` takes.
 _TAKEN = (*WORDS, 'joints', 'tracer', 'branches')
@@ -77,6 +91,14 @@ _TURN = 6.2832
 formula = lru_cache(maxsize=1024)(Formula)
 
 
+class Argument(NamedTuple):
+    """What follows a word: its kind, as in a form, and the option that it belongs to, if any."""
+
+    kind: str
+    text: str
+    option: str = ''
+
+
 class Line(NamedTuple):
     """One construction: the joints it places, its word, and what follows the word."""
 
@@ -84,22 +106,24 @@ class Line(NamedTuple):
     names: Tuple[str, ...]
     word: str
     args: Tuple[str, ...]
-
-    def arguments(self) -> Iterable[Tuple[str, str]]:
-        """Return what follows the word, each with its kind."""
-        return zip(_FORMS[self.word].split()[1:], self.args)
+    arguments: Tuple[Argument, ...] = ()
 
     @property
     def stands_on(self) -> Tuple[str, ...]:
         """The joints that it is constructed from."""
-        return tuple(arg for kind, arg in self.arguments() if kind in _JOINTS)
+        return tuple(arg.text for arg in self.arguments if arg.kind in _JOINTS)
+
+    @property
+    def drives(self) -> bool:
+        """Whether it adds an input."""
+        return self.word in INPUTS and not any(arg.option == 'geared' for arg in self.arguments)
 
     def numbers(self) -> Iterable[Tuple[str, Formula]]:
         """Yield its numbers, each with its kind; raise ValueError for what is none."""
-        for kind, arg in self.arguments():
+        for kind, text, _ in self.arguments:
             if kind in _NUMBERS:
                 try:
-                    yield kind, formula(arg)
+                    yield kind, formula(text)
                 except ValueError as error:
                     raise self.error(error) from None
 
@@ -140,25 +164,50 @@ def _parsed(text: str) -> Line:
         raise _error(text, f'expected NAME and one of the constructions {", ".join(_FORMS)}')
     at = found[0]
     line = Line(text, tuple(parts[:at]), parts[at], tuple(parts[at + 1:]))
-    form = _FORMS[line.word].split()[1:]
-    least = sum(not word.startswith('[') for word in form)
     names = 3 if line.word == 'inversor' else 1
-    if len(line.names) != names or not least <= len(line.args) <= len(form):
+    fitting = [arguments for form in _FORMS[line.word]
+               if (arguments := _fitted(form, line.args)) is not None]
+    if len(line.names) != names or not fitting:
         several = '; one line a joint' if len(found) > 1 else ''
-        raise line.error(f'expected "{"NAME " * names}{_FORMS[line.word]}"{several}')
+        forms = ' or '.join(f'"{"NAME " * names}{form}"' for form in _FORMS[line.word])
+        raise line.error(f'expected {forms}{several}')
+    line = line._replace(arguments=tuple(fitting[-1]))
     for name in line.names:
         if not _NAME.fullmatch(name) or name in _FORMS:
             raise line.error(f'{quoted(name)} is no name for a joint: a letter, then up to 63 '
                              'letters, digits and underscores, but none of the constructions')
-    for kind, arg in zip(form, line.args):
-        if '|' in kind and arg not in kind.split('|') or kind == '[up]' and arg != 'up':
-            raise line.error(f'{quoted(arg)} must be {kind.strip("[]").replace("|", " or ")}')
+    for kind, arg, _ in line.arguments:
+        if '|' in kind and arg not in kind.split('|'):
+            raise line.error(f'{quoted(arg)} must be {kind.replace("|", " or ")}')
     for kind, number in line.numbers():
         if 'deg' in number.words and kind != 'ANGLE':
-            raise line.error(f'{quoted(number.text)} is in degrees, but {kind} is a length')
+            raise line.error(f'{quoted(number.text)} is in degrees, but {kind} is no angle')
         if not number.names:
             _check_number(line, kind, number, {})
     return line
+
+
+def _fitted(form: str, args: Tuple[str, ...]) -> Optional[List[Argument]]:
+    """Return what follows a word as a form has it; None if it does not fit."""
+    required, *options = re.split(r' *\[|\] *\[', form.rstrip(']'))
+    _, *kinds = required.split()
+    if len(args) < len(kinds) or any(_is_literal(kind) and kind != arg
+                                     for kind, arg in zip(kinds, args)):
+        return None
+    found = [Argument(kind, arg) for kind, arg in zip(kinds, args) if not _is_literal(kind)]
+    left = list(args[len(kinds):])
+    for word, *kinds in map(str.split, options):
+        if left[:1] == [word] and len(left) > len(kinds):
+            # An option of one word is that word.
+            found += [Argument(kind, arg, word)
+                      for kind, arg in zip(kinds or [word], left[1:] if kinds else left)]
+            del left[:1 + len(kinds)]
+    return None if left else found
+
+
+def _is_literal(kind: str) -> bool:
+    """Return whether a part of a form stands for itself."""
+    return kind.islower() and '|' not in kind
 
 
 def _check_order(lines: List[Line]) -> None:
@@ -236,7 +285,7 @@ def branches(lines: Iterable[Line]) -> dict:
     """Return the assembly sign, +1 or -1, of each joint that can be assembled in two ways."""
     return {line.names[0]: int(_WORDS[arg])
             for line in lines if line.word != 'rigid'
-            for kind, arg in line.arguments() if '|' in kind}
+            for kind, arg, _ in line.arguments if '|' in kind}
 
 
 def check_name(called: str) -> None:
@@ -258,7 +307,7 @@ def lengths(lines: Iterable[Line]) -> dict:
 
 def has_literal_lengths(lines: Iterable[Line]) -> bool:
     """Return whether any length does not grow as the dimensions do, or an angle does."""
-    return any(number.degree not in (None, 0 if kind == 'ANGLE' else 1)
+    return any(number.degree not in (None, 0 if kind in _PLAIN else 1)
                for line in lines for kind, number in line.numbers())
 
 
@@ -266,22 +315,28 @@ def draw(builder: Builder, lines: Iterable[Line], symbols: Mapping[str, Real],
          signs: Mapping[str, int]) -> None:
     """Place the joints of a linkage, one line after the other."""
     for line in lines:
-        args = [_argument(line, kind, arg, symbols, signs) for kind, arg in line.arguments()]
+        plain: List[Any] = []
+        options: Dict[str, List[Any]] = {}
+        for arg in line.arguments:
+            values = options.setdefault(arg.option, []) if arg.option else plain
+            values.append(_value(line, arg, symbols, signs))
+        named = {word: Gear(*values) if word == 'geared' else values[0]
+                 for word, values in options.items()}
         names = line.names if len(line.names) > 1 else line.names[0]
         try:
-            getattr(builder, line.word)(names, *args)
+            getattr(builder, line.word)(names, *plain, **named)
         except ConstructionError as error:
             raise line.error(error) from None
 
 
-def _argument(line: Line, kind: str, arg: str, symbols: Mapping[str, Real],
-              signs: Mapping[str, int]) -> Union[str, Real, float]:
+def _value(line: Line, arg: Argument, symbols: Mapping[str, Real],
+           signs: Mapping[str, int]) -> Union[str, Real, float, bool]:
     """Return what a construction takes for one word of its line."""
-    if kind in _JOINTS:
-        return arg
-    if kind in _NUMBERS:
-        return formula(arg).expression(symbols)
-    return signs.get(line.names[0], _WORDS[arg])
+    if arg.kind in _NUMBERS:
+        return formula(arg.text).expression(symbols)
+    if '|' in arg.kind:
+        return signs.get(line.names[0], _WORDS[arg.text])
+    return True if arg.kind == arg.text else arg.text
 
 
 def symbols_of(dimensions: Iterable[str], signed: Iterable[str]) -> dict:

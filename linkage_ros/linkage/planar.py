@@ -77,6 +77,20 @@ class CrankEnds(NamedTuple):
     theta: Real
 
 
+def unit(vector: Complex, length: Real) -> Complex:
+    """Return the direction of a vector of this constant length."""
+    along = vector / length
+    along.spin = vector.spin
+    return along
+
+
+def turned(vector: Complex, theta: Real) -> Complex:
+    """Return a vector of constant length turned by an angle [rad]."""
+    turning = spin(vector)
+    return with_spin(vector * Complex(cosine(theta), sine(theta)), Rate(
+        (theta, *turning.of), lambda rate, *rates: rate + turning.formula(*rates)))
+
+
 class Limit(NamedTuple):
     """
     A margin that is negative, by more than the tolerance, where a linkage cannot be assembled.

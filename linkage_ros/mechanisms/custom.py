@@ -30,7 +30,7 @@ def design(joints: Tuple[str, ...], tracer: Optional[str], names: Tuple[str, ...
 
     """
     lines = joint_lines.parse(joints)
-    if not any(line.word in joint_lines.INPUTS for line in lines):
+    if not any(line.drives for line in lines):
         raise ValueError('a linkage needs a line that drives it: '
                          f'{" or ".join(joint_lines.INPUTS)}')
     for line in lines:
@@ -48,9 +48,14 @@ def design(joints: Tuple[str, ...], tracer: Optional[str], names: Tuple[str, ...
 
 
 def check(lines: List[joint_lines.Line], linkage: Mechanism) -> None:
-    """Raise ValueError, with its line, for a number, a bar or a triangle that cannot be."""
+    """Raise ValueError, with its line, for a number, bar, triangle or stroke that cannot be."""
     joint_lines.check_numbers(lines, linkage.dimensions)
     check_bars(linkage)
+    tips = {link.name: link.tip for link in linkage.links}
+    for input_ in linkage.inputs:
+        if not np.all(np.less(input_.low, input_.high)):
+            raise linkage.line_of(tips[input_.name]).error(
+                f'the {input_.name} must have a way to go: from a lower end to a higher one')
     for line, exists in linkage.triangles().items():
         if not np.all(exists):
             raise line.error('no triangle has these sides: each must be shorter than the '
