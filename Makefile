@@ -81,6 +81,7 @@ long: build $(venv)/.tools ## Run the long tests
 lint: .venv-lint/.installed ## Check style and types
 	@$(lint_bin)/ruff check .
 	@$(lint_bin)/mypy
+	@$(lint_bin)/oxlint linkage_ros/web/page
 	@$(lint_bin)/python -c 'import sys; from xml.dom.minidom import parse; [parse(f) for f in sys.argv[1:]]' \
 	  package.xml linkage_interfaces/package.xml
 
