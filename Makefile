@@ -70,8 +70,10 @@ docs: .venv-docs/.installed ## Build the documentation to docs/_build/html/ and 
 	@echo 'Documentation: docs/_build/html/index.html'
 
 .PHONY: test
-test: build $(venv)/.tools ## Run the tests, but for the long ones
-	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 -m 'not long'
+test: build $(venv)/.tools ## Run the tests, but for the long ones, and say what they cover
+	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m slipcover --source linkage_ros \
+	  --json --out $(build)/coverage.json -m pytest -n 2 -m 'not long'
+	@python .ci/coverage.py $(build)/coverage.json
 
 .PHONY: long
 long: build $(venv)/.tools ## Run the long tests
