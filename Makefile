@@ -70,8 +70,10 @@ docs: .venv-docs/.installed ## Build the documentation to docs/_build/html/ and 
 	@echo 'Documentation: docs/_build/html/index.html'
 
 .PHONY: test
-test: build $(venv)/.tools ## Run the tests, but for the long ones
-	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 -m 'not long'
+test: build $(venv)/.tools ## Run the tests, but for the long ones, and say what they cover
+	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m slipcover --source linkage_ros \
+	  --json --out $(build)/coverage.json -m pytest -n 2 -m 'not long'
+	@python .ci/coverage.py $(build)/coverage.json
 
 .PHONY: long
 long: build $(venv)/.tools ## Run the long tests
@@ -81,6 +83,7 @@ long: build $(venv)/.tools ## Run the long tests
 lint: .venv-lint/.installed ## Check style and types
 	@$(lint_bin)/ruff check .
 	@$(lint_bin)/mypy
+	@$(lint_bin)/oxlint linkage_ros/web/page
 	@$(lint_bin)/python -c 'import sys; from xml.dom.minidom import parse; [parse(f) for f in sys.argv[1:]]' \
 	  package.xml linkage_interfaces/package.xml
 

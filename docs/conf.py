@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Sphinx: Markdown pages, and those of the catalogue, which are made from the sources."""
+"""Sphinx: written pages, and those of the catalogue and the library, made from the sources."""
 
 from pathlib import Path
 import sys
@@ -15,8 +15,15 @@ project = 'linkage_ros'
 author = 'linkage_ros contributors'
 project_copyright = '2026, linkage_ros contributors'
 
-extensions = ['myst_parser']
+extensions = ['myst_parser', 'sphinx.ext.autodoc', 'sphinx.ext.napoleon']
 myst_heading_anchors = 3
+autodoc_member_order = 'bysource'
+autodoc_preserve_defaults = True
+autodoc_typehints = 'none'  # the docstrings name the types
+default_role = 'py:obj'
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+strip_signature_backslash = True  # a name may end in _
 exclude_patterns = ['_build']
 smartquotes = False
 

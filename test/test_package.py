@@ -44,11 +44,12 @@ def manifest(folder):
 def test_all_files_name_one_version(arguments):
     version = manifest('.').findtext('version')
     changelog = (ROOT / 'CHANGELOG.rst').read_text()
-    released = re.findall(r'^(\d+\.\d+\.\d+) \(\d{4}-\d\d-\d\d\)\n-+$', changelog, re.MULTILINE)
+    released = re.findall(r'^(\d+\.\d+\.\d+) \((\d{4}-\d\d-\d\d)\)\n-+$', changelog, re.MULTILINE)
+    citation = (ROOT / 'CITATION.cff').read_text()
     assert manifest('linkage_interfaces').findtext('version') == version
     assert arguments['version'] == version
-    assert released[0] == version
-    assert f'\nversion: {version}\n' in (ROOT / 'CITATION.cff').read_text()
+    assert released[0][0] == version
+    assert f"\nversion: {version}\ndate-released: '{released[0][1]}'\n" in citation
 
 
 def test_setup_names_the_package_of_the_manifest(arguments):

@@ -34,8 +34,11 @@ class Input(NamedTuple):
         What users call it: 'crank', 'cylinder2'.
     kind : str
         ANGLE [rad] or LENGTH [m].
-    low, high : float
-        Between which values all poses lie: of an angle one turn, of a length its longest stroke.
+    low : float
+        All poses lie between this value and `high`: of an angle one turn, of a length its longest
+        stroke.
+    high : float
+        The other end.
 
     """
 

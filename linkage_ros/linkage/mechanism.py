@@ -44,25 +44,7 @@ def _hashable(names: Any) -> Any:
 
 
 class Mechanism:
-    """
-    A linkage whose dimensions are set.
-
-    A pose depends on the inputs alone: any value, in any order, gives the same numbers. Joint
-    angles in arrays may differ by an ulp from those asked for one by one.
-    Make one with `linkage_ros.mechanisms.create`.
-
-    Attributes
-    ----------
-    inputs : tuple of Input
-        What drives it: cranks by their angles [rad], cylinders by their lengths [m].
-    points, joints : tuple of str
-        The linkage's joints, and its moving links, whose joint angles there are.
-    bars : tuple of (str, str)
-        The joints at the ends of each bar.
-    lines : tuple of (str, str)
-        What is drawn as a line: the bars, and the cylinders.
-
-    """
+    """A linkage whose dimensions are set: its poses, velocities, joint angles and reach."""
 
     def __init__(self, design: Design, structure: Structure, dimensions: Mapping,
                  branches: Mapping[str, int], accelerate: bool = False):
@@ -110,7 +92,7 @@ class Mechanism:
 
     @cached_property
     def frames(self) -> Mapping:
-        """Where each link's joints lie [m], seen from the link: x along its bar."""
+        """Where each link's joints lie [m] as seen from the link, x along its bar."""
         return MappingProxyType({
             link: {name: tuple(map(self._metres, (place.x, place.y)))
                    for name, place in frame.items()}
@@ -169,8 +151,8 @@ class Mechanism:
         Returns
         -------
         dict
-            For each joint an array of shape (*theta.shape, 2) [m], NaN where it cannot be
-            assembled.
+            For each joint an array [m] of theta's shape and a last axis for x and y, NaN where it
+            cannot be assembled.
 
         Raises
         ------

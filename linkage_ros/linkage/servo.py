@@ -70,11 +70,39 @@ class Answer(NamedTuple):
 
 
 class Mechanism(Analysed):
-    """A linkage that is solved from its outputs, its levers by a closed form of their own."""
+    """
+    A linkage whose dimensions are set; make one with `linkage_ros.mechanisms.create`.
+
+    A pose depends on the inputs alone: any value, in any order, gives the same numbers. Joint
+    angles in arrays may differ by an ulp from those asked for one by one.
+
+    Attributes
+    ----------
+    type : str
+        The name of its type.
+    dimensions : dict
+        Its dimensions [m] by name.
+    branches : dict
+        The assembly sign, +1 or -1, of each joint that has two.
+    inputs : tuple of Input
+        What drives it: cranks by their angles [rad], cylinders by their lengths [m].
+    points : tuple of str
+        The linkage's joints, in the order in which they are placed.
+    joints : tuple of str
+        Its moving links, whose joint angles there are.
+    links : tuple of Link
+        What each joint angle is: name, parent, joint, kind, zero [rad] and tip.
+    bars : tuple of (str, str)
+        The joints at the ends of each bar.
+    lines : tuple of (str, str)
+        What is drawn as a line: the bars, and the cylinders.
+    tracer : str
+        The joint whose curve is the locus.
+
+    """
 
     def input_for(self, output: str, value: ArrayLike, near: Optional[ArrayLike] = None,
                   others: Sequence[float] = ()) -> Any:
-        """Return the values of the input that give an output a value; see `Analysed.input_for`."""
         swept = any(np.ndim(length) for length in self.dimensions.values())
         if swept or others or not self._has_lever(output):
             return super().input_for(output, value, near, others)

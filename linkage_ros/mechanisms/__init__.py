@@ -4,6 +4,8 @@
 """
 The catalogue: mechanisms by the names that users type.
 
+::
+
     from linkage_ros import mechanisms
     leg = mechanisms.create('jansen', m=15.0)
     leg.solve(0.5, points=('G',))

@@ -7,7 +7,7 @@ Robot models: the mechanisms of a scene as URDF.
 A URDF is a tree, so each closed loop is cut open at a joint. A link's own frame is on the joint
 that it hangs on, x along its bar; the joints that it carries are frames fixed to it. A link that
 was cut off a joint has a frame for it too, which coincides with the joint's as long as the loop
-is closed:
+is closed::
 
     <frame_id>
       <mechanism>_ground_link             at the mechanism's pose; its plane is x-y

@@ -139,7 +139,7 @@ class Machine:
 
     @property
     def tracer(self) -> str:
-        """The joint whose curve is shown: the linkage's own tracer if it is wanted."""
+        """The joint whose curve is shown, the linkage's own tracer if it is wanted."""
         return self.linkage.tracer if self.linkage.tracer in self.points else self.points[-1]
 
 

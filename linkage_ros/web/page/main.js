@@ -175,7 +175,8 @@ function draw(after) {
 function show(key) {
   shown = key;
   const several = mechanisms.size > 1;
-  const labels = several ? [['', 'all'], ...[...mechanisms.values()].map(({ key, name }) => [key, name])] : [];
+  const labels = several
+    ? [['', 'all'], ...[...mechanisms.values()].map(one => [one.key, one.name])] : [];
   views.replaceChildren(...labels.map(([value, label]) => {
     const button = document.createElement('button');
     button.textContent = label;

@@ -230,8 +230,8 @@ class Section {
     const type = settings.get('type')?.value ?? '';
     const heading = element('header', {}, element('h2', { textContent: name }),
       element('span', { className: 'about', textContent: type === name ? '' : type }));
-    this.speeds = new Map([...settings].filter(([name]) => name.endsWith('.speed'))
-      .map(([name, { value }]) => [name, value || 1]));
+    this.speeds = new Map([...settings].filter(([field]) => field.endsWith('.speed'))
+      .map(([field, { value }]) => [field, value || 1]));
     if (this.speeds.size) {
       this.button = element('button', { onclick: () => this.stopOrTurn() });
       heading.append(this.button);
