@@ -9,11 +9,11 @@ import random
 import re
 import time
 
-from hostile_texts import LEGAL, mutations, TEXTS
 from linkage_ros import mechanisms, scene
 from linkage_ros.linkage import joint_lines
 import numpy as np
 import pytest
+from truth.hostile_texts import LEGAL, mutations, TEXTS
 
 FOUR_BAR = ('O ground 0 0', 'Q ground g 0', 'A crank O m', 'B dyad A Q b c left')
 # More digits than Python writes.

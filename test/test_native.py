@@ -13,7 +13,7 @@ from linkage_ros.formula import expression, program
 from linkage_ros.linkage.walker import Assembly
 import numpy as np
 import pytest
-import stress
+from truth import hard_cases
 
 native = pytest.importorskip('linkage_ros.formula.llvm_code')
 
@@ -23,7 +23,7 @@ TYPES = [kind for kind in mechanisms.TYPES if len(mechanisms.create(kind).inputs
 def angles(linkage):
     """Return angles [rad] of every size, dead points and reach limits, and no numbers at all."""
     ends = [end for arc in linkage.reach() for end in arc] + list(linkage.dead_points())
-    return np.concatenate([stress.angles(np.random.default_rng(3), 200, ends),
+    return np.concatenate([hard_cases.angles(np.random.default_rng(3), 200, ends),
                            [math.inf, -math.inf, math.nan]])
 
 

@@ -6,15 +6,13 @@
 from fractions import Fraction
 import math
 
-from accuracy import Case, truth
-import brute_force
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
-import reference
-import stress
+from truth import brute_force_reach, exact_poses, hard_cases
+from truth.accuracy_rule import Case, truth
 
-KINDS = list(stress.CATALOGUE)
+KINDS = list(hard_cases.CATALOGUE)
 TURN = [(-math.pi, math.pi)]
 
 
@@ -22,8 +20,8 @@ def drawn(kind, seed, count):
     """Yield random mechanisms of a kind, on random branches."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
-        branches = {name: int(rng.choice((-1, 1))) for name in reference.BRANCHES[kind]}
-        yield mechanisms.create(kind, branches=branches, **stress.dimensions(kind, rng))
+        branches = {name: int(rng.choice((-1, 1))) for name in exact_poses.KINDS[kind].branches}
+        yield mechanisms.create(kind, branches=branches, **hard_cases.dimensions(kind, rng))
 
 
 def told(mechanism, *more):
@@ -36,9 +34,9 @@ def told(mechanism, *more):
 def test_the_reach_is_what_brute_force_finds(kind, count):
     theta = np.linspace(-math.pi, math.pi, 1441)
     for mechanism in drawn(kind, 1, count):
-        gap = brute_force.gap(kind, mechanism.dimensions, theta, mechanism.branches)
-        held = brute_force.inside(mechanism.reach(), theta)
-        wrong = (np.abs(gap) > brute_force.DOUBT) & (held != (gap > 0.0))
+        gap = brute_force_reach.gap(kind, mechanism.dimensions, theta, mechanism.branches)
+        held = brute_force_reach.inside(mechanism.reach(), theta)
+        wrong = (np.abs(gap) > brute_force_reach.DOUBT) & (held != (gap > 0.0))
         assert not wrong.any(), told(mechanism, theta[wrong])
 
 
@@ -50,11 +48,11 @@ def test_a_pose_exists_exactly_inside_the_reach(kind, count):
         ends = [end for arc in arcs for end in arc]
         theta = np.concatenate([np.linspace(-math.pi, math.pi, 101)] + [
             end + np.array([-1e-6, 1e-6]) for end in ends])
-        gap = brute_force.gap(kind, mechanism.dimensions, theta, mechanism.branches)
-        clear = np.abs(gap) > brute_force.DOUBT
-        theta = theta[clear & ((brute_force.distance(arcs, theta) > 1e-8) | (arcs == TURN))]
+        gap = brute_force_reach.gap(kind, mechanism.dimensions, theta, mechanism.branches)
+        clear = np.abs(gap) > brute_force_reach.DOUBT
+        theta = theta[clear & ((brute_force_reach.distance(arcs, theta) > 1e-8) | (arcs == TURN))]
         placed = np.isfinite(mechanism.solve(theta)[mechanism.tracer]).all(-1)
-        held = brute_force.inside(arcs, theta)
+        held = brute_force_reach.inside(arcs, theta)
         assert (placed == held).all(), told(mechanism, theta[placed != held])
 
 
@@ -113,9 +111,9 @@ def test_the_lever_reach_is_what_brute_force_finds(half):
     for mechanism in drawn('slotted_lever', 7, 300):
         mechanism = mechanisms.create('slotted_lever', branches={'L': half},
                                       **mechanism.dimensions)
-        gap = brute_force.lever_gap(mechanism.dimensions, lever, half)
-        held = brute_force.inside(mechanism.lever_reach(), lever)
-        wrong = (np.abs(gap) > brute_force.DOUBT) & (held != (gap > 0.0))
+        gap = brute_force_reach.lever_gap(mechanism.dimensions, lever, half)
+        held = brute_force_reach.inside(mechanism.lever_reach(), lever)
+        wrong = (np.abs(gap) > brute_force_reach.DOUBT) & (held != (gap > 0.0))
         assert not wrong.any(), told(mechanism, lever[wrong])
 
 

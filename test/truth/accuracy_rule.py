@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The measure of accuracy, and the angles and dimensions on which it is taken.
+How far an answer about the catalogue may be from the truth, and how far it is.
 
 A result is measured in units of its *sensitivity*: what moving each input, the crank angle and
 every length, by half an ulp does to the true result. That much uncertainty is in the question
@@ -22,8 +22,9 @@ import math
 from typing import Dict, List, NamedTuple, Optional
 
 import numpy as np
-import reference
-from reference import mp
+
+from . import exact_poses
+from .exact_poses import mp
 
 RULE = 4.0
 GRAZE = 32.0
@@ -104,7 +105,7 @@ def truth(case, theta, links, rates=False):
 
 def _bars(case):
     """Return the lengths of bars that are no dimension but follow from them: rounded as well."""
-    length = reference.exact(case.dimensions)
+    length = exact_poses.exact(case.dimensions)
     if case.kind == 'water_drop':
         return {'rocker': 2 * length['a'], 'tail': 3 * length['a']}
     if case.kind == 'slotted_lever':
@@ -115,8 +116,8 @@ def _bars(case):
 def servo_truth(dimensions, half, lever_angle, cut):
     """Return the `Truth` of a lever's inverse on one cut of its slot with the crank circle."""
     def evaluate(length, angle):
-        found = reference.servo(length, angle, cut)
-        after, before = (reference.servo(length, angle + step, cut).angle
+        found = exact_poses.servo(length, angle, cut)
+        after, before = (exact_poses.servo(length, angle + step, cut).angle
                          for step in (STEP, -STEP))
         turned = mp.arg(mp.expj(after - before))
         return ({'angle servo': mp.expj(found.angle),
@@ -126,7 +127,7 @@ def servo_truth(dimensions, half, lever_angle, cut):
 
 
 def _truth(evaluate, dimensions, angle, bars=()):
-    length = reference.exact(dimensions)
+    length = exact_poses.exact(dimensions)
     values, gaps = evaluate(length, mp.mpf(angle))
     spread, slack = dict.fromkeys(values, mp.zero), dict.fromkeys(gaps, mp.zero)
     for side in (1, -1):
@@ -166,7 +167,7 @@ def _distance(name, old, new):
 
 def _turned(old, new):
     """Return the angle between two directions that are close to each other."""
-    return reference.cross(old, new) / (old * mp.conj(new)).real
+    return exact_poses.cross(old, new) / (old * mp.conj(new)).real
 
 
 def _state(gap, slack):
@@ -178,11 +179,11 @@ def _state(gap, slack):
 
 def _evaluate(case, length, theta, links, rates):
     """Return the outputs and gaps at one angle; the angle of a joint stays a direction."""
-    now = reference.place(case.kind, length, theta, case.branches)
+    now = exact_poses.place(case.kind, length, theta, case.branches)
     values = _placed(now, links)
     if rates:
         before, after = (
-            _placed(reference.place(case.kind, length, theta + step, case.branches), links)
+            _placed(exact_poses.place(case.kind, length, theta + step, case.branches), links)
             for step in (-_STEP, _STEP))
         for name in list(values):
             values[_rate_name(name)] = _difference(name, before[name], after[name]) / (2 * _STEP)
@@ -207,7 +208,7 @@ def _direction(points, link, by_name):
         parent = by_name[link.parent]
         bar *= mp.conj(points[parent.tip] - points[parent.joint])
     quarters = round(link.zero / (math.pi / 2))
-    return bar * (-reference.I) ** quarters
+    return bar * (-exact_poses.I) ** quarters
 
 
 def _rate_name(name):
@@ -265,7 +266,7 @@ def _due_of(states):
 
 def _needs(kind, output, links):
     """Return the closures that an output depends on; the tip of a link stands for the link."""
-    needs = reference.NEEDS[kind]
+    needs = exact_poses.KINDS[kind].needs
     what, _, name = output.rpartition(' ')
     if name == 'slide':
         return needs['L']
@@ -323,8 +324,8 @@ def _error(output, result, value):
 
 def _top_speeds(case, links, angles=24):
     """Return every output's largest speed over a turn; at least a crank's of its own kind."""
-    length = reference.exact(case.dimensions)
-    crank = abs(reference.place(case.kind, length, mp.zero, case.branches).points['A'])
+    length = exact_poses.exact(case.dimensions)
+    crank = abs(exact_poses.place(case.kind, length, mp.zero, case.branches).points['A'])
     top = {}
     for theta in np.arange(angles) * (2 * math.pi / angles) + 0.1:
         values, gaps = _evaluate(case, length, mp.mpf(theta), links, True)
