@@ -227,7 +227,9 @@ def test_a_stream_of_new_names_is_said_within_bounds(graph, monkeypatch):
     said = hand.warnings('nothing is called')
     assert len(said) <= 20 and 'no more will be named' in said[-1]
     assert all(len(text) < 500 and '\n' not in text for text in said)
-    assert len(hand.node._strangers) == 20
+    hand.send(['another'], [0.0])
+    hand.moved(['jansen_crank'], [0.8])
+    assert hand.warnings('nothing is called') == said
 
 
 def test_inputs_that_nobody_sends_are_said_once(graph, monkeypatch):

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.long
 
 KINDS = list(mechanisms.TYPES)
 # Those with a reference of their own, beside the one that draws every joint line.
-REFERENCED = [kind for kind in KINDS if kind in reference.BRANCHES]
+REFERENCED = [kind for kind in KINDS if kind in exact_poses.KINDS]
 # Coordinates and slides that never change.
 CONSTANT = {'peaucellier': ['C.x'], 'slider_crank': ['B.y']}
 

@@ -300,7 +300,7 @@ def test_any_other_name_is_for_a_dimension():
 
 
 def test_every_construction_says_what_follows_it_in_the_module_s_text():
-    for word in joint_lines._FORMS:
+    for word in joint_lines.FORMS:
         assert re.search(rf'^    [A-Z][A-Z ]* {word} ', joint_lines.__doc__, re.MULTILINE), word
 
 

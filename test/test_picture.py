@@ -13,6 +13,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from linkage_ros import scene  # noqa: E402
+from linkage_ros.linkage.walker import Assembly  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics, LATCHED  # noqa: E402
 from linkage_ros.robot_model import urdf  # noqa: E402
 from ros_harness import Graph, Process  # noqa: E402
@@ -75,10 +76,8 @@ def test_a_locus_that_is_no_curve_any_more_goes_for_whoever_comes_late_too(graph
     node = graph.start(Kinematics, CELL)
     picture = Picture(graph, 'cell')
     graph.until(lambda: picture().keys() == {2})
-    outlet = node._mechanisms['cell']
-    assembly = type(outlet._model.assembly)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(assembly, 'locus', lambda *_: np.zeros((1, 2)))
+        patch.setattr(Assembly, 'locus', lambda *_: np.zeros((1, 2)))
         assert graph.set(node, cell__scale=0.9).successful
     graph.until(lambda: not picture())
     late = graph.listen(Marker, 'cell/locus', LATCHED)

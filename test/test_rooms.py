@@ -9,7 +9,8 @@ import re
 
 import pytest
 
-PACKAGE = Path(__file__).parents[1] / 'linkage_ros'
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / 'linkage_ros'
 # From the ground up: a module imports from its own room and from those below.
 ROOMS = ('words', 'palette', 'formula', 'linkage', 'mechanisms', 'scene', 'command', 'robot_model',
          'render', 'nodes', 'web')
@@ -18,6 +19,9 @@ ROS = ('rclpy', 'builtin_interfaces', 'geometry_msgs', 'rcl_interfaces', 'sensor
        'visualization_msgs', 'linkage_interfaces')
 MODULES = sorted(PACKAGE.rglob('*.py'))
 PAGE = PACKAGE / 'web' / 'page'
+OUTSIDE = sorted([*(ROOT / 'test').rglob('*.py'), *(ROOT / 'benchmark').rglob('*.py')])
+# Public for all their underscores.
+NAMED_TUPLE = ('_replace', '_asdict', '_fields', '_make')
 
 
 def room(module):
@@ -50,6 +54,14 @@ def test_a_module_imports_nothing_from_above(module):
         if top == 'linkage_ros' and own:
             assert ROOMS.index(below[0]) <= ROOMS.index(own), f'{module.name} imports {name}'
         assert own in WITH_ROS or top not in ROS, f'{module.name} needs ROS: {name}'
+
+
+@pytest.mark.parametrize('module', OUTSIDE, ids=lambda path: str(path.relative_to(ROOT)))
+def test_who_tests_or_measures_uses_what_everybody_may(module):
+    for node in ast.walk(ast.parse(module.read_text())):
+        if isinstance(node, ast.Attribute) and node.attr not in NAMED_TUPLE:
+            private = node.attr.startswith('_') and not node.attr.endswith('__')
+            assert not private or ast.unparse(node.value) == 'self', ast.unparse(node)
 
 
 @pytest.mark.parametrize('module', MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))

@@ -67,7 +67,7 @@ def truth_of(kind, linkage, angle, cut):
                  'rate servo': 2 * STEP / turned if turned else mp.zero},
                 {'servo': gap, 'slide': half * slide})
 
-    return accuracy_rule._truth(evaluate, linkage.dimensions, float(angle))
+    return accuracy_rule.truth_of(evaluate, linkage.dimensions, float(angle))
 
 
 def rows_of(kind, linkage, angles):
@@ -77,13 +77,13 @@ def rows_of(kind, linkage, angles):
     top = {'rate servo': length['a'] / length.get('b', length['a'])}
     for angle in angles:
         cuts = [truth_of(kind, linkage, angle, cut) for cut in (1, -1)]
-        due = [accuracy_rule._due_of(exact.closures.values()) for exact in cuts]
+        due = [accuracy_rule.due_of(exact.closures.values()) for exact in cuts]
         wanted = 'number' if 'number' in due else 'nan' if due == ['nan', 'nan'] else ''
         for exact, state in zip(cuts, due):
             if state == wanted:
                 near = float(mp.arg(exact.values['angle servo']))
                 found = linkage.servo_for('lever', float(angle), near)
-                rows += [accuracy_rule._row(case, angle, name, result, exact, wanted, top)
+                rows += [accuracy_rule.row_of(case, angle, name, result, exact, wanted, top)
                          for name, result in zip(('angle servo', 'rate servo'), found)]
     return rows
 

@@ -54,7 +54,7 @@ _JOINTS = ('CENTRE', 'BASE', 'FIRST', 'SECOND', 'POINT', 'CORNER', 'POLE', 'PIN'
 _NUMBERS = ('X', 'Y', 'LENGTH', 'DISTANCE', 'OFFSET', 'ANGLE')
 
 # What follows each word, in the order its construction takes it. The words of INPUTS add one each.
-_FORMS = {
+FORMS = {
     'ground': 'ground X Y', 'crank': 'crank CENTRE LENGTH [up]',
     'cylinder': 'cylinder BASE PIVOT LENGTH left|right',
     'dyad': 'dyad FIRST SECOND LENGTH LENGTH left|right',
@@ -87,7 +87,7 @@ class Line(NamedTuple):
 
     def arguments(self) -> Iterable[Tuple[str, str]]:
         """Return what follows the word, each with its kind."""
-        return zip(_FORMS[self.word].split()[1:], self.args)
+        return zip(FORMS[self.word].split()[1:], self.args)
 
     @property
     def stands_on(self) -> Tuple[str, ...]:
@@ -135,19 +135,19 @@ def _parsed(text: str) -> Line:
     if len(text) > _LONGEST:
         raise _error(text, f'a line has up to {_LONGEST} letters, this has {len(text)}')
     parts = text.split()
-    found = [i for i, part in enumerate(parts) if part in _FORMS and i > 0]
+    found = [i for i, part in enumerate(parts) if part in FORMS and i > 0]
     if not found:
-        raise _error(text, f'expected NAME and one of the constructions {", ".join(_FORMS)}')
+        raise _error(text, f'expected NAME and one of the constructions {", ".join(FORMS)}')
     at = found[0]
     line = Line(text, tuple(parts[:at]), parts[at], tuple(parts[at + 1:]))
-    form = _FORMS[line.word].split()[1:]
+    form = FORMS[line.word].split()[1:]
     least = sum(not word.startswith('[') for word in form)
     names = 3 if line.word == 'inversor' else 1
     if len(line.names) != names or not least <= len(line.args) <= len(form):
         several = '; one line a joint' if len(found) > 1 else ''
-        raise line.error(f'expected "{"NAME " * names}{_FORMS[line.word]}"{several}')
+        raise line.error(f'expected "{"NAME " * names}{FORMS[line.word]}"{several}')
     for name in line.names:
-        if not _NAME.fullmatch(name) or name in _FORMS:
+        if not _NAME.fullmatch(name) or name in FORMS:
             raise line.error(f'{quoted(name)} is no name for a joint: a letter, then up to 63 '
                              'letters, digits and underscores, but none of the constructions')
     for kind, arg in zip(form, line.args):

@@ -100,7 +100,7 @@ def truth(case, theta, links, rates=False):
     """Return the `Truth` of a case at a crank angle, for the links as a mechanism lists them."""
     def evaluate(length, angle):
         return _evaluate(case, length, angle, links, rates)
-    return _truth(evaluate, case.dimensions, float(theta), _bars(case))
+    return truth_of(evaluate, case.dimensions, float(theta), _bars(case))
 
 
 def _bars(case):
@@ -123,10 +123,11 @@ def servo_truth(dimensions, half, lever_angle, cut):
         return ({'angle servo': mp.expj(found.angle),
                  'rate servo': 2 * STEP / turned if turned else mp.zero},
                 {'servo': found.gap, 'slide': half * found.slide})
-    return _truth(evaluate, dimensions, float(lever_angle))
+    return truth_of(evaluate, dimensions, float(lever_angle))
 
 
-def _truth(evaluate, dimensions, angle, bars=()):
+def truth_of(evaluate, dimensions, angle, bars=()):
+    """Return the `Truth` of a function of lengths and an angle to values and gaps."""
     length = exact_poses.exact(dimensions)
     values, gaps = evaluate(length, mp.mpf(angle))
     spread, slack = dict.fromkeys(values, mp.zero), dict.fromkeys(gaps, mp.zero)
@@ -239,23 +240,24 @@ def judge(case, found, links, rates=False, exact=None) -> List[Row]:
     """Measure {output: array} at every angle of a case; `exact` are its truths, if known."""
     exact = exact or [truth(case, theta, links, rates) for theta in case.thetas]
     top = _top_speeds(case, links) if rates else {}
-    return [_row(case, theta, output, results[index], exact[index],
+    return [row_of(case, theta, output, results[index], exact[index],
                  _due(case.kind, output, exact[index].closures, links), top)
             for index, theta in enumerate(case.thetas) for output, results in found.items()]
 
 
 def verdict(case, angle, output, result, exact):
     """Return the `Row` of one result that depends on every closure of its truth."""
-    return _row(case, angle, output, np.asarray(result), exact,
-                _due_of(exact.closures.values()), {})
+    return row_of(case, angle, output, np.asarray(result), exact,
+                due_of(exact.closures.values()), {})
 
 
 def _due(kind, output, closures, links):
     """Tell what is due: 'number', 'nan', 'either', or 'any' where no true pose exists nearby."""
-    return _due_of({closures[name] for name in _needs(kind, output, links)})
+    return due_of({closures[name] for name in _needs(kind, output, links)})
 
 
-def _due_of(states):
+def due_of(states):
+    """Tell what is due where closures are in some states, as `_due` does."""
     states = set(states)
     if states <= {'meets'}:
         return 'number'
@@ -284,7 +286,8 @@ def _chain(name, by_name):
         yield from (parent.joint, parent.tip)
 
 
-def _row(case, theta, output, result, exact, due, top):
+def row_of(case, theta, output, result, exact, due, top):
+    """Return the `Row` of one result, from what is due and the top speeds of outputs."""
     spread = float(exact.sensitivity[output])
     rate = output.startswith(('rate', 'velocity'))
     error, ratio, problem = math.nan, 0.0, ''
@@ -364,15 +367,15 @@ def measure_servo(lever, angles, label='') -> List[Row]:
     case = Case(lever.type, lever.dimensions, angles, lever.branches, label)
     for angle in angles:
         cuts = [servo_truth(lever.dimensions, half, angle, cut) for cut in (1, -1)]
-        due = [_due_of(exact.closures.values()) for exact in cuts]
+        due = [due_of(exact.closures.values()) for exact in cuts]
         wanted = 'number' if 'number' in due else 'nan' if due == ['nan', 'nan'] else ''
         for exact, state in zip(cuts, due):
             if state == wanted:
                 near = float(mp.arg(exact.values['angle servo']))
                 found, slope = lever.servo(float(angle), near=near)
                 top = {'rate servo': lever.dimensions['a'] / lever.dimensions['b']}
-                rows += [_row(case, angle, 'angle servo', found, exact, wanted, {}),
-                         _row(case, angle, 'rate servo', slope, exact, wanted, top)]
+                rows += [row_of(case, angle, 'angle servo', found, exact, wanted, {}),
+                         row_of(case, angle, 'rate servo', slope, exact, wanted, top)]
     return rows
 
 
