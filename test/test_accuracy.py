@@ -32,13 +32,13 @@ def ends(mechanism):
     return [end for arc in mechanism.reach() for end in arc if abs(end) < math.pi][:4]
 
 
-def awkward(mechanism, rng, count):
-    """Return random angles and some at every decade of distance from dead points and limits."""
+def awkward(mechanism, rng, count, near=40):
+    """Return random angles and some, at decades of distance, near dead points and limits."""
     spots = [0.0, math.pi, *ends(mechanism)]
     chosen = rng.choice(spots, 2, replace=False)
-    near = np.concatenate([hard_cases.approach(spot) for spot in chosen])
-    near = rng.choice(near, math.ceil(40 * SHARE[mechanism.type]), replace=False)
-    return np.concatenate([hard_cases.angles(rng, count, spots), near])
+    close = np.concatenate([hard_cases.approach(spot) for spot in chosen])
+    close = rng.choice(close, math.ceil(near * SHARE[mechanism.type]), replace=False)
+    return np.concatenate([hard_cases.angles(rng, count, spots), close])
 
 
 def some(kind, seed, count):
@@ -55,10 +55,11 @@ def check(rows):
     assert not broken(rows), summary(rows)
 
 
+@pytest.mark.parametrize('near', [12, pytest.param(40, marks=pytest.mark.long)])
 @pytest.mark.parametrize('kind, dimensions, branches', CATALOGUE)
-def test_the_catalogue_is_right_to_the_last_digits(kind, dimensions, branches):
+def test_the_catalogue_is_right_to_the_last_digits(kind, dimensions, branches, near):
     mechanism = mechanisms.create(kind, branches=branches, **dimensions)
-    check(measure(mechanism, awkward(mechanism, np.random.default_rng(1), 3)))
+    check(measure(mechanism, awkward(mechanism, np.random.default_rng(1), 3, near)))
 
 
 @pytest.mark.parametrize('kind', KINDS)

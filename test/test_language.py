@@ -465,6 +465,8 @@ OUTPUTS = {
     'changed value': lambda text: BAR.with_dimensions(b=text),
 }
 BAR = made()
+# Where texts are read letter by letter.
+PARSED = ('line', 'number', 'length', 'angle')
 
 
 def refused(ask, text) -> bool:
@@ -483,12 +485,16 @@ def refused(ask, text) -> bool:
 
 
 @pytest.mark.filterwarnings('error')
-@pytest.mark.parametrize('role', [*ROLES, *OUTPUTS])
-def test_a_hostile_text_is_refused_in_a_short_sentence(role):
-    assert len(TEXTS) > 700
-    kept = [text for text in TEXTS if not refused({**ROLES, **OUTPUTS}[role], text)]
-    assert len(kept) < 0.1 * len(TEXTS) and all(len(text) < 20000 for text in kept)
-    if role in ('line', 'number', 'length', 'angle'):
+@pytest.mark.parametrize('role, every', [
+    *((role, 1 if role in PARSED else 5) for role in (*ROLES, *OUTPUTS)),
+    *(pytest.param(role, 1, marks=pytest.mark.long) for role in (*ROLES, *OUTPUTS)
+      if role not in PARSED)])
+def test_a_hostile_text_is_refused_in_a_short_sentence(role, every):
+    texts = TEXTS[::every]
+    assert len(texts) > 140
+    kept = [text for text in texts if not refused({**ROLES, **OUTPUTS}[role], text)]
+    assert len(kept) < 0.1 * len(texts) and all(len(text) < 20000 for text in kept)
+    if role in PARSED:
         assert len(kept) < 10, kept
 
 

@@ -108,7 +108,8 @@ def test_nothing_is_left_of_a_node_that_is_destroyed(graph):
     graph.until(lambda: not picture())
 
 
-@pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('stop', [
+    signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_nothing_is_left_of_a_process_that_is_told_to_end(tmp_path, stop):
     path = tmp_path / 'scene.yaml'
     path.write_text('/**:\n  ros__parameters:\n    mechanisms: [jansen]\n')

@@ -166,7 +166,9 @@ def test_more_sources_than_are_remembered_cost_no_more_than_reading_each(reader,
     assert reader.looked <= 20_000 and learnt.total() < 20_000 / 50
 
 
-def test_what_is_remembered_is_bounded_whatever_comes(reader):
+def test_what_is_remembered_is_bounded_whatever_comes(reader, monkeypatch):
+    monkeypatch.setattr(joint_state_reader, 'SOURCES', 32)
+
     def read(sources):
         for i in sources:
             text = serialize_message(message(['a' * (i % 7), f'{i:09}'][i % 2:]))
@@ -177,12 +179,12 @@ def test_what_is_remembered_is_bounded_whatever_comes(reader):
 
     tracemalloc.start()
     try:
-        before = read(range(1500))
-        assert read(range(1500, 3000)) - before < 20_000  # bytes: less than 14 a source
+        before = read(range(500))
+        assert read(range(500, 2500)) - before < 50 * 2000  # bytes: half an entry for each
     finally:
         tracemalloc.stop()
     kept = sum(isinstance(each, joint_state_reader.Layout) for each in gc.get_objects())
-    assert 0 < kept <= joint_state_reader.SOURCES
+    assert 0 < kept <= 32
 
 
 def test_a_source_that_cannot_be_learnt_excludes_itself_alone(reader):

@@ -99,23 +99,23 @@ def test_the_command_prints_the_robot_of_a_scene():
     assert printed == urdf.describe(found.machines.values(), found.frame_id) + '\n'
 
 
-def test_the_command_prints_those_that_are_named():
-    code, printed = Process('urdf', CATALOGUE, '--mechanism', 'jansen').end()
-    assert code == 0
+def test_the_command_prints_those_that_are_named(capsys):
+    assert main(['--mechanism', 'jansen', '--ros-args', '--params-file', str(CATALOGUE)]) == 0
     jansen = scene.load(str(CATALOGUE)).machines['jansen']
-    assert printed == urdf.describe([jansen], 'world') + '\n'
+    assert capsys.readouterr().out == urdf.describe([jansen], 'world') + '\n'
 
 
 @pytest.mark.parametrize('arguments, lines, complaint', [
     (['--mechanism', 'leg'], 'rate: 50.0', "there is no mechanism 'leg'; allowed: water_drop, "),
     ([], 'rate: -1.0', 'rate must be a finite number'),
 ])
-def test_the_command_says_in_one_line_what_is_wrong(tmp_path, arguments, lines, complaint):
+def test_the_command_says_in_one_line_what_is_wrong(
+        tmp_path, capsys, arguments, lines, complaint):
     file = tmp_path / 'scene.yaml'
     file.write_text(f'/**:\n  ros__parameters:\n    {lines}\n')
-    code, printed = Process('urdf', file, *arguments).end()
-    assert code == 1
-    assert complaint in printed and len(printed.splitlines()) == 1
+    assert main([*arguments, '--ros-args', '--params-file', str(file)]) == 1
+    printed = capsys.readouterr()
+    assert complaint in printed.err and not printed.out and printed.err.count('\n') == 1
 
 
 NOWHERE, NO_SCENE, FOREIGN = 'nowhere.yaml', 'rate.yaml', 'foreign.yaml'

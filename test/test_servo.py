@@ -88,8 +88,9 @@ def rows_of(kind, linkage, angles):
     return rows
 
 
+@pytest.mark.parametrize('levers', [3, pytest.param(12, marks=pytest.mark.long)])
 @pytest.mark.parametrize('kind', LEVERS)
-def test_servo_angles_and_reductions_of_any_lever_are_right(kind, levers=12):
+def test_servo_angles_and_reductions_of_any_lever_are_right(kind, levers):
     rows = []
     for linkage, angles in random_levers(kind, 1, levers):
         rows += rows_of(kind, linkage, angles)
