@@ -143,7 +143,7 @@ UNPUBLISHABLE = {
 
 @pytest.mark.parametrize('given, bad, named', UNPUBLISHABLE.values(), ids=UNPUBLISHABLE)
 def test_what_cannot_be_published_is_refused_and_what_was_there_goes_on(graph, given, bad, named):
-    node = graph.start(Kinematics, given)
+    node = graph.start(Kinematics, {'mechanisms': ['jansen'], **given})
     states = graph.listen(JointState, 'jansen/joint_states')
     loci = graph.listen(Marker, 'jansen/locus', LATCHED)
     models = graph.listen(String, 'jansen/robot_description', LATCHED)

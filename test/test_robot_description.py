@@ -20,7 +20,7 @@ from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.robot_model import urdf  # noqa: E402
 from linkage_ros.robot_model.command import main  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
-from robots import LIBRARIES  # noqa: E402
+from robots import Pinocchio, Yourdfpy  # noqa: E402
 from ros_harness import Process  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
@@ -48,8 +48,9 @@ def in_frame(pose, point):
     return turned + [pose.position.x, pose.position.y, pose.position.z]
 
 
-@pytest.mark.parametrize('library', LIBRARIES)
-@pytest.mark.parametrize('name', SCENES)
+@pytest.mark.parametrize('name, library', [
+    *((name, Pinocchio) for name in SCENES), ('slotted_lever', Yourdfpy),
+    *(pytest.param(name, Yourdfpy, marks=pytest.mark.long) for name in SCENES)])
 def test_joint_states_put_the_robot_where_the_markers_are(graph, name, library):
     machine = graph.start(Kinematics, given(name)).scene.machines['m']
     descriptions = graph.listen(String, 'm/robot_description', LATCHED)

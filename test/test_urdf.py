@@ -13,7 +13,7 @@ from linkage_ros.linkage.walker import Assembly
 from linkage_ros.robot_model import urdf
 import numpy as np
 import pytest
-from robots import LIBRARIES, Yourdfpy
+from robots import LIBRARIES, Pinocchio, Yourdfpy
 
 TOLERANCE = 1e-12
 SLIDES = {'slide', 'block', 'cylinder', 'left0_block', 'left1_block', 'right0_block',
@@ -109,9 +109,11 @@ def limits(one):
             for name, end in ends.items()}
 
 
-@pytest.mark.parametrize('count', [6, pytest.param(41, marks=pytest.mark.long)])
-@pytest.mark.parametrize('library', LIBRARIES)
-@pytest.mark.parametrize('name', MACHINES)
+@pytest.mark.parametrize('name, library, count', [
+    *((name, Pinocchio, 6) for name in MACHINES),
+    *((name, Yourdfpy, 6) for name in ('jansen', 'slotted_lever', 'boxer engine')),
+    *(pytest.param(name, library, 41, marks=pytest.mark.long)
+      for name in MACHINES for library in LIBRARIES)])
 def test_every_joint_is_met_and_every_loop_is_closed(name, library, count):
     one = MACHINES[name]()
     text = description(one)

@@ -33,7 +33,7 @@ from linkage_ros.nodes import message_layout, messages  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
-from linkage_ros.web import feed, server  # noqa: E402
+from linkage_ros.web import feed, scene_view, server  # noqa: E402
 from linkage_ros.web.feed import Feed  # noqa: E402
 from linkage_ros.web.scene_view import LATCHED  # noqa: E402
 from linkage_ros.web.viewer import Viewer  # noqa: E402
@@ -54,7 +54,7 @@ from visualization_msgs.msg import Marker, MarkerArray, UVCoordinate  # noqa: E4
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / 'linkage_ros' / 'web' / 'page'
 NODES = (CrankDriver, Kinematics, ServoInverse)
-RATE = {'rate': 100.0}
+RATE = {'rate': 40.0}
 LEVER = {**RATE, 'mechanisms': ['lever', 'drop'], 'lever.type': 'slotted_lever',
          'drop.type': 'water_drop'}
 LEG = {**RATE, 'mechanisms': ['leg'], 'leg.type': 'jansen', 'leg.crank.speed': 0.0,
@@ -410,7 +410,8 @@ def test_a_lever_that_cannot_be_dragged_says_why(lever, mechanism, angle, reason
     assert lever.values('lever.crank.speed') == [1.0]
 
 
-def test_nobody_is_listened_to_while_nobody_looks(show):
+def test_nobody_is_listened_to_while_nobody_looks(show, monkeypatch):
+    monkeypatch.setattr(scene_view, 'SECONDS_TO_LINGER', 0.2)
     running = show(LEG)
     at_rest = running.entities()
 
@@ -628,7 +629,7 @@ FLOODS = {
 
 @pytest.mark.skipif(not Path('/proc/self/statm').exists(), reason='memory is read from /proc')
 @pytest.mark.parametrize('what, seconds', [
-    ('answers', 1.0), *(pytest.param(what, 15.0, marks=pytest.mark.long) for what in FLOODS)])
+    ('answers', 0.5), *(pytest.param(what, 15.0, marks=pytest.mark.long) for what in FLOODS)])
 def test_a_client_that_does_not_read_costs_little_and_harms_nobody(show, what, seconds):
     running = show({**LEG, 'leg.crank.speed': 1.0})
     url = running.viewer.url
@@ -663,7 +664,7 @@ def test_a_client_that_does_not_read_does_not_keep_the_viewer_from_ending(show):
     running = show(LEG)
     with Deaf(running.viewer.url) as deaf:
         deaf.upgrade()
-        assert deaf.flood(FLOODS['answers'], 0.5)
+        assert deaf.flood(FLOODS['answers'], 0.3)
         before = time.monotonic()
         running.viewer.destroy_node()
         assert time.monotonic() - before < 5.0
