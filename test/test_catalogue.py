@@ -69,10 +69,11 @@ def test_a_file_that_is_no_mechanism_is_named(tmp_path, text, said):
     assert error.startswith('ImportError: linkage_ros.mechanisms.broken ') and said in error
 
 
+@pytest.mark.parametrize('seeds', [1, pytest.param(5, marks=pytest.mark.long)])
 @pytest.mark.parametrize('kind', list(mechanisms.TYPES))
-def test_every_mechanism_holds_what_any_linkage_must(kind):
+def test_every_mechanism_holds_what_any_linkage_must(kind, seeds):
     design = Design(mechanisms.design(kind).joints, mechanisms.create(kind).dimensions, {})
-    found = [problem for seed in range(5)
+    found = [problem for seed in range(seeds)
              for problem in checks.problems(design, np.random.default_rng(seed))[0]]
     assert not found, found[0]
 
