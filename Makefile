@@ -49,12 +49,12 @@ help: ## Show what can be made
 
 .PHONY: demo
 demo: build ## Run the nodes, measure what they send, draw it to demo/out/
-	@$(in_ros) python demo/demo.py
+	@$(in_ros) PYTHONPATH=$$PYTHONPATH:test python demo/demo.py
 
 .PHONY: bench
 bench: build $(venv)/.tools .venv-bench/.installed ## Measure run time against error, stability, and the nodes
-	@.venv-bench/bin/python benchmark/run.py
-	@.venv-bench/bin/python benchmark/stability.py
+	@.venv-bench/bin/python -m benchmark.run
+	@.venv-bench/bin/python -m benchmark.stability
 	@.venv-bench/bin/python -m benchmark.engines
 	@$(in_ros) python -m benchmark.nodes --quick
 

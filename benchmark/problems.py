@@ -5,21 +5,16 @@
 What every method is asked, and what is true.
 
 The angles are fixed: a turn in even steps, and named sets of awkward ones. The truth is that of
-test/reference.py, kept as a pair of float64 numbers, so that errors below an ulp still show.
+test/truth/exact_poses.py, kept as a pair of float64 numbers, so that errors below an ulp show.
 """
 
 import hashlib
 import math
 from pathlib import Path
-import sys
 from typing import Dict, NamedTuple
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
-
-import accuracy  # noqa: E402
-import reference  # noqa: E402
+from truth import accuracy_rule, exact_poses
 
 CACHE = Path(__file__).with_name('.cache')
 UNIT = 2.0 ** -53
@@ -140,20 +135,20 @@ def problem(kind):
     group = np.repeat(list(sets), [len(values) for values in sets.values()])
     dimensions = DIMENSIONS[kind]
     found = _cached(kind, dimensions, theta)
-    lengths = reference.bars(kind, dimensions).values()
+    lengths = exact_poses.bars(kind, dimensions).values()
     return Problem(kind, dimensions, POINTS[kind], float(max(lengths)), theta, group,
                    found['high'], found['low'], found['sensitivity'], found['due'])
 
 
 def pose(kind, theta):
     """Return the true pose nearest to a crank angle, {joint: complex}, the ground's with it."""
-    length = reference.exact(DIMENSIONS[kind])
-    found = reference.place(kind, length, reference.mp.mpf(theta))
+    length = exact_poses.exact(DIMENSIONS[kind])
+    found = exact_poses.place(kind, length, exact_poses.mp.mpf(theta))
     return {name: complex(place) for name, place in found.points.items()}
 
 
 def _cached(kind, dimensions, theta):
-    files = (__file__, reference.__file__, accuracy.__file__)
+    files = (__file__, exact_poses.__file__, accuracy_rule.__file__)
     sources = b''.join(Path(file).read_bytes() for file in files)
     asked = hashlib.sha256(sources + repr(dimensions).encode() + theta.tobytes()).hexdigest()
     path = CACHE / f'{kind}-{asked[:16]}.npz'
@@ -164,20 +159,20 @@ def _cached(kind, dimensions, theta):
 
 
 def _truth(kind, dimensions, theta):
-    case = accuracy.Case(kind, dimensions, theta)
+    case = accuracy_rule.Case(kind, dimensions, theta)
     points = POINTS[kind]
     shape = len(theta), len(points)
     table = {'high': np.empty((*shape, 2)), 'low': np.empty((*shape, 2)),
              'sensitivity': np.empty(shape), 'due': np.empty(shape, int)}
     for row, angle in enumerate(theta):
-        found = accuracy.truth(case, angle, ())
+        found = accuracy_rule.truth(case, angle, ())
         for column, name in enumerate(points):
             for axis, part in enumerate((found.values[name].real, found.values[name].imag)):
                 high = float(part)
                 table['high'][row, column, axis] = high
                 table['low'][row, column, axis] = float(part - high)
             table['sensitivity'][row, column] = float(found.sensitivity[name])
-            needs = reference.NEEDS[kind].get(name, '')
+            needs = exact_poses.KINDS[kind].needs.get(name, '')
             table['due'][row, column] = _due({found.closures[joint] for joint in needs})
     return table
 

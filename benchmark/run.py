@@ -4,9 +4,9 @@
 """
 Run time against error: every method on every linkage at several batch sizes.
 
-    python benchmark/run.py                      everything, within ten minutes
-    python benchmark/run.py --quick              a look, within a minute
-    python benchmark/run.py --compare old.json   ratios to an earlier run, nothing is run
+    python -m benchmark.run                      everything, within ten minutes
+    python -m benchmark.run --quick              a look, within a minute
+    python -m benchmark.run --compare old.json   ratios to an earlier run, nothing is run
 
 Rows go to benchmark/results/latest.json, with a table and plots beside it. What it needs is in
 benchmark/requirements.txt; a method whose package is not installed is named and left out.
@@ -22,13 +22,12 @@ import time
 # One core for every method: the numbers are per core.
 for library in ('OMP', 'OPENBLAS', 'MKL', 'NUMEXPR'):
     os.environ.setdefault(f'{library}_NUM_THREADS', '1')
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np  # noqa: E402
 
-from benchmark import methods, plots, problems, report, timing  # noqa: E402
-from benchmark.errors import judge  # noqa: E402
-from benchmark.machine import machine  # noqa: E402
+from . import methods, plots, problems, report, timing  # noqa: E402
+from .errors import judge  # noqa: E402
+from .machine import machine  # noqa: E402
 
 RESULTS = Path(__file__).with_name('results')
 QUICK = ('ours', 'compiled_c', 'original', 'sympy_expression', 'table', 'newton', 'pylinkage_step')

@@ -4,19 +4,19 @@
 """
 Measure how many digits the linkages keep, against the truth in 80 digits.
 
-    python benchmark/stability.py --samples 100000
+    python -m benchmark.stability --samples 100000
 
 Three questions are asked of every mechanism of the catalogue: do the bars keep their length and is
 NaN given exactly where nothing can be assembled (all samples, in float64); how large is the error
 in units of the input's own uncertainty (a part of them, against multiprecision, on the catalogue's
 dimensions and on random and degenerate ones); is the reach what brute force finds. The formulas of
 the original documents go through the same check. The measure and the hard cases are those of
-the tests: test/accuracy.py, test/stress.py.
+the tests: test/truth/accuracy_rule.py, test/truth/hard_cases.py.
 
-A fourth is asked of random linkages of every word: does all that test/linkage_checks.py checks
-hold, poses, velocities, reach, dead points and inverse among it, and how large is the error where
-joints hang on each other in chains (test/joint_lines_accuracy.py). Exits with 1 if the library
-breaks a rule.
+A fourth is asked of random linkages of every word: does all hold that
+test/truth/linkage_checks.py checks, poses, velocities, reach, dead points and inverse among it,
+and how large is the error where joints hang on each other in chains
+(test/truth/drawing_accuracy.py). Exits with 1 if the library breaks a rule.
 """
 
 import argparse
@@ -27,21 +27,18 @@ from pathlib import Path
 import platform
 import sys
 
+from linkage_ros import mechanisms
 import numpy as np
 from tqdm import tqdm
-
-ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
-
-import accuracy  # noqa: E402
-import brute_force  # noqa: E402
-import linkage_checks  # noqa: E402
-from linkage_ros import mechanisms  # noqa: E402
-import random_linkages  # noqa: E402
-import reference  # noqa: E402
-import stress  # noqa: E402
-
-from benchmark import original_formulas  # noqa: E402
+from truth import (
+    accuracy_rule,
+    brute_force_reach,
+    exact_poses,
+    hard_cases,
+    linkage_checks,
+    original_formulas,
+    random_linkages,
+)
 
 # One in so many samples is compared with the multiprecision truth, once on the catalogue's
 # dimensions and once on random ones; one in four of these with its velocities and rates. A leg
@@ -85,12 +82,12 @@ def parse(args):
     parser.add_argument('--linkages', type=int, default=10_000, help='random linkages')
     parser.add_argument('--grid', type=int, default=8000,
                         help='angles at which a random linkage is searched by brute force')
-    parser.add_argument('--mechanisms', nargs='*', default=list(stress.CATALOGUE),
-                        choices=list(stress.CATALOGUE))
+    parser.add_argument('--mechanisms', nargs='*', default=list(hard_cases.CATALOGUE),
+                        choices=list(hard_cases.CATALOGUE))
     parser.add_argument('--jobs', type=int, default=2)
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--output', type=Path, metavar='JSON',
-                        default=ROOT / 'benchmark' / 'results' / 'stability.json')
+                        default=Path(__file__).with_name('results') / 'stability.json')
     return parser.parse_args(args)
 
 
@@ -123,11 +120,11 @@ def run(task):
 def closure(kind, rng, count, _):
     """Check bars and NaN of many angles in float64, on the catalogue's dimensions."""
     mechanism = catalogued(kind, rng)
-    theta = stress.angles(rng, count, ends(mechanism.reach()))
-    gap = brute_force.gap(kind, mechanism.dimensions, theta, mechanism.branches)
+    theta = hard_cases.angles(rng, count, ends(mechanism.reach()))
+    gap = brute_force_reach.gap(kind, mechanism.dimensions, theta, mechanism.branches)
     points = mechanism.solve(theta)
     placed = np.all([np.isfinite(place).all(-1) for place in points.values()], axis=0)
-    clear = np.abs(gap) > brute_force.DOUBT
+    clear = np.abs(gap) > brute_force_reach.DOUBT
     wrong = clear & (placed != (gap > 0.0))
     whole = clear & placed
     stretch = max(
@@ -147,7 +144,7 @@ def random(kind, rng, count, rates):
     rows = []
     for _ in range(count // 5):
         branches = branched(kind, rng)
-        mechanism = mechanisms.create(kind, branches=branches, **stress.dimensions(kind, rng))
+        mechanism = mechanisms.create(kind, branches=branches, **hard_cases.dimensions(kind, rng))
         rows += measured(mechanism, rng, 5, rates, 'random')
     return 'accuracy', rows
 
@@ -157,9 +154,9 @@ def servo(kind, rng, count, _):
     rows = []
     for _ in range(count // 5):
         lever = mechanisms.create(kind, branches=branched(kind, rng),
-                                  **stress.dimensions(kind, rng))
-        angles = stress.angles(rng, 5, ends(lever.lever_reach()), turns=1.0)
-        rows += with_method('library', accuracy.measure_servo(lever, angles, 'random'))
+                                  **hard_cases.dimensions(kind, rng))
+        angles = hard_cases.angles(rng, 5, ends(lever.lever_reach()), turns=1.0)
+        rows += with_method('library', accuracy_rule.measure_servo(lever, angles, 'random'))
         rows += with_method('original', original_servo(lever, angles))
     return 'accuracy', rows
 
@@ -170,13 +167,13 @@ def reach(kind, rng, count, _):
     wrong, full, partial = [], 0, 0
     for _ in range(count):
         mechanism = mechanisms.create(kind, branches=branched(kind, rng),
-                                      **stress.dimensions(kind, rng))
+                                      **hard_cases.dimensions(kind, rng))
         arcs = mechanism.reach()
         full += arcs == [(-math.pi, math.pi)]
         partial += len(arcs) > 0 and arcs != [(-math.pi, math.pi)]
-        gap = brute_force.gap(kind, mechanism.dimensions, theta, mechanism.branches)
-        held = brute_force.inside(arcs, theta)
-        if np.any((np.abs(gap) > brute_force.DOUBT) & (held != (gap > 0.0))):
+        gap = brute_force_reach.gap(kind, mechanism.dimensions, theta, mechanism.branches)
+        held = brute_force_reach.inside(arcs, theta)
+        if np.any((np.abs(gap) > brute_force_reach.DOUBT) & (held != (gap > 0.0))):
             wrong.append((mechanism.dimensions, mechanism.branches))
     return 'reach', (kind, count, full, partial, wrong)
 
@@ -206,18 +203,19 @@ TASKS = {'closure': closure, 'catalogue': catalogue, 'random': random, 'servo': 
 
 def measured(mechanism, rng, count, rates, label):
     """Measure the library and, where they know the design, the original formulas."""
-    case = accuracy.case_of(mechanism, stress.angles(rng, count, ends(mechanism.reach())), label)
+    theta = hard_cases.angles(rng, count, ends(mechanism.reach()))
+    case = accuracy_rule.case_of(mechanism, theta, label)
     links = mechanism.links
-    exact = [accuracy.truth(case, theta, links, rates) for theta in case.thetas]
-    found = accuracy.answers(mechanism, case.thetas, rates)
-    rows = with_method('library', accuracy.judge(case, found, links, rates, exact))
-    usual = mechanism.branches == reference.BRANCHES[mechanism.type]
+    exact = [accuracy_rule.truth(case, theta, links, rates) for theta in case.thetas]
+    found = accuracy_rule.answers(mechanism, case.thetas, rates)
+    rows = with_method('library', accuracy_rule.judge(case, found, links, rates, exact))
+    usual = mechanism.branches == exact_poses.KINDS[mechanism.type].branches
     if usual and not (case.kind == 'slotted_lever' and case.dimensions['e']):
         found = original_formulas.solve(case.kind, case.dimensions, case.thetas)
         if case.kind == 'slotted_lever':
             found['angle lever'] = original_formulas.lever_angle(
                 case.thetas, case.dimensions['a'], case.dimensions['b'])
-        rows += with_method('original', accuracy.judge(case, found, links, False, exact))
+        rows += with_method('original', accuracy_rule.judge(case, found, links, False, exact))
     return rows
 
 
@@ -226,11 +224,11 @@ def original_servo(lever, angles):
     a, b, e = (lever.dimensions[name] for name in 'abe')
     if e or lever.branches['L'] < 0:
         return []
-    case = accuracy.case_of(lever, angles, 'random')
+    case = accuracy_rule.case_of(lever, angles, 'random')
     rows = []
     for angle, found in zip(angles, original_formulas.servo_angle(angles, a, b)):
-        exact = accuracy.servo_truth(lever.dimensions, 1, angle, 1)
-        rows.append(accuracy.verdict(case, angle, 'angle servo', found, exact))
+        exact = accuracy_rule.servo_truth(lever.dimensions, 1, angle, 1)
+        rows.append(accuracy_rule.verdict(case, angle, 'angle servo', found, exact))
     return rows
 
 
@@ -241,14 +239,14 @@ def with_method(method, rows):
 
 def catalogued(kind, rng):
     """Return one of the catalogue's linkages on random branches."""
-    designs = stress.CATALOGUE[kind]
+    designs = hard_cases.CATALOGUE[kind]
     return mechanisms.create(kind, branches=branched(kind, rng),
                              **designs[rng.integers(len(designs))])
 
 
 def branched(kind, rng):
     """Return random assembly signs, the usual ones half of the time."""
-    usual = reference.BRANCHES[kind]
+    usual = exact_poses.KINDS[kind].branches
     if rng.random() < 0.5:
         return dict(usual)
     return {name: int(rng.choice((-1, 1))) for name in usual}

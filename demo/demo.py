@@ -14,7 +14,6 @@ import signal
 import sys
 
 HERE = Path(__file__).parent
-sys.path.append(str(HERE.parent / 'test'))
 
 try:
     from domains import Domain

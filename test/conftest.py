@@ -4,6 +4,7 @@
 """Fixtures; message fields are checked, which is off by default."""
 
 import atexit
+import gc
 import os
 
 from domains import Domain
@@ -15,6 +16,12 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 _domain = Domain()
 atexit.register(_domain.release)
 os.environ['ROS_DOMAIN_ID'] = str(_domain.id)
+
+
+def pytest_collection_finish():
+    """Leave what has been imported and collected to itself: collecting garbage takes less."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture

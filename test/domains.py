@@ -16,7 +16,7 @@ DOMAINS = 100
 FIRST_PORT, PORTS_PER_DOMAIN = 7410, 250
 
 # What was in use last may still be ending: it comes last.
-_candidates = (1 + number % DOMAINS for number in count(os.getpid()))
+candidates = (1 + number % DOMAINS for number in count(os.getpid()))
 
 
 class Domain:
@@ -36,7 +36,7 @@ class Domain:
     """
 
     def __init__(self):
-        for self.id in islice(_candidates, DOMAINS):
+        for self.id in islice(candidates, DOMAINS):
             self._lock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
             try:
                 self._lock.bind(('', FIRST_LOCK + self.id))

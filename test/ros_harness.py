@@ -171,8 +171,12 @@ class Process:
         """Send a signal."""
         self._process.send_signal(signal)
 
+    def line(self):
+        """Return the next line that is printed, '' after the last."""
+        return self._process.stdout.readline()
+
     def end(self, seconds=DEADLINE):
-        """Wait for the end; return exit code and all that was printed."""
+        """Wait for the end; return exit code and all else that was printed."""
         try:
             printed, _ = self._process.communicate(timeout=seconds)
         finally:

@@ -10,20 +10,18 @@ import shutil
 import subprocess
 import sys
 
-from accuracy import broken, case_of, judge, summary
-import linkage_checks as checks
 from linkage_ros import mechanisms
 from linkage_ros.mechanisms.four_bar import grashof
 import numpy as np
 import pytest
-from random_linkages import Design
-import reference
-import reference_wider
-from reference_wider import HELD
-import stress
+from truth import exact_poses, hard_cases, linkage_checks as checks
+from truth.accuracy_rule import broken, case_of, judge, summary
+from truth.exact_poses import HELD
+from truth.random_linkages import Design
 
 # Those with a reference of their own, beside the one that draws every joint line.
-WIDER = [kind for kind in reference_wider.PLACE if kind in mechanisms.TYPES]
+WIDER = [kind for kind in exact_poses.KINDS
+         if kind in mechanisms.TYPES and kind not in hard_cases.CATALOGUE]
 
 
 def held(linkage):
@@ -71,10 +69,11 @@ def test_a_file_that_is_no_mechanism_is_named(tmp_path, text, said):
     assert error.startswith('ImportError: linkage_ros.mechanisms.broken ') and said in error
 
 
+@pytest.mark.parametrize('seeds', [1, pytest.param(5, marks=pytest.mark.long)])
 @pytest.mark.parametrize('kind', list(mechanisms.TYPES))
-def test_every_mechanism_holds_what_any_linkage_must(kind):
+def test_every_mechanism_holds_what_any_linkage_must(kind, seeds):
     design = Design(mechanisms.design(kind).joints, mechanisms.create(kind).dimensions, {})
-    found = [problem for seed in range(5)
+    found = [problem for seed in range(seeds)
              for problem in checks.problems(design, np.random.default_rng(seed))[0]]
     assert not found, found[0]
 
@@ -82,23 +81,25 @@ def test_every_mechanism_holds_what_any_linkage_must(kind):
 @pytest.mark.parametrize('kind', WIDER)
 def test_the_wider_catalogue_is_right_to_the_last_digits(kind):
     linkage = mechanisms.create(kind)
-    near = [stress.approach(end)[::5] for end in ends(linkage)[:2]]
-    thetas = np.concatenate([stress.angles(np.random.default_rng(1), 12, ends(linkage)), *near])
+    near = [hard_cases.approach(end)[::5] for end in ends(linkage)[:2]]
+    anywhere = hard_cases.angles(np.random.default_rng(1), 12, ends(linkage))
+    thetas = np.concatenate([anywhere, *near])
     rows = rows_of(linkage, thetas)
     assert rows and not broken(rows), summary(rows)
 
 
+@pytest.mark.parametrize('count', [4, pytest.param(12, marks=pytest.mark.long)])
 @pytest.mark.parametrize('kind', WIDER)
-def test_other_dimensions_and_branches_are_right_too(kind):
+def test_other_dimensions_and_branches_are_right_too(kind, count):
     rng, rows = np.random.default_rng(3), []
-    for _ in range(12):
-        lengths = {name: value * stress.log_uniform(rng, 0.7, 1.4)
+    for _ in range(count):
+        lengths = {name: value * hard_cases.log_uniform(rng, 0.7, 1.4)
                    for name, value in mechanisms.defaults(kind).items()}
         if kind == 'chebyshev_lambda':  # any other size would round its proportions
             lengths = {'a': 2.0 ** int(rng.integers(-9, 9))}
-        branches = {name: int(rng.choice((-1, 1))) for name in reference.BRANCHES[kind]}
+        branches = {name: int(rng.choice((-1, 1))) for name in exact_poses.KINDS[kind].branches}
         linkage = mechanisms.create(kind, branches=branches, **lengths)
-        rows += rows_of(linkage, stress.angles(rng, 3, ends(linkage)))
+        rows += rows_of(linkage, hard_cases.angles(rng, 3, ends(linkage)))
     assert rows and not broken(rows), summary(rows)
 
 

@@ -5,12 +5,15 @@
 
 import math
 import re
+from types import SimpleNamespace
 
 import pytest
 
 pytest.importorskip('rclpy')
 
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
+from rclpy.clock import ClockType  # noqa: E402
+from rclpy.duration import Duration  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 
@@ -207,32 +210,53 @@ def test_simulated_time_may_leap_ahead(graph):
     assert driver.at(3601 * SECOND) == (pytest.approx(3600.0 % math.tau, abs=1e-12), 1.0)
 
 
-def test_system_time_that_is_set_ahead_makes_no_jump(graph):
-    node = graph.start(CrankDriver, {'mechanisms': ['drop'], 'drop.type': 'water_drop'})
+class OnSystemTime(CrankDriver):
+    """A crank driver on a machine whose clock can be set: `set_by` is by how much."""
+
+    set_by = Duration()
+
+    def get_clock(self):
+        """Return a clock that has been set."""
+        clock = super().get_clock()
+        return SimpleNamespace(now=lambda: clock.now() + self.set_by,
+                               ros_time_is_active=clock.ros_time_is_active)
+
+
+@pytest.fixture
+def on_system_time(graph):
+    """Return a crank driver whose clock can be set, and what it sends; it has sent something."""
+    node = graph.start(OnSystemTime, {'mechanisms': ['drop'], 'drop.type': 'water_drop'})
     heard = graph.listen(JointState, 'crank_states')
     graph.until(lambda: len(heard) > 2)
-    # What is left by time that was set ahead an hour: a last tick an hour ago.
-    hour = 3600 * SECOND
-    before = node._motions['drop_crank'].at(node._now)[0]
-    node._motions = {name: motion.moved(node._now, node._now - hour)
-                     for name, motion in node._motions.items()}
-    node._now -= hour
+    return node, heard
+
+
+def after(graph, node, heard):
+    """Return three messages of a node that were sent after its clock was set."""
+    now = node.get_clock().now().nanoseconds
+    return graph.until(lambda: [m for m in heard if abs(
+        m.header.stamp.sec * SECOND + m.header.stamp.nanosec - now) < 100 * SECOND][2:] and heard)
+
+
+@pytest.mark.parametrize('seconds', [3600, -3600])
+def test_system_time_that_is_set_makes_no_jump(graph, on_system_time, seconds):
+    node, heard = on_system_time
+    before = heard[-1].position[0]
+    node.set_by = Duration(seconds=seconds)
     del heard[:]
-    graph.until(lambda: len(heard) > 2)
-    for message in heard:
-        assert 0.0 < (message.position[0] - before) % math.tau < 2.0
+    for message in after(graph, node, heard):
+        assert 0.0 <= (message.position[0] - before) % math.tau < 2.0
 
 
-def test_a_change_amid_a_leap_of_system_time_makes_no_jump_either(graph):
-    node = graph.start(CrankDriver, {'mechanisms': ['drop'], 'drop.type': 'water_drop'})
-    heard = graph.listen(JointState, 'crank_states')
-    graph.until(lambda: len(heard) > 2)
-    before = node._motions['drop_crank'].at(node._now)[0]
-    node._motions = {name: motion.moved(node._now, node._now - SECOND * 1000)
-                     for name, motion in node._motions.items()}
-    node._now -= 1000 * SECOND
+def test_a_change_amid_a_leap_of_system_time_makes_no_jump_either(graph, on_system_time):
+    node, heard = on_system_time
+    before = heard[-1].position[0]
+    node.set_by = Duration(seconds=1000)
     assert node.set_parameters([Parameter('drop.crank.speed', value=0.5)])[0].successful
-    assert 0.0 < (node._motions['drop_crank'].at(node._now)[0] - before) % math.tau < 2.0
+    del heard[:]
+    message = after(graph, node, heard)[-1]
+    assert 0.0 <= (message.position[0] - before) % math.tau < 2.0
+    assert message.velocity[0] == 0.5
 
 
 @pytest.mark.parametrize('rate', [5e-324, 1e-300, 1e-9])
@@ -242,15 +266,14 @@ def test_a_rate_may_be_as_low_as_one_likes(graph, rate):
     assert driver.at(SECOND) == (0.0, 1.0)
 
 
-def test_a_timer_that_sleeps_since_system_time_went_back_is_woken(graph):
-    node = graph.start(CrankDriver, {'mechanisms': ['drop'], 'drop.type': 'water_drop'})
-    heard = graph.listen(JointState, 'crank_states')
-    graph.until(lambda: heard)
+def test_a_timer_that_sleeps_since_system_time_went_back_is_woken(graph, on_system_time):
+    node, heard = on_system_time
     # What is left by time that was set back an hour: a last tick in the future, and silence.
-    node._now += 3600 * SECOND
-    node._timer.cancel()
-    del heard[:]
-    graph.until(lambda: len(heard) > 2)
+    node.set_by = Duration(seconds=-3600)
+    for timer in node.timers:
+        if timer.clock.clock_type != ClockType.STEADY_TIME:
+            timer.cancel()
+    after(graph, node, heard)
 
 
 def test_a_namespace_is_put_before_the_topic(graph):

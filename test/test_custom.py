@@ -8,12 +8,12 @@ import math
 from pathlib import Path
 import re
 
-from accuracy import broken, case_of, judge, summary
 from linkage_ros import mechanisms, scene
 import numpy as np
 import pytest
-from reference_wider import MOVING
-import stress
+from truth import hard_cases
+from truth.accuracy_rule import broken, case_of, judge, summary
+from truth.exact_poses import MOVING
 
 TURN = [(-math.pi, math.pi)]
 PAGE = Path(__file__).parents[1] / 'docs' / 'write-your-own.md'
@@ -51,7 +51,7 @@ def test_the_catalogue_written_out_gives_the_same_bits(kind):
 def test_every_construction_is_right_to_the_last_digits_where_it_moves():
     rng, rows = np.random.default_rng(3), []
     for _ in range(12):
-        lengths = {name: length * stress.log_uniform(rng, 0.6, 1.6)
+        lengths = {name: length * hard_cases.log_uniform(rng, 0.6, 1.6)
                    for name, length in LENGTHS.items()}
         branches = {name: int(rng.choice((-1, 1))) for name in 'BSL'}
         try:
@@ -60,7 +60,7 @@ def test_every_construction_is_right_to_the_last_digits_where_it_moves():
             assert 'no triangle has these sides' in str(error)
             continue
         ends = [end for arc in linkage.reach() for end in arc]
-        rows += measured(linkage, stress.angles(rng, 6, ends))
+        rows += measured(linkage, hard_cases.angles(rng, 6, ends))
     assert len(rows) > 300 and not broken(rows), summary(rows)
 
 

@@ -63,7 +63,7 @@ def test_a_domain_that_others_use_is_left_alone(kind, first, apart, monkeypatch)
         theirs = domain.id
     with socket.socket(socket.AF_INET, kind) as other:
         other.bind(('', first + apart * theirs))
-        monkeypatch.setattr(domains, '_candidates', cycle(
+        monkeypatch.setattr(domains, 'candidates', cycle(
             [theirs, *(number for number in range(1, 101) if number != theirs)]))
         with domains.Domain() as another:
             assert another.id != theirs
@@ -71,7 +71,7 @@ def test_a_domain_that_others_use_is_left_alone(kind, first, apart, monkeypatch)
 
 def test_where_all_are_in_use_that_is_said(monkeypatch):
     with domains.Domain() as domain:
-        monkeypatch.setattr(domains, '_candidates', repeat(domain.id))
+        monkeypatch.setattr(domains, 'candidates', repeat(domain.id))
         with pytest.raises(RuntimeError, match='every ROS_DOMAIN_ID from 1 to 100 is in use'):
             domains.Domain()
 

@@ -5,18 +5,18 @@
 
 import math
 
-from accuracy import case_of, truth
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
-import reference
-from reference_wider import HELD
+from truth import exact_poses
+from truth.accuracy_rule import case_of, truth
+from truth.exact_poses import HELD
 
 pytestmark = pytest.mark.long
 
 KINDS = list(mechanisms.TYPES)
 # Those with a reference of their own, beside the one that draws every joint line.
-REFERENCED = [kind for kind in KINDS if kind in reference.BRANCHES]
+REFERENCED = [kind for kind in KINDS if kind in exact_poses.KINDS]
 # Coordinates and slides that never change.
 CONSTANT = {'peaucellier': ['C.x'], 'slider_crank': ['B.y']}
 
@@ -93,8 +93,8 @@ def _miss(exact, output, value):
         return float(abs(found - value)), float(exact.sensitivity[name]) + half
     if output == 'slide':
         return float(abs(exact.values['slide'] - value)), float(exact.sensitivity[output]) + half
-    direction = exact.values[f'angle {output}'] * reference.mp.expj(-reference.mp.mpf(value))
-    return (float(abs(reference.mp.arg(direction))),
+    direction = exact.values[f'angle {output}'] * exact_poses.mp.expj(-exact_poses.mp.mpf(value))
+    return (float(abs(exact_poses.mp.arg(direction))),
             float(exact.sensitivity[f'angle {output}']) + half)
 
 

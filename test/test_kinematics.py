@@ -16,6 +16,7 @@ from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from rcl_interfaces.msg import Log  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
+from ros_harness import Graph  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
@@ -385,6 +386,13 @@ def test_only_the_mechanism_that_is_changed_is_made_anew(graph):
             if machine != before[name]} == {'jansen'}
 
 
+@pytest.fixture(scope='module')
+def bench():
+    """Return a bench that no test changes."""
+    with Graph() as graph:
+        yield Bench(graph, 'jansen')
+
+
 @pytest.mark.parametrize('values, reason', [
     ({'jansen.dimensions.m': -1.0}, 'jansen.dimensions.m must be .* above 0'),
     ({'jansen.dimensions.m': True}, 'jansen.dimensions.m must be'),
@@ -399,8 +407,7 @@ def test_only_the_mechanism_that_is_changed_is_made_anew(graph):
     ({'water_drop.leg_pairs': 2}, 'read-only.* water_drop.leg_pairs'),
     ({'jansen.type': 'water_drop'}, 'read-only.* jansen.type'),
 ])
-def test_a_bad_value_is_refused_with_a_reason_and_the_node_runs_on(graph, values, reason):
-    bench = Bench(graph, 'jansen')
+def test_a_bad_value_is_refused_with_a_reason_and_the_node_runs_on(bench, values, reason):
     before = bench.legs_at(0.3)[0]
     refused = bench.set(**values)
     assert not refused.successful

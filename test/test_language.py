@@ -9,11 +9,11 @@ import random
 import re
 import time
 
-from hostile_texts import LEGAL, mutations, TEXTS
 from linkage_ros import mechanisms, scene
 from linkage_ros.linkage import joint_lines
 import numpy as np
 import pytest
+from truth.hostile_texts import LEGAL, mutations, TEXTS
 
 FOUR_BAR = ('O ground 0 0', 'Q ground g 0', 'A crank O m', 'B dyad A Q b c left')
 # More digits than Python writes.
@@ -51,10 +51,12 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P crank O 1 zero B', 'O and B are not joints of one moving link'),
     ('P crank O 1 geared gear 2 0', 'it cannot be geared to gear; there are: crank'),
     ('P crank O 1 geared crank 2deg 0', "'2deg' is in degrees, but RATIO is no angle"),
-    ('P cylinder O A 1 left geared crank 2 0', 'it cannot be geared to crank; there are: none'),
+    ('P cylinder O A 1 left geared crank 2 0',
+     'it cannot be geared to crank; there are: none'),
     ('P carriage O Q 0 1', 'expected "NAME carriage ORIGIN along TOWARDS DISTANCE DISTANCE'),
     ('P carriage O along B 0 1', 'O and B are not joints of one moving link'),
-    ('P carriage O along A 1 1', 'the carriage must have a way to go: from a lower end to a'),
+    ('P carriage O along A 1 1',
+     'the carriage must have a way to go: from a lower end to a'),
     ('P block A 1 1', 'A is no joint of a block'),
     ('P slider A 1 O along A out', 'the joints it stands on must differ'),
     ('P inversor Q A 3 1', 'expected "NAME NAME NAME inversor POLE PIN LENGTH LENGTH"'),
@@ -225,7 +227,7 @@ def arithmetic(rng, depth):
 def test_arithmetic_is_what_python_makes_of_the_same_letters():
     rng, tried = random.Random(5), 0
     known = {**LENGTHS, 'pi': math.pi, 'sqrt': math.sqrt, 'max': max}
-    for _ in range(200):
+    for _ in range(100):
         number = arithmetic(rng, 5)
         try:
             value = eval(number, known)
@@ -236,7 +238,7 @@ def test_arithmetic_is_what_python_makes_of_the_same_letters():
         found = made(f'P ground {number} 0').solve(0.0, ('P',))['P'][0]
         assert found == pytest.approx(value, rel=1e-13, abs=1e-13), number
         tried += 1
-    assert 100 < tried < 200
+    assert 50 < tried < 100
 
 
 @pytest.mark.parametrize('angle, rad', [
@@ -309,7 +311,7 @@ def test_any_other_name_is_for_a_dimension():
 
 
 def test_every_construction_says_what_follows_it_in_the_module_s_text():
-    for word in joint_lines._FORMS:
+    for word in joint_lines.FORMS:
         assert re.search(rf'^    [A-Z][A-Z ]* {word} ', joint_lines.__doc__, re.MULTILINE), word
 
 
@@ -474,6 +476,8 @@ OUTPUTS = {
     'changed value': lambda text: BAR.with_dimensions(b=text),
 }
 BAR = made()
+# Where texts are read letter by letter.
+PARSED = ('line', 'number', 'length', 'angle')
 
 
 def refused(ask, text) -> bool:
@@ -492,12 +496,16 @@ def refused(ask, text) -> bool:
 
 
 @pytest.mark.filterwarnings('error')
-@pytest.mark.parametrize('role', [*ROLES, *OUTPUTS])
-def test_a_hostile_text_is_refused_in_a_short_sentence(role):
-    assert len(TEXTS) > 700
-    kept = [text for text in TEXTS if not refused({**ROLES, **OUTPUTS}[role], text)]
-    assert len(kept) < 0.1 * len(TEXTS) and all(len(text) < 20000 for text in kept)
-    if role in ('line', 'number', 'length', 'angle'):
+@pytest.mark.parametrize('role, every', [
+    *((role, 1 if role in PARSED else 5) for role in (*ROLES, *OUTPUTS)),
+    *(pytest.param(role, 1, marks=pytest.mark.long) for role in (*ROLES, *OUTPUTS)
+      if role not in PARSED)])
+def test_a_hostile_text_is_refused_in_a_short_sentence(role, every):
+    texts = TEXTS[::every]
+    assert len(texts) > 140
+    kept = [text for text in texts if not refused({**ROLES, **OUTPUTS}[role], text)]
+    assert len(kept) < 0.1 * len(texts) and all(len(text) < 20000 for text in kept)
+    if role in PARSED:
         assert len(kept) < 10, kept
 
 
@@ -508,7 +516,7 @@ def test_the_lines_that_are_mutated_are_legal(line):
 
 @pytest.mark.filterwarnings('error')
 @pytest.mark.parametrize('count, seed', [
-    (1500, 1), pytest.param(60000, 2, marks=pytest.mark.long),
+    (800, 1), pytest.param(60000, 2, marks=pytest.mark.long),
     pytest.param(60000, 3, marks=pytest.mark.long)])
 def test_a_line_with_slips_is_refused_or_makes_a_linkage(count, seed):
     outcomes = [refused(made, text) for text in mutations(count, seed)]
@@ -517,7 +525,7 @@ def test_a_line_with_slips_is_refused_or_makes_a_linkage(count, seed):
 
 def test_what_passes_is_only_what_is_documented():
     number = re.compile(r'[0-9.eE]+|[+*/(),-]|max|sqrt|pi|deg|[gmbc]')
-    for text in mutations(1500, 4):
+    for text in mutations(800, 4):
         if not refused(made, text):
             for word in text.split():
                 name = re.fullmatch('[A-Za-z][A-Za-z0-9_]*', word)

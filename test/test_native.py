@@ -3,19 +3,50 @@
 
 """Machine code says what plain Python says, and is done without where there is none."""
 
-from concurrent.futures import Future
 import importlib
 import math
 import sys
+import threading
 
 from linkage_ros import mechanisms
 from linkage_ros.formula import expression, program
 from linkage_ros.linkage.walker import Assembly
 import numpy as np
 import pytest
-import stress
+from truth import hard_cases
 
 native = pytest.importorskip('linkage_ros.formula.llvm_code')
+
+class Code(native.Loop):
+    """Machine code that counts how often it is made and run; it is made when it may be."""
+
+    made, ran, allowed = 0, 0, threading.Event()
+
+    def __init__(self, *operations):
+        Code.allowed.wait(20.0)
+        super().__init__(*operations)
+        Code.made += 1
+        self._run, self.run = self.run, self._counted
+
+    def _counted(self, *arguments):
+        Code.ran += 1
+        self._run(*arguments)
+
+
+@pytest.fixture
+def code(monkeypatch):
+    """Return the class of all machine code that is made in a test."""
+    monkeypatch.setattr(native, 'Loop', Code)
+    Code.made = Code.ran = 0
+    Code.allowed.set()
+    return Code
+
+
+def fresh(name):
+    """Return a linkage whose code nobody has asked for, as no other joint is called so."""
+    return mechanisms.create('custom', joints=[
+        'O ground 0 0', 'Q ground 3 0', 'A crank O 1', f'{name} dyad A Q 2.5 2.5 left'])
+
 
 TYPES = [kind for kind in mechanisms.TYPES if len(mechanisms.create(kind).inputs) == 1]
 
@@ -23,7 +54,7 @@ TYPES = [kind for kind in mechanisms.TYPES if len(mechanisms.create(kind).inputs
 def angles(linkage):
     """Return angles [rad] of every size, dead points and reach limits, and no numbers at all."""
     ends = [end for arc in linkage.reach() for end in arc] + list(linkage.dead_points())
-    return np.concatenate([stress.angles(np.random.default_rng(3), 200, ends),
+    return np.concatenate([hard_cases.angles(np.random.default_rng(3), 200, ends),
                            [math.inf, -math.inf, math.nan]])
 
 
@@ -42,8 +73,11 @@ def test_every_bit_is_the_same(kind):
 
 
 @pytest.mark.parametrize('kind', ['jansen', 'slotted_lever'])
-def test_so_it_is_for_the_legs_of_a_walker(kind, monkeypatch):
-    linkage = mechanisms.create(kind)
+def test_so_it_is_for_the_legs_of_a_walker(kind, monkeypatch, code):
+    design = mechanisms.design(kind)
+    # A design of its own, whose code is made here.
+    linkage = mechanisms.create('custom', joints=(*design.joints, 'Z ground 0 0'),
+                                **mechanisms.defaults(kind))
     legs = (6, True) if kind == 'jansen' else (1, False)
 
     def solution():
@@ -51,14 +85,14 @@ def test_so_it_is_for_the_legs_of_a_walker(kind, monkeypatch):
         return assembly.solution(linkage.points, assembly.joints, assembly.joints)
 
     quick = solution()
-    quick._batch._loop.result()
+    quick.finish()
     monkeypatch.setattr(type(linkage), 'accelerated', lambda linkage: linkage)
     plain = solution()
     for theta in angles(linkage)[:60].tolist():
         for each in (quick, plain):
             each.solve([theta], [-2.5])
         assert np.array_equal(quick.values, plain.values, equal_nan=True)
-    assert quick._batch._run and not plain._batch._run
+    assert code.ran == 60
 
 
 def test_so_it_is_for_two_cranks():
@@ -70,43 +104,41 @@ def test_so_it_is_for_two_cranks():
     assert np.array_equal(solved, expected, equal_nan=True)
 
 
-def test_a_change_of_dimensions_needs_no_other_code():
+def test_a_change_of_dimensions_needs_no_other_code(code):
     linkage, thetas = mechanisms.create('peaucellier').accelerated(), np.array([0.2, -0.3])
     grown = linkage.with_dimensions(**{k: 2.0 * v for k, v in linkage.dimensions.items()})
-    assert np.array_equal(grown.solve(thetas)['C'], 2.0 * linkage.solve(thetas)['C'])
-    loops = [each._ready('points', None)[1]._variant.loop for each in (linkage, grown)]
-    assert loops[0] is loops[1]
+    before = linkage.solve(thetas)['C']
+    made = code.made
+    assert np.array_equal(grown.solve(thetas)['C'], 2.0 * before)
+    assert code.made == made
 
 
-def batch(rows):
-    """Return water drops, a row each, whose code is still being made, and that code."""
-    linkage = mechanisms.create('water_drop')
-    made = linkage.accelerated()._bound('points', linkage.points)
-    found = made.batch(rows)
-    loop, found._loop = found._loop, Future()
-    return found, loop.result(), one_by_one(linkage.function(), found.given[0])
+def test_nobody_waits_for_the_compiler(code):
+    linkage = fresh('Waited')
+    code.allowed.clear()
+    solution = Assembly(linkage).solution(('Waited',))
+    solution.solve([0.3])
+    expected = solution.rows.copy()
+    assert expected[0] == pytest.approx(linkage.solve(0.3)['Waited']) and not code.made
+    code.allowed.set()
+    solution.finish()
+    solution.rows[:] = 0.0
+    solution.solve([0.3])
+    assert np.array_equal(solution.rows, expected) and code.ran == 1
 
 
-def test_nobody_waits_for_the_compiler():
-    rows = np.zeros((3, 10))
-    found, loop, expected = batch(rows)
-    found.solve()
-    assert np.array_equal(rows, expected) and not found._run
-    found._loop.set_result(loop)
-    rows[:] = 0.0
-    found.solve()
-    assert np.array_equal(rows, expected) and found._run
+def test_what_cannot_be_compiled_is_done_in_plain_python(monkeypatch):
+    def refuse(*_):
+        raise RuntimeError('no such processor')
 
-
-def test_what_cannot_be_compiled_is_done_in_plain_python():
-    rows = np.zeros((3, 10))
-    found, _, expected = batch(rows)
-    found._loop.set_exception(RuntimeError('no such processor'))
+    monkeypatch.setattr(native, 'Loop', refuse)
+    linkage = fresh('Refused')
+    solution = Assembly(linkage).solution(('Refused',))
+    solution.finish()
     with pytest.warns(UserWarning, match='no machine code.*no such processor'):
-        found.solve()
-    rows[:] = 0.0
-    found.solve()
-    assert np.array_equal(rows, expected)
+        solution.solve([0.2])
+    solution.solve([0.3])
+    assert solution.rows[0] == pytest.approx(linkage.solve(0.3)['Refused'])
 
 
 def test_an_llvmlite_that_is_too_old_is_named(monkeypatch):
@@ -126,10 +158,10 @@ def test_without_llvmlite_only_accelerated_is_missing(monkeypatch):
     assert solution.rows[0] == pytest.approx(linkage.solve(0.3)['P'])
 
 
-def test_it_is_compiled_once_for_all_mechanisms_of_a_type():
-    loops = {id(mechanisms.create('hoeken').accelerated()._ready('points', None)[1]._variant.loop)
-             for _ in range(3)}
-    assert len(loops) == 1
+def test_it_is_compiled_once_for_all_mechanisms_of_a_type(code):
+    for _ in range(3):
+        fresh('Shared').accelerated().solve(np.array([0.3]))
+    assert (code.made, code.ran) == (1, 3)
 
 
 def test_a_chain_of_operations_may_be_as_long_as_one_likes():

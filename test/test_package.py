@@ -172,7 +172,10 @@ OLD = 'case "$*" in *version_info*) exit 1;; -V) echo Python 3.9.18; exit;; esac
 
 
 @pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
-@pytest.mark.parametrize('target', ['lint', 'docs', 'pictures', 'build', 'demo', 'test', 'bench'])
+@pytest.mark.parametrize('target', [
+    'lint', 'docs', 'build',
+    *(pytest.param(target, marks=pytest.mark.long)
+      for target in ('pictures', 'demo', 'test', 'bench'))])
 def test_each_target_says_in_one_line_that_python_is_too_old(copy, tmp_path, target):
     python = wrapped(tmp_path, OLD)
     said = only_line(['make', target, f'PYTHON={python}'], copy, os.environ)

@@ -13,6 +13,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from linkage_ros import scene  # noqa: E402
+from linkage_ros.linkage.walker import Assembly  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics, LATCHED  # noqa: E402
 from linkage_ros.robot_model import urdf  # noqa: E402
 from ros_harness import Graph, Process  # noqa: E402
@@ -75,10 +76,8 @@ def test_a_locus_that_is_no_curve_any_more_goes_for_whoever_comes_late_too(graph
     node = graph.start(Kinematics, CELL)
     picture = Picture(graph, 'cell')
     graph.until(lambda: picture().keys() == {2})
-    outlet = node._mechanisms['cell']
-    assembly = type(outlet._model.assembly)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(assembly, 'locus', lambda *_: np.zeros((1, 2)))
+        patch.setattr(Assembly, 'locus', lambda *_: np.zeros((1, 2)))
         assert graph.set(node, cell__scale=0.9).successful
     graph.until(lambda: not picture())
     late = graph.listen(Marker, 'cell/locus', LATCHED)
@@ -109,7 +108,8 @@ def test_nothing_is_left_of_a_node_that_is_destroyed(graph):
     graph.until(lambda: not picture())
 
 
-@pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('stop', [
+    signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_nothing_is_left_of_a_process_that_is_told_to_end(tmp_path, stop):
     path = tmp_path / 'scene.yaml'
     path.write_text('/**:\n  ros__parameters:\n    mechanisms: [jansen]\n')
@@ -143,7 +143,7 @@ UNPUBLISHABLE = {
 
 @pytest.mark.parametrize('given, bad, named', UNPUBLISHABLE.values(), ids=UNPUBLISHABLE)
 def test_what_cannot_be_published_is_refused_and_what_was_there_goes_on(graph, given, bad, named):
-    node = graph.start(Kinematics, given)
+    node = graph.start(Kinematics, {'mechanisms': ['jansen'], **given})
     states = graph.listen(JointState, 'jansen/joint_states')
     loci = graph.listen(Marker, 'jansen/locus', LATCHED)
     models = graph.listen(String, 'jansen/robot_description', LATCHED)

@@ -146,7 +146,7 @@ def test_the_bars_in_the_data_are_as_long_as_in_the_original_document(tmp_path):
 def test_both_directions_have_one_scale_and_nothing_is_cut_off(type_):
     one = machine(type_)
     picture = picture_of(one, size=(640, 400))
-    axes = picture.panels[0]._axes
+    axes = picture.figure.axes[0]
     (x0, y0), (x1, y1) = axes.transData.transform([(0.0, 0.0), (1.0, 1.0)])
     assert x1 - x0 == pytest.approx(y1 - y0, rel=1e-9)
     places = Cycle(one).course.reshape(-1, 2)
@@ -187,13 +187,13 @@ def test_a_gif_keeps_the_colours_that_colour_blind_people_tell_apart(tmp_path):
 
 def test_the_pairs_of_a_walker_pale_from_the_first_to_the_last(tmp_path):
     made = picture_of(machine('jansen', leg_pairs=3))
-    legs = next(layer for layer in made.panels[0]._moving if isinstance(layer, layers.Legs))
-    brightness = {leg: np.mean(artists['bars'].get_colors()[0][:3]) for leg, artists in legs._legs}
+    legs = next(layer for layer in made.panels[0].moving if isinstance(layer, layers.Legs))
+    brightness = {leg: np.mean(artists['bars'].get_colors()[0][:3]) for leg, artists in legs.legs}
     assert brightness[0] == brightness[1] < brightness[2] == brightness[3] < brightness[4]
 
 
 def segments_of(picture):
-    trace = next(layer for layer in picture.panels[0]._moving if isinstance(layer, layers.Trace))
+    trace = next(layer for layer in picture.panels[0].moving if isinstance(layer, layers.Trace))
     return [np.asarray(path.vertices) for path in trace.artists[0].get_paths()]
 
 
@@ -244,7 +244,7 @@ def test_any_motion_is_drawn_in_place_of_the_solved_one():
 def test_the_floor_moves_as_the_foot_that_stands_on_it():
     walker = machine('jansen', leg_pairs=3)
     picture = picture_of(walker, parts=USUAL | {'floor'})
-    floor = next(la for la in picture.panels[0]._moving if isinstance(la, layers.Floor))
+    floor = next(la for la in picture.panels[0].moving if isinstance(la, layers.Floor))
     foot = walker.linkage.points.index('G')
 
     def state(turns):
@@ -259,7 +259,7 @@ def test_the_floor_moves_as_the_foot_that_stands_on_it():
     for k in range(60):
         (leg, x, mark), (same, further, mark_further) = state(k / 60), state((k + 0.1) / 60)
         if leg == same:
-            step = (mark_further - mark - (further - x)) / floor._spacing
+            step = (mark_further - mark - (further - x)) / floor.spacing
             assert abs(step - round(step)) < 0.02
             moved += 1
     assert moved > 30
@@ -287,7 +287,7 @@ def test_the_angle_is_in_the_title():
 
 
 def texts_of(picture):
-    headline = picture.panels[0]._moving[-1]
+    headline = picture.panels[0].moving[-1]
     return [text.get_text() for text in headline.artists]
 
 

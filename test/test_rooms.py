@@ -4,12 +4,12 @@
 """The rooms of the package stand on each other in one order; ls shows which of them need ROS."""
 
 import ast
+from functools import cache
 from pathlib import Path
 import re
 
-import pytest
-
-PACKAGE = Path(__file__).parents[1] / 'linkage_ros'
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / 'linkage_ros'
 # From the ground up: a module imports from its own room and from those below.
 ROOMS = ('words', 'palette', 'formula', 'linkage', 'mechanisms', 'scene', 'command', 'robot_model',
          'render', 'nodes', 'web')
@@ -18,6 +18,15 @@ ROS = ('rclpy', 'builtin_interfaces', 'geometry_msgs', 'rcl_interfaces', 'sensor
        'visualization_msgs', 'linkage_interfaces')
 MODULES = sorted(PACKAGE.rglob('*.py'))
 PAGE = PACKAGE / 'web' / 'page'
+OUTSIDE = sorted([*(ROOT / 'test').rglob('*.py'), *(ROOT / 'benchmark').rglob('*.py')])
+# Public for all their underscores.
+NAMED_TUPLE = ('_replace', '_asdict', '_fields', '_make')
+
+
+@cache
+def parsed(module):
+    """Return the syntax tree of a module."""
+    return ast.parse(module.read_text())
 
 
 def room(module):
@@ -29,7 +38,7 @@ def room(module):
 def imported(module):
     """Yield what a module imports when it is imported, as full names."""
     here = ('linkage_ros', *module.relative_to(PACKAGE).parent.parts)
-    for node in ast.parse(module.read_text()).body:
+    for node in parsed(module).body:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -42,19 +51,27 @@ def test_every_module_has_its_room():
     assert {room(module) for module in MODULES} == {'', *ROOMS}
 
 
-@pytest.mark.parametrize('module', MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_a_module_imports_nothing_from_above(module):
-    own = room(module)
-    for name in imported(module):
-        top, *below = name.split('.')
-        if top == 'linkage_ros' and own:
-            assert ROOMS.index(below[0]) <= ROOMS.index(own), f'{module.name} imports {name}'
-        assert own in WITH_ROS or top not in ROS, f'{module.name} needs ROS: {name}'
+def test_a_module_imports_nothing_from_above():
+    for module in MODULES:
+        own = room(module)
+        for name in imported(module):
+            top, *below = name.split('.')
+            if top == 'linkage_ros' and own:
+                assert ROOMS.index(below[0]) <= ROOMS.index(own), f'{module.name} imports {name}'
+            assert own in WITH_ROS or top not in ROS, f'{module.name} needs ROS: {name}'
 
 
-@pytest.mark.parametrize('module', MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_a_module_begins_with_what_it_is_for(module):
-    assert ast.get_docstring(ast.parse(module.read_text()))
+def test_who_tests_or_measures_uses_what_everybody_may():
+    for module in OUTSIDE:
+        for node in ast.walk(parsed(module)):
+            if isinstance(node, ast.Attribute) and node.attr not in NAMED_TUPLE:
+                private = node.attr.startswith('_') and not node.attr.endswith('__')
+                assert not private or ast.unparse(node.value) == 'self', f'{module}:{node.lineno}'
+
+
+def test_a_module_begins_with_what_it_is_for():
+    for module in MODULES:
+        assert ast.get_docstring(parsed(module)), module
 
 
 def test_every_colour_is_in_the_palette():

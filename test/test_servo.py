@@ -5,12 +5,11 @@
 
 import math
 
-import accuracy
-from accuracy import broken, Case, mp, STEP, summary
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
-import stress
+from truth import accuracy_rule, hard_cases
+from truth.accuracy_rule import broken, Case, mp, STEP, summary
 
 # Levers: the lines, crank centre and pivot as complex numbers, and whether the crank's zero is up.
 PIVOT_BELOW = ('O ground 0 0', 'Q ground 0 -b', 'A crank O a up',
@@ -31,7 +30,7 @@ def random_levers(kind, seed, count):
     """Yield levers, some nearly degenerate, each with awkward lever angles."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
-        lengths, half = stress.dimensions('slotted_lever', rng), int(rng.choice((-1, 1)))
+        lengths, half = hard_cases.dimensions('slotted_lever', rng), int(rng.choice((-1, 1)))
         own = mechanisms.create('slotted_lever', branches={'L': half}, **lengths)
         ends = [end for arc in own.reach() for end in arc]
         limits = [end for arc in own.lever_reach() for end in arc]
@@ -43,7 +42,7 @@ def random_levers(kind, seed, count):
         joints = LEVERS[kind][0]
         made = own if joints is None else mechanisms.create(
             'custom', joints=joints, branches={'L': half}, **lengths)
-        yield made, stress.angles(rng, 4, limits, turns=1.0) + turn
+        yield made, hard_cases.angles(rng, 4, limits, turns=1.0) + turn
 
 
 def truth_of(kind, linkage, angle, cut):
@@ -68,7 +67,7 @@ def truth_of(kind, linkage, angle, cut):
                  'rate servo': 2 * STEP / turned if turned else mp.zero},
                 {'servo': gap, 'slide': half * slide})
 
-    return accuracy._truth(evaluate, linkage.dimensions, float(angle))
+    return accuracy_rule.truth_of(evaluate, linkage.dimensions, float(angle))
 
 
 def rows_of(kind, linkage, angles):
@@ -78,19 +77,20 @@ def rows_of(kind, linkage, angles):
     top = {'rate servo': length['a'] / length.get('b', length['a'])}
     for angle in angles:
         cuts = [truth_of(kind, linkage, angle, cut) for cut in (1, -1)]
-        due = [accuracy._due_of(exact.closures.values()) for exact in cuts]
+        due = [accuracy_rule.due_of(exact.closures.values()) for exact in cuts]
         wanted = 'number' if 'number' in due else 'nan' if due == ['nan', 'nan'] else ''
         for exact, state in zip(cuts, due):
             if state == wanted:
                 near = float(mp.arg(exact.values['angle servo']))
                 found = linkage.servo_for('lever', float(angle), near)
-                rows += [accuracy._row(case, angle, name, result, exact, wanted, top)
+                rows += [accuracy_rule.row_of(case, angle, name, result, exact, wanted, top)
                          for name, result in zip(('angle servo', 'rate servo'), found)]
     return rows
 
 
+@pytest.mark.parametrize('levers', [3, pytest.param(12, marks=pytest.mark.long)])
 @pytest.mark.parametrize('kind', LEVERS)
-def test_servo_angles_and_reductions_of_any_lever_are_right(kind, levers=12):
+def test_servo_angles_and_reductions_of_any_lever_are_right(kind, levers):
     rows = []
     for linkage, angles in random_levers(kind, 1, levers):
         rows += rows_of(kind, linkage, angles)

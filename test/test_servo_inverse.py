@@ -348,7 +348,7 @@ def check_random_scene(graph, rng):
     return 1
 
 
-def test_random_outputs_in_random_sweeps_are_had_or_cannot_be(graph, scenes=30, seed=1):
+def test_random_outputs_in_random_sweeps_are_had_or_cannot_be(graph, scenes=12, seed=1):
     rng = np.random.default_rng(seed)
     assert sum(check_random_scene(graph, rng) for _ in range(scenes)) > scenes // 4
 

@@ -13,7 +13,7 @@ from linkage_ros.linkage.walker import Assembly
 from linkage_ros.robot_model import urdf
 import numpy as np
 import pytest
-from robots import LIBRARIES, Yourdfpy
+from robots import LIBRARIES, Pinocchio, Yourdfpy
 
 TOLERANCE = 1e-12
 SLIDES = {'slide', 'block', 'cylinder', 'left0_block', 'left1_block', 'right0_block',
@@ -55,12 +55,12 @@ CUTS = {'water_drop': 1, 'jansen': 3, 'peaucellier': 3, 'slotted_lever': 1,
         'five-bar with a block': 2, 'boom': 1, 'boom and arm': 2}
 
 
-def drives(one):
+def drives(one, count=41):
     """Return inputs [rad or m] all through the reach, a row for each pose."""
     if len(one.inputs) == 1:
-        return np.concatenate([np.linspace(*arc, 41) for arc in one.first.reach])[:, None]
+        return np.concatenate([np.linspace(*arc, count) for arc in one.first.reach])[:, None]
     ends = np.transpose([(drive.input.low, drive.input.high) for drive in one.inputs.values()])
-    rows = np.random.default_rng(0).uniform(*ends, (200, len(one.inputs)))
+    rows = np.random.default_rng(0).uniform(*ends, (5 * count, len(one.inputs)))
     sizes = [1.0 if drive.input.turns else one.scale for drive in one.inputs.values()]
     held = np.isfinite(list(one.linkage.solve((rows / sizes).T).values())).all(axis=(0, 2))
     return rows[held]
@@ -109,15 +109,18 @@ def limits(one):
             for name, end in ends.items()}
 
 
-@pytest.mark.parametrize('library', LIBRARIES)
-@pytest.mark.parametrize('name', MACHINES)
-def test_every_joint_is_met_and_every_loop_is_closed(name, library):
+@pytest.mark.parametrize('name, library, count', [
+    *((name, Pinocchio, 6) for name in MACHINES),
+    *((name, Yourdfpy, 6) for name in ('jansen', 'slotted_lever', 'boxer engine')),
+    *(pytest.param(name, library, 41, marks=pytest.mark.long)
+      for name in MACHINES for library in LIBRARIES)])
+def test_every_joint_is_met_and_every_loop_is_closed(name, library, count):
     one = MACHINES[name]()
     text = description(one)
     robot = library(text)
     frames = [link for link in links(text) if not re.search('_link$|^world$', link)]
     near = TOLERANCE * one.scale * one.linkage.longest
-    for thetas in drives(one):
+    for thetas in drives(one, count):
         positions, places = posed(one, thetas)
         assert sorted(robot.joints) == sorted(positions)
         assert {re.sub(r'_cut\d*$', '', frame) for frame in frames} == set(places)

@@ -32,7 +32,7 @@ class Plain(Ours):
 
     def prepare(self, kind, dimensions):
         """Read the joint lines and make the code, nothing of which is kept from before."""
-        mechanisms._structure.cache_clear()
+        mechanisms.structure_of.cache_clear()
         vars(mechanisms.design(kind)).pop('lines', None)
         super().prepare(kind, dimensions)
         self.solve_one = self._mechanism.function(POINTS)
@@ -68,9 +68,10 @@ class OnOurs(Plain):
     def prepare(self, kind, dimensions):
         """Make the function of the other engine."""
         super().prepare(kind, dimensions)
-        # What `formula.llvm_code` is handed, which nobody else needs.
-        _, pose = self._mechanism._ready('points', POINTS)
-        self.make(pose._variant._listing, pose._constants)
+        design, made = mechanisms.design(kind), self._mechanism
+        structure = mechanisms.structure_of(design, tuple(made.branches.items()))
+        pose = structure.program('points', POINTS).bind({**made.dimensions, '[m]': 1.0}, {})
+        self.make(pose.variant.listing, pose.constants)
 
     def make(self, listing, constants):
         """Make the function of a list of operations and its constants."""
@@ -144,7 +145,7 @@ class Numba(OnOurs):
 
     def make(self, listing, constants):
         """Compile the text of the Python code."""
-        lines, outputs, _ = listing.statements(program._FLOAT)
+        lines, outputs, _ = listing.statements(program.FLOAT)
         body = [f'{name} = {code}' for name, code, _ in lines]
         source = '\n'.join([
             'def pose(x0):', *(f'    {line}' for line in body),
@@ -153,7 +154,7 @@ class Numba(OnOurs):
             *(f'        {line}' for line in body),
             *(f'        rows[n, {k}] = {code}' for k, code in enumerate(outputs))])
         # With the constants as globals they are part of the machine code.
-        scope = {**program._FLOAT.names, 'grazed': numba.njit(program._grazed),
+        scope = {**program.FLOAT.names, 'grazed': numba.njit(program.grazed),
                  **{f'k{number}': value for number, value in zip(listing.constants, constants)}}
         exec(compile(source, '<linkage>', 'exec'), scope)
         # Without numba's check of every division, which raises.

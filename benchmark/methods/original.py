@@ -4,9 +4,10 @@
 """The formulas of the original documents: by `math` for one pose, by numpy for many."""
 
 import numpy as np
+from truth import original_formulas
 
 from .method import columns, Method
-from .. import original_formulas, problems
+from .. import problems
 
 
 class Original(Method):

@@ -23,12 +23,10 @@ import tempfile
 import time
 from types import SimpleNamespace
 
+from domains import Domain
+
 from . import report
 from .. import document
-
-sys.path.insert(0, str(Path(__file__).parents[2] / 'test'))
-
-from domains import Domain  # noqa: E402
 
 ROS = [SimpleNamespace(package=name) for name in ('ros-rclpy', 'ros-rmw-fastrtps-cpp')]
 RESULTS = Path(__file__).parents[1] / 'results' / 'nodes.json'
@@ -40,8 +38,6 @@ def main():
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     domain = Domain()
     os.environ.setdefault('ROS_DOMAIN_ID', str(domain.id))
-    os.environ['PYTHONPATH'] = os.pathsep.join(
-        [str(Path(__file__).parents[2]), os.environ.get('PYTHONPATH', '')])
     options = arguments()
     result = json.loads(options.output.read_text()) if options.output.exists() else {}
     if not options.tables:

@@ -185,7 +185,7 @@ class Bench:
                 for name, found in bursts.items()]
 
     def _calls(self, process, client, request, count):
-        times, spin, cpu = [], self.driver._executor.spin_once, process.cpu()
+        times, spin, cpu = [], self.driver.executor.spin_once, process.cpu()
         for _ in range(count):
             start = time.perf_counter()
             future = client.call_async(request)

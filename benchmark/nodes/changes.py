@@ -79,7 +79,7 @@ def change(driver, client, values):
 
 def gaps(driver, line, client, kind):
     """Return the longest time between two poses [ms] around each change, and what each took."""
-    times, found, took = line._heard[0], [], []
+    times, found, took = line.heard[0], [], []
     for i in range(ROUNDS):
         driver.wait(BREAK)
         times.clear()

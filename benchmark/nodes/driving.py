@@ -82,28 +82,28 @@ class Driver:
         rclpy.init()
         self.node = rclpy.create_node('driver')
         # Nobody takes what arrives for this one: what a drawing program does is not measured.
-        self._idle = rclpy.create_node('viewer')
-        self._executor = scene_node.Executor()
-        self._executor.add_node(self.node)
+        self.idle = rclpy.create_node('viewer')
+        self.executor = scene_node.Executor()
+        self.executor.add_node(self.node)
 
     def end(self):
         """End it."""
-        self._executor.shutdown()
+        self.executor.shutdown()
         self.node.destroy_node()
-        self._idle.destroy_node()
+        self.idle.destroy_node()
         rclpy.try_shutdown()
 
     def wait(self, seconds):
         """Let what arrives be heard for a while."""
         until = time.perf_counter() + seconds
         while (left := until - time.perf_counter()) > 0.0:
-            self._executor.spin_once(timeout_sec=left)
+            self.executor.spin_once(timeout_sec=left)
 
     def until(self, predicate, seconds=DEADLINE):
         """Let what arrives be heard until something holds; return whether it did."""
         deadline = time.perf_counter() + seconds
         while not (held := predicate()) and time.perf_counter() < deadline:
-            self._executor.spin_once(timeout_sec=0.02)
+            self.executor.spin_once(timeout_sec=0.02)
         return held
 
     def line(self, process, scene, topics):
@@ -140,19 +140,19 @@ class Line:
     def __init__(self, driver, process, scene, topics):
         self.process = process
         self._driver = driver
-        self._cranks = scenes.Cranks(scene)
-        self._publisher = driver.node.create_publisher(
+        self.cranks = scenes.Cranks(scene)
+        self.publisher = driver.node.create_publisher(
             JointState, f'/{process.name}/crank_states', 10)
-        self._heard = []
+        self.heard = []
         self._subscriptions = [
             self._hear(f'/{process.name}/{topic.name}') if topic.joints
-            else driver._idle.create_subscription(
+            else driver.idle.create_subscription(
                 MarkerArray, f'/{process.name}/{topic.name}', self._ignore, 1, raw=True)
             for topic in topics]
 
     def _hear(self, path):
         times = []
-        self._heard.append(times)
+        self.heard.append(times)
         return self._driver.node.create_subscription(
             JointState, path, lambda _: times.append(time.perf_counter()), 1000, raw=True)
 
@@ -161,42 +161,42 @@ class Line:
 
     def close(self):
         """Hear no more."""
-        self._driver.node.destroy_publisher(self._publisher)
+        self._driver.node.destroy_publisher(self.publisher)
         for subscription in self._subscriptions:
             self._driver.node.destroy_subscription(subscription)
-            self._driver._idle.destroy_subscription(subscription)
+            self._driver.idle.destroy_subscription(subscription)
         self._driver.wait(0.1)
 
     def send(self):
         """Send the next crank message."""
-        self._publisher.publish(next(self._cranks))
+        self.publisher.publish(next(self.cranks))
 
     def connected(self):
         """Return whether both ends know each other; sends a message."""
-        if not self._publisher.get_subscription_count():
+        if not self.publisher.get_subscription_count():
             return False
         self.send()
-        return all(self._heard)
+        return all(self.heard)
 
     def burst(self, rate, count):
         """Send crank messages at a rate [Hz]; return what came of it."""
         self._driver.wait(0.05)
-        for times in self._heard:
+        for times in self.heard:
             times.clear()
-        spin, sent, cpu = self._driver._executor.spin_once, [], self.process.cpu()
+        spin, sent, cpu = self._driver.executor.spin_once, [], self.process.cpu()
         start = time.perf_counter()
         while len(sent) < count:
             left = start + len(sent) / rate - time.perf_counter()
             if left > 0.0:
                 spin(timeout_sec=left)
             else:
-                message = next(self._cranks)
+                message = next(self.cranks)
                 sent.append(time.perf_counter())
-                self._publisher.publish(message)
+                self.publisher.publish(message)
         deadline = time.perf_counter() + PATIENCE
-        while (any(len(times) < count for times in self._heard)
+        while (any(len(times) < count for times in self.heard)
                and time.perf_counter() < deadline):
             spin(timeout_sec=0.01)
-        if not self._heard:
+        if not self.heard:
             self._driver.wait(0.05)
-        return Burst(sent, self._heard, self.process.cpu() - cpu)
+        return Burst(sent, self.heard, self.process.cpu() - cpu)

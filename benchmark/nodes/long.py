@@ -81,7 +81,7 @@ def trouble(bench, seconds):
     try:
         line = bench.driver.line(process, scene, scenes.topics(scene))
         client, deaf = (node.create_client(SetParameters, '/troubled/kinematics/set_parameters')
-                        for node in (bench.driver.node, bench.driver._idle))
+                        for node in (bench.driver.node, bench.driver.idle))
         bench.driver.wait(2.0)
         stalled.signal(signal.SIGSTOP)
         with changes.turning(line):
@@ -89,11 +89,11 @@ def trouble(bench, seconds):
                 given = changes.CHANGES[kinds[second % len(kinds)]](second % 40)
                 took.append(1e3 * changes.change(bench.driver, client, given))
                 deaf.call_async(SetParameters.Request())
-                text = serialize_message(next(line._cranks))
-                line._publisher.publish(random.bytes(int(random.integers(1, 300))))
-                line._publisher.publish(text[:int(random.integers(1, len(text)))])
+                text = serialize_message(next(line.cranks))
+                line.publisher.publish(random.bytes(int(random.integers(1, 300))))
+                line.publisher.publish(text[:int(random.integers(1, len(text)))])
                 bench.driver.wait(max(0.0, 1.0 - 1e-3 * took[-1]))
-                for times in line._heard:
+                for times in line.heard:
                     assert times, f'nothing was published in second {second}'
                     times.clear()
                 sizes.append(process.resident())

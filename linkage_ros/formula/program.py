@@ -56,7 +56,7 @@ def keep(found: dict, key: Any, value: Any) -> Any:
     return value
 
 
-def _grazed(x: float, tolerance: float) -> float:
+def grazed(x: float, tolerance: float) -> float:
     """Return the root of a radicand that is not above zero."""
     return 0.0 if x >= -tolerance else math.nan
 
@@ -107,14 +107,14 @@ class _Dialect:
     frees: bool
 
 
-_FLOAT = _Dialect(
+FLOAT = _Dialect(
     {**_OPERATORS, 'where': '({1} if {0} else {2})',
      'rint': 'round({})',
      'root': '(sqrt({0}) if {0} > 0.0 else grazed({0}, {1}))',
      'gated': '({0} if {1} >= -{2} else nan)'},
     frozenset({'root'}),
     {'sin': math.sin, 'cos': math.cos, 'sqrt': math.sqrt, 'atan2': math.atan2,
-     'grazed': _grazed, 'nan': math.nan, 'inf': math.inf}, frees=False)
+     'grazed': grazed, 'nan': math.nan, 'inf': math.inf}, frees=False)
 
 _ARRAY = _Dialect(
     {**_OPERATORS, 'where': 'where({}, {}, {})', 'root': 'root({}, {})',
@@ -295,24 +295,24 @@ class _Variant:
 
     def __init__(self, outputs: Sequence[Real], decided: Mapping[Real, bool],
                  replaced: Mapping[Real, Real], arguments: int):
-        self._listing = _Listing(outputs, decided, replaced)
+        self.listing = _Listing(outputs, decided, replaced)
         self.arguments, self.outputs = arguments, len(outputs)
-        self.constants = [self._listing.entries[n][0] for n in self._listing.constants]
+        self.constants = [self.listing.entries[n][0] for n in self.listing.constants]
         self._placing: Dict[tuple, Callable] = {}
 
     def placing(self, names: tuple) -> Callable:
         """Return the code for one pose that returns the outputs in pairs, by name."""
         if names not in self._placing:
-            self._placing[names] = _python(self._listing, _FLOAT, self.arguments, names)
+            self._placing[names] = _python(self.listing, FLOAT, self.arguments, names)
         return self._placing[names]
 
     @cached_property
     def float(self) -> Callable:
-        return _python(self._listing, _FLOAT, self.arguments)
+        return _python(self.listing, FLOAT, self.arguments)
 
     @cached_property
     def array(self) -> Callable:
-        return _python(self._listing, _ARRAY, self.arguments)
+        return _python(self.listing, _ARRAY, self.arguments)
 
     @cached_property
     def loop(self) -> Future:
@@ -325,7 +325,7 @@ class _Variant:
         try:
             from .llvm_code import Loop
 
-            made.set_result(Loop(*self._listing.operations()))
+            made.set_result(Loop(*self.listing.operations()))
         except Exception as error:
             made.set_exception(error)
 
@@ -392,19 +392,19 @@ class Pose:
     """The outputs of a program as a function of the arguments, for dimensions that are set."""
 
     def __init__(self, variant: _Variant, constants: Sequence, shape: tuple, accelerate: bool):
-        self._variant = variant
-        self._constants = constants
+        self.variant = variant
+        self.constants = constants
         self._accelerate = accelerate
         self.shape = shape
 
     @cached_property
     def at(self) -> Callable:
         """The function from the arguments, floats, to the outputs of one set of dimensions."""
-        return self._variant.float(*self._constants, self._by_arrays)
+        return self.variant.float(*self.constants, self._by_arrays)
 
     @cached_property
     def _given(self) -> np.ndarray:
-        return np.array(self._constants)
+        return np.array(self.constants)
 
     def _by_arrays(self, *arguments: float) -> tuple:
         """Return the outputs at one pose with inf or nan where Python's floats raise."""
@@ -415,7 +415,7 @@ class Pose:
         def by_arrays(theta: float) -> Dict[str, np.ndarray]:
             return dict(zip(names, np.reshape(self._by_arrays(theta), (-1, 2))))
 
-        return self._variant.placing(names)(*self._constants, by_arrays)
+        return self.variant.placing(names)(*self.constants, by_arrays)
 
     def __call__(self, *arguments: Any) -> Any:
         """Return the outputs at floats, as floats, or over arrays that are broadcast together."""
@@ -433,37 +433,37 @@ class Pose:
         shape, size = arrays[0].shape, arrays[0].size
         flat = [a.ravel() for a in arrays]
         if self._accelerate:
-            out = np.empty((self._variant.outputs, size))
-            loop, given = self._variant.loop.result(), np.array(flat)
+            out = np.empty((self.variant.outputs, size))
+            loop, given = self.variant.loop.result(), np.array(flat)
             loop.run(*loop.arguments(given, self._given, out))
         else:
             out = self._plainly(flat, size)
-        return out.reshape(self._variant.outputs, *shape)
+        return out.reshape(self.variant.outputs, *shape)
 
     def searched(self, *arguments: Any) -> np.ndarray:
         """Return what `over` does for one set of dimensions, without code for single poses."""
         arguments = np.broadcast_arrays(*arguments)
         flat = [a.ravel() for a in arguments]
         return self._blocks(flat, arguments[0].size).reshape(
-            self._variant.outputs, *arguments[0].shape)
+            self.variant.outputs, *arguments[0].shape)
 
     def batch(self, rows: np.ndarray) -> Batch:
         """Return poses to be solved again and again, into rows (poses, outputs)."""
-        return Batch(self._plainly, self._variant.loop if self._accelerate else None,
-                     self._given, self._variant.arguments, rows)
+        return Batch(self._plainly, self.variant.loop if self._accelerate else None,
+                     self._given, self.variant.arguments, rows)
 
     def _plainly(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
         return self._one_by_one(given, size) if size < FEW else self._blocks(given, size)
 
     def _one_by_one(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
         poses = map(self.at, *(a.tolist() for a in given))
-        outputs = self._variant.outputs
+        outputs = self.variant.outputs
         return np.fromiter(chain.from_iterable(poses), float, size * outputs).reshape(
             size, outputs).T
 
     def _blocks(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
-        pose = self._variant.array(*self._constants)
-        out = np.empty((self._variant.outputs, size))
+        pose = self.variant.array(*self.constants)
+        out = np.empty((self.variant.outputs, size))
         with np.errstate(all='ignore'):
             for start in range(0, size, BLOCK):
                 block = slice(start, start + BLOCK)
@@ -474,7 +474,7 @@ class Pose:
     def _swept(self, arguments: Sequence[np.ndarray]) -> np.ndarray:
         shape = np.broadcast_shapes(self.shape, *map(np.shape, arguments))
         with np.errstate(all='ignore'):
-            rows = self._variant.array(*self._constants)(*arguments)
+            rows = self.variant.array(*self.constants)(*arguments)
         return np.array([np.broadcast_to(row, shape) for row in rows], float)
 
 

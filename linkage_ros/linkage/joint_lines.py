@@ -62,7 +62,7 @@ _PLAIN = ('ANGLE', 'RATIO')
 
 # What follows each word, in the order its construction takes it; in brackets what may follow. The
 # words of INPUTS add an input each, unless it is geared to another.
-_FORMS = {
+FORMS = {
     'ground': ('ground X Y',),
     'crank': ('crank CENTRE LENGTH [up] [zero JOINT] [geared INPUT RATIO ANGLE]',),
     'cylinder': ('cylinder BASE PIVOT LENGTH left|right [geared INPUT RATIO DISTANCE]',),
@@ -159,21 +159,21 @@ def _parsed(text: str) -> Line:
     if len(text) > _LONGEST:
         raise _error(text, f'a line has up to {_LONGEST} letters, this has {len(text)}')
     parts = text.split()
-    found = [i for i, part in enumerate(parts) if part in _FORMS and i > 0]
+    found = [i for i, part in enumerate(parts) if part in FORMS and i > 0]
     if not found:
-        raise _error(text, f'expected NAME and one of the constructions {", ".join(_FORMS)}')
+        raise _error(text, f'expected NAME and one of the constructions {", ".join(FORMS)}')
     at = found[0]
     line = Line(text, tuple(parts[:at]), parts[at], tuple(parts[at + 1:]))
     names = 3 if line.word == 'inversor' else 1
-    fitting = [arguments for form in _FORMS[line.word]
+    fitting = [arguments for form in FORMS[line.word]
                if (arguments := _fitted(form, line.args)) is not None]
     if len(line.names) != names or not fitting:
         several = '; one line a joint' if len(found) > 1 else ''
-        forms = ' or '.join(f'"{"NAME " * names}{form}"' for form in _FORMS[line.word])
+        forms = ' or '.join(f'"{"NAME " * names}{form}"' for form in FORMS[line.word])
         raise line.error(f'expected {forms}{several}')
     line = line._replace(arguments=tuple(fitting[-1]))
     for name in line.names:
-        if not _NAME.fullmatch(name) or name in _FORMS:
+        if not _NAME.fullmatch(name) or name in FORMS:
             raise line.error(f'{quoted(name)} is no name for a joint: a letter, then up to 63 '
                              'letters, digits and underscores, but none of the constructions')
     for kind, arg, _ in line.arguments:

@@ -57,7 +57,8 @@ TYPES = MappingProxyType(_found())
 
 
 @lru_cache(maxsize=32)
-def _structure(design: Design, branches: Tuple[Tuple[str, int], ...]) -> Structure:
+def structure_of(design: Design, branches: Tuple[Tuple[str, int], ...]) -> Structure:
+    """Return what mechanisms of a design and its branches share, made once."""
     return Structure(design, dict(branches))
 
 
@@ -125,7 +126,7 @@ def create(type_: str, /, *, branches: Optional[Mapping[str, int]] = None,
     chosen = design(type_, joints, tracer, dimensions)
     lengths = checked_dimensions(chosen, dimensions)
     signs = checked_branches(chosen, branches)
-    structure = _structure(chosen, tuple(signs.items()))
+    structure = structure_of(chosen, tuple(signs.items()))
     kind = getattr(TYPES.get(type_), 'Mechanism', Mechanism)
     made = kind(chosen, structure, lengths, signs)
     chosen.check(made)

@@ -71,7 +71,7 @@ class Reader:
 
     def _learn(self, text, message, said):
         try:
-            source = _Source(text, message, said)
+            source = Source(text, message, said)
         except NoLayout:
             return
         alike = self._sources.get(source.size, {})
@@ -91,7 +91,7 @@ class Reader:
             del self._sources[source.size]
 
 
-class _Source:
+class Source:
     """How messages of a source are told from others, and how their numbers are taken."""
 
     def __init__(self, text: bytes, message: JointState, said: JointStateNumbers):

@@ -136,13 +136,13 @@ class Legs:
         self._tracer = linkage.points.index(machine.tracer)
         self._fixed = fixed(cycle.course)[self._joints]
         self._slots = list(slots(linkage, cycle, index))
-        self._legs = []
+        self.legs = []
         sides = 1 + machine.mirrored
         thin = unit * (1.0 if len(cycle.prefixes) == 1 else 0.7)
         for leg in reversed(range(len(cycle.prefixes))):
             white = WHITENED * (leg // sides) / machine.leg_pairs
-            self._legs.append((leg, self._artists(axes, parts, white, thin)))
-        self.artists = sorted((artist for _, artists in self._legs for artist in artists.values()),
+            self.legs.append((leg, self._artists(axes, parts, white, thin)))
+        self.artists = sorted((artist for _, artists in self.legs for artist in artists.values()),
                               key=lambda artist: artist.get_zorder())
 
     def _artists(self, axes, parts, white, unit):
@@ -176,7 +176,7 @@ class Legs:
 
     def show(self, pose):
         """Move the legs."""
-        for leg, artists in self._legs:
+        for leg, artists in self.legs:
             self._show_leg(artists, pose.places[leg])
 
     def _show_leg(self, artists, places):
@@ -239,7 +239,7 @@ class Floor:
         self._way = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
         # After a turn the marks are where others were; a lone foot brings them back itself.
         turn, stride = abs(self._way[-1]), np.ptp(self._way) or 1.0
-        self._spacing = turn / self.MARKS if turn > 0.1 * stride else 0.5 * stride
+        self.spacing = turn / self.MARKS if turn > 0.1 * stride else 0.5 * stride
         self._tracer = tracer
         self._axes = axes
         style = {'color': FLOOR, 'zorder': 1, 'animated': True, 'capstyle': 'round'}
@@ -256,9 +256,9 @@ class Floor:
         way = np.interp(pose.turns * SAMPLES % (samples - 1), np.arange(samples), self._way)
         low, high = self._axes.get_xlim()
         self._line.set_segments([[(low, level), (high, level)]])
-        first = low + (way - low) % self._spacing - self._spacing
-        marks = np.arange(first, high + self._spacing, self._spacing)
-        depth = 0.22 * self._spacing
+        first = low + (way - low) % self.spacing - self.spacing
+        marks = np.arange(first, high + self.spacing, self.spacing)
+        depth = 0.22 * self.spacing
         self._marks.set_segments([[(x, level), (x - depth, level - depth)] for x in marks])
 
 

@@ -137,7 +137,7 @@ class Panel:
             moving.append(self._names)
         if parts & {'title', 'dimensions'}:
             moving.append(layers.Headline(axes, machine, parts, unit, single))
-        self._moving = moving
+        self.moving = moving
         self._extent = self._drawn()
         self._dress('axes' in parts, unit)
 
@@ -181,12 +181,12 @@ class Panel:
     def show(self, turns):
         """Move all to where they are after so many turns of the crank."""
         self.pose = self.cycle.pose(turns)
-        for layer in self._moving:
+        for layer in self.moving:
             layer.show(self.pose)
 
     def draw(self):
         """Draw what moves onto what stands still."""
-        for layer in self._moving:
+        for layer in self.moving:
             for artist in layer.artists:
                 self._axes.draw_artist(artist)
 

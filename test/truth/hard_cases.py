@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Angles and dimensions that are hard on a linkage, drawn from a seeded generator.
+Angles and dimensions that are hard on the catalogue, drawn from a seeded generator.
 
 Three tenths of the random dimensions are nearly or exactly degenerate: a kite almost folded, a
 dyad that only just reaches, equal arms. Angles crowd around dead points and reach limits, down to

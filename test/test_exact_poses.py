@@ -5,11 +5,10 @@
 
 import numpy as np
 import pytest
-import reference
-from reference import LEFT, mp, RIGHT
-import stress
+from truth import exact_poses, hard_cases
+from truth.exact_poses import LEFT, mp, RIGHT
 
-KINDS = list(stress.CATALOGUE)
+KINDS = list(hard_cases.CATALOGUE)
 FLIPPED = {
     'water_drop': [{}],
     'jansen': [{}, {'C': RIGHT}, {'E': LEFT}, {'F': RIGHT}, {'C': RIGHT, 'E': LEFT, 'F': RIGHT}],
@@ -41,19 +40,19 @@ def drawn(kind, seed, count=100):
     """Yield random lengths and angles of a linkage, as (lengths, theta, branches)."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
-        dimensions = stress.dimensions(kind, rng)
+        dimensions = hard_cases.dimensions(kind, rng)
         branches = FLIPPED[kind][rng.integers(len(FLIPPED[kind]))]
-        yield reference.exact(dimensions), mp.mpf(stress.angles(rng, 1)[0]), branches
+        yield exact_poses.exact(dimensions), mp.mpf(hard_cases.angles(rng, 1)[0]), branches
 
 
 @pytest.mark.parametrize('kind', KINDS)
 def test_every_bar_keeps_its_length_to_1e_45(kind):
     assembled = 0
     for length, theta, branches in drawn(kind, seed=1):
-        pose = reference.place(kind, length, theta, branches)
+        pose = exact_poses.place(kind, length, theta, branches)
         if pose.assembled:
             assembled += 1
-            for (p, q), bar in reference.bars(kind, length).items():
+            for (p, q), bar in exact_poses.bars(kind, length).items():
                 distance = abs(pose.points[p] - pose.points[q])
                 assert abs(distance - bar) < 1e-45 * bar, (p, q)
     assert assembled >= 15
@@ -61,13 +60,13 @@ def test_every_bar_keeps_its_length_to_1e_45(kind):
 
 @pytest.mark.parametrize('kind', KINDS)
 def test_every_bar_keeps_its_length_through_the_dead_points(kind):
-    for dimensions in stress.CATALOGUE[kind]:
-        length = reference.exact(dimensions)
+    for dimensions in hard_cases.CATALOGUE[kind]:
+        length = exact_poses.exact(dimensions)
         for spot in (0.0, float(mp.pi)):
-            for theta in stress.approach(spot):
-                pose = reference.place(kind, length, mp.mpf(theta))
+            for theta in hard_cases.approach(spot):
+                pose = exact_poses.place(kind, length, mp.mpf(theta))
                 if pose.assembled:
-                    for (p, q), bar in reference.bars(kind, length).items():
+                    for (p, q), bar in exact_poses.bars(kind, length).items():
                         distance = abs(pose.points[p] - pose.points[q])
                         assert abs(distance - bar) < 1e-45 * bar, (p, q, theta)
 
@@ -75,14 +74,14 @@ def test_every_bar_keeps_its_length_through_the_dead_points(kind):
 def test_the_jansen_leg_agrees_with_the_table_of_the_original_program():
     for line in JANSEN_TABLE.split('\n')[1:-1]:
         degrees, *published = map(mp.mpf, line.split())
-        pose = reference.place('jansen', reference.exact(stress.HOLY), mp.radians(degrees))
+        pose = exact_poses.place('jansen', exact_poses.exact(hard_cases.HOLY), mp.radians(degrees))
         check_rounded(pose, 'ACDEFG', published)
 
 
 def test_the_water_drop_agrees_with_the_table_of_the_original_program():
     for line in WATER_DROP_TABLE.split('\n')[1:-1]:
         degrees, *published = map(mp.mpf, line.split())
-        pose = reference.place('water_drop', {'a': mp.one}, mp.radians(degrees))
+        pose = exact_poses.place('water_drop', {'a': mp.one}, mp.radians(degrees))
         check_rounded(pose, 'ABP', published)
 
 
@@ -98,15 +97,15 @@ def test_circles_give_the_published_angles_of_andrews_squeezer():
     """Check the start angles of the IVP test set (Hairer and Wanner, Solving ODEs II, VII.7)."""
     A, B = mp.mpc('-0.06934', '-0.00227'), mp.mpc('-0.03635', '0.03273')
     ss, e, zt, u = (mp.mpf(digits) for digits in ('0.035', '0.02', '0.04', '0.04'))
-    E, _ = reference.circles(mp.mpc(0), mp.mpf('0.021'), B, ss, LEFT)
-    G, _ = reference.circles(A, u, E, e, RIGHT)
-    H, _ = reference.circles(A, zt, E, e, LEFT)
+    E, _ = exact_poses.circles(mp.mpc(0), mp.mpf('0.021'), B, ss, LEFT)
+    G, _ = exact_poses.circles(A, u, E, e, RIGHT)
+    H, _ = exact_poses.circles(A, zt, E, e, LEFT)
     angles = {
         '-0.0617138900142764496358948458001': mp.arg(-E),
-        '0.455279819163070380255912382449': mp.arg((B - E) / reference.I),
+        '0.455279819163070380255912382449': mp.arg((B - E) / exact_poses.I),
         '0.487364979543842550225598953530': mp.arg(H - A),
-        '0.222668390165885884674473185609': mp.arg((H - E) / reference.I) - mp.arg(H - A),
-        '1.23054744454982119249735015568': mp.arg((A - G) / reference.I),
+        '0.222668390165885884674473185609': mp.arg((H - E) / exact_poses.I) - mp.arg(H - A),
+        '1.23054744454982119249735015568': mp.arg((A - G) / exact_poses.I),
     }
     for published, angle in angles.items():
         assert abs(angle - mp.mpf(published)) < 1e-28
@@ -114,7 +113,7 @@ def test_circles_give_the_published_angles_of_andrews_squeezer():
 
 def test_the_inversor_draws_a_straight_line():
     for length, theta, branches in drawn('peaucellier', seed=2):
-        pose = reference.place('peaucellier', length, theta, branches)
+        pose = exact_poses.place('peaucellier', length, theta, branches)
         if pose.assembled:
             r, a, b = (length[name] for name in 'rab')
             line = (a - b) * (a + b) / (2 * r) - r
@@ -125,7 +124,7 @@ def test_the_inversor_ends_where_the_original_document_says():
     r, a, b = mp.mpf(3), mp.mpf(9), mp.mpf(4)
     half = mp.acos((a - b) / (2 * r))
     inside, outside = (
-        reference.place('peaucellier', {'r': r, 'a': a, 'b': b}, 2 * half + step)
+        exact_poses.place('peaucellier', {'r': r, 'a': a, 'b': b}, 2 * half + step)
         for step in (mp.mpf('-1e-40'), mp.mpf('1e-40')))
     assert inside.assembled and not outside.assembled
     assert abs(inside.points['C'].imag - (a + b) * mp.sin(half)) < 1e-38
@@ -137,30 +136,30 @@ def test_the_drop_has_the_area_of_eight_circles_of_the_crank():
     for turn in range(count):
         theta = 2 * mp.pi * turn / count
         before, now, after = (
-            reference.place('water_drop', {'a': mp.one}, theta + shift).points['P']
+            exact_poses.place('water_drop', {'a': mp.one}, theta + shift).points['P']
             for shift in (-step, 0, step))
-        area += reference.cross(now, after - before) / (4 * step) * 2 * mp.pi / count
+        area += exact_poses.cross(now, after - before) / (4 * step) * 2 * mp.pi / count
     assert abs(abs(area) - 8 * mp.pi) < 1e-45
 
 
 def test_the_pin_lies_in_the_slot():
     """Check a e^(i theta) + b = e^(i phi) (t + i e), the loop equation."""
     for length, theta, branches in drawn('slotted_lever', seed=3):
-        pose = reference.place('slotted_lever', length, theta, branches)
+        pose = exact_poses.place('slotted_lever', length, theta, branches)
         if pose.assembled:
             a, b, e = (length[name] for name in 'abe')
             lever = pose.points['L'] - pose.points['Q']
-            turn = lever / abs(lever) / reference.I
+            turn = lever / abs(lever) / exact_poses.I
             loop = a * mp.expj(theta) + b - turn * mp.mpc(pose.slide, e)
             assert abs(loop) < 1e-45 * (a + b)
 
 
 def test_the_inverse_of_the_lever_leads_back():
     for length, theta, branches in drawn('slotted_lever', seed=4):
-        pose = reference.place('slotted_lever', length, theta, branches)
+        pose = exact_poses.place('slotted_lever', length, theta, branches)
         if pose.assembled:
-            lever = mp.arg((pose.points['L'] - pose.points['Q']) / reference.I)
-            found = [reference.servo(length, lever, cut) for cut in (1, -1)]
+            lever = mp.arg((pose.points['L'] - pose.points['Q']) / exact_poses.I)
+            found = [exact_poses.servo(length, lever, cut) for cut in (1, -1)]
             misses = [abs(mp.expj(theta) - mp.expj(answer.angle)) for answer in found]
             slides = [abs(pose.slide - answer.slide) for answer in found]
             assert min(misses) < 1e-30
@@ -169,9 +168,9 @@ def test_the_inverse_of_the_lever_leads_back():
 
 def test_the_lever_returns_quickly_by_the_textbook_ratio():
     """Check (pi + 2 asin(a/b)) / (pi - 2 asin(a/b)) between the two ends of the stroke."""
-    length = reference.exact({'a': 80.0, 'b': 150.0, 'e': 0.0})
+    length = exact_poses.exact({'a': 80.0, 'b': 150.0, 'e': 0.0})
     end = mp.asin(length['a'] / length['b'])
-    first, last = (reference.servo(length, side * end, 1).angle for side in (-1, 1))
+    first, last = (exact_poses.servo(length, side * end, 1).angle for side in (-1, 1))
     forth = last - first
     ratio = forth / (2 * mp.pi - forth)
     assert abs(ratio - (mp.pi + 2 * end) / (mp.pi - 2 * end)) < 1e-35
@@ -181,8 +180,8 @@ def test_the_lever_returns_quickly_by_the_textbook_ratio():
     ('peaucellier', {'r': 3.0, 'a': 9.0, 'b': 4.0}, 3.0),
     ('peaucellier', {'r': 9.0, 'a': 4.0, 'b': 3.0}, 0.0),
     ('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 100.0}, 3.0),
-    ('jansen', {**stress.HOLY, 'j': 90.0}, 3.0),
-    ('jansen', {**stress.HOLY, 'e': 82.0}, 0.0),
+    ('jansen', {**hard_cases.HOLY, 'j': 90.0}, 3.0),
+    ('jansen', {**hard_cases.HOLY, 'e': 82.0}, 0.0),
 ])
 def test_what_cannot_be_assembled_has_no_pose(kind, dimensions, theta):
-    assert reference.pose(kind, dimensions, theta) is None
+    assert exact_poses.pose(kind, dimensions, theta) is None

@@ -11,14 +11,15 @@ assembled, negative where it cannot, and not to be trusted closer to zero than `
 import math
 
 import numpy as np
-import reference
+
+from . import exact_poses
 
 DOUBT = 1e-9
 
 
 def gap(kind, dimensions, theta, branches=None):
     """Return the smallest gap at crank angles [rad], an array."""
-    sides = {**reference.BRANCHES[kind], **(branches or {})}
+    sides = {**exact_poses.KINDS[kind].branches, **(branches or {})}
     with np.errstate(invalid='ignore', divide='ignore'):
         return _GAP[kind](np.asarray(theta, float), sides, **dimensions)
 

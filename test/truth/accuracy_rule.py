@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The measure of accuracy, and the angles and dimensions on which it is taken.
+How far an answer about the catalogue may be from the truth, and how far it is.
 
 A result is measured in units of its *sensitivity*: what moving each input, the crank angle and
 every length, by half an ulp does to the true result. That much uncertainty is in the question
@@ -22,8 +22,9 @@ import math
 from typing import Dict, List, NamedTuple, Optional
 
 import numpy as np
-import reference
-from reference import mp
+
+from . import exact_poses
+from .exact_poses import mp
 
 RULE = 4.0
 GRAZE = 32.0
@@ -99,12 +100,12 @@ def truth(case, theta, links, rates=False):
     """Return the `Truth` of a case at a crank angle, for the links as a mechanism lists them."""
     def evaluate(length, angle):
         return _evaluate(case, length, angle, links, rates)
-    return _truth(evaluate, case.dimensions, float(theta), _bars(case))
+    return truth_of(evaluate, case.dimensions, float(theta), _bars(case))
 
 
 def _bars(case):
     """Return the lengths of bars that are no dimension but follow from them: rounded as well."""
-    length = reference.exact(case.dimensions)
+    length = exact_poses.exact(case.dimensions)
     if case.kind == 'water_drop':
         return {'rocker': 2 * length['a'], 'tail': 3 * length['a']}
     if case.kind == 'slotted_lever':
@@ -115,18 +116,19 @@ def _bars(case):
 def servo_truth(dimensions, half, lever_angle, cut):
     """Return the `Truth` of a lever's inverse on one cut of its slot with the crank circle."""
     def evaluate(length, angle):
-        found = reference.servo(length, angle, cut)
-        after, before = (reference.servo(length, angle + step, cut).angle
+        found = exact_poses.servo(length, angle, cut)
+        after, before = (exact_poses.servo(length, angle + step, cut).angle
                          for step in (STEP, -STEP))
         turned = mp.arg(mp.expj(after - before))
         return ({'angle servo': mp.expj(found.angle),
                  'rate servo': 2 * STEP / turned if turned else mp.zero},
                 {'servo': found.gap, 'slide': half * found.slide})
-    return _truth(evaluate, dimensions, float(lever_angle))
+    return truth_of(evaluate, dimensions, float(lever_angle))
 
 
-def _truth(evaluate, dimensions, angle, bars=()):
-    length = reference.exact(dimensions)
+def truth_of(evaluate, dimensions, angle, bars=()):
+    """Return the `Truth` of a function of lengths and an angle to values and gaps."""
+    length = exact_poses.exact(dimensions)
     values, gaps = evaluate(length, mp.mpf(angle))
     spread, slack = dict.fromkeys(values, mp.zero), dict.fromkeys(gaps, mp.zero)
     for side in (1, -1):
@@ -166,7 +168,7 @@ def _distance(name, old, new):
 
 def _turned(old, new):
     """Return the angle between two directions that are close to each other."""
-    return reference.cross(old, new) / (old * mp.conj(new)).real
+    return exact_poses.cross(old, new) / (old * mp.conj(new)).real
 
 
 def _state(gap, slack):
@@ -178,11 +180,11 @@ def _state(gap, slack):
 
 def _evaluate(case, length, theta, links, rates):
     """Return the outputs and gaps at one angle; the angle of a joint stays a direction."""
-    now = reference.place(case.kind, length, theta, case.branches)
+    now = exact_poses.place(case.kind, length, theta, case.branches)
     values = _placed(now, links)
     if rates:
         before, after = (
-            _placed(reference.place(case.kind, length, theta + step, case.branches), links)
+            _placed(exact_poses.place(case.kind, length, theta + step, case.branches), links)
             for step in (-_STEP, _STEP))
         for name in list(values):
             values[_rate_name(name)] = _difference(name, before[name], after[name]) / (2 * _STEP)
@@ -207,7 +209,7 @@ def _direction(points, link, by_name):
         parent = by_name[link.parent]
         bar *= mp.conj(points[parent.tip] - points[parent.joint])
     quarters = round(link.zero / (math.pi / 2))
-    return bar * (-reference.I) ** quarters
+    return bar * (-exact_poses.I) ** quarters
 
 
 def _rate_name(name):
@@ -238,23 +240,24 @@ def judge(case, found, links, rates=False, exact=None) -> List[Row]:
     """Measure {output: array} at every angle of a case; `exact` are its truths, if known."""
     exact = exact or [truth(case, theta, links, rates) for theta in case.thetas]
     top = _top_speeds(case, links) if rates else {}
-    return [_row(case, theta, output, results[index], exact[index],
+    return [row_of(case, theta, output, results[index], exact[index],
                  _due(case.kind, output, exact[index].closures, links), top)
             for index, theta in enumerate(case.thetas) for output, results in found.items()]
 
 
 def verdict(case, angle, output, result, exact):
     """Return the `Row` of one result that depends on every closure of its truth."""
-    return _row(case, angle, output, np.asarray(result), exact,
-                _due_of(exact.closures.values()), {})
+    return row_of(case, angle, output, np.asarray(result), exact,
+                due_of(exact.closures.values()), {})
 
 
 def _due(kind, output, closures, links):
     """Tell what is due: 'number', 'nan', 'either', or 'any' where no true pose exists nearby."""
-    return _due_of({closures[name] for name in _needs(kind, output, links)})
+    return due_of({closures[name] for name in _needs(kind, output, links)})
 
 
-def _due_of(states):
+def due_of(states):
+    """Tell what is due where closures are in some states, as `_due` does."""
     states = set(states)
     if states <= {'meets'}:
         return 'number'
@@ -265,7 +268,7 @@ def _due_of(states):
 
 def _needs(kind, output, links):
     """Return the closures that an output depends on; the tip of a link stands for the link."""
-    needs = reference.NEEDS[kind]
+    needs = exact_poses.KINDS[kind].needs
     what, _, name = output.rpartition(' ')
     if name == 'slide':
         return needs['L']
@@ -283,7 +286,8 @@ def _chain(name, by_name):
         yield from (parent.joint, parent.tip)
 
 
-def _row(case, theta, output, result, exact, due, top):
+def row_of(case, theta, output, result, exact, due, top):
+    """Return the `Row` of one result, from what is due and the top speeds of outputs."""
     spread = float(exact.sensitivity[output])
     rate = output.startswith(('rate', 'velocity'))
     error, ratio, problem = math.nan, 0.0, ''
@@ -323,8 +327,8 @@ def _error(output, result, value):
 
 def _top_speeds(case, links, angles=24):
     """Return every output's largest speed over a turn; at least a crank's of its own kind."""
-    length = reference.exact(case.dimensions)
-    crank = abs(reference.place(case.kind, length, mp.zero, case.branches).points['A'])
+    length = exact_poses.exact(case.dimensions)
+    crank = abs(exact_poses.place(case.kind, length, mp.zero, case.branches).points['A'])
     top = {}
     for theta in np.arange(angles) * (2 * math.pi / angles) + 0.1:
         values, gaps = _evaluate(case, length, mp.mpf(theta), links, True)
@@ -363,15 +367,15 @@ def measure_servo(lever, angles, label='') -> List[Row]:
     case = Case(lever.type, lever.dimensions, angles, lever.branches, label)
     for angle in angles:
         cuts = [servo_truth(lever.dimensions, half, angle, cut) for cut in (1, -1)]
-        due = [_due_of(exact.closures.values()) for exact in cuts]
+        due = [due_of(exact.closures.values()) for exact in cuts]
         wanted = 'number' if 'number' in due else 'nan' if due == ['nan', 'nan'] else ''
         for exact, state in zip(cuts, due):
             if state == wanted:
                 near = float(mp.arg(exact.values['angle servo']))
                 found, slope = lever.servo(float(angle), near=near)
                 top = {'rate servo': lever.dimensions['a'] / lever.dimensions['b']}
-                rows += [_row(case, angle, 'angle servo', found, exact, wanted, {}),
-                         _row(case, angle, 'rate servo', slope, exact, wanted, top)]
+                rows += [row_of(case, angle, 'angle servo', found, exact, wanted, {}),
+                         row_of(case, angle, 'rate servo', slope, exact, wanted, top)]
     return rows
 
 

@@ -13,11 +13,11 @@ import time
 from typing import NamedTuple
 import warnings
 
-import joint_lines_accuracy as accuracy
-from joint_lines_truth import draw, FLOATS, Linkage
 from linkage_ros import mechanisms
 import numpy as np
-import random_linkages
+
+from . import drawing_accuracy, random_linkages
+from .drawing import draw, FLOATS, Linkage
 
 TURN = 2 * math.pi
 # Arcs below this width [rad] are the rounding of an angle or two.
@@ -43,7 +43,7 @@ class Subject:
         self.linkage = Linkage(design.joints, design.dimensions, design.branches)
         self.cranks = len(self.mechanism.inputs)
         self.held = tuple(float(x) for x in rng.uniform(-3.0, 3.0, self.cranks - 1))
-        self.poses = accuracy.outputs(self.linkage, self.mechanism.links)
+        self.poses = drawing_accuracy.outputs(self.linkage, self.mechanism.links)
         self.theta = np.linspace(-math.pi, math.pi, 2 * samples + 1)[1::2]
         self.ways = sorted(self.linkage.passings(), key=self._misfit)
 
@@ -53,11 +53,11 @@ class Subject:
 
     def fitted(self, thetas, rates=False):
         """Measure all answers, on the way past the change points that fits them best."""
-        found = accuracy.answers(self.mechanism, thetas, self.poses, rates)
+        found = drawing_accuracy.answers(self.mechanism, thetas, self.poses, rates)
         best = None
         for way in self.ways:
-            measure = accuracy.Measure(self.linkage, self.poses, way)
-            rows = accuracy.judge(measure, thetas, found, rates)
+            measure = drawing_accuracy.Measure(self.linkage, self.poses, way)
+            rows = drawing_accuracy.judge(measure, thetas, found, rates)
             count = sum(bool(row.problem) for row in rows)
             if best is None or count < best[0]:
                 best = count, rows
@@ -91,7 +91,7 @@ class Subject:
 
     def measure(self):
         """Return the measure in many digits."""
-        return accuracy.Measure(self.linkage, self.poses, self.ways[0])
+        return drawing_accuracy.Measure(self.linkage, self.poses, self.ways[0])
 
     def states(self, theta):
         """Return the states of all closures at an angle of the first crank, in many digits."""
@@ -174,7 +174,7 @@ def rates(subject, count=1):
 def _broken(subject, thetas, with_rates):
     rows = subject.fitted(thetas, with_rates)
     subject.rows = getattr(subject, 'rows', []) + rows
-    for row in accuracy.broken(rows)[:2]:
+    for row in drawing_accuracy.broken(rows)[:2]:
         what = f'{row.output.what} {"rate " * (row.output.crank is not None)}{row.problem}'
         yield what, (f'{row.output} at {row.thetas}: got {row.result}, true is '
                      f'{complex(row.value)}, ratio {row.ratio:.3g}, error {row.error:.3g}, '

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The measure of accuracy for linkages of the user's own, whose joints hang on each other in chains.
+How far an answer about any linkage may be from its drawing, where joints hang on each other.
 
 A result is measured in units of its *sensitivity*: what moving each thing that is rounded by half
 an ulp does to the true result. Rounded are the inputs (crank angles, dimensions, numbers in the
@@ -22,8 +22,9 @@ from typing import NamedTuple
 
 import gmpy2
 from gmpy2 import mpc, mpfr
-from joint_lines_truth import DIGITS, draw, half_ulp, Linkage, precisely
 import numpy as np
+
+from .drawing import DIGITS, draw, half_ulp, Linkage, precisely
 
 RULE, RATE_RULE = 4.0, 8.0
 GRAZE = 32.0
