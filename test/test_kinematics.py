@@ -517,12 +517,13 @@ def test_a_linkage_with_two_cylinders_follows_both_lengths(graph):
 
 
 def test_a_length_that_cannot_be_is_said_in_metres(graph):
-    alone = {**BOOM, 'boom.joints': BOOM['boom.joints'][:4]}
-    graph.start(Kinematics, alone)
-    heard, drawn = graph.listen(Log, '/rosout'), graph.listen(MarkerArray, 'boom/markers')
-    push = graph.crank(['boom_cylinder'])
+    # Of a name of its own: what is logged goes out on a publisher of the logger's name.
+    graph.start(Kinematics, {'mechanisms': ['lift'], 'lift.type': 'custom', 'lift.scale': 2.0,
+                             'lift.joints': BOOM['boom.joints'][:4]})
+    heard, drawn = graph.listen(Log, '/rosout'), graph.listen(MarkerArray, 'lift/markers')
+    push = graph.crank(['lift_cylinder'])
     push([2.0], drawn)
     with pytest.raises(AssertionError, match='in time'):
         push([9.0], [], seconds=0.3)
-    graph.until(lambda: [m for m in heard if 'boom cannot be assembled at cylinder length 9 m; '
+    graph.until(lambda: [m for m in heard if 'lift cannot be assembled at cylinder length 9 m; '
                          'the reach is [1.12297, 3.27703] m' in m.msg])

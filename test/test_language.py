@@ -61,7 +61,7 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P slider A 1 O along A out', 'the joints it stands on must differ'),
     ('P inversor Q A 3 1', 'expected "NAME NAME NAME inversor POLE PIN LENGTH LENGTH"'),
     ('P R dyad A Q 1 1 left', 'expected "NAME dyad'),
-    ('P teleport 0 0', 'expected NAME and one of the constructions ground, crank, cylinder, carriage'),
+    ('P teleport 0 0', 'expected NAME and one of the constructions ground, crank, cylinder, '),
     ('', 'expected NAME and one of the constructions'),
     ('9 ground 0 0', "'9' is no name for a joint"),
     ('P.x ground 0 0', "'P.x' is no name for a joint"),
