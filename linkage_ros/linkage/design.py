@@ -7,24 +7,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Callable, FrozenSet, List, Mapping, Tuple, TYPE_CHECKING
-
-import numpy as np
+from typing import Callable, FrozenSet, List, Mapping, Optional, Tuple
 
 from . import joint_lines
-
-if TYPE_CHECKING:
-    from .mechanism import Mechanism
-
-
-def check_bars(linkage: Mechanism) -> None:
-    """Raise ValueError, with its line, for a bar that has no length."""
-    for (first, second), length in linkage.bar_lengths.items():
-        size = np.asarray(length)
-        if not np.all((size > 0.0) & np.isfinite(size)):
-            raise linkage.line_of(first, second).error(
-                f'the bar {first}-{second} must be longer than zero, got {length:g}'
-                if not size.ndim else f'the bar {first}-{second} must be longer than zero')
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +29,9 @@ class Design:
         The joint whose curve is the locus.
     signed : frozenset
         Dimensions that may be zero or negative.
-    check : callable
-        From a mechanism of this type; raises ValueError for dimensions that cannot be.
+    check : callable, optional
+        From a mechanism of this type; raises ValueError for dimensions that cannot be. Default:
+        every bar must have a length.
 
     """
 
@@ -54,7 +40,7 @@ class Design:
     joints: Tuple[str, ...]
     tracer: str
     signed: FrozenSet[str] = frozenset()
-    check: Callable = check_bars
+    check: Optional[Callable] = None
 
     @cached_property
     def lines(self) -> List[joint_lines.Line]:

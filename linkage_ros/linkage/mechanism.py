@@ -32,6 +32,16 @@ SMALL, LARGE = 1e-30, 1e30
 Inputs = Union[ArrayLike, Sequence[ArrayLike]]
 
 
+def check_bars(linkage: Mechanism) -> None:
+    """Raise ValueError, with its line, for a bar that has no length."""
+    for (first, second), length in linkage.bar_lengths.items():
+        size = np.asarray(length)
+        if not np.all((size > 0.0) & np.isfinite(size)):
+            raise linkage.line_of(first, second).error(
+                f'the bar {first}-{second} must be longer than zero, got {length:g}'
+                if not size.ndim else f'the bar {first}-{second} must be longer than zero')
+
+
 def _hashable(names: Any) -> Any:
     """Return names as a tuple, None or one name as it is; raise ValueError if they are none."""
     try:
@@ -117,8 +127,12 @@ class Mechanism:
         made = type(self)(self._design, self._structure,
                           checked_dimensions(self._design, {**self.dimensions, **changed}),
                           self.branches, self._accelerate)
-        self._design.check(made)
+        made.check()
         return made
+
+    def check(self) -> None:
+        """Raise ValueError, with the line, if its dimensions cannot be."""
+        (self._design.check or check_bars)(self)
 
     def accelerated(self) -> Mechanism:
         """

@@ -129,5 +129,5 @@ def create(type_: str, /, *, branches: Optional[Mapping[str, int]] = None,
     structure = structure_of(chosen, tuple(signs.items()))
     kind = getattr(TYPES.get(type_), 'Mechanism', Mechanism)
     made = kind(chosen, structure, lengths, signs)
-    chosen.check(made)
+    made.check()
     return made

@@ -11,8 +11,8 @@ from typing import Any, Iterable, List, Optional, Tuple
 import numpy as np
 
 from ..linkage import joint_lines
-from ..linkage.design import check_bars, Design
-from ..linkage.mechanism import Mechanism
+from ..linkage.design import Design
+from ..linkage.mechanism import check_bars, Mechanism
 from ..words import listed, quoted
 
 MOST_LINES = 2000
