@@ -151,7 +151,7 @@ def _stamp(message):
 
 def module(name):
     """Return the module of an executable."""
-    rooms = {'render': 'render', 'urdf': 'robot_model', 'viewer': 'web.viewer'}
+    rooms = {'render': 'render', 'urdf': 'nodes.urdf_command', 'viewer': 'web.viewer'}
     return f'linkage_ros.{rooms.get(name, f"nodes.{name}")}'
 
 

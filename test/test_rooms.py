@@ -36,9 +36,9 @@ def room(module):
 
 
 def imported(module):
-    """Yield what a module imports when it is imported, as full names."""
+    """Yield what a module imports, at once or later, as full names."""
     here = ('linkage_ros', *module.relative_to(PACKAGE).parent.parts)
-    for node in parsed(module).body:
+    for node in ast.walk(parsed(module)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
