@@ -527,3 +527,34 @@ def test_a_length_that_cannot_be_is_said_in_metres(graph):
         push([9.0], [], seconds=0.3)
     graph.until(lambda: [m for m in heard if 'lift cannot be assembled at cylinder length 9 m; '
                          'the reach is [1.12297, 3.27703] m' in m.msg])
+
+
+def test_an_encoder_on_the_rocker_drives_as_the_crank_does(graph):
+    graph.start(Kinematics, {'mechanisms': ['bars'], 'bars.type': 'four_bar',
+                             'bars.crank.source': 'QB', 'bars.crank.start': 0.7})
+    linkage, states = mechanisms.create('four_bar'), graph.listen(JointState, 'bars/joint_states')
+    measure = graph.crank(['bars_QB'])
+    for theta in (0.7, 1.0, 1.8, 2.4):
+        rocker = float(linkage.joint_angles(theta)['QB'])
+        state = measure([rocker], states, [0.5])
+        found = dict(zip(state.name, state.position))
+        assert found['bars_crank'] == pytest.approx(theta)
+        assert found['bars_QB'] == pytest.approx(rocker)
+        assert dict(zip(state.name, state.velocity))['bars_QB'] == pytest.approx(0.5)
+
+
+def test_a_draw_wire_that_says_what_cannot_be_is_passed_over(graph):
+    graph.start(Kinematics, {'mechanisms': ['wired'], 'wired.type': 'four_bar',
+                             'wired.crank.source': 'distance(O,B)', 'wired.crank.start': 0.7})
+    linkage, states = mechanisms.create('four_bar'), graph.listen(JointState, 'wired/joint_states')
+    heard = graph.listen(Log, '/rosout')
+    measure = graph.crank(['wired_distance(O,B)'])
+    length = float(linkage.joint_angles(0.9, ['distance(O,B)'])['distance(O,B)'])
+    assert measure([length], states).position[0] == pytest.approx(0.9)
+    for bad in (1e3, math.nan, math.inf):
+        with pytest.raises(AssertionError, match='in time'):
+            measure([bad], [], seconds=0.2)
+    graph.until(lambda: [m for m in heard if 'distance(O,B) 1000 cannot be' in m.msg])
+    assert measure([length], states).position[0] == pytest.approx(0.9)
+    assert len([m for m in heard if 'cannot be' in m.msg]) == 1
+    assert all(np.isfinite(state.position).all() for state in states)

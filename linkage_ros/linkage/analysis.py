@@ -39,8 +39,8 @@ class Analysed(Mechanism):
         Parameters
         ----------
         output : str
-            A joint's coordinate, such as 'C.x' or 'C.y' [m], or a link's name: its joint angle
-            [rad], whole turns aside, or its slide [m], as `joint_angles` gives it.
+            A link's name: its joint angle [rad], whole turns aside, or its slide [m]; a joint's
+            coordinate such as 'C.x' [m]; 'distance(A,C)' [m]; 'angle(A,C)' [rad] from +x.
         value : float or array-like
             What the output is to be.
         near : float or array-like, optional
@@ -71,8 +71,8 @@ class Analysed(Mechanism):
 
         """
         value, first = numbers('value', value), self.inputs[0]
-        solver = self._inverse(output, tuple(map(float, others)))
-        answers = in_order(solver(value.ravel()), first) * first.size
+        branches = self._inverse(output, tuple(map(float, others)))
+        answers = in_order(branches.answers(value.ravel()), first) * first.size
         answers = answers.reshape(*value.shape, answers.shape[-1])
         return answers if near is None else nearest(answers, numbers('near', near), first)
 
@@ -94,7 +94,7 @@ class Analysed(Mechanism):
             followed past -pi and pi.
 
         """
-        self._check_output(output)
+        self.check_output(output)
         pose, angular = self._bound('output', output), np.array([self._structure.turns(output)])
         found = [extremes(lambda value: pose.searched(value)[:1], low, high, angular)[0].tolist()
                  for low, high in (self.reach() if arcs is None else arcs)]
@@ -221,13 +221,39 @@ class Analysed(Mechanism):
 
         return self._remembered('near zeros', others, find)
 
-    def _inverse(self, output: str, others: Tuple[float, ...]) -> Callable:
-        """Return the function from values of an output, shape (n,), to candidates (k, n)."""
-        self._check_output(output)
+    def follow(self, output: str, value: float, near: float) -> Tuple[float, float]:
+        """
+        Return the input that gives an output a value, going on from another without a jump.
+
+        Parameters
+        ----------
+        output : str
+            What `input_for` takes, of a linkage with one input.
+        value : float
+            What the output is [rad or m].
+        near : float
+            Where the input was [rad or m]; whole turns of a crank are kept.
+
+        Returns
+        -------
+        (float, float)
+            The input [rad or m], between the dead points and extremes of the output that `near` is
+            between, and d output / d input there; NaN if the output has no such value there.
+
+        """
+        branches, pose = self._remembered('follow', (output,), lambda: (
+            self._inverse(output, ()), self._bound('output', output).at))
+        turns = math.tau * math.floor((near + math.pi) / math.tau) if self.inputs[0].turns else 0.0
+        found, rate = branches.follow(pose, self.inputs[0].size, value, near - turns)
+        return found + turns, rate
+
+    def _inverse(self, output: str, others: Tuple[float, ...]) -> MonotoneBranches:
+        """Return the branches of an output."""
         return self._remembered('inverse', (output, *others),
-                                lambda: self._branches(output, others).answers)
+                                lambda: self._branches(output, others))
 
     def _branches(self, output: str, others: Tuple[float, ...]) -> MonotoneBranches:
+        self.check_output(output)
         angular = self._structure.turns(output)
         marks = distinct((near.value for near in self._near_zeros(others)
                           if near.gap <= NEAR * near.size), self.inputs[0].counted())
@@ -235,9 +261,11 @@ class Analysed(Mechanism):
             self._curve('output', output, others), self._counted_reach(others), marks, angular,
             GRAZE * (math.pi if angular else self.longest))
 
-    def _check_output(self, output: str) -> None:
-        allowed = (*self.joints, *(f'{name}.{axis}' for name in self.points for axis in 'xy'))
-        if output not in allowed:
+    def check_output(self, output: str) -> None:
+        """Raise ValueError if there is no such output, or it stands still."""
+        if not self.has_output(output):
+            allowed = (*self.joints, *(f'{name}.{axis}' for name in self.points for axis in 'xy'),
+                       'distance(A,B)', 'angle(A,B)')
             raise ValueError(f'{self.type} has no output {quoted(output)}; '
                              f'allowed: {listed(allowed)}')
         if not self._structure.moves(output):

@@ -12,7 +12,7 @@ method kept inside a bracket, to the last digit.
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Iterable, Iterator, List, NamedTuple, Sequence, Tuple
+from typing import Any, Callable, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -119,6 +119,54 @@ class MonotoneBranches:
                 part = np.where(target <= branch.value[0] + near, branch.theta[0], part)
                 row[place] = np.where(target >= branch.value[-1] - near, branch.theta[-1], part)
         return found
+
+    def follow(self, pose: Callable, size: float, value: float,
+               near: float) -> Tuple[float, float]:
+        """
+        Return the input that gives a value on the branch that another is on, and the rate there.
+
+        `pose` is the curve for a float; inputs are here in rad or m, `size` of them in one. NaN
+        where the branch does not hold the value.
+        """
+        for branch in self._branches:
+            lo, hi = branch.theta[0], branch.theta[-1]
+            if lo <= near / size <= hi:
+                bracket = self._bracket(branch, value)
+                if bracket:
+                    return self._refined(pose, branch.sign, *bracket, size)
+        return math.nan, math.nan
+
+    def _bracket(self, branch: _Branch, value: float) -> Optional[Tuple[float, float, float]]:
+        """Return the samples on both sides of a value, as the branch counts it, and that."""
+        low, high, slack = float(branch.value[0]), float(branch.value[-1]), self._rounding
+        target = branch.sign * value
+        if self._angular and math.isfinite(target):
+            target += math.tau * math.ceil((low - slack - target) / math.tau)
+        if not low - slack <= target <= high + slack:
+            return None
+        i = min(max(int(branch.value.searchsorted(target)), 1), len(branch.theta) - 1)
+        return float(branch.theta[i - 1]), float(branch.theta[i]), target
+
+    def _refined(self, pose: Callable, sign: float, lo: float, hi: float, target: float,
+                 size: float) -> Tuple[float, float]:
+        """Return where an output meets a target: Newton's method kept inside a bracket."""
+        lo, hi = lo * size, hi * size
+        theta, last = 0.5 * (lo + hi), math.inf
+        best = theta, math.nan
+        for _ in range(STEPS):
+            now, rate = pose(theta)
+            gap = sign * now - target
+            if self._angular:
+                gap = math.remainder(gap, math.tau)
+            if abs(gap) >= last and last < self._rounding:
+                return best
+            last, best = abs(gap), (theta, rate)
+            lo, hi = (theta, hi) if gap < 0.0 else (lo, theta)
+            guess = theta - sign * gap / rate if rate else math.nan
+            if guess == theta or hi - lo <= math.ulp(max(-lo, hi)):
+                break
+            theta = guess if lo < guess < hi else 0.5 * (lo + hi)
+        return best
 
     def _runs(self, lo: float, hi: float) -> Iterator[_Run]:
         """Yield samples as angles, values, rates and rounding, cut where there is no value."""

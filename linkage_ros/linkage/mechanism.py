@@ -204,7 +204,7 @@ class Mechanism:
         theta : float or array-like
             What `solve` takes.
         joints : sequence of str, optional
-            The links wanted, by name. Default: all.
+            The links wanted, by name, or other outputs; see `has_output`. Default: all links.
 
         Returns
         -------
@@ -219,6 +219,19 @@ class Mechanism:
 
         """
         return self._scalars('angles', theta, joints)
+
+    def has_output(self, name: Any) -> bool:
+        """
+        Return whether there is an output of this name.
+
+        That is a link's name, for its joint angle [rad] or slide [m]; a joint's coordinate such as
+        'C.x' [m]; 'distance(A,C)' [m] of two joints; 'angle(A,C)' [rad] from +x to A -> C.
+        """
+        return isinstance(name, str) and self._structure.has(name)
+
+    def is_angle(self, output: str) -> bool:
+        """Return whether an output is an angle [rad], not a length [m]."""
+        return self._structure.turns(output)
 
     def joint_rates(self, theta: Inputs, joints: Optional[Sequence[str]] = None,
                     by: int = 0) -> dict:
@@ -354,7 +367,7 @@ class Mechanism:
             return allowed
         names = (wanted,) if isinstance(wanted, str) else wanted
         for name in names:
-            if name not in allowed:
+            if name not in allowed and not (what == 'joint' and self.has_output(name)):
                 raise ValueError(f'{self.type} has no {what} {quoted(name)}; '
                                  f'allowed: {listed(allowed)}')
         return names

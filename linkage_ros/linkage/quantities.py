@@ -10,16 +10,29 @@ They hold for any dimensions; from them comes the code, with nothing in it that 
 from __future__ import annotations
 
 from itertools import chain, cycle
-from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Tuple
+import re
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 from . import joint_lines
-from .builder import Builder, in_metres, Link
+from .builder import Builder, in_metres
 from .design import Design
-from .planar import Limit
-from ..formula.expression import argument, derivative, gated, Real, real, spin
+from .planar import Arm, Limit
+from ..formula.expression import (
+    arctangent,
+    argument,
+    Complex,
+    derivative,
+    gated,
+    Real,
+    real,
+    spin,
+    square_root,
+)
 from ..formula.program import keep, Program
 
 Names = Tuple[str, ...]
+# Of two joints: how far they are apart, and where the second is seen from the first.
+_PAIR = re.compile(r'(?:distance|angle)\(([A-Za-z]\w*),([A-Za-z]\w*)\)')
 
 
 class Leg(NamedTuple):
@@ -81,8 +94,24 @@ class Structure:
         return rate if alone or not value.varies else gated(rate, abs(value), real(0.0))
 
     def _angles(self, names: Names) -> List[Real]:
-        values = self.built.joint_values
-        return [in_metres(values[n]) if self._slides(n) else values[n] for n in names]
+        return [self._value(name) for name in names]
+
+    def _value(self, name: str) -> Real:
+        """Return a joint angle, a slide, or another output by its name."""
+        if name in self.built.joint_values:
+            value = self.built.joint_values[name]
+            return in_metres(value) if self._slides(name) else value
+        if (arm := self._arm(name)) is None:
+            joint, _, axis = name.rpartition('.')
+            return self._points((joint,))['xy'.index(axis)]
+        if self.turns(name):
+            return arctangent(arm.vector.y, arm.vector.x)
+        return in_metres(square_root(arm.square))
+
+    def _arm(self, name: str) -> Optional[Arm]:
+        """Return what the name of a distance or an angle is about; None if it is another."""
+        pair = _PAIR.fullmatch(name)
+        return self.built.arm(*pair.groups()) if pair else None
 
     def _parts(self, wanted: Tuple[Names, Names, Names]) -> List[Real]:
         points, joints, rates = wanted
@@ -119,20 +148,22 @@ class Structure:
         def d(expression: Real) -> Real:
             return derivative(expression, {by: 1.0}, known)
 
-        def turning(name: str) -> Real:
-            bar = self.built.directions.get(name)
+        def turning(bar: Optional[Complex]) -> Real:
             if bar is None:
                 return real(0.0)
             turned = spin(bar)
             return turned.formula(*map(d, turned.of))
 
-        def rate(link: Link) -> Real:
-            if link.kind == 'prismatic' or link.name in inputs:
-                return d(self._angles((link.name,))[0])
-            return turning(link.name) - turning(link.parent)
+        def rate(name: str) -> Real:
+            if not self.turns(name) or name in inputs:
+                return d(self._value(name))
+            if arm := self._arm(name):
+                return turning(arm.vector)
+            return turning(directions.get(name)) - turning(directions.get(parents[name]))
 
-        links = {link.name: link for link in self.built.links}
-        return [self._due(rate(links[n]), self.built.joint_values[n]) for n in names]
+        directions = self.built.directions
+        parents = {link.name: link.parent for link in self.built.links}
+        return [self._due(rate(name), self._value(name)) for name in names]
 
     def _margins(self, _: Names) -> List[Real]:
         """Return each limit's margin, so much above its tolerance that a reached one is >= 0."""
@@ -155,15 +186,21 @@ class Structure:
 
     def _output(self, name: str) -> List[Real]:
         """Return an output, as `input_for` names it, and its rate by the first input."""
-        joint, _, axis = name.rpartition('.')
-        if not joint:
-            return self._angles((name,)) + self._rates((name,))
-        i = 'xy'.index(axis)
-        return [self._points((joint,))[i], self._velocities((joint,))[i]]
+        return [self._value(name), *self._rates((name,))]
+
+    def has(self, output: str) -> bool:
+        """Return whether there is an output of this name."""
+        joint, _, axis = output.rpartition('.')
+        pair = _PAIR.fullmatch(output)
+        ends = pair.groups() if pair else (joint,) if axis in ('x', 'y') else ()
+        return output in self.built.joint_values or bool(ends) and len(set(ends)) == len(
+            ends) and set(ends) <= self.built.points.keys()
 
     def turns(self, output: str) -> bool:
         """Return whether an output is an angle, not a length."""
-        return '.' not in output and not self._slides(output)
+        if output in self.built.joint_values:
+            return not self._slides(output)
+        return output.startswith('angle(')
 
     def moves(self, output: str) -> bool:
         """Return whether an output depends on the first input."""

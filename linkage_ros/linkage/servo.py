@@ -197,9 +197,6 @@ class Mechanism(Analysed):
 
     def _rates_at(self, output: str, theta: np.ndarray) -> np.ndarray:
         """Return d output / d input."""
-        joint, _, axis = output.rpartition('.')
-        if joint:
-            return self.velocity(theta, (joint,))[joint][..., 'xy'.index(axis)]
         return self.joint_rates(theta, (output,))[output]
 
 

@@ -46,10 +46,11 @@ class Kinematics(scene_node.SceneNode):
         self._mechanisms = {}
         self._drawing, self._ended = Lock(), False
         super().__init__(scene.KINEMATICS, **kwargs)
-        self._mechanisms = {name: MechanismPublisher(self, name, list(machine.inputs))
+        self._mechanisms = {name: MechanismPublisher(self, machine)
                          for name, machine in self.scene.machines.items()}
-        self._inputs = {f'{name}_{input_}': (shown, i) for name, shown in self._mechanisms.items()
-                        for i, input_ in enumerate(shown.inputs)}
+        self._inputs = {f'{name}_{drive.heard}': (self._mechanisms[name], i)
+                        for name, machine in self.scene.machines.items()
+                        for i, drive in enumerate(machine.inputs.values())}
         self._unheard, self._strangers = set(self._inputs), set()
         self._reader = joint_state_reader.Reader(self._routed)
         self._patience = self.create_timer(
@@ -276,8 +277,9 @@ class Model:
 class MechanismPublisher:
     """The topics of one mechanism, and the last that was heard of each of its inputs."""
 
-    def __init__(self, node_, name: str, inputs: Sequence[str]):
-        self.name, self.inputs = name, inputs
+    def __init__(self, node_, machine: scene.Machine):
+        self.name = name = machine.name
+        self._source = machine.first.source
         self._joint_states = node_.create_publisher(JointState, f'{name}/joint_states', 10)
         self._markers = node_.create_publisher(MarkerArray, f'{name}/markers', 1)
         self._locus = node_.create_publisher(Marker, f'{name}/locus', LATCHED)
@@ -286,8 +288,8 @@ class MechanismPublisher:
         self._logger = node_.get_logger().get_child(name)
         self._model, self._pose, self._driven = None, None, None
         self._stamp = NEVER
-        self._values = [None] * len(inputs)
-        self._speeds = [None] * len(inputs)
+        self._values = [None] * len(machine.inputs)
+        self._speeds = [None] * len(machine.inputs)
         # The markers in the picture, and whether the locus is.
         self._drawn, self._curved = frozenset(), False
 
@@ -358,11 +360,26 @@ class MechanismPublisher:
 
         """
         for i, place in places:
-            self._values[i] = positions[place]
-            self._speeds[i] = speeds[place] if speeds else None
+            value, speed = positions[place], speeds[place] if speeds else None
+            if self._source:
+                value, speed = self._measured(value, speed)
+            if value is not None:
+                self._values[i], self._speeds[i] = value, speed
         if None not in self._values:
             self._show(stamp, tuple(self._values),
                        () if None in self._speeds else tuple(self._speeds))
+
+    def _measured(self, value, speed):
+        """Return the input and its speed that the source tells; None if it cannot be."""
+        machine = self._model.machine
+        near = self._values[0]
+        found, rate = machine.measured(
+            self._source, value, machine.first.start if near is None else near)
+        if not math.isfinite(found):
+            self._logger.warning(f'{self._source} {value:.6g} cannot be: it is passed over',
+                                 throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
+            return None, None
+        return found, speed / rate if speed is not None and rate else None
 
     def _show(self, stamp, values, speeds):
         """Publish what is listened to."""

@@ -7,6 +7,7 @@ from functools import cached_property
 import math
 from operator import itemgetter
 import sys
+from typing import Optional
 
 import numpy as np
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -59,8 +60,8 @@ class ServoInverse(scene_node.SceneNode):
     def adopt(self, new):
         """Forget what was asked about."""
         self._known = {}
-        self._inputs = {f'{name}_{input_}' for name, machine in new.machines.items()
-                        for input_ in machine.inputs}
+        self._inputs = {f'{name}_{drive.heard}' for name, machine in new.machines.items()
+                        for drive in machine.inputs.values()}
 
     def _inputs_in(self, message):
         """Return the names of the scene's inputs in a message, and their places."""
@@ -81,7 +82,7 @@ class ServoInverse(scene_node.SceneNode):
         try:
             key = request.mechanism, request.output
             asked = self._known.get(key) or Asked(_machine(self.scene, *key), request.output)
-            solve(asked, request, response, self._heard.get(asked.input, math.inf))
+            solve(asked, request, response, asked.present(self._heard.get(asked.heard)))
             self._known[key] = asked
         except ValueError as problem:
             response.message = elided(str(problem), MESSAGE)
@@ -142,18 +143,24 @@ class Asked:
     """
 
     def __init__(self, machine: scene.Machine, output: str):
-        self._linkage, self._name = machine.linkage, output or LEVER
+        self._machine, self._linkage, self._name = machine, machine.linkage, output or LEVER
         if len(machine.inputs) > 1:
             raise ValueError(f'{machine.name} has several inputs; only a linkage with one can be '
                              'solved for an output')
         self._drive = machine.first
-        self.input, self.unit = f'{machine.name}_{self._drive.input.name}', self._drive.input.unit
+        self.heard, self.unit = f'{machine.name}_{self._drive.heard}', self._drive.input.unit
         self.what = 'lever angles' if self._name == LEVER else f'values of {self._name}'
-        slides = [link.name for link in self._linkage.links if link.kind == 'prismatic']
-        self._turns = '.' not in self._name and self._name not in slides
-        # Lengths of the linkage are to be scaled.
-        self._scale = 1.0 if self._turns else machine.scale
-        self._input_scale = 1.0 if self._drive.input.turns else machine.scale
+        self._linkage.check_output(self._name)
+        self._turns = self._linkage.is_angle(self._name)
+        self._scale = machine.scale_of(self._name)
+        self._input_scale = machine.scale_of(self._drive.input.name)
+
+    def present(self, heard: Optional[float]) -> float:
+        """Return where the input is, from what was heard last; infinite if that is not known."""
+        if heard is None or not self._drive.source:
+            return math.inf if heard is None else heard
+        found, _ = self._machine.measured(self._drive.source, heard, self._drive.start)
+        return found if math.isfinite(found) else math.inf
 
     def servo(self, wanted, near):
         """Return for each value the input [rad or m] and d output / d input there."""

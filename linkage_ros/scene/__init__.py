@@ -21,7 +21,7 @@ from typing import Any, Dict, List, Optional, Tuple
 from .parameters import Field, Parameter, plain, SceneError, Values
 from .. import mechanisms
 from ..linkage.inputs import Arc, Input
-from ..linkage.mechanism import Mechanism
+from ..linkage.servo import Mechanism
 from ..linkage.walker import Assembly
 from ..words import elided, listed, quoted
 
@@ -74,6 +74,8 @@ POSE = Field('double_array', "Pose of the linkage's plane in frame_id: "
 SPEED = Field('double', 'Speed of the {0} [{1}/s].', -FASTEST, FASTEST, readers=(DRIVER,))
 START = Field('double', 'Where the {0} starts [{1}]; a new value moves it there.',
               readers=(DRIVER,))
+SOURCE = Field('string', 'Output that is measured, from which the {0} follows; empty: the {0} '
+               'itself.', readers=(KINEMATICS, INVERSE), read_only=True)
 SWEEP = Field('double_array', 'Between which values [{1}] the {0} moves to and fro; '
               'empty: through its reach, or all round.', readers=ALL,
               rule=f'the lower end and the higher end, within {FARTHEST:g} of zero, or none')
@@ -96,6 +98,8 @@ class Drive:
         Between which ends it moves to and fro; None: it turns all round.
     ends : (float, float), optional
         The ends that were set, beyond which no answer lies either; None: all its reach.
+    source : str
+        The output that is measured instead; empty: the input itself.
 
     """
 
@@ -105,6 +109,12 @@ class Drive:
     start: float
     sweep: Optional[Arc]
     ends: Optional[Arc] = None
+    source: str = ''
+
+    @property
+    def heard(self) -> str:
+        """What messages call what they say of it, after the mechanism's name."""
+        return self.source or self.input.name
 
 
 @dataclass(frozen=True)
@@ -132,6 +142,25 @@ class Machine:
     def first(self) -> Drive:
         """The first input, for most linkages the only one."""
         return next(iter(self.inputs.values()))
+
+    def scale_of(self, output: str) -> float:
+        """Return by what an output is multiplied to be seen in the scene."""
+        return 1.0 if self.linkage.is_angle(output) else self.scale
+
+    def measured(self, output: str, value: float, near: float) -> Tuple[float, float]:
+        """
+        Return the input that an output tells [rad or m], and d output / d input there.
+
+        It goes on from where it was near, without a jump where it can; NaN outside the reach or
+        the sweep that is set.
+        """
+        drive, own, unit = self.first, self.scale_of(self.first.input.name), self.scale_of(output)
+        ends = drive.ends and (drive.ends[0] / own, drive.ends[1] / own)
+        found, rate = self.linkage.follow(output, value / unit, near / own)
+        if not (ends[0] <= found <= ends[1] if ends else found == found):
+            found, rate = map(float, self.linkage.servo_for(
+                output, value / unit, near / own, ends))
+        return found * own, rate * unit / own
 
     def assembly(self) -> Assembly:
         """Return its legs on their inputs."""
@@ -258,6 +287,8 @@ def _machine(name: str, given: Mapping[str, Any], old: Optional[Machine], strict
     inputs = {input_.name: _drive(name, *_scaled(input_, linkage, reach, scale), values,
                                   settled.get(input_.name), strict)
               for input_ in linkage.inputs}
+    for drive in inputs.values():
+        _check_source(name, linkage, drive)
     _refuse_unknown(values.left(), [parameter.name for parameter in values.parameters])
     return Machine(name, linkage, reach, scale, leg_pairs, mirrored, points, pose, inputs, given,
                    tuple(values.parameters))
@@ -381,21 +412,35 @@ def _drive(name: str, input_: Input, reach, values: Values, old: Optional[Drive]
     chosen = values.left(f'{name}.start')
     start = values.take(f'{name}.start', start_field, 0.0)
     sweep = values.take(f'{name}.sweep', sweep_field, ())
+    source = values.take(f'{name}.source', _about(SOURCE, input_.name), '')
     if sweep:
         _check_sweep(f'{name}.sweep', sweep, input_, reach)
     elif input_.is_whole(reach):
-        return Drive(input_, reach, speed, start, None)
+        return Drive(input_, reach, speed, start, None, source=source)
     arcs = [sweep] if sweep else reach
     home = [arc for arc in arcs if input_.holds(arc, start, start)]
     low, high = (home or arcs)[0]
     trimmed = 0.0 if sweep else MARGIN * (high - low)
     drive = Drive(input_, reach, speed, start, (low + trimmed, high - trimmed),
-                  tuple(sweep) or None)
+                  tuple(sweep) or None, source)
     settled = not strict or old and (old.start, old.sweep) == (drive.start, drive.sweep)
     if chosen and not home and not settled:
         raise SceneError(f'{name}.start must be inside the {"sweep" if sweep else "reach"} '
                          f'{in_words(arcs)} {input_.unit}, not {start}')
     return drive
+
+
+def _check_source(name, linkage: Mechanism, drive: Drive):
+    if not drive.source:
+        return
+    key = f'{name}.{drive.input.name}.source'
+    if len(linkage.inputs) > 1:
+        raise SceneError(f'{key} must be empty: only a linkage with one input can be solved for '
+                         f'an output, and {name} has {len(linkage.inputs)}')
+    try:
+        linkage.check_output(drive.source)
+    except ValueError as error:
+        raise SceneError(f'{key}: {error}') from None
 
 
 def _usual_speed(input_: Input, reach) -> float:

@@ -1,0 +1,127 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What can be measured of a linkage: its value, its rate, and where the input then is."""
+
+import math
+
+from linkage_ros import mechanisms, scene
+import numpy as np
+import pytest
+
+LIFT = {'mechanisms': ['lift'], 'lift.type': 'custom', 'lift.scale': 2.0, 'lift.joints': [
+    'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C line O B 1.6']}
+ROCKER = {'mechanisms': ['bars'], 'bars.type': 'four_bar', 'bars.scale': 0.01}
+ASKED = [('jansen', 'distance(A,G)'), ('jansen', 'angle(C,G)'), ('four_bar', 'distance(O,B)'),
+         ('four_bar', 'angle(B,A)'), ('slotted_lever', 'distance(Q,A)'), ('klann', 'angle(O,E)')]
+
+
+def measured(linkage, output, theta):
+    """Return an output from where the joints are."""
+    first, second = output[:-1].partition('(')[2].split(',')
+    place = linkage.solve(theta)
+    arm = (place[second] - place[first]) @ (1, 1j)
+    return np.abs(arm) if output.startswith('distance') else np.angle(arm)
+
+
+@pytest.mark.parametrize('shape', [(), (1,), (3, 2), (0,)])
+@pytest.mark.parametrize('type_, output', ASKED)
+def test_distances_and_angles_are_those_of_the_joints(type_, output, shape):
+    linkage = mechanisms.create(type_)
+    theta = np.resize([0.3, 1.1, -2.0, 2.9, 0.0, -0.7], shape)
+    found = linkage.joint_angles(theta, [output])[output]
+    assert found.shape == shape
+    np.testing.assert_allclose(found, measured(linkage, output, theta), rtol=1e-13, atol=1e-13)
+
+
+@pytest.mark.parametrize('type_, output', ASKED)
+def test_their_rates_are_differences(type_, output):
+    linkage, step = mechanisms.create(type_), 1e-6
+    theta = np.linspace(0.3, 2.5, 9)
+    ahead = measured(linkage, output, theta + step) - measured(linkage, output, theta - step)
+    np.testing.assert_allclose(linkage.joint_rates(theta, [output])[output],
+                               ahead / (2 * step), rtol=1e-6, atol=1e-6)
+    function = linkage.function((), [output], [output])
+    assert function(0.3)[1] == linkage.joint_rates(0.3, [output])[output]
+
+
+@pytest.mark.parametrize('type_, output', ASKED)
+def test_the_inverse_gives_them_back(type_, output):
+    linkage = mechanisms.create(type_)
+    for theta in (0.4, 1.9, -1.2):
+        value = float(measured(linkage, output, theta))
+        assert np.nanmin(np.abs(linkage.input_for(output, value) - theta)) < 1e-7
+
+
+@pytest.mark.parametrize('name', ['distance(A,A)', 'distance(A,Z)', 'angle(A)', 'angle(A,B,C)',
+                                  'distance(A, B)', 'A.z', '', 'distance', '(A,B)', 7, None])
+def test_what_is_no_output_is_refused_by_its_name(name):
+    linkage = mechanisms.create('four_bar')
+    assert not linkage.has_output(name)
+    with pytest.raises(ValueError, match='four_bar has no'):
+        linkage.input_for(name, 1.0)
+
+
+# --- following a measured value ---
+
+@pytest.mark.parametrize('type_, output', [
+    ('four_bar', 'QB'), ('jansen', 'BC'), ('jansen', 'EF'), ('slotted_lever', 'lever'),
+    ('water_drop', 'distance(A,C)'), ('slider_crank', 'block'), ('jansen', 'angle(A,G)')])
+def test_the_input_follows_a_measured_output_between_its_extremes(type_, output):
+    linkage = mechanisms.create(type_)
+    (least, low), (greatest, high) = linkage.extremes(output)[0]
+    low, high = sorted((low, high))
+    theta = np.linspace(low, high, 400)[5:-5]
+    values = linkage.joint_angles(theta, [output])[output]
+    near = theta[0]
+    for true, value in zip(theta.tolist(), values.tolist()):
+        near, rate = linkage.follow(output, value, near)
+        again = linkage.joint_angles(near, [output])[output]
+        assert math.remainder(again - value, math.tau) == pytest.approx(
+            0.0, abs=1e-13 * max(1.0, linkage.longest))
+        if low < high and np.all(np.diff(np.unwrap(values)) * np.diff(values)[0] > 0.0):
+            assert near == pytest.approx(true, abs=1e-6)
+            assert rate == pytest.approx(float(linkage.joint_rates(near, [output])[output]))
+
+
+def test_whole_turns_are_kept_and_what_cannot_be_is_not_a_number():
+    linkage = mechanisms.create('four_bar')
+    value = float(linkage.joint_angles(0.7)['QB'])
+    for turns in (-3, 0, 1, 100):
+        near, _ = linkage.follow('QB', value, 0.6 + turns * math.tau)
+        assert near == pytest.approx(0.7 + turns * math.tau)
+    for bad in (9.0, math.nan, math.inf, -math.inf):
+        outside = linkage.follow('distance(O,B)', bad * 100.0, 0.6)
+        assert all(map(math.isnan, outside))
+
+
+def test_a_scene_measures_lengths_scaled_and_beyond_a_branch_the_nearest_answer():
+    machine = scene.read({**LIFT, 'lift.cylinder.source': 'OB'}).machines['lift']
+    for length in (1.3, 2.0, 3.1):
+        angle = machine.linkage.joint_angles(length / 2.0)['OB']
+        found, rate = machine.measured('OB', float(angle), 2.0)
+        assert found == pytest.approx(length)
+        assert rate == pytest.approx(0.5 * machine.linkage.joint_rates(length / 2.0)['OB'])
+    drawn = machine.linkage.solve(1.0)['C']
+    assert machine.measured('C.x', 2.0 * drawn[0], 2.0)[0] == pytest.approx(2.0)
+    crank = scene.read({**ROCKER, 'bars.crank.source': 'QB'}).machines['bars']
+    across = float(crank.linkage.joint_angles(math.pi - 0.01)['QB'])
+    assert crank.measured('QB', across, math.pi + 0.01)[0] == pytest.approx(math.pi - 0.01)
+
+
+def test_a_measured_value_stays_inside_the_sweep_that_is_set():
+    swept = scene.read({**ROCKER, 'bars.crank.source': 'QB', 'bars.crank.sweep': [0.5, 1.0]})
+    machine = swept.machines['bars']
+    inside, outside = (float(machine.linkage.joint_angles(theta)['QB']) for theta in (0.8, 1.6))
+    assert machine.measured('QB', inside, 0.6)[0] == pytest.approx(0.8)
+    assert math.isnan(machine.measured('QB', outside, 0.6)[0])
+
+
+@pytest.mark.parametrize('name, source, text', [
+    ('five_bar', 'P.y', 'five_bar.crank.source must be empty: only a linkage with one input'),
+    ('four_bar', 'QX', "four_bar.crank.source: four_bar has no output 'QX'; allowed: crank, AB"),
+    ('four_bar', 'distance(O,Q)', 'four_bar.crank.source: distance(O,Q) of four_bar does not')])
+def test_a_source_that_cannot_be_is_refused(name, source, text):
+    with pytest.raises(scene.SceneError) as refused:
+        scene.read({'mechanisms': [name], f'{name}.crank.source': source})
+    assert text in str(refused.value)
