@@ -249,6 +249,8 @@ class Analysed(Mechanism):
 
     def _inverse(self, output: str, others: Tuple[float, ...]) -> MonotoneBranches:
         """Return the branches of an output."""
+        if not isinstance(output, str):
+            self.check_output(output)
         return self._remembered('inverse', (output, *others),
                                 lambda: self._branches(output, others))
 

@@ -114,6 +114,8 @@ class Builder:
         self.inputs: List[Input] = []
         self.arguments: List[Real] = []
         self.cylinders: List[Tuple[str, str]] = []
+        # The ground joints of the lines that what is added is mirrored in, one after the other.
+        self.mirrors: Tuple[Tuple[str, ...], ...] = ()
         self._vectors: Dict[Tuple[str, str], _Vector] = {}
         self._axes: Dict[str, _Vector] = {}
         self._driven: Dict[str, Tuple[Input, Real]] = {}
@@ -133,6 +135,9 @@ class Builder:
             self._on_ground(centre, '; or its zero is towards a joint of its link')
             parent, along = GROUND, Complex(0.0, 1.0) if up else Complex(1.0, 0.0)
             start = real(pi / 2 if up else 0.0)
+            if self.mirrors:
+                along = self._mirrored(along)
+                start = arctangent(along.y, along.x)
         else:
             parent, along, start = self._direction(centre, zero)
         crank = planar.Crank(self.points[centre].place, length, along, turning)
@@ -214,6 +219,22 @@ class Builder:
             return abs(apart - bar), apart + bar
         return real(0.0), self.points[base].span + self.points[pivot].span + bar
 
+    def image(self, name: str, point: str, first: str, second: str) -> None:
+        """Fix a joint to the ground where another is seen in the mirror line of two others."""
+        for joint in (point, first, second):
+            self._on_ground(joint)
+        self.mirrors, origin = ((first, second),), self.points[first]
+        place = origin.place + self._mirrored(self.points[point].place - origin.place)
+        self.points[name] = _Point(place, GROUND, self.points[point].span + 2.0 * origin.span)
+
+    def _mirrored(self, vector: Complex) -> Complex:
+        """Return a vector's image in the mirror lines."""
+        for ends in self.mirrors:
+            line = self._side(*ends)
+            axis = line.vector / line.length
+            vector = axis * axis * vector.conjugate()
+        return vector
+
     def dyad(self, name: str, first: str, second: str, to_first: Real, to_second: Real,
              side: float) -> None:
         """Join bars of to_first and to_second [m] from two joints, left of first -> second."""
@@ -224,21 +245,32 @@ class Builder:
     def rigid(self, name: str, first: str, second: str, to_first: Real, to_second: Real,
               side: float) -> None:
         """Add the third corner of a rigid triangle on a bar; left of first -> second."""
-        vector, base, link = self._bar_between(first, second)
+        vector, base, link = self._side(first, second)
         corner = planar.triangle(base, to_first, to_second, side)
         self.triangles[name] = corner.y
         self.limits.append(planar.Limit(abs(corner.y), real(0.0)))
+        if link == GROUND:
+            self._fix(name, first, vector * corner, to_first)
+            return
         self._place(name, first, vector * corner, link, to_first, (second,))
         self._bar(second, name, vector * (corner - Complex(1.0, 0.0)), to_second, link)
         self._add_to_frame(name, first, second, link, corner)
 
     def line(self, name: str, first: str, second: str, distance: Real) -> None:
         """Add a point on the line of a bar, a distance [m] from first, towards second."""
-        vector, base, link = self._bar_between(first, second)
+        vector, base, link = self._side(first, second)
+        if link == GROUND:
+            self._fix(name, first, vector * (distance / base), abs(distance))
+            return
         kite = self._kites.get((first, second))
         self._place(name, first, vector * (distance / base), link, abs(distance), (second,),
                     kite.beyond_kite(-(distance / base)) if kite else None)
         self._add_to_frame(name, first, second, link, Complex(distance / base, 0.0))
+
+    def _fix(self, name: str, first: str, vector: Complex, length: Real) -> None:
+        """Fix a joint to the ground, a vector [m] away from another."""
+        start = self.points[first]
+        self.points[name] = _Point(start.place + vector, GROUND, start.span + length)
 
     def mirror(self, name: str, point: str, first: str, second: str) -> None:
         """Mirror a joint in the line of two others: the far corner of a kite."""
@@ -320,6 +352,9 @@ class Builder:
         else:
             self._on_ground(origin)
             parent, along, angle = GROUND, Complex(cosine(direction), sine(direction)), direction
+            if self.mirrors:
+                along = self._mirrored(along)
+                angle = arctangent(along.y, along.x)
         rail = self._rail(pin, origin, along)
         found = planar.slider(rail, rod, side)
         self.limits += found.limits

@@ -14,6 +14,8 @@ Linkages written down: one line a joint, in the order they are placed.
     P line A B d              on the line of bar AB, d from A; negative: on the other side of A
     B mirror O A C            mirror image of O in the line AC: the far corner of a kite
     C parallelogram B A D     corner opposite B of a parallelogram on the bars BA and BD
+    Q image P O H             ground joint where P is seen in the mirror line O -> H of the ground
+    M mirrored O H            all of the above once more in that mirror: AM is the image of A
     B C D inversor P A a b    Peaucellier cell from pole P to pin A: long bars a, rhombus b
     L slot Q A e out d        tip, d from Q, of a lever about Q; A in its slot, e to its left
     S slider A r G p out      block on a line through G in direction p [rad], on a rod r from A
@@ -74,6 +76,8 @@ FORMS = {
     'mirror': ('mirror POINT FIRST SECOND',),
     'parallelogram': ('parallelogram CORNER FIRST SECOND',),
     'antiparallelogram': ('antiparallelogram CORNER FIRST SECOND',),
+    'image': ('image POINT FIRST SECOND',),
+    'mirrored': ('mirrored FIRST SECOND',),
     'inversor': ('inversor POLE PIN LENGTH LENGTH',),
     'slot': ('slot PIVOT PIN OFFSET out|in LENGTH',),
     'slider': ('slider PIN LENGTH ORIGIN ANGLE out|in',
@@ -107,6 +111,8 @@ class Line(NamedTuple):
     word: str
     args: Tuple[str, ...]
     arguments: Tuple[Argument, ...] = ()
+    # The ground joints of the mirror lines that it is an image in, one after the other.
+    mirrors: Tuple[Tuple[str, ...], ...] = ()
 
     @property
     def stands_on(self) -> Tuple[str, ...]:
@@ -150,9 +156,53 @@ def _hint(args: Iterable[str]) -> str:
 
 def parse(texts: Iterable[str]) -> List[Line]:
     """Return the lines of a linkage; raise ValueError with the line that cannot be."""
-    lines = [_parsed(text) for text in texts]
+    lines: List[Line] = []
+    for text in texts:
+        line = _parsed(text)
+        lines += _mirrored(lines, line) if line.word == 'mirrored' else [line]
     _check_order(lines)
     return lines
+
+
+def _mirrored(lines: List[Line], mirror: Line) -> List[Line]:
+    """Return the images of lines in a mirror line: what stands on that alone is its own image."""
+    own = set(mirror.stands_on)
+    count: Dict[str, int] = {}
+    found = []
+    for line in lines:
+        count[line.word] = count.get(line.word, 0) + 1
+        if own >= {*line.names} or line.stands_on and own >= {*line.stands_on} \
+                and line.word in ('line', 'carriage'):
+            own |= {*line.names}
+            continue
+        if line.word == 'ground':
+            found.append(_parsed(f'{line.names[0]}{mirror.names[0]} image {line.names[0]} '
+                                 f'{" ".join(mirror.stands_on)}')._replace(text=mirror.text))
+            continue
+        suffix = dict.fromkeys(own, '')
+        args = [_image(line.word, arg, suffix.get(arg.text, mirror.names[0]))
+                for arg in line.arguments if arg.option != 'geared']
+        if line.word in INPUTS:
+            number = count[line.word] if count[line.word] > 1 else ''
+            ratio = -1 if line.word == 'crank' else 1
+            args += [f'geared {line.word}{number} {ratio} 0']
+        names = [name + mirror.names[0] for name in line.names[::-1]]
+        found.append(_parsed(f'{" ".join(names)} {line.word} {" ".join(args)}')._replace(
+            text=mirror.text, mirrors=(*line.mirrors, mirror.stands_on)))
+    return found
+
+
+def _image(word: str, arg: Argument, suffix: str) -> str:
+    """Return what stands for an argument in the image of a line."""
+    if arg.kind in _JOINTS:
+        text = arg.text + suffix
+    elif arg.kind == 'left|right':
+        text = 'right' if arg.text == 'left' else 'left'
+    else:
+        across = (word, arg.kind) in (('slot', 'OFFSET'), ('block', 'Y'))
+        text = f'-({arg.text})' if across else arg.text
+    word = 'along' if arg.kind == 'TOWARDS' else arg.option if arg.option != arg.text else ''
+    return f'{word} {text}'.strip()
 
 
 def _parsed(text: str) -> Line:
@@ -236,7 +286,8 @@ def _missing(lines: List[Line], line: Line, joint: str, placed: Mapping[str, Lin
         for needed in places[name].stands_on:
             if needed in line.names:
                 return (f'joints {listed((needed, *_way(after, name)))} wait for each other: only '
-                        'groups of two bars, dyads, can be solved, one after the other')
+                        'groups of two bars, dyads, can be solved, one after the other, not Assur '
+                        'groups of class III, such as a platform on three bars')
             if needed in places and needed not in placed and needed not in after:
                 after[needed] = name
                 waiting.append(needed)
@@ -324,6 +375,7 @@ def draw(builder: Builder, lines: Iterable[Line], symbols: Mapping[str, Real],
                  for word, values in options.items()}
         names = line.names if len(line.names) > 1 else line.names[0]
         try:
+            builder.mirrors = line.mirrors
             getattr(builder, line.word)(names, *plain, **named)
         except ConstructionError as error:
             raise line.error(error) from None

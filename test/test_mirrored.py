@@ -1,0 +1,74 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A linkage and its image in a mirror line: every joint is where the mirror shows it."""
+
+from linkage_ros import mechanisms
+import numpy as np
+import pytest
+
+# One of every construction, by two inputs; the mirror line O-H is askew and joints lie on it.
+ALL = ('O ground 0 0', 'H ground 1 2', 'K ground 1 0', 'Q ground 1.5 -0.3', 'A crank K 0.2',
+       'B dyad A Q 0.7 0.6 left', 'T rigid B Q 0.5 0.6 right', 'I line Q B 0.9',
+       'S slider B 0.9 Q 0.3 out', 'U block S 0.1 0.2', 'L slot Q A 0.05 out 1.0',
+       'E crank A 0.1 zero K', 'M mirror K A Q', 'P parallelogram Q B T',
+       'N antiparallelogram Q B I', 'R V W inversor Q A 1.5 0.6', 'G line K Q 0.3',
+       'F cylinder K G 0.4 left geared carriage 1 0', 'm mirrored O H')
+CARRIAGE = ('O ground 0 0', 'H ground 1 2', 'C carriage O along H 0.1 0.6')
+GRIPPER = ('O ground 0 0', 'H ground 1 0', 'S carriage O along H 0.1 0.6', 'A ground 0.2 0.4',
+           'B dyad S A 0.4 0.3 left', 'T rigid A B 0.5 0.4 left', 'm mirrored O H')
+
+
+def seen(places, first='O', second='H'):
+    """Return each place as it is seen in the mirror line, as complex numbers."""
+    at = {name: complex(*place) for name, place in places.items()}
+    along = (at[second] - at[first]) / abs(at[second] - at[first])
+    return at, {name: at[first] + along ** 2 * (place - at[first]).conjugate()
+                for name, place in at.items()}
+
+
+@pytest.mark.parametrize('up', ['', ' up'])
+def test_every_construction_has_its_image(up):
+    lines = [line + up if line == 'A crank K 0.2' else line for line in (*CARRIAGE, *ALL[2:])]
+    linkage = mechanisms.create('custom', joints=lines)
+    assert [input_.name for input_ in linkage.inputs] == ['carriage', 'crank', 'crank2']
+    count = 0
+    for values in np.random.default_rng(3).uniform((0.15, -3.0, -3.0), (0.55, 3.0, 3.0), (40, 3)):
+        places, images = seen(linkage.solve(values.tolist()))
+        for name, image in images.items():
+            if f'{name}m' in places:
+                assert np.isnan(image) == np.isnan(places[f'{name}m'])
+                assert np.isnan(image) or abs(image - places[f'{name}m']) < 1e-13
+                count += not np.isnan(image)
+    assert count > 400 and 'Om' not in linkage.points and 'Cm' not in linkage.points
+
+
+def test_what_drives_along_the_mirror_line_drives_both_fingers():
+    linkage = mechanisms.create('custom', joints=GRIPPER)
+    assert [input_.name for input_ in linkage.inputs] == ['carriage']
+    assert linkage.points == ('O', 'H', 'S', 'A', 'B', 'T', 'Am', 'Bm', 'Tm')
+    found = linkage.solve(0.3)
+    assert found['Tm'] == pytest.approx(found['T'] * (1.0, -1.0))
+    rates = linkage.velocity(0.3)
+    assert rates['Tm'] == pytest.approx(rates['T'] * (1.0, -1.0))
+    assert linkage.reach() == [(0.1, 0.6)]
+
+
+def test_an_image_may_be_mirrored_again():
+    linkage = mechanisms.create('custom', joints=(
+        'O ground 0 0', 'H ground 1 0', 'V ground 0 1', 'K ground 2 1', 'A crank K 0.5 up',
+        'x mirrored O H', 'y mirrored O V'))
+    place = {name: complex(*at) for name, at in linkage.solve(0.4).items()}
+    assert place['Ax'] == pytest.approx(place['A'].conjugate())
+    assert place['Ay'] == pytest.approx(-place['A'].conjugate())
+    assert place['Axy'] == pytest.approx(-place['A'])
+
+
+@pytest.mark.parametrize('line, text', [
+    ('m mirrored O A', 'joint A must be on the ground'), ('m mirrored O O', 'must differ'),
+    ('9 mirrored O H', 'is no name for a joint'), ('m mirrored O X', 'X is not placed before'),
+    ('m mirrored O', 'expected "NAME mirrored FIRST SECOND"'),
+    ('m n mirrored O H', 'expected "NAME mirrored FIRST SECOND"')])
+def test_a_mirror_line_that_cannot_be_is_refused(line, text):
+    with pytest.raises(ValueError, match=text):
+        mechanisms.create('custom', joints=('O ground 0 0', 'H ground 1 0', 'A crank O 1', line))
