@@ -303,7 +303,9 @@ def _linkage(name, type_, values):
     except ValueError as error:
         raise SceneError(f'{name}.dimensions: {error}') from None
     if not reach:
-        lengths = listed(f'{key}={value:g}' for key, value in dimensions.items())
+        # Those that are not the usual ones first: of many only some are named.
+        usual = sorted(dimensions, key=lambda key: dimensions[key] == design.dimensions[key])
+        lengths = listed(f'{key}={dimensions[key]:g}' for key in usual)
         raise SceneError(f'{name}.dimensions must let the {type_} be assembled at some '
                          f'{linkage.inputs[0].kind}, which {lengths} do not')
     return linkage, reach
