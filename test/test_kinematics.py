@@ -531,7 +531,7 @@ def test_a_length_that_cannot_be_is_said_in_metres(graph):
 
 def test_an_encoder_on_the_rocker_drives_as_the_crank_does(graph):
     graph.start(Kinematics, {'mechanisms': ['bars'], 'bars.type': 'four_bar',
-                             'bars.crank.source': 'QB', 'bars.crank.start': 0.7})
+                             'bars.crank.measures': 'QB', 'bars.crank.start': 0.7})
     linkage, states = mechanisms.create('four_bar'), graph.listen(JointState, 'bars/joint_states')
     measure = graph.crank(['bars_QB'])
     for theta in (0.7, 1.0, 1.8, 2.4):
@@ -545,7 +545,7 @@ def test_an_encoder_on_the_rocker_drives_as_the_crank_does(graph):
 
 def test_a_draw_wire_that_says_what_cannot_be_is_passed_over(graph):
     graph.start(Kinematics, {'mechanisms': ['wired'], 'wired.type': 'four_bar',
-                             'wired.crank.source': 'distance(O,B)', 'wired.crank.start': 0.7})
+                             'wired.crank.measures': 'distance(O,B)', 'wired.crank.start': 0.7})
     linkage, states = mechanisms.create('four_bar'), graph.listen(JointState, 'wired/joint_states')
     heard = graph.listen(Log, '/rosout')
     measure = graph.crank(['wired_distance(O,B)'])
@@ -554,7 +554,44 @@ def test_a_draw_wire_that_says_what_cannot_be_is_passed_over(graph):
     for bad in (1e3, math.nan, math.inf):
         with pytest.raises(AssertionError, match='in time'):
             measure([bad], [], seconds=0.2)
-    graph.until(lambda: [m for m in heard if 'distance(O,B) 1000 cannot be' in m.msg])
+    graph.until(lambda: [m for m in heard if 'distance(O,B) cannot be where '
+                         'wired_distance(O,B) is 1000' in m.msg])
     assert measure([length], states).position[0] == pytest.approx(0.9)
     assert len([m for m in heard if 'cannot be' in m.msg]) == 1
     assert all(np.isfinite(state.position).all() for state in states)
+
+
+MOTORS = {'mechanisms': ['left', 'right'], 'left.type': 'four_bar', 'right.type': 'four_bar',
+          'left.crank.source': 'hip_motor', 'left.crank.ratio': 0.5, 'left.crank.offset': 0.2,
+          'right.crank.source': 'hip_motor', 'right.crank.ratio': -2.0}
+
+
+def test_a_motor_of_any_name_drives_by_ratio_and_offset(graph):
+    node = graph.start(Kinematics, MOTORS)
+    left, right = (graph.listen(JointState, f'{name}/joint_states') for name in ('left', 'right'))
+    turn = graph.crank(['hip_motor', 'left_crank'])
+    state = turn([0.6, 9.0], left, [1.0, 0.0])
+    assert state.position[0] == pytest.approx(0.5) and state.velocity[0] == pytest.approx(0.5)
+    other = graph.until(lambda: [m for m in right if m.header.stamp == state.header.stamp])[0]
+    assert other.position[0] == pytest.approx(-1.2) and other.velocity[0] == pytest.approx(-2.0)
+    assert graph.set(node, left__crank__offset=0.0).successful
+    assert turn([0.6, 9.0], left, [1.0, 0.0]).position[0] == pytest.approx(0.3)
+    refused = graph.set(node, left__crank__ratio=0.0)
+    assert not refused.successful and 'left.crank.ratio must be' in refused.reason
+
+
+@pytest.mark.parametrize('told', [
+    {'bars.crank.source': 'motor', 'bars.crank.ratio': -0.25, 'bars.crank.offset': 1.0},
+    {'bars.crank.measures': 'QB', 'bars.crank.ratio': 2.0, 'bars.crank.sweep': [0.5, 1.4]}])
+def test_the_driver_tells_what_the_motor_would(graph, told):
+    scene = {'mechanisms': ['bars'], 'bars.type': 'four_bar', **told}
+    graph.start(Kinematics, scene)
+    driver = graph.start(CrankDriver, scene)
+    states, sent = (graph.listen(JointState, topic)
+                    for topic in ('bars/joint_states', 'crank_states'))
+    graph.until(lambda: len(states) > 5 and len(sent) > 5)
+    assert set(sent[-1].name) == {told.get('bars.crank.source', 'bars_QB')}
+    crank = driver.scene.machines['bars'].first
+    low, high = crank.sweep or (-math.inf, math.inf)
+    assert all(low <= state.position[0] <= high for state in states)
+    assert all(abs(state.velocity[0]) == pytest.approx(1.0) for state in states)

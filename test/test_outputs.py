@@ -96,7 +96,7 @@ def test_whole_turns_are_kept_and_what_cannot_be_is_not_a_number():
 
 
 def test_a_scene_measures_lengths_scaled_and_beyond_a_branch_the_nearest_answer():
-    machine = scene.read({**LIFT, 'lift.cylinder.source': 'OB'}).machines['lift']
+    machine = scene.read({**LIFT, 'lift.cylinder.measures': 'OB'}).machines['lift']
     for length in (1.3, 2.0, 3.1):
         angle = machine.linkage.joint_angles(length / 2.0)['OB']
         found, rate = machine.measured('OB', float(angle), 2.0)
@@ -104,13 +104,13 @@ def test_a_scene_measures_lengths_scaled_and_beyond_a_branch_the_nearest_answer(
         assert rate == pytest.approx(0.5 * machine.linkage.joint_rates(length / 2.0)['OB'])
     drawn = machine.linkage.solve(1.0)['C']
     assert machine.measured('C.x', 2.0 * drawn[0], 2.0)[0] == pytest.approx(2.0)
-    crank = scene.read({**ROCKER, 'bars.crank.source': 'QB'}).machines['bars']
+    crank = scene.read({**ROCKER, 'bars.crank.measures': 'QB'}).machines['bars']
     across = float(crank.linkage.joint_angles(math.pi - 0.01)['QB'])
     assert crank.measured('QB', across, math.pi + 0.01)[0] == pytest.approx(math.pi - 0.01)
 
 
 def test_a_measured_value_stays_inside_the_sweep_that_is_set():
-    swept = scene.read({**ROCKER, 'bars.crank.source': 'QB', 'bars.crank.sweep': [0.5, 1.0]})
+    swept = scene.read({**ROCKER, 'bars.crank.measures': 'QB', 'bars.crank.sweep': [0.5, 1.0]})
     machine = swept.machines['bars']
     inside, outside = (float(machine.linkage.joint_angles(theta)['QB']) for theta in (0.8, 1.6))
     assert machine.measured('QB', inside, 0.6)[0] == pytest.approx(0.8)
@@ -118,10 +118,10 @@ def test_a_measured_value_stays_inside_the_sweep_that_is_set():
 
 
 @pytest.mark.parametrize('name, source, text', [
-    ('five_bar', 'P.y', 'five_bar.crank.source must be empty: only a linkage with one input'),
-    ('four_bar', 'QX', "four_bar.crank.source: four_bar has no output 'QX'; allowed: crank, AB"),
-    ('four_bar', 'distance(O,Q)', 'four_bar.crank.source: distance(O,Q) of four_bar does not')])
+    ('five_bar', 'P.y', 'five_bar.crank.measures must be empty: only a linkage with one input'),
+    ('four_bar', 'QX', "four_bar.crank.measures: four_bar has no output 'QX'; allowed: crank, AB"),
+    ('four_bar', 'distance(O,Q)', 'four_bar.crank.measures: distance(O,Q) of four_bar does not')])
 def test_a_source_that_cannot_be_is_refused(name, source, text):
     with pytest.raises(scene.SceneError) as refused:
-        scene.read({'mechanisms': [name], f'{name}.crank.source': source})
+        scene.read({'mechanisms': [name], f'{name}.crank.measures': source})
     assert text in str(refused.value)

@@ -322,7 +322,8 @@ def test_every_parameter_says_what_it_means_and_who_reads_it():
         assert field.meaning.endswith('.') and field.allowed and field.readers
         name, _, what = parameter.name.partition('.')
         assert field.read_only == (parameter.name == 'mechanisms' or what == 'type'
-                                   or what.endswith('.source') or what in ('leg_pairs', 'mirrored')
+                                   or what.endswith(('.source', '.measures'))
+                                   or what in ('leg_pairs', 'mirrored')
                                    and name in ('water_drop', 'slotted_lever'))
 
 

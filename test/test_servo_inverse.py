@@ -400,3 +400,12 @@ def test_a_length_that_cannot_be_had_is_explained_in_metres(call, output, wanted
     response = call({**BOOM, 'boom.cylinder.sweep': [1.5, 2.0]}, output=output,
                     lever_angle=[wanted])
     assert not response.success and text in response.message
+
+
+def test_the_answer_is_where_the_motor_has_to_be(call):
+    theta = mechanisms.create('slotted_lever').servo_angle(0.3)
+    geared = call({'mechanisms': ['slotted_lever'], 'slotted_lever.crank.ratio': -0.5,
+                   'slotted_lever.crank.offset': 0.1}, lever_angle=[0.3], servo_near=[-0.7])
+    assert geared.servo_angle[0] == pytest.approx((theta - 0.1) / -0.5)
+    assert geared.reduction[0] == pytest.approx(
+        -0.5 * mechanisms.create('slotted_lever').reduction(theta))

@@ -28,7 +28,7 @@ class CrankDriver(scene_node.SceneNode):
     def __init__(self, **kwargs):
         super().__init__(scene.DRIVER, **kwargs)
         self._motions = {}
-        self._drives = {}
+        self._drives, self._machines = {}, {}
         self._now = self._steady = None
         self._messages = JointStates()
         self._publisher = self.create_publisher(JointState, 'crank_states', 10)
@@ -40,15 +40,15 @@ class CrankDriver(scene_node.SceneNode):
     def adopt(self, new):
         """Let every input go on as the scene says: from where it is, or from a new start."""
         now = 0 if self._now is None else self._settled().nanoseconds
-        drives = {f'{name}_{input_}': drive for name, machine in new.machines.items()
+        drives = {(name, input_): drive for name, machine in new.machines.items()
                   for input_, drive in machine.inputs.items()}
-        for name, drive in drives.items():
-            old = self._drives.get(name)
+        for key, drive in drives.items():
+            old = self._drives.get(key)
             if old is None or old.start != drive.start:
-                self._motions[name] = Motion.of(drive, now)
+                self._motions[key] = Motion.of(drive, now)
             elif (old.speed, old.sweep) != (drive.speed, drive.sweep):
-                self._motions[name] = self._motions[name].changed(drive.speed, drive.sweep, now)
-            self._drives[name] = drive
+                self._motions[key] = self._motions[key].changed(drive.speed, drive.sweep, now)
+        self._drives, self._machines = drives, new.machines
         self._pace(new.rate)
 
     def _pace(self, rate):
@@ -82,13 +82,23 @@ class CrankDriver(scene_node.SceneNode):
         time = self._settled()
         now = time.nanoseconds
         if self._publisher.get_subscription_count():
-            values, speeds = zip(*(motion.at(now) for motion in self._motions.values()))
+            said = {drive.source: self._said(key, drive, now)
+                    for key, drive in self._drives.items()}
+            positions, speeds = zip(*said.values())
             self._publisher.publish(
-                self._messages.message(time.to_msg(), list(self._motions), values, speeds))
+                self._messages.message(time.to_msg(), list(said), positions, speeds))
+
+    def _said(self, key, drive, now):
+        """Return where an input is and how fast, as its source tells it."""
+        value, speed = self._motions[key].at(now)
+        if drive.is_plain:
+            return value, speed
+        return self._machines[key[0]].told(drive, value, speed)
 
     def serves(self):
         """Say which inputs it moves, how often."""
-        return f'moves {listed(self._motions, 200)} on crank_states at {self.scene.rate:g} Hz'
+        sources = [drive.source for drive in self._drives.values()]
+        return f'moves {listed(sources, 200)} on crank_states at {self.scene.rate:g} Hz'
 
     def _wake(self):
         set_back = self._now is not None and self._time().nanoseconds < self._now

@@ -48,9 +48,11 @@ class Kinematics(scene_node.SceneNode):
         super().__init__(scene.KINEMATICS, **kwargs)
         self._mechanisms = {name: MechanismPublisher(self, machine)
                          for name, machine in self.scene.machines.items()}
-        self._inputs = {f'{name}_{drive.heard}': (self._mechanisms[name], i)
-                        for name, machine in self.scene.machines.items()
-                        for i, drive in enumerate(machine.inputs.values())}
+        # Each input that a source tells of, by the source's name.
+        self._inputs = {}
+        for name, machine in self.scene.machines.items():
+            for i, drive in enumerate(machine.inputs.values()):
+                self._inputs.setdefault(drive.source, []).append((self._mechanisms[name], i))
         self._unheard, self._strangers = set(self._inputs), set()
         self._reader = joint_state_reader.Reader(self._routed)
         self._patience = self.create_timer(
@@ -119,9 +121,9 @@ class Kinematics(scene_node.SceneNode):
         known = len(message.velocity) == len(message.name)
         routes = {}
         for name, place in dict(zip(message.name, range(len(message.position)))).items():
-            if name in self._inputs:
-                shown, i = self._inputs[name]
+            for shown, i in self._inputs.get(name, ()):
                 routes.setdefault(shown, []).append((i, place))
+            if name in self._inputs:
                 self._hear(name)
         self._meet(message.name)
         return [(shown, places, known) for shown, places in routes.items()]
@@ -151,7 +153,7 @@ class Kinematics(scene_node.SceneNode):
             waiting = [name for name in self._inputs if name in self._unheard]
             self.get_logger().warning(
                 f'crank_states: nothing was heard of {listed(waiting, 150)}, without which '
-                f'{listed(dict.fromkeys(self._inputs[name][0].name for name in waiting), 150)} '
+                f'{listed(dict.fromkeys(self._inputs[name][0][0].name for name in waiting), 150)} '
                 'cannot move')
 
 
@@ -201,6 +203,7 @@ class Model:
 
     def __init__(self, machine: scene.Machine, frame_id: str):
         self.machine, self.made_for = machine, (machine, frame_id)
+        self.drives = list(machine.inputs.values())
         self.robot = urdf.describe([machine], frame_id)
         self.assembly = machine.assembly()
         self.inputs = [f'{machine.name}_{input_}' for input_ in machine.inputs]
@@ -279,7 +282,6 @@ class MechanismPublisher:
 
     def __init__(self, node_, machine: scene.Machine):
         self.name = name = machine.name
-        self._source = machine.first.source
         self._joint_states = node_.create_publisher(JointState, f'{name}/joint_states', 10)
         self._markers = node_.create_publisher(MarkerArray, f'{name}/markers', 1)
         self._locus = node_.create_publisher(Marker, f'{name}/locus', LATCHED)
@@ -361,25 +363,23 @@ class MechanismPublisher:
         """
         for i, place in places:
             value, speed = positions[place], speeds[place] if speeds else None
-            if self._source:
-                value, speed = self._measured(value, speed)
+            if not (drive := self._model.drives[i]).is_plain:
+                value, speed = self._understood(drive, value, speed, self._values[i])
             if value is not None:
                 self._values[i], self._speeds[i] = value, speed
         if None not in self._values:
             self._show(stamp, tuple(self._values),
                        () if None in self._speeds else tuple(self._speeds))
 
-    def _measured(self, value, speed):
-        """Return the input and its speed that the source tells; None if it cannot be."""
-        machine = self._model.machine
-        near = self._values[0]
-        found, rate = machine.measured(
-            self._source, value, machine.first.start if near is None else near)
-        if not math.isfinite(found):
-            self._logger.warning(f'{self._source} {value:.6g} cannot be: it is passed over',
-                                 throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
+    def _understood(self, drive, position, speed, near):
+        """Return an input and its speed as its source tells; None if they cannot be."""
+        value, speed = self._model.machine.understood(drive, position, speed, near)
+        if drive.measures and not math.isfinite(value):
+            self._logger.warning(
+                f'{drive.measures} cannot be where {drive.source} is {position:.6g}: it is passed '
+                'over', throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
             return None, None
-        return found, speed / rate if speed is not None and rate else None
+        return value, speed
 
     def _show(self, stamp, values, speeds):
         """Publish what is listened to."""

@@ -60,7 +60,7 @@ class ServoInverse(scene_node.SceneNode):
     def adopt(self, new):
         """Forget what was asked about."""
         self._known = {}
-        self._inputs = {f'{name}_{drive.heard}' for name, machine in new.machines.items()
+        self._inputs = {drive.source for machine in new.machines.values()
                         for drive in machine.inputs.values()}
 
     def _inputs_in(self, message):
@@ -82,7 +82,7 @@ class ServoInverse(scene_node.SceneNode):
         try:
             key = request.mechanism, request.output
             asked = self._known.get(key) or Asked(_machine(self.scene, *key), request.output)
-            solve(asked, request, response, asked.present(self._heard.get(asked.heard)))
+            solve(asked, request, response, asked.present(self._heard.get(asked.source)))
             self._known[key] = asked
         except ValueError as problem:
             response.message = elided(str(problem), MESSAGE)
@@ -117,7 +117,7 @@ def solve(asked, request, response, present=math.inf):
     # One angle is the usual question, and floats answer it sooner than arrays.
     given = np.array if len(wanted) > 1 else itemgetter(0)
     known = present if abs(present) <= scene.FARTHEST else None
-    found = asked.servo(given(wanted), given(near) if near else known)
+    found = asked.servo(given(wanted), asked.input_of(given(near)) if near else known)
     response.servo_angle, response.reduction = map(_listed, found)
     response.reachable = list(map(math.isfinite, response.servo_angle))
     response.success = all(response.reachable)
@@ -148,27 +148,36 @@ class Asked:
             raise ValueError(f'{machine.name} has several inputs; only a linkage with one can be '
                              'solved for an output')
         self._drive = machine.first
-        self.heard, self.unit = f'{machine.name}_{self._drive.heard}', self._drive.input.unit
+        self.source, self.unit = self._drive.source, self._drive.input.unit
         self.what = 'lever angles' if self._name == LEVER else f'values of {self._name}'
         self._linkage.check_output(self._name)
         self._turns = self._linkage.is_angle(self._name)
         self._scale = machine.scale_of(self._name)
         self._input_scale = machine.scale_of(self._drive.input.name)
 
+        # Where something else is measured, the answer is the input itself.
+        self._ratio, self._offset = (1.0, 0.0) if self._drive.measures else (
+            self._drive.ratio, self._drive.offset)
+
+    def input_of(self, position):
+        """Return the input [rad or m] of its source's position."""
+        return self._ratio * position + self._offset
+
     def present(self, heard: Optional[float]) -> float:
         """Return where the input is, from what was heard last; infinite if that is not known."""
-        if heard is None or not self._drive.source:
-            return math.inf if heard is None else heard
-        found, _ = self._machine.measured(self._drive.source, heard, self._drive.start)
+        if heard is None:
+            return math.inf
+        found, _ = self._machine.understood(self._drive, heard, None, None)
         return found if math.isfinite(found) else math.inf
 
     def servo(self, wanted, near):
-        """Return for each value the input [rad or m] and d output / d input there."""
+        """Return for each value where the source has to be, and d output / d source there."""
         unit, ends = self._input_scale, self._drive.ends
         value, rate = self._linkage.servo_for(
             self._name, wanted / self._scale, near if near is None else near / unit,
             ends and (ends[0] / unit, ends[1] / unit))
-        return value * unit, rate * (self._scale / unit)
+        return ((value * unit - self._offset) / self._ratio,
+                rate * (self._scale / unit * self._ratio))
 
     def reason(self, value: float) -> str:
         """Return in words why a value cannot be had: which end of the sweep or reach forbids."""

@@ -74,8 +74,13 @@ POSE = Field('double_array', "Pose of the linkage's plane in frame_id: "
 SPEED = Field('double', 'Speed of the {0} [{1}/s].', -FASTEST, FASTEST, readers=(DRIVER,))
 START = Field('double', 'Where the {0} starts [{1}]; a new value moves it there.',
               readers=(DRIVER,))
-SOURCE = Field('string', 'Output that is measured, from which the {0} follows; empty: the {0} '
-               'itself.', readers=(KINEMATICS, INVERSE), read_only=True)
+SOURCE = Field('string', 'Joint in messages that tells of the {0}; empty: its name, or that of what '
+               'is measured, after <mechanism>_.', readers=ALL, read_only=True)
+MEASURES = Field('string', 'Output that the source measures, from which the {0} follows; empty: the '
+                 '{0} itself.', readers=ALL, read_only=True)
+RATIO = Field('double', 'How far the {0} moves for each unit of its source.', readers=ALL,
+              rule='not zero')
+OFFSET = Field('double', 'Where the {0} is when its source is at zero [{1}].', readers=ALL)
 SWEEP = Field('double_array', 'Between which values [{1}] the {0} moves to and fro; '
               'empty: through its reach, or all round.', readers=ALL,
               rule=f'the lower end and the higher end, within {FARTHEST:g} of zero, or none')
@@ -99,6 +104,10 @@ class Drive:
     ends : (float, float), optional
         The ends that were set, beyond which no answer lies either; None: all its reach.
     source : str
+        The joint in messages that tells of it.
+    ratio, offset : float
+        It is ratio * position + offset; so is what is measured instead.
+    measures : str
         The output that is measured instead; empty: the input itself.
 
     """
@@ -110,11 +119,14 @@ class Drive:
     sweep: Optional[Arc]
     ends: Optional[Arc] = None
     source: str = ''
+    ratio: float = 1.0
+    offset: float = 0.0
+    measures: str = ''
 
     @property
-    def heard(self) -> str:
-        """What messages call what they say of it, after the mechanism's name."""
-        return self.source or self.input.name
+    def is_plain(self) -> bool:
+        """Whether its source tells the input as it is."""
+        return (self.ratio, self.offset, self.measures) == (1.0, 0.0, '')
 
 
 @dataclass(frozen=True)
@@ -161,6 +173,24 @@ class Machine:
             found, rate = map(float, self.linkage.servo_for(
                 output, value / unit, near / own, ends))
         return found * own, rate * unit / own
+
+    def understood(self, drive: Drive, position: float, speed: Optional[float],
+                   near: Optional[float]) -> Tuple[float, Optional[float]]:
+        """Return an input and its speed as its source tells, going on from where it was near."""
+        value, speed = drive.ratio * position + drive.offset, speed and drive.ratio * speed
+        if not drive.measures:
+            return value, speed
+        found, rate = self.measured(drive.measures, value, drive.start if near is None else near)
+        return found, speed / rate if speed is not None and rate else None
+
+    def told(self, drive: Drive, value: float, speed: float) -> Tuple[float, float]:
+        """Return an input and its speed as its source would tell it."""
+        if output := drive.measures:
+            own, unit = self.scale_of(drive.input.name), self.scale_of(output)
+            rate = float(self.linkage.joint_rates(value / own, [output])[output]) * unit / own
+            value = float(self.linkage.joint_angles(value / own, [output])[output]) * unit
+            speed = rate * speed
+        return (value - drive.offset) / drive.ratio, speed / drive.ratio
 
     def assembly(self) -> Assembly:
         """Return its legs on their inputs."""
@@ -288,7 +318,7 @@ def _machine(name: str, given: Mapping[str, Any], old: Optional[Machine], strict
                                   settled.get(input_.name), strict)
               for input_ in linkage.inputs}
     for drive in inputs.values():
-        _check_source(name, linkage, drive)
+        _check_measures(name, linkage, drive)
     _refuse_unknown(values.left(), [parameter.name for parameter in values.parameters])
     return Machine(name, linkage, reach, scale, leg_pairs, mirrored, points, pose, inputs, given,
                    tuple(values.parameters))
@@ -414,17 +444,17 @@ def _drive(name: str, input_: Input, reach, values: Values, old: Optional[Drive]
     chosen = values.left(f'{name}.start')
     start = values.take(f'{name}.start', start_field, 0.0)
     sweep = values.take(f'{name}.sweep', sweep_field, ())
-    source = values.take(f'{name}.source', _about(SOURCE, input_.name), '')
+    told = _told(name, input_, values)
     if sweep:
         _check_sweep(f'{name}.sweep', sweep, input_, reach)
     elif input_.is_whole(reach):
-        return Drive(input_, reach, speed, start, None, source=source)
+        return Drive(input_, reach, speed, start, None, None, *told)
     arcs = [sweep] if sweep else reach
     home = [arc for arc in arcs if input_.holds(arc, start, start)]
     low, high = (home or arcs)[0]
     trimmed = 0.0 if sweep else MARGIN * (high - low)
     drive = Drive(input_, reach, speed, start, (low + trimmed, high - trimmed),
-                  tuple(sweep) or None, source)
+                  tuple(sweep) or None, *told)
     settled = not strict or old and (old.start, old.sweep) == (drive.start, drive.sweep)
     if chosen and not home and not settled:
         raise SceneError(f'{name}.start must be inside the {"sweep" if sweep else "reach"} '
@@ -432,15 +462,27 @@ def _drive(name: str, input_: Input, reach, values: Values, old: Optional[Drive]
     return drive
 
 
-def _check_source(name, linkage: Mechanism, drive: Drive):
-    if not drive.source:
+def _told(name: str, input_: Input, values: Values) -> Tuple[str, float, float, str]:
+    """Return how messages tell of an input: source, ratio, offset, and what is measured."""
+    source, measures, ratio, offset = (
+        values.take(f'{name}.{key}', _about(field, input_.name, input_.unit), default)
+        for key, field, default in (('source', SOURCE, ''), ('measures', MEASURES, ''),
+                                    ('ratio', RATIO, 1.0), ('offset', OFFSET, 0.0)))
+    if not ratio:
+        raise RATIO.error(f'{name}.ratio', ratio)
+    mechanism = name.partition('.')[0]
+    return source or f'{mechanism}_{measures or input_.name}', ratio, offset, measures
+
+
+def _check_measures(name, linkage: Mechanism, drive: Drive):
+    if not drive.measures:
         return
-    key = f'{name}.{drive.input.name}.source'
+    key = f'{name}.{drive.input.name}.measures'
     if len(linkage.inputs) > 1:
         raise SceneError(f'{key} must be empty: only a linkage with one input can be solved for '
                          f'an output, and {name} has {len(linkage.inputs)}')
     try:
-        linkage.check_output(drive.source)
+        linkage.check_output(drive.measures)
     except ValueError as error:
         raise SceneError(f'{key}: {error}') from None
 

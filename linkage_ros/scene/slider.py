@@ -42,7 +42,7 @@ def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
     machine = scene.machines.get(name)
     if machine and what == 'dimensions':
         return _length(machine.linkage, key, field.positive, _used(machine))
-    if machine and what in machine.inputs:
+    if machine and what in machine.inputs and key == 'start':
         reach = machine.inputs[what].reach
         ends = [value, *(end for arc in reach for end in arc)]
         return _whole_stops(value, min(ends), max(ends))
