@@ -74,10 +74,10 @@ POSE = Field('double_array', "Pose of the linkage's plane in frame_id: "
 SPEED = Field('double', 'Speed of the {0} [{1}/s].', -FASTEST, FASTEST, readers=(DRIVER,))
 START = Field('double', 'Where the {0} starts [{1}]; a new value moves it there.',
               readers=(DRIVER,))
-SOURCE = Field('string', 'Joint in messages that tells of the {0}; empty: its name, or that of what '
-               'is measured, after <mechanism>_.', readers=ALL, read_only=True)
-MEASURES = Field('string', 'Output that the source measures, from which the {0} follows; empty: the '
-                 '{0} itself.', readers=ALL, read_only=True)
+SOURCE = Field('string', 'Joint in messages that tells of the {0}; empty: its name, or that of '
+               'what is measured, after <mechanism>_.', readers=ALL, read_only=True)
+MEASURES = Field('string', 'Output that the source measures, from which the {0} follows; empty: '
+                 'the {0} itself.', readers=ALL, read_only=True)
 RATIO = Field('double', 'How far the {0} moves for each unit of its source.', readers=ALL,
               rule='not zero')
 OFFSET = Field('double', 'Where the {0} is when its source is at zero [{1}].', readers=ALL)
