@@ -119,8 +119,9 @@ class Mechanism:
 
     @property
     def longest(self) -> float:
-        """The longest bar [m]."""
-        return max(self.bar_lengths.values())
+        """The longest bar [m]; where there is none, the longest way of an input."""
+        return max(self.bar_lengths.values(),
+                   default=max(input_.high - input_.low for input_ in self.inputs))
 
     def with_dimensions(self, /, **changed: ArrayLike) -> Mechanism:
         """Return the same mechanism with other dimensions [m]; raises ValueError like create."""

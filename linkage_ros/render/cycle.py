@@ -122,9 +122,13 @@ class Cycle:
         return np.concatenate([before, self.pose(end).places[None, :, joint]])
 
     def locus(self, machine: Machine) -> np.ndarray:
-        """Return the whole curve of the first leg's tracer [m], shape (n, 2)."""
+        """
+        Return the whole curve of the first leg's tracer [m], shape (n, 2).
+
+        It is empty where several inputs are never all back at their start.
+        """
         curve = self._locus(machine.tracer)
-        if len(curve):
+        if len(curve) or self.turns == MOST_TURNS:
             return curve
         return self.course[:, 0, machine.linkage.points.index(machine.tracer)]
 

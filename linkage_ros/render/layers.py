@@ -50,7 +50,7 @@ class Trace:
             self.artists = [lines]
         elif kind != 'none':
             curve = cycle.locus(machine)
-            for side in (1.0, -1.0)[:1 + machine.mirrored]:
+            for side in (1.0, -1.0)[:1 + machine.mirrored] if len(curve) else ():
                 self._add_still(axes, curve * (side, 1.0), unit)
 
     def _add_still(self, axes, curve, unit):
@@ -119,13 +119,15 @@ def cranks(linkage, parent=None):
 
 
 def straight(curve):
-    """Return two ends of a curve that is a straight line, and None for any other."""
+    """Return two ends of a curve that is a straight line, and None for any other or none."""
+    if not len(curve):
+        return None
     first = curve[0]
     last = curve[np.argmax(np.hypot(*(curve - first).T))]
     along = last - first
     length = math.hypot(*along)
-    away = np.abs((curve - first) @ (-along[1], along[0])) / (length or 1.0)
-    return (first, last) if away.max() <= STRAIGHT * length else None
+    across = np.abs((curve - first) @ (-along[1], along[0]))
+    return (first, last) if length and across.max() <= STRAIGHT * length * length else None
 
 
 def around(frame):
@@ -326,8 +328,8 @@ class Names:
         linkage = machine.linkage
         self._axes = axes
         self._index = [linkage.points.index(name) for name in machine.points]
-        self._bars = np.array([[linkage.points.index(name) for name in bar]
-                               for bar in (*linkage.bars, *linkage.cylinders)])
+        lines = *linkage.bars, *((link.joint, link.tip) for link in linkage.links)
+        self._bars = np.array([[linkage.points.index(name) for name in line] for line in lines])
         self._fixed = np.flatnonzero(fixed(cycle.course))
         self._pivot = PIVOT_SIZE * unit * axes.figure.dpi / 72
         in_slots = {link.tip for link in linkage.links if link.kind == 'prismatic'}
