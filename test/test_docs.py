@@ -73,9 +73,9 @@ def test_every_word_has_its_drawing_with_the_very_lines_that_it_shows():
     pytest.importorskip('yaml')
     machines = scene.load(ROOT / 'pictures' / 'words.yaml').machines
     text = (ROOT / 'docs' / 'which-word.md').read_text()
-    rows = re.findall(r'^\| !\[.*\]\(images/words/(\w+)\.png\) \| (.*?) \|', text, re.MULTILINE)
-    assert [name for name, _ in rows] == [*dict(rows)] and set(machines) == {*dict(rows)}
-    shown = {name: re.findall('`(.*?)`', lines) for name, lines in rows}
+    rows = re.findall(r'\(images/words/(\w+)\.png\)\n\n```text\n(.*?)\n```', text, re.DOTALL)
+    shown = {name: lines.splitlines() for name, lines in rows}
+    assert len(rows) == len(shown) and set(shown) == set(machines)
     for name, lines in shown.items():
         written = machines[name].given[f'{name}.joints']
         assert lines == [line for line in written if line in lines]

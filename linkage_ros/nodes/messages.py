@@ -19,7 +19,7 @@ from .. import palette
 LINKS_ID, JOINTS_ID, LOCUS_ID, GUIDES_ID, BODIES_ID = range(5)
 LOOKS = ((Marker.LINE_LIST, palette.LINK, 1 / 40), (Marker.SPHERE_LIST, palette.JOINT, 1 / 20),
          (Marker.LINE_STRIP, palette.LOCUS, 1 / 100), (Marker.LINE_LIST, palette.TRACK, 1 / 60),
-         (Marker.LINE_LIST, palette.DARK, 1 / 16))
+         (Marker.LINE_LIST, palette.DARK, 1 / 20))
 
 
 class JointStates:
