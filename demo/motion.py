@@ -27,7 +27,7 @@ class Motion:
     bars : float array (n, legs * bars, 2, 2)
         Ends of each bar [m].
     course : float array (n, legs, points, 2)
-        The joints [m].
+        The joints [m], and behind them the ends of what slides.
     period : float
         Seconds of a turn.
     prefixes : tuple of str
@@ -42,7 +42,7 @@ class Motion:
                 if seconds(message.markers[0].header.stamp) in states]
         if not both:
             raise DemoError(f'{machine.name} sent no messages while it was listened to')
-        links, joints = zip(*both)
+        links, *others = zip(*both)
         self.machine = machine
         self.joint_states = len(joint_states)
         self.times = np.array([seconds(marker.header.stamp) for marker in links])
@@ -51,8 +51,11 @@ class Motion:
         self.bars = self.bars.reshape(len(links), -1, 2, 2)
         self.inputs = [tuple(states[time][f'{machine.name}_{name}'] for name in machine.inputs)
                        for time in self.times]
-        self.course = np.array([places(marker) for marker in joints])
-        self.course = self.course.reshape(len(joints), -1, len(machine.points), 2)
+        # Joints, guides and bodies in turn, each leg after leg.
+        legs = len(machine.assembly().legs)
+        self.course = np.concatenate([
+            np.array([places(marker) for marker in markers]).reshape(len(links), legs, -1, 2)
+            for markers in others], axis=2)
         self.period = Wheel(next(iter(machine.inputs.values()))).period
         self.prefixes = ('',) * self.course.shape[1]
         self._locus = places(locus)

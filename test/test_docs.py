@@ -12,6 +12,7 @@ import subprocess
 import sys
 
 from linkage_ros import mechanisms, scene
+from linkage_ros.linkage import joint_lines
 import pytest
 
 ROOT = Path(__file__).parents[1]
@@ -65,7 +66,29 @@ def test_no_page_shows_a_picture_that_is_not_kept():
 
 
 def test_the_pictures_that_are_kept_are_small():
-    assert sum(file.stat().st_size for file in (ROOT / 'docs/images').iterdir()) < 2.5e6
+    assert sum(file.stat().st_size for file in (ROOT / 'docs/images').rglob('*.*')) < 2.5e6
+
+
+def test_every_word_has_its_drawing_with_the_very_lines_that_it_shows():
+    pytest.importorskip('yaml')
+    machines = scene.load(ROOT / 'pictures' / 'words.yaml').machines
+    text = (ROOT / 'docs' / 'which-word.md').read_text()
+    rows = re.findall(r'\(images/words/(\w+)\.png\)\n\n```text\n(.*?)\n```', text, re.DOTALL)
+    shown = {name: lines.splitlines() for name, lines in rows}
+    assert len(rows) == len(shown) and set(shown) == set(machines)
+    for name, lines in shown.items():
+        written = machines[name].given[f'{name}.joints']
+        assert lines == [line for line in written if line in lines]
+        assert lines[-1] == written[-1]
+        assert any(word in lines[-1].split() for word in joint_lines.FORMS)
+    drawn = {part for lines in shown.values() for line in lines for part in line.split()}
+    assert set(joint_lines.FORMS) <= drawn
+
+
+def test_the_tables_of_words_name_all_of_them():
+    for page in ('which-word.md', 'write-your-own.md'):
+        named = re.findall(r'`(\w+)`', (ROOT / 'docs' / page).read_text())
+        assert set(joint_lines.FORMS) <= set(named)
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)

@@ -54,9 +54,13 @@ class Bench:
         """Return the joint states at a crank angle."""
         return self._turn([theta], self.joints, list(speed))
 
-    def links_and_joints_at(self, theta):
-        """Return both markers at a crank angle."""
+    def markers_at(self, theta):
+        """Return all markers at a crank angle."""
         return self._turn([theta], self.markers).markers
+
+    def links_and_joints_at(self, theta):
+        """Return both markers of links and joints at a crank angle."""
+        return [marker for marker in self.markers_at(theta) if marker.id < 2]
 
     def legs_at(self, theta):
         """Return the joints' places at a crank angle, of each leg by name."""
@@ -504,7 +508,7 @@ def test_a_linkage_with_two_cylinders_follows_both_lengths(graph):
     for state, message in pairs:
         lengths = dict(zip(state.name, state.position))
         speeds = dict(zip(state.name, state.velocity))
-        place = dict(zip('OPBCDE', places(message.markers[-1])))
+        place = dict(zip('OPBCDE', places(message.markers[1])))
         for name, ends in (('cylinder', 'PB'), ('cylinder2', 'DE')):
             assert math.dist(*map(place.get, ends)) == pytest.approx(lengths[f'boom_{name}'])
         assert (speeds['boom_cylinder'], abs(speeds['boom_cylinder2'])) == (0.3, 0.1)
@@ -514,6 +518,26 @@ def test_a_linkage_with_two_cylinders_follows_both_lengths(graph):
         assert abs(speeds['boom_OB']) == pytest.approx(0.3 * lengths['boom_cylinder'] / area)
         lines = places(message.markers[0]).reshape(-1, 2, 2)
         assert any((line == [place['P'], place['B']]).all() for line in lines)
+        assert [marker.id for marker in message.markers] == [0, 1, 4]
+        for barrel, (base, rod) in zip(places(message.markers[2]).reshape(-1, 2, 2), ('PB', 'DE')):
+            length, cylinder = math.dist(*barrel), math.dist(place[base], place[rod])
+            assert barrel[0] == pytest.approx(place[base]) and 0.0 < length < cylinder
+            along = (place[rod] - place[base]) / cylinder
+            assert barrel[1] == pytest.approx(place[base] + length * along)
+
+
+def test_a_pin_in_a_slot_is_a_block_on_a_guide_that_turns_with_the_lever(graph):
+    bench = Bench(graph, 'slotted_lever')
+    for theta in (0.3, -2.0):
+        _, joints, guides, blocks = bench.markers_at(theta)
+        assert (guides.id, blocks.id) == (3, 4) and guides.scale.x < blocks.scale.x
+        place = dict(zip('OQAL', places(joints)))
+        along = (place['L'] - place['Q']) / math.dist(place['L'], place['Q'])
+        (start, end), (back, front) = places(guides), places(blocks)
+        assert (end - start) / math.dist(start, end) == pytest.approx(along)
+        assert (front - back) / math.dist(back, front) == pytest.approx(along)
+        assert 0.5 * (back + front) == pytest.approx(place['A'])
+        assert 0.0 < (place['A'] - start) @ along < math.dist(start, end)
 
 
 def test_a_length_that_cannot_be_is_said_in_metres(graph):

@@ -62,7 +62,7 @@ def test_joint_states_put_the_robot_where_the_markers_are(graph, name, library):
               for point in machine.points]
     for theta in (-1.0, 0.0, 0.3, 1.1):
         state = turn([theta], joints)
-        _, spheres = turn([theta], markers).markers
+        _, spheres, *_ = turn([theta], markers).markers
         found = robot.places(dict(zip(state.name, state.position)), frames)
         for frame, point in zip(frames, spheres.points):
             wanted = in_frame(spheres.pose, point)

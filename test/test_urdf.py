@@ -11,6 +11,7 @@ from linkage_ros import mechanisms, scene
 from linkage_ros.linkage.output_range import common_reach, travels
 from linkage_ros.linkage.walker import Assembly
 from linkage_ros.robot_model import urdf
+from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD, shapes
 import numpy as np
 import pytest
 from robots import LIBRARIES, Pinocchio, Yourdfpy
@@ -149,6 +150,37 @@ def test_every_bar_is_a_rod_from_joint_to_joint(name):
     near = TOLERANCE * one.scale * one.linkage.longest
     assert len(rods) == len(bars)
     assert all(any(np.abs(rod - bar).max() < near for rod in rods) for bar in bars)
+
+
+@pytest.mark.parametrize('name, kinds', [
+    ('boom and arm', {BARREL, ROD}), ('boxer engine', {GUIDE, BLOCK}),
+    ('slotted_lever with offset', {GUIDE, BLOCK})])
+def test_what_slides_is_drawn_where_its_joints_are(name, kinds):
+    one = MACHINES[name]()
+    robot, found = Yourdfpy(description(one)), shapes(one)
+    assert {shape.kind for shape in found} == kinds
+    positions, places = posed(one, drives(one)[5])
+    robot.places(positions, [])
+    drawn = [visual_ends(robot, link, visual) for link in robot.robot.robot.links
+             for visual in link.visuals if not visual.geometry.sphere]
+    solution = one.assembly().solution([end for shape in found for end in shape[2:]])
+    solution.solve(drives(one)[5].tolist())
+    near = TOLERANCE * one.scale * one.linkage.longest
+    for row in solution.rows:
+        for ends in row.reshape(-1, 2, 2):
+            wanted = [in_space(one.pose, end) for end in ends]
+            assert any(min(np.abs(wanted - each).max(), np.abs(wanted - each[::-1]).max()) < near
+                       for each in drawn)
+
+
+def visual_ends(robot, link, visual):
+    """Return where a rod or a box begins and ends in space [m]."""
+    rod = visual.geometry.cylinder
+    half = 0.5 * (np.array([0.0, 0.0, rod.length]) if rod
+                  else np.array([visual.geometry.box.size[0], 0.0, 0.0]))
+    ends = np.array([[*-half, 1.0], [*half, 1.0]]).T
+    origin = np.eye(4) if visual.origin is None else visual.origin
+    return (robot.robot.get_transform(link.name) @ origin @ ends)[:3].T
 
 
 @pytest.mark.long

@@ -806,7 +806,8 @@ def test_a_port_that_is_no_parameter_is_refused(tmp_path):
 
 def walker(step, legs=2, frame='world', width=1.0):
     """Return a message as kinematics sends it."""
-    made = messages.Markers('leg', frame, (0.0, 1.0, 2.0, 0.5, 0.0, 0.0), [(0, 1), (1, 2)], width)
+    made = messages.Markers('leg', frame, (0.0, 1.0, 2.0, 0.5, 0.0, 0.0), width,
+                            {0: [(0, 1), (1, 2)], 1: range(3)})
     places = np.random.default_rng(step).normal(size=(legs, 3, 2))
     stamp = rclpy.time.Time(nanoseconds=1 + 10 ** 9 * step).to_msg()
     return serialize_message(made.message(stamp, places))

@@ -159,8 +159,9 @@ def test_all_legs_of_a_walker_are_solved_in_one_call(graph, work):
 @pytest.mark.parametrize('count', [1, 7, 288])
 def test_a_patched_message_reads_like_one_that_is_built(count):
     random = np.random.default_rng(count)
-    markers = messages.Markers('walker', 'world', [0.1, 0.2, 0.3, 0.4, 0.5, 0.6],
-                               [(0, 0)] if count == 1 else [(0, 1), (1, 0)], 1.0)
+    markers = messages.Markers(
+        'walker', 'world', [0.1, 0.2, 0.3, 0.4, 0.5, 0.6], 1.0,
+        {0: [(0, 0)], 1: [0]} if count == 1 else {0: [(0, 1), (1, 0)], 1: [0, 1]})
     states = messages.JointStates()
     names = [f'walker_joint{i}' for i in range(count)]
 

@@ -160,6 +160,7 @@ class Builder:
         self._place(name, pivot, found.second, link, bar, (base,))
         self.transmissions[name] = planar.transmission(found)
         barrel = self._hang(base, name, found.first, None, self._numbered('barrel'))
+        self._axes[barrel] = _Vector(found.first, real(1.0), barrel)
         self._slide(word, barrel, base, name, length, found.first)
         self.cylinders.append((base, name))
 
@@ -394,6 +395,14 @@ class Builder:
             vector = ends[1].place - ends[0].place
             return _Vector(vector, vector.length(), GROUND)
         return self._bar_between(first, second)
+
+    def spot(self, link: str, seen: Complex) -> Complex:
+        """Return the place of a point that a link carries, from where it lies on the link."""
+        if link == GROUND:
+            return seen
+        axis, (joint, start) = self._axes[link], next(iter(self.frames[link].items()))
+        along = planar.unit(axis.vector, axis.length)
+        return self.points[joint].place + along * (seen - start)
 
     def _shared_link(self, first: str, second: str) -> Optional[str]:
         """Return the moving link that two joints are on, None if there is none."""

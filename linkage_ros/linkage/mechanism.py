@@ -19,7 +19,7 @@ from .builder import in_metres, UNIT
 from .design import Design
 from .input_range import arcs
 from .inputs import Arc
-from .quantities import Structure
+from .quantities import Points, Spot, Structure
 from ..formula.expression import Real
 from ..formula.program import Batch, evaluate, keep, Pose
 from ..words import listed, quoted
@@ -66,7 +66,7 @@ class Mechanism:
         self.points = tuple(built.points)
         self.joints = tuple(built.joint_values)
         self.bars = tuple((bar.first, bar.second) for bar in built.bars)
-        self.lines = (*self.bars, *built.cylinders)
+        self.cylinders = tuple(built.cylinders)
         self._design = design
         self._structure = structure
         self._accelerate = accelerate
@@ -119,8 +119,9 @@ class Mechanism:
 
     @property
     def longest(self) -> float:
-        """The longest bar [m]."""
-        return max(self.bar_lengths.values())
+        """The longest bar [m]; where there is none, the longest way of an input."""
+        return max(self.bar_lengths.values(),
+                   default=max(input_.high - input_.low for input_ in self.inputs))
 
     def with_dimensions(self, /, **changed: ArrayLike) -> Mechanism:
         """Return the same mechanism with other dimensions [m]; raises ValueError like create."""
@@ -302,7 +303,7 @@ class Mechanism:
                                            ('rates', rates)))
         return self._bound('parts', wanted).at
 
-    def legs(self, points: Tuple[str, ...], joints: Tuple[str, ...], moving: Tuple[str, ...],
+    def legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...],
              rows: np.ndarray) -> Batch:
         """
         Return legs like this one on the same inputs, to be solved again and again.
@@ -312,8 +313,10 @@ class Mechanism:
 
         Parameters
         ----------
-        points, joints, moving : tuple of str
-            The joints whose places, angles and velocities are wanted.
+        points : tuple of str or Spot
+            The joints, and points that are none, whose places are wanted.
+        joints, moving : tuple of str
+            The links whose joint angles and velocities are wanted.
         rows : float array (legs, n)
             Where they go: x, y [m] of each point, joint angles [rad; a slide: m], velocities.
 
@@ -324,8 +327,16 @@ class Mechanism:
             [rad/s or m/s], and the numbers of its `Leg`.
 
         """
-        program = self._structure.legs(points, joints, moving)
-        return program.bind(self._lengths, self._evaluated, self._accelerate).batch(rows)
+        lengths, unit = dict(self._lengths), self._lengths[UNIT.args[0]]
+        named: List[Union[str, Spot]] = []
+        for i, point in enumerate(points):
+            if isinstance(point, Spot):
+                names = f'[x{i}]', f'[y{i}]'
+                lengths.update(zip(names, (point.x / unit, point.y / unit)))
+                point = Spot(point.link, *names)
+            named.append(point)
+        program = self._structure.legs(tuple(named), joints, moving)
+        return program.bind(lengths, dict(self._evaluated), self._accelerate).batch(rows)
 
     def _vectors(self, kind: str, theta: Inputs, points: Any, *by: int) -> dict:
         names, pose = self._ready(kind, points, *by)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from itertools import chain, cycle
 import re
-from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple, Union
 
 from . import joint_lines
 from .builder import Builder, in_metres
@@ -22,6 +22,7 @@ from ..formula.expression import (
     argument,
     Complex,
     derivative,
+    dimension,
     gated,
     Real,
     real,
@@ -49,6 +50,18 @@ class Leg(NamedTuple):
     size: Any
 
 
+class Spot(NamedTuple):
+    """A point that is no joint: the link that carries it, and where it lies there [m]."""
+
+    link: str
+    x: Any
+    y: Any
+
+
+# Joints by name, and spots.
+Points = Tuple[Union[str, Spot], ...]
+
+
 class Structure:
     """A design drawn with its branches: what all mechanisms of that kind share."""
 
@@ -72,16 +85,23 @@ class Structure:
             keep(self._programs, key, Program(outputs, len(self.built.inputs)))
         return self._programs[key]
 
-    def legs(self, points: Names, joints: Names, moving: Names) -> Program:
+    def legs(self, points: Points, joints: Names, moving: Names) -> Program:
         """Return the code for a leg of several; see `Mechanism.legs`."""
         key = points, joints, moving
         if key not in self._programs:
             keep(self._programs, key, self._legs(points, joints, moving))
         return self._programs[key]
 
-    def _points(self, names: Names) -> List[Real]:
-        places = [self.built.points[n].place for n in names]
-        return [in_metres(part) for place in places for part in (place.x, place.y)]
+    def _points(self, names: Points) -> List[Real]:
+        return [in_metres(part) for place in map(self._place, names)
+                for part in (place.x, place.y)]
+
+    def _place(self, point: Union[str, Spot]) -> Complex:
+        """Return where a joint is, or a spot whose coordinates are dimensions."""
+        if isinstance(point, str):
+            return self.built.points[point].place
+        return self.built.spot(point.link, Complex(*(
+            dimension(name, positive=False) for name in point[1:])))
 
     def _velocities(self, names: Names, by: int = 0) -> List[Real]:
         known: Dict[Real, Real] = {}
@@ -118,7 +138,7 @@ class Structure:
         turning = [self._rates(rates, by) for by in range(len(self.built.inputs))]
         return [*self._points(points), *self._angles(joints), *chain.from_iterable(turning)]
 
-    def _legs(self, points: Names, joints: Names, moving: Names) -> Program:
+    def _legs(self, points: Points, joints: Names, moving: Names) -> Program:
         inputs = self.built.inputs
         given = [argument(i) for i in range(2 * len(inputs) + len(Leg._fields))]
         values, speeds, leg = (given[:len(inputs)], given[len(inputs):2 * len(inputs)],

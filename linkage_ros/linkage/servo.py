@@ -94,8 +94,8 @@ class Mechanism(Analysed):
         What each joint angle is: name, parent, joint, kind, zero [rad] and tip.
     bars : tuple of (str, str)
         The joints at the ends of each bar.
-    lines : tuple of (str, str)
-        What is drawn as a line: the bars, and the cylinders.
+    cylinders : tuple of (str, str)
+        The joints at the ends of each cylinder, its base first.
     tracer : str
         The joint whose curve is the locus.
 

@@ -11,12 +11,12 @@ leg at pi - (theta - 2 pi j/N), on the same crank pin.
 from functools import cached_property
 import math
 from struct import Struct
-from typing import Callable, NamedTuple, Optional, Sequence
+from typing import Callable, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 
 from .mechanism import Mechanism
-from .quantities import Leg
+from .quantities import Leg, Spot
 from ..formula.program import Batch
 
 LOCUS_POINTS = 361
@@ -149,7 +149,7 @@ class Assembly:
         except ImportError:
             return self.linkage
 
-    def solution(self, points: Sequence[str] = (), joints: Sequence[str] = (),
+    def solution(self, points: Sequence[Union[str, Spot]] = (), joints: Sequence[str] = (),
                  rates: Sequence[str] = ()) -> Solution:
         """Return what solves all legs for points, joint angles and rates, and nothing else."""
         layout = Layout(len(self.legs), len(self.linkage.inputs), 2 * len(points), len(joints),

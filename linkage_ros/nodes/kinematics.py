@@ -21,7 +21,7 @@ from . import joint_state_reader, messages, scene_node
 from .message_layout import pack, unpack, Unreadable, Wire
 from .. import scene
 from ..linkage.walker import Layout
-from ..robot_model import urdf
+from ..robot_model import shapes, urdf
 from ..words import listed
 
 # Any source will do; what comes while the node is kept waiting, 50 ms at 1000 Hz, is not lost.
@@ -207,16 +207,13 @@ class Model:
         self.robot = urdf.describe([machine], frame_id)
         self.assembly = machine.assembly()
         self.inputs = [f'{machine.name}_{input_}' for input_ in machine.inputs]
-        self._points = machine.points
         self._joint_names = np.array([
             [f'{machine.name}_{prefix}{joint}' for joint in self.assembly.joints]
             for prefix in self.assembly.legs])
         drawn = machine.name, frame_id, machine.pose
         size = urdf.size(machine)
-        place = {point: i for i, point in enumerate(machine.points)}
-        bars = [(place[p], place[q]) for p, q in machine.linkage.lines
-                if p in place and q in place]
-        self.drawn = *drawn, bars, size
+        self._points, shown = _shown(machine)
+        self.drawn = *drawn, size, shown
         self.marker_array = messages.Markers(*self.drawn)
         self.joint_state = messages.JointStates()
         curve = self.assembly.locus(machine.tracer)
@@ -275,6 +272,21 @@ class Model:
         """Return the markers of the legs that can be assembled."""
         places = pose.rows()[:, :pose.layout.coordinates]
         return self.marker_array.message(stamp, places.reshape(len(places), -1, 2))
+
+
+def _shown(machine: scene.Machine):
+    """Return the points of the markers, joints and others, and which of them each marker shows."""
+    place = {point: i for i, point in enumerate(machine.points)}
+    linkage, points = machine.linkage, list(machine.points)
+    shown = {
+        messages.LINKS_ID: [(place[p], place[q]) for p, q in (*linkage.bars, *linkage.cylinders)
+                            if p in place and q in place],
+        messages.JOINTS_ID: range(len(place)), messages.GUIDES_ID: [], messages.BODIES_ID: []}
+    for shape in shapes.drawn(machine, place):
+        id_ = messages.GUIDES_ID if shape.kind == shapes.GUIDE else messages.BODIES_ID
+        shown[id_].append((len(points), len(points) + 1))
+        points += [shape.start, shape.end]
+    return tuple(points), shown
 
 
 class MechanismPublisher:

@@ -5,7 +5,7 @@
 
 from array import array
 import math
-from typing import Sequence
+from typing import Mapping, Sequence
 
 from geometry_msgs.msg import Point, Pose, Quaternion
 import numpy as np
@@ -16,9 +16,10 @@ from visualization_msgs.msg import Marker, MarkerArray
 from .. import palette
 
 # How each marker is drawn, by its id: type, colour and width as a part of the longest bar.
-LINKS_ID, JOINTS_ID, LOCUS_ID = range(3)
+LINKS_ID, JOINTS_ID, LOCUS_ID, GUIDES_ID, BODIES_ID = range(5)
 LOOKS = ((Marker.LINE_LIST, palette.LINK, 1 / 40), (Marker.SPHERE_LIST, palette.JOINT, 1 / 20),
-         (Marker.LINE_STRIP, palette.LOCUS, 1 / 100))
+         (Marker.LINE_STRIP, palette.LOCUS, 1 / 100), (Marker.LINE_LIST, palette.TRACK, 1 / 60),
+         (Marker.LINE_LIST, palette.DARK, 1 / 20))
 
 
 class JointStates:
@@ -38,7 +39,7 @@ class JointStates:
 
 class Markers:
     """
-    The links and the joints of one mechanism, as one marker each.
+    The links, joints, guides and bodies (barrels and blocks) of one mechanism, a marker each.
 
     Parameters
     ----------
@@ -48,10 +49,11 @@ class Markers:
         Frame of the pose.
     pose : sequence of float
         Of the linkage's plane: x, y, z [m], roll, pitch, yaw [rad].
-    bars : sequence of (int, int)
-        The joints at the ends of each bar, by their place among the points.
     size : float
         The longest bar [m].
+    shown : mapping
+        What each marker shows, by its id: joints or ends of lines, by their place among the
+        points.
 
     Attributes
     ----------
@@ -60,20 +62,19 @@ class Markers:
 
     """
 
-    def __init__(self, name: str, frame_id: str, pose, bars, size: float):
-        self._ends = np.array(bars, int).reshape(-1)
-        self._links, self._joints = (_marker(name, id_, frame_id, pose, size)
-                                     for id_ in (LINKS_ID, JOINTS_ID))
-        markers = [self._links, self._joints] if bars else [self._joints]
-        self._message = MarkerArray(markers=markers)
-        self.ids = frozenset(marker.id for marker in markers)
+    def __init__(self, name: str, frame_id: str, pose, size: float,
+                 shown: Mapping[int, Sequence]):
+        self._shown = [(_marker(name, id_, frame_id, pose, size), np.array(points, int).ravel())
+                       for id_, points in shown.items() if points]
+        self._message = MarkerArray(markers=[marker for marker, _ in self._shown])
+        self.ids = frozenset(marker.id for marker, _ in self._shown)
         self._points = {}
 
     def message(self, stamp, places: np.ndarray) -> MarkerArray:
         """Return the markers of places [m], shape (legs, points, 2)."""
-        for marker, row in ((self._links, places[:, self._ends]), (self._joints, places)):
+        for marker, points in self._shown:
             marker.header.stamp = stamp
-            marker.points = self._filled(marker.id, row.reshape(-1, 2).tolist())
+            marker.points = self._filled(marker.id, places[:, points].reshape(-1, 2).tolist())
         return self._message
 
     def _filled(self, id_, pairs):

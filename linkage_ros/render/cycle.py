@@ -12,6 +12,7 @@ from typing import NamedTuple, Tuple
 
 import numpy as np
 
+from ..robot_model.shapes import drawn
 from ..scene import Drive, in_words, Machine, SceneError
 from ..scene.motion import Motion
 
@@ -20,7 +21,7 @@ MOST_TURNS = 24  # after which several inputs need not be where they started
 
 
 class Configuration(NamedTuple):
-    """Turns since the start, inputs [rad or m], and all joints [m], (legs, joints, 2)."""
+    """Turns since the start, inputs [rad or m], and what a course has then, (legs, joints, 2)."""
 
     turns: float
     inputs: Tuple[float, ...]
@@ -84,13 +85,16 @@ class Cycle:
     prefixes : tuple of str
         What the names of each leg's joints begin with.
     course : float array (turns * SAMPLES + 1, legs, joints, 2)
-        All joints in that time, both ends included [m]; NaN where they cannot be assembled.
+        All joints in that time, both ends included [m], and behind them the ends of what slides;
+        NaN where they cannot be assembled.
 
     """
 
     def __init__(self, machine: Machine):
         assembly = machine.assembly()
-        self._solution = assembly.solution(points=machine.linkage.points)
+        sliding = drawn(machine, machine.points)
+        self._solution = assembly.solution((*machine.linkage.points, *(
+            end for shape in sliding for end in (shape.start, shape.end))))
         self._wheels = [Wheel(drive) for drive in machine.inputs.values()]
         self.first = self._wheels[0]
         self.period = self.first.period
@@ -118,9 +122,13 @@ class Cycle:
         return np.concatenate([before, self.pose(end).places[None, :, joint]])
 
     def locus(self, machine: Machine) -> np.ndarray:
-        """Return the whole curve of the first leg's tracer [m], shape (n, 2)."""
+        """
+        Return the whole curve of the first leg's tracer [m], shape (n, 2).
+
+        It is empty where several inputs are never all back at their start.
+        """
         curve = self._locus(machine.tracer)
-        if len(curve):
+        if len(curve) or self.turns == MOST_TURNS:
             return curve
         return self.course[:, 0, machine.linkage.points.index(machine.tracer)]
 

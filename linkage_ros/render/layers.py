@@ -7,6 +7,7 @@ The layers of a picture, drawn with Matplotlib: traces, guides, legs, floor, hea
 Each adds artists to axes and moves them; `artists` are those that move, in drawing order.
 """
 
+import cmath
 import math
 import textwrap
 
@@ -18,6 +19,7 @@ import numpy as np
 
 from .cycle import SAMPLES
 from ..palette import CRANK, DARK, FLOOR, GREY, GUIDE, LINK, TRACE, TRACK
+from ..robot_model import shapes
 
 FADED = 0.3  # turns after which a fading trace is gone
 STANCE = 0.06  # of a foot curve's height: a foot lower than that is on the ground
@@ -48,7 +50,7 @@ class Trace:
             self.artists = [lines]
         elif kind != 'none':
             curve = cycle.locus(machine)
-            for side in (1.0, -1.0)[:1 + machine.mirrored]:
+            for side in (1.0, -1.0)[:1 + machine.mirrored] if len(curve) else ():
                 self._add_still(axes, curve * (side, 1.0), unit)
 
     def _add_still(self, axes, curve, unit):
@@ -89,34 +91,50 @@ def guides(axes, machine, cycle, unit):
     first_leg = cycle.course[:, 0]
     dashed = {'color': GUIDE, 'lw': 1.6 * unit, 'ls': (0, (6, 4)), 'zorder': 1}
     around = np.exp(1j * np.linspace(0.0, math.tau, 361))
-    for bar in cranks(linkage):
+    for bar in cranks(linkage, 'ground'):
         centre, pin = (first_leg[0, linkage.points.index(name)] for name in bar)
         circle = centre @ (1, 1j) + around * math.dist(centre, pin)
         axes.plot(circle.real, circle.imag, **dashed)
     line = straight(cycle.locus(machine))
     if line is not None:
         axes.axline(*line, **dashed)
-    for link in linkage.links:
-        if link.kind == 'prismatic' and link.parent == 'ground':
-            track = straight(first_leg[:, linkage.points.index(link.tip)])
-            axes.plot(*np.transpose(track), color=TRACK, lw=14 * unit, zorder=1,
-                      solid_capstyle='round')
+    for shape, ends in sliding(machine):
+        if shape.kind == shapes.GUIDE and shape.is_fixed:
+            for track in cycle.course[0, :1 + machine.mirrored, ends]:
+                axes.plot(*track.T, color=TRACK, lw=8 * unit, zorder=1, solid_capstyle='round')
 
 
-def cranks(linkage):
-    """Return the bars that are cranks, from the joint they turn about to their pin."""
+def sliding(machine):
+    """Return what slides, and the places of its ends behind those of the joints."""
+    first = len(machine.linkage.points)
+    return [(shape, slice(first + 2 * k, first + 2 * k + 2))
+            for k, shape in enumerate(shapes.drawn(machine, machine.points))]
+
+
+def cranks(linkage, parent=None):
+    """Return the bars that inputs turn, from centre to pin; all, or those on one link."""
     names = [input_.name for input_ in linkage.inputs if input_.turns]
-    return [(link.joint, link.tip) for link in linkage.links if link.name in names]
+    return [(link.joint, link.tip) for link in linkage.links
+            if link.name in names and parent in (None, link.parent)]
 
 
 def straight(curve):
-    """Return two ends of a curve that is a straight line, and None for any other."""
+    """Return two ends of a curve that is a straight line, and None for any other or none."""
+    if not len(curve):
+        return None
     first = curve[0]
     last = curve[np.argmax(np.hypot(*(curve - first).T))]
     along = last - first
     length = math.hypot(*along)
-    away = np.abs((curve - first) @ (-along[1], along[0])) / (length or 1.0)
-    return (first, last) if away.max() <= STRAIGHT * length else None
+    across = np.abs((curve - first) @ (-along[1], along[0]))
+    return (first, last) if length and across.max() <= STRAIGHT * length * length else None
+
+
+def around(frame):
+    """Return a link's joints as they follow each other around their middle."""
+    seen = {name: complex(*place) for name, place in frame.items()}
+    middle = sum(seen.values()) / len(seen)
+    return sorted(seen, key=lambda name: cmath.phase(seen[name] - middle))
 
 
 class Legs:
@@ -125,17 +143,25 @@ class Legs:
     def __init__(self, axes, machine, cycle, parts, unit):
         linkage = machine.linkage
         index = {name: linkage.points.index(name) for name in machine.points}
-        shown = [bar for bar in linkage.lines if set(bar) <= set(index)]
         turning = cranks(linkage)
-        self._bars, self._cranks = (
-            np.array([[index[p], index[q]] for p, q in shown if ((p, q) in turning) is driven],
-                     int).reshape(-1, 2) for driven in (False, True))
-        self._plates = [[index[name] for name in frame] for frame in linkage.frames.values()
-                        if len(frame) == 3 and set(frame) <= set(index)]
+        bars = [bar for bar in linkage.bars if bar not in turning]
+        lines = {'bars': bars, 'rods': linkage.cylinders, 'cranks': turning}
+        self._lines = {kind: np.array([[index[p], index[q]] for p, q in ends
+                                       if {p, q} <= set(index)], int).reshape(-1, 2)
+                       for kind, ends in lines.items()}
+        self._plates = [[index[name] for name in around(frame)]
+                        for frame in linkage.frames.values()
+                        if len(frame) > 2 and set(frame) <= set(index)]
         self._joints = np.array(list(index.values()))
         self._tracer = linkage.points.index(machine.tracer)
         self._fixed = fixed(cycle.course)[self._joints]
-        self._slots = list(slots(linkage, cycle, index))
+        inputs = {input_.name for input_ in linkage.inputs}
+        self._pieces: dict = {'slots': [], 'bodies': [], 'driven': []}
+        for shape, ends in sliding(machine):
+            if shape.kind != shapes.GUIDE:
+                self._pieces['driven' if shape.slide.name in inputs else 'bodies'].append(ends)
+            elif not shape.is_fixed:
+                self._pieces['slots'].append(ends)
         self.legs = []
         sides = 1 + machine.mirrored
         thin = unit * (1.0 if len(cycle.prefixes) == 1 else 0.7)
@@ -150,10 +176,14 @@ class Legs:
         zorder = 10 + 10 * (1.0 - white)
         made = {}
 
-        def lines(name, colour, width, above, **style):
-            made[name] = LineCollection([], colors=colour, lw=width * unit, capstyle='round',
-                                        zorder=zorder + above, animated=True, **style)
+        def lines(name, colour, width, above, cap='round'):
+            made[name] = LineCollection([], colors=colour, lw=width * unit, capstyle=cap,
+                                        zorder=zorder + above, animated=True)
             axes.add_collection(made[name], autolim=False)
+
+        def rimmed(name, colour, width, above, cap='round'):
+            lines(f'{name}_rims', dark, width + 3.5, above, cap)
+            lines(name, colour, width, above + 0.01, cap)
 
         def dots(name, marker, size, above, **style):
             made[name], = axes.plot([], [], ls='', marker=marker, ms=size * unit,
@@ -165,9 +195,11 @@ class Legs:
                                             zorder=zorder, animated=True)
             axes.add_collection(made['plates'], autolim=False)
             lines('bars', whiter(LINK, white), 5.5, 0.1)
-            lines('slot_rims', dark, 17, 0.2)
-            lines('slots', 'white', 13.5, 0.3)
-            lines('cranks', whiter(CRANK, white), 5.5, 0.35)
+            rimmed('slots', 'white', 13.5, 0.2)
+            lines('rods', dark, 4, 0.3)
+            lines('cranks', whiter(CRANK, white), 5.5, 0.32)
+            rimmed('bodies', whiter(TRACK, white), 9, 0.34, 'projecting')
+            rimmed('driven', whiter(CRANK, white), 9, 0.36, 'projecting')
         if 'joints' in parts:
             dots('pivots', PIVOT, 2 * PIVOT_SIZE, 0.05, mfc=whiter(GREY, 0.4), mec=GREY)
             dots('joints', 'o', 9, 0.4, mfc='white', mec=dark, mew=2.2 * unit)
@@ -182,11 +214,11 @@ class Legs:
     def _show_leg(self, artists, places):
         if 'bars' in artists:
             artists['plates'].set_verts([places[plate] for plate in self._plates])
-            artists['bars'].set_segments(places[self._bars])
-            artists['cranks'].set_segments(places[self._cranks])
-            tracks = [from_frame(ends, places[bar]) for bar, ends in self._slots]
-            artists['slot_rims'].set_segments(tracks)
-            artists['slots'].set_segments(tracks)
+            for name, ends in self._lines.items():
+                artists[name].set_segments(places[ends])
+            for name, pieces in self._pieces.items():
+                for part in (f'{name}_rims', name):
+                    artists[part].set_segments([places[ends] for ends in pieces])
         if 'joints' in artists:
             joints = places[self._joints]
             artists['pivots'].set_data(*joints[self._fixed].T)
@@ -197,33 +229,6 @@ class Legs:
 def fixed(course):
     """Return which joints of the first leg never move."""
     return np.ptp(course[:, 0], axis=0).max(axis=1) == 0.0
-
-
-def slots(linkage, cycle, shown):
-    """Yield for each slot in a moving link the joints of its bar, and its ends seen from there."""
-    links = {link.name: link for link in linkage.links}
-    for link in linkage.links:
-        parent = links.get(link.parent)
-        if link.kind == 'prismatic' and parent \
-                and {parent.joint, parent.tip, link.tip} <= set(shown):
-            bar = [linkage.points.index(name) for name in (parent.joint, parent.tip)]
-            first_leg = cycle.course[:, 0]
-            seen = to_frame(first_leg[:, linkage.points.index(link.tip)], first_leg[:, bar])
-            ends = np.array([np.nanmin(seen.real), np.nanmax(seen.real)])
-            yield bar, ends + 1j * np.nanmean(seen.imag)
-
-
-def to_frame(places, bar):
-    """Return places as complex numbers [m], seen from the start of a bar along it."""
-    start, end = bar[..., 0, :] @ (1, 1j), bar[..., 1, :] @ (1, 1j)
-    return (places @ (1, 1j) - start) * np.conj(end - start) / np.abs(end - start)
-
-
-def from_frame(seen, bar):
-    """Return the places [m] that are so seen along a bar, shape (n, 2)."""
-    start, end = bar @ (1, 1j)
-    there = start + seen * (end - start) / abs(end - start)
-    return np.stack([there.real, there.imag], axis=-1)
 
 
 class Floor:
@@ -323,8 +328,8 @@ class Names:
         linkage = machine.linkage
         self._axes = axes
         self._index = [linkage.points.index(name) for name in machine.points]
-        self._bars = np.array([[linkage.points.index(name) for name in bar]
-                               for bar in linkage.bars])
+        lines = *linkage.bars, *((link.joint, link.tip) for link in linkage.links)
+        self._bars = np.array([[linkage.points.index(name) for name in line] for line in lines])
         self._fixed = np.flatnonzero(fixed(cycle.course))
         self._pivot = PIVOT_SIZE * unit * axes.figure.dpi / 72
         in_slots = {link.tip for link in linkage.links if link.kind == 'prismatic'}

@@ -143,7 +143,8 @@ class Panel:
 
     def _drawn(self):
         """Return the lowest and the highest x and y of what is drawn in a turn [m]."""
-        places = [self.cycle.course[:, :, self._joints].reshape(-1, 2)]
+        course, joints = self.cycle.course, len(self.machine.linkage.points)
+        places = [course[:, :, self._joints].reshape(-1, 2), course[:, :, joints:].reshape(-1, 2)]
         places += [line.get_xydata() for line in self._axes.lines if len(line.get_xdata()) > 2]
         drawn = np.concatenate(places)
         return np.nanmin(drawn, axis=0), np.nanmax(drawn, axis=0)

@@ -28,6 +28,7 @@ import math
 from typing import Dict, Iterable, Optional, Sequence, Tuple
 from xml.etree import ElementTree
 
+from . import shapes
 from .. import palette
 from ..linkage.builder import GROUND
 from ..linkage.output_range import common_reach, ground_frame, Travel, travels
@@ -38,8 +39,8 @@ COLOURS = {'orange': palette.ORANGE, 'blue': palette.BLUE, 'green': palette.GREE
            'grey': palette.DARK}
 *BARS, JOINTS = COLOURS
 
-# Radii of bars and joints, as parts of the longest bar.
-BAR, JOINT = 1 / 80, 1 / 40
+# As parts of the longest bar: radii of bars, joints and barrels, thickness of guides and blocks.
+BAR, JOINT, BARREL, GUIDE, BLOCK = 1 / 80, 1 / 40, 1 / 32, 1 / 80, 1 / 20
 
 # Sizes [m] between which nothing that is drawn is lost in single precision, as displays have it.
 SMALLEST, LARGEST = 1e-30, 1e30
@@ -98,6 +99,7 @@ class _Model:
         self._robot, self._machine, self._assembly = robot, machine, machine.assembly()
         self._links = machine.linkage.links
         self._bars = machine.linkage.bars
+        self._shapes = shapes.shapes(machine)
         self._frames = {GROUND: ground_frame(machine.linkage), **machine.linkage.frames}
         self._travels = {**travels(machine.linkage, machine.reach),
                          **_input_travels(machine, self._assembly)}
@@ -105,7 +107,9 @@ class _Model:
 
     def add_to(self, root: str):
         """Add ground, crank and legs."""
-        self._robot.fix(root, self._link('', GROUND), self._machine.pose)
+        ground = self._robot.fix(root, self._link('', GROUND), self._machine.pose)
+        for side in dict.fromkeys(leg.side for leg in self._assembly.legs.values()):
+            self._draw_shapes(side, GROUND, ground, JOINTS)
         if self._shared:
             self._hang('', 1.0, self._shared)
         for prefix, leg in self._assembly.legs.items():
@@ -143,15 +147,23 @@ class _Model:
             (*place, 0.0, 0.0, 0.0, zero), axis, travel)
 
     def _draw(self, side, link, element, colour):
-        """Add bars as rods, and a slide as a block."""
-        frame, size = self._frames[link.name], self._size
+        """Add bars as rods, and what slides on a link or is the slide."""
+        frame = self._frames[link.name]
         for first, second in self._bars:
             if first in frame and second in frame:
-                _draw_rod(element, colour, BAR * size, self._place(side, link.name, first),
+                _draw_rod(element, colour, BAR * self._size, self._place(side, link.name, first),
                           self._place(side, link.name, second))
-        if link.kind == 'prismatic':
-            _draw(element, colour, (*self._place(side, link.name, link.tip), *[0.0] * 4),
-                  'box', size=_numbers(4.0 * JOINT * size, *[2.0 * JOINT * size] * 2))
+        self._draw_shapes(side, link.name, element, colour)
+
+    def _draw_shapes(self, side, link, element, colour):
+        """Add guides, blocks, barrels and the rods in them."""
+        for shape in self._shapes:
+            if shape.start.link == link:
+                start, end = (self._seen(side, link, spot[1:]) for spot in shape[2:])
+                draw, thickness = {
+                    shapes.GUIDE: (_draw_box, GUIDE), shapes.BLOCK: (_draw_box, BLOCK),
+                    shapes.BARREL: (_draw_rod, BARREL), shapes.ROD: (_draw_rod, BAR)}[shape.kind]
+                draw(element, colour, thickness * self._size, start, end)
 
     def _add_points(self, prefix, side, link, points, ends):
         """Add joints of a link as links of their own, those that it was cut off as well."""
@@ -169,7 +181,11 @@ class _Model:
 
     def _place(self, side, link, point):
         """Return x, y [m] of a point of a link; the ground is mirrored in y, a link in its bar."""
-        x, y = (self._machine.scale * value for value in self._frames[link][point])
+        return self._seen(side, link, self._frames[link][point])
+
+    def _seen(self, side, link, place):
+        """Return x, y [m] of a place on a link."""
+        x, y = (self._machine.scale * value for value in place)
         return (side * x, y) if link == GROUND else (x, side * y)
 
 
@@ -248,11 +264,23 @@ class _Robot:
 
 
 def _draw_rod(element, colour, radius, start, end):
-    along = end[0] - start[0], end[1] - start[1]
-    middle = 0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1])
+    x, y, length, angle = _between(start, end)
     # A cylinder's axis is z: it is laid down along x, then turned.
-    _draw(element, colour, (*middle, 0.0, 0.0, 0.5 * math.pi, math.atan2(along[1], along[0])),
-          'cylinder', radius=_numbers(radius), length=_numbers(math.hypot(*along)))
+    _draw(element, colour, (x, y, 0.0, 0.0, 0.5 * math.pi, angle), 'cylinder',
+          radius=_numbers(radius), length=_numbers(length))
+
+
+def _draw_box(element, colour, thickness, start, end):
+    x, y, length, angle = _between(start, end)
+    _draw(element, colour, (x, y, 0.0, 0.0, 0.0, angle), 'box',
+          size=_numbers(length, thickness, thickness))
+
+
+def _between(start, end):
+    """Return the middle x, y of two places, how far apart they are, and the angle between."""
+    along = end[0] - start[0], end[1] - start[1]
+    return (0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]), math.hypot(*along),
+            math.atan2(along[1], along[0]))
 
 
 def _draw(element, colour, pose, shape, **sizes):

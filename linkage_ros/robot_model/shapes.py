@@ -1,0 +1,101 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+What slides, as it is drawn: a cylinder's barrel and rod, a block, and the guide it runs on.
+
+Each is a straight piece of one link, so it moves with that link in markers, pictures and models.
+"""
+
+from __future__ import annotations
+
+import cmath
+from typing import Any, Collection, Dict, Iterable, List, NamedTuple, Sequence, Tuple
+
+import numpy as np
+
+from ..linkage.builder import GROUND, Link
+from ..linkage.output_range import ground_frame
+from ..linkage.quantities import Spot
+from ..scene import Drive, Machine
+
+GUIDE, BLOCK, BARREL, ROD = 'guide', 'block', 'barrel', 'rod'
+# Of the longest bar: half the length of a block, and how far a guide goes beyond its block.
+HALF_BLOCK = 1 / 20
+# Of a cylinder's shortest length: the least and the most that its barrel takes.
+SHORT_BARREL, LONG_BARREL = 0.5, 0.9
+# Poses by which it is found how far something slides.
+SAMPLES = 361
+
+
+class Shape(NamedTuple):
+    """A piece of a link from start to end, and the slide that it belongs to; before scale."""
+
+    kind: str
+    slide: Link
+    start: Spot
+    end: Spot
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether it is on the ground."""
+        return self.start.link == GROUND
+
+
+def shapes(machine: Machine) -> List[Shape]:
+    """Return what slides in a mechanism, guides first; what no pose is found of is left out."""
+    linkage = machine.linkage
+    slides = [link for link in linkage.links if link.kind == 'prismatic']
+    if not slides:
+        return []
+    frames = {GROUND: ground_frame(linkage), **linkage.frames}
+    found: List[Shape] = []
+    for link, (low, high) in _travels(machine, slides):
+        pieces = (_cylinder(link, low, high) if (link.joint, link.tip) in linkage.cylinders
+                  else _block(link, low, high, frames, HALF_BLOCK * linkage.longest))
+        found += [Shape(kind, link, start, end) for kind, start, end in pieces]
+    return sorted(found, key=lambda shape: shape.kind != GUIDE)
+
+
+def drawn(machine: Machine, wanted: Collection[str]) -> List[Shape]:
+    """Return what is drawn where these joints are wanted; rods are drawn as other bars are."""
+    return [shape for shape in shapes(machine)
+            if shape.kind != ROD and {shape.slide.joint, shape.slide.tip} <= set(wanted)]
+
+
+def _cylinder(link: Link, low: float, high: float) -> Iterable[Tuple[str, Spot, Spot]]:
+    """Yield barrel and rod: a barrel takes in the stroke, as far as there is room for it."""
+    barrel = min(max(high - low, SHORT_BARREL * low), LONG_BARREL * low)
+    yield BARREL, Spot(link.parent, 0.0, 0.0), Spot(link.parent, barrel, 0.0)
+    yield ROD, Spot(link.name, barrel - high, 0.0), Spot(link.name, 0.0, 0.0)
+
+
+def _block(link: Any, low: float, high: float, frames: Dict[str, dict],
+           half: float) -> Iterable[Tuple[str, Spot, Spot]]:
+    """Yield the guide, on the link that a slide slides on, and the block."""
+    x, y = frames[link.name][link.tip]
+    start, along = complex(*frames[link.parent][link.joint]), cmath.rect(1.0, link.zero)
+    first, last = (start + along * complex(x + end, y) for end in (low - half, high + half))
+    yield GUIDE, Spot(link.parent, first.real, first.imag), Spot(link.parent, last.real, last.imag)
+    yield BLOCK, Spot(link.name, x - half, y), Spot(link.name, x + half, y)
+
+
+def _travels(machine: Machine,
+             slides: Sequence[Link]) -> Iterable[Tuple[Link, Tuple[float, float]]]:
+    """Yield how far each goes [m] while the inputs take all values that they may, before scale."""
+    names = [link.name for link in slides]
+    count = max(round(SAMPLES ** (1.0 / len(machine.inputs))), 2)
+    grid = np.meshgrid(*(_values(drive, machine.scale, count)
+                         for drive in machine.inputs.values()))
+    found = machine.linkage.joint_angles(grid if len(grid) > 1 else grid[0], names)
+    for link in slides:
+        values = found[link.name][np.isfinite(found[link.name])]
+        if values.size:
+            yield link, (float(values.min()), float(values.max()))
+
+
+def _values(drive: Drive, scale: float, count: int) -> np.ndarray:
+    """Return so many values of an input, all through its ends or its reach, before scale."""
+    arcs = [drive.ends] if drive.ends else drive.reach
+    values = np.concatenate([np.linspace(low, high, count) for low, high in arcs])
+    return values if drive.input.turns else values / scale

@@ -1,0 +1,111 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Barrels, rods, guides and blocks are where the joints say, in every pose and in every leg."""
+
+from linkage_ros import mechanisms, scene
+from linkage_ros.robot_model import shapes
+from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD
+import numpy as np
+import pytest
+
+ENGINE = ('O ground 0 0', 'G ground 0 -20', 'A crank O 40', 'B slider A 120 G 0.5 out',
+          'P rigid A B 50 90 left')
+MOVING = ('O ground 0 0', 'Q ground 1.6 0', 'A crank O 0.5', 'B dyad A Q 1.8 1 left',
+          'D ground 0.8 1.2', 'S slider D 0.7 A along B out', 'T block S 0.1 0.2')
+RACK = ('O ground 0 0', 'H ground 1 0.5', 'S carriage O along H 0.1 0.9', 'A ground 0.2 0.7',
+        'B dyad S A 0.6 0.5 left', 'm mirrored O H')
+
+
+def machine(type_='custom', **given):
+    return scene.read({'mechanisms': ['m'], 'm.type': type_, **{
+        f'm.{name.replace("__", ".")}': value for name, value in given.items()}}).machines['m']
+
+
+MACHINES = {
+    'excavator': lambda: scene.load('config/excavator.yaml').machines['excavator'],
+    'boxer engine': lambda: machine(joints=ENGINE, leg_pairs=2, scale=0.01),
+    'guide on a coupler': lambda: machine(joints=MOVING, crank__sweep=[0.8, 1.6], scale=3.0),
+    'rack and its image': lambda: machine(joints=RACK),
+    'slotted_lever': lambda: machine('slotted_lever', dimensions__e=20.0, scale=1e-3),
+    'slider_crank': lambda: machine('slider_crank'),
+}
+
+
+def poses(one, count=40):
+    """Yield joints by name, lengths of slides, and the ends of each shape, as complex numbers."""
+    found = shapes.shapes(one)
+    ends = [end for shape in found for end in (shape.start, shape.end)]
+    slides = tuple(link.name for link in one.linkage.links if link.kind == 'prismatic')
+    inputs = [name for name in slides if name in one.inputs]
+    solution = one.assembly().solution(
+        (*one.linkage.points, *ends), [name for name in slides if name not in inputs])
+    random, points = np.random.default_rng(0), one.linkage.points
+    for _ in range(count):
+        values = [random.uniform(*(drive.ends or drive.reach[0])) for drive in one.inputs.values()]
+        solution.solve(values)
+        for row in solution.rows[np.isfinite(solution.rows).all(axis=1)]:
+            places = row[:2 * (len(points) + len(ends))].reshape(-1, 2) @ (1, 1j)
+            yield (dict(zip(points, places)), dict(zip(one.inputs, values)),
+                   list(zip(found, places[len(points):].reshape(-1, 2))))
+
+
+@pytest.mark.parametrize('name', MACHINES)
+def test_what_slides_is_where_its_joints_say(name):
+    one, count = MACHINES[name](), 0
+    size = one.scale * one.linkage.longest
+    near = pytest.approx(0.0, abs=1e-13 * max(size, 1.0))
+    for place, lengths, drawn in poses(one):
+        for shape, (start, end) in drawn:
+            link, count = shape.slide, count + 1
+            along = (end - start) / abs(end - start)
+            tip = (place[link.tip] - start) / along
+            if shape.kind in (GUIDE, BLOCK):
+                assert tip.imag == near and 0.0 < tip.real < abs(end - start)
+            if shape.kind == GUIDE and 'slide' not in link.name:
+                assert ((place[link.joint] - start) / along).imag == near
+            if shape.kind == BLOCK:
+                assert tip.real - abs(end - start) / 2 == near
+            if shape.kind == BARREL:
+                assert start - place[link.joint] == near and tip.imag == near
+                assert abs(end - start) < tip.real == pytest.approx(lengths[link.name])
+            if shape.kind == ROD:
+                assert end - place[link.tip] == near
+                assert ((place[link.joint] - start) / along).imag == near
+    assert count >= 40 * len(shapes.shapes(one))
+
+
+@pytest.mark.parametrize('name, kinds', [
+    ('excavator', [BARREL, ROD] * 3), ('boxer engine', [GUIDE, BLOCK]),
+    ('guide on a coupler', [GUIDE, BLOCK]), ('rack and its image', [GUIDE, BLOCK])])
+def test_a_cylinder_is_barrel_and_rod_and_a_block_has_a_guide(name, kinds):
+    assert [shape.kind for shape in shapes.shapes(MACHINES[name]())] == kinds
+
+
+def test_a_barrel_takes_in_its_rod_and_the_rod_never_leaves_it():
+    one = MACHINES['excavator']()
+    for barrel, rod in zip(*[iter(shapes.shapes(one))] * 2):
+        low, high = one.inputs[barrel.slide.name].sweep
+        length = barrel.end.x - barrel.start.x
+        assert 0.5 * low <= length <= 0.9 * low
+        assert rod.end.x - rod.start.x == pytest.approx(high - length)
+        assert low - (rod.end.x - rod.start.x) >= 0.0
+
+
+def test_a_guide_stays_on_the_link_that_it_is_on():
+    one = MACHINES['guide on a coupler']()
+    seen = [[(end - place['A']) / (place['B'] - place['A']) for end in ends]
+            for place, _, drawn in poses(one) for shape, ends in drawn if shape.kind == GUIDE]
+    assert len(seen) == 40 and np.ptp(seen, axis=0) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_what_nobody_wants_is_not_drawn():
+    one = machine(joints=MOVING, points=['O', 'A', 'B'], crank__sweep=[0.8, 1.6])
+    assert shapes.shapes(one) and not shapes.drawn(one, one.points)
+    assert not shapes.shapes(scene.read({'mechanisms': ['jansen']}).machines['jansen'])
+
+
+def test_a_linkage_without_a_bar_is_as_large_as_its_stroke():
+    rack = mechanisms.create('custom', joints=['O ground 0 0', 'H ground 1 0',
+                                               'S carriage O along H 0.1 0.9'])
+    assert rack.longest == 0.8
