@@ -68,7 +68,7 @@ def test_every_number_has_a_meaning_a_unit_and_a_range_with_whole_stops(node):
         name = parameter.name
         assert range_ is not None and range_.from_value <= parameter.value <= range_.to_value, name
         assert about.description.endswith('.') and about.additional_constraints, name
-        unit = re.search(r'\[(m|rad|rad/s|Hz)\]', about.description)
+        unit = re.search(r'\[(m|rad|rad/s|m/s|Hz|1)\]', about.description)
         assert unit or parameter.type_ == Parameter.Type.INTEGER or name.endswith('.scale'), name
         assert range_.step == (1 if parameter.type_ == Parameter.Type.INTEGER else 0.0), name
         values = stops(range_.from_value, range_.to_value,

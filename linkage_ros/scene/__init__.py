@@ -78,7 +78,7 @@ SOURCE = Field('string', 'Joint in messages that tells of the {0}; empty: its na
                'what is measured, after <mechanism>_.', readers=ALL, read_only=True)
 MEASURES = Field('string', 'Output that the source measures, from which the {0} follows; empty: '
                  'the {0} itself.', readers=ALL, read_only=True)
-RATIO = Field('double', 'How far the {0} moves for each unit of its source.', readers=ALL,
+RATIO = Field('double', 'How far the {0} moves for each unit of its source [1].', readers=ALL,
               rule='not zero')
 OFFSET = Field('double', 'Where the {0} is when its source is at zero [{1}].', readers=ALL)
 SWEEP = Field('double_array', 'Between which values [{1}] the {0} moves to and fro; '
