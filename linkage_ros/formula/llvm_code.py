@@ -73,7 +73,8 @@ def _address(array: np.ndarray) -> int:
     return array.__array_interface__['data'][0]
 
 
-def _module(operations, constants, outputs) -> ir.Module:
+def _module(operations: Sequence, constants: Sequence[int],
+            outputs: Sequence[int]) -> ir.Module:
     module = ir.Module()
     pointer = NUMBER.as_pointer()
     loop = ir.Function(module, ir.FunctionType(
@@ -115,28 +116,28 @@ def _count(value: int) -> ir.Constant:
     return ir.Constant(COUNT, value)
 
 
-def _load(builder, array, place):
+def _load(builder: ir.IRBuilder, array: ir.Value, place: ir.Value) -> ir.Value:
     return builder.load(builder.gep(array, [place]))
 
 
-def _operators(builder) -> dict[str, Callable]:
+def _operators(builder: ir.IRBuilder) -> dict[str, Callable]:
     """Return what each operation appends to the code."""
-    def call(name, arity=1):
+    def call(name: str, arity: int = 1) -> Callable:
         function = builder.module.globals.get(name) or ir.Function(
             builder.module, ir.FunctionType(NUMBER, [NUMBER] * arity), name)
         return lambda *operands: builder.call(function, operands)
 
-    def compare(sign):
+    def compare(sign: str) -> Callable:
         return lambda x, y: builder.fcmp_ordered(sign, x, y)
 
-    def reaches(margin, tolerance):
+    def reaches(margin: ir.Value, tolerance: ir.Value) -> ir.Value:
         return compare('>=')(margin, builder.fneg(tolerance))
 
-    def root(x, tolerance):
+    def root(x: ir.Value, tolerance: ir.Value) -> ir.Value:
         grazed = builder.select(reaches(x, tolerance), ZERO, NAN)
         return builder.select(compare('>')(x, ZERO), sqrt(x), grazed)
 
-    def gated(x, margin, tolerance):
+    def gated(x: ir.Value, margin: ir.Value, tolerance: ir.Value) -> ir.Value:
         return builder.select(reaches(margin, tolerance), x, NAN)
 
     sqrt = call('llvm.sqrt.f64')
