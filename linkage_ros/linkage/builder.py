@@ -141,7 +141,7 @@ class Builder:
         else:
             parent, along, start = self._direction(centre, zero)
         crank = planar.Crank(self.points[centre].place, length, along, turning)
-        bar = crank.bar() if parent == GROUND else planar.turned(along, turning) * length
+        bar = crank.bar() if parent == GROUND else planar.turned(along, turning, length)
         self._hang(centre, name, bar, length, link, parent, start)
         self.joint_values[link] = turning
         self._place(name, centre, bar, link, length, () if zero is None else (zero,))

@@ -84,10 +84,10 @@ def unit(vector: Complex, length: Real) -> Complex:
     return along
 
 
-def turned(vector: Complex, theta: Real) -> Complex:
-    """Return a vector of constant length turned by an angle [rad]."""
-    turning = spin(vector)
-    return with_spin(vector * Complex(cosine(theta), sine(theta)), Rate(
+def turned(along: Complex, theta: Real, length: Real) -> Complex:
+    """Return a bar of a length [m], turned from a direction by an angle [rad]."""
+    turning = spin(along)
+    return with_spin(along * Complex(cosine(theta), sine(theta)) * length, Rate(
         (theta, *turning.of), lambda rate, *rates: rate + turning.formula(*rates)))
 
 
