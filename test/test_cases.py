@@ -391,3 +391,182 @@ def test_the_inverse_finds_the_first_input_from_where_every_joint_is(name):
             back = linkage.solve([answers, *(x + 0.0 * answers for x in held)]
                                  if held else answers)[joint][:, axis]
             np.testing.assert_allclose(back, value, atol=1e-12 * linkage.longest)
+
+
+# --- what is published about them --------------------------------------------------------------
+
+def turned(linkage, theta, first, second):
+    """Return the angles from one joint to another [rad], without jumps."""
+    name = f'angle({first},{second})'
+    return np.unwrap(linkage.joint_angles(theta, (name,))[name])
+
+
+def corner(one, other, opposite):
+    """Return the angle between two sides of a triangle, in digits: the law of cosines."""
+    return mp.acos((one ** 2 + other ** 2 - opposite ** 2) / (2 * one * other))
+
+
+@pytest.mark.parametrize('piston', [-0.6, -0.3, 0.0, 0.2, 0.45])
+def test_an_excavator_turns_by_the_law_of_cosines(piston):
+    linkage, n = made('excavator'), {key: mpf(x) for key, x in CASES['excavator'].numbers.items()}
+    boom, arm, bucket = (40 * piston + zero for zero in (98.779, 130.89, 120.459))
+    place = {name: in_digits(at) for name, at in linkage.solve([boom, arm, bucket]).items()}
+
+    def angle(pivot, one, other):
+        return abs(mp.arg((place[one] - place[pivot]) / (place[other] - place[pivot])))
+
+    idler = IDLER + corner(n['e'], n['i'], mpf(120.459)) - corner(n['e'], n['i'], bucket)
+    across = mp.sqrt(n['i'] ** 2 + n['g'] ** 2 - 2 * n['i'] * n['g'] * mp.cos(idler))
+    for found, exact in ((angle('O', 'P', 'B'), corner(n['p'], n['b'], boom)),
+                         (angle('A', 'C', 'D'), corner(n['c'], n['d'], arm)),
+                         (angle('E', 'G', 'H'), idler),
+                         (angle('H', 'E', 'J'), corner(n['g'], across, n['i'])
+                          + corner(across, n['m'], n['k']))):
+        assert abs(found - min(exact, 2 * mp.pi - exact)) < 4e-15
+
+
+def test_the_longest_piston_of_the_excavator_is_longer_than_its_triangles():
+    # 40 x 0.6 + 130.89 cm are more than the 112.156 + 41.031 cm that arm and boom leave.
+    linkage = made('excavator')
+    longest = [40 * 0.6 + zero for zero in (98.779, 130.89, 120.459)]
+    over = [length > input_.high for length, input_ in zip(longest, linkage.inputs)]
+    assert over == [False, True, True]
+    place = linkage.solve(longest)
+    assert np.isfinite(place['B']).all() and np.isnan(place['D']).all()
+
+
+def test_both_cranks_of_a_leg_on_one_shaft_hold_its_foot_between_them():
+    leg, (a, b) = made('five-bar leg'), CASES['five-bar leg'].numbers.values()
+    first, second = poses('five-bar leg', 40).T
+    half, middle = 0.5 * (second - first), 0.5 * (second + first)
+    far = a * np.cos(half) + np.sqrt(b ** 2 - (a * np.sin(half)) ** 2)
+    np.testing.assert_allclose(leg.solve([first, second])['F'] @ (1, 1j),
+                               far * np.exp(1j * middle), rtol=1e-14)
+    assert np.isnan(leg.solve([0.3, 0.3])['F']).all()
+
+
+def test_two_parallelograms_keep_the_tool_level():
+    arm, inputs = made('parallelogram arm'), given(poses('parallelogram arm', 40))
+    place = arm.solve(inputs)
+    np.testing.assert_allclose(place['L'] - place['W'], place['G'] - place['O'], atol=1e-12)
+    np.testing.assert_allclose(
+        place['W'] @ (1, 1j),
+        142.07 * np.exp(1j * inputs[0]) - 158.81 * np.exp(1j * inputs[1]), rtol=1e-14)
+    # Driven the other way: the motor of the lower arm holds, that of the upper arm follows.
+    assert not np.any(arm.velocity(inputs, by=1)['A'])
+
+
+def test_a_finger_that_mimics_its_driver_is_off_by_two_degrees():
+    finger, theta = made('2F-85 finger'), np.linspace(0.0, 0.8, 81)
+    follower = np.degrees(turned(finger, theta, 'P', 'F'))
+    assert np.ptp(follower) == pytest.approx(1.85, abs=0.005)
+    np.testing.assert_allclose(finger.solve(0.0)['T'] @ (1, 1j), TIP, atol=1e-16)
+
+
+def test_the_side_of_a_nearly_folded_dyad_is_not_that_of_its_zero_pose():
+    toe, ahead_of = made("Cassie's toe"), np.angle(FOOT - CRANK)
+    tarsus, heel = np.angle(FOOT), math.atan2(0.006, 0.05512)
+
+    def foot(linkage, crank):
+        pins = linkage.solve([tarsus, crank - ahead_of])
+        return np.angle((pins['B'] - pins['F']) @ (1, 1j)) - heel
+
+    # Of the keyframe the soft closure is 2 mm open, which is 0.035 rad at the foot.
+    assert foot(toe, -1.52439) == pytest.approx(-1.59681, abs=0.04)
+    other = mechanisms.create('custom', joints=[
+        line.strip() for line in CASES["Cassie's toe"].lines.strip().splitlines()],
+        branches={'B': 1}, **CASES["Cassie's toe"].numbers)
+    assert foot(other, 0.0) == pytest.approx(0.0, abs=1e-12)
+    assert abs(foot(toe, 0.0)) > 0.1
+
+
+def test_the_closed_four_bar_of_gazebo_stays_a_parallelogram():
+    four_bar, theta = made('closed SDF four-bar'), np.linspace(-math.pi, math.pi, 91)
+    place = four_bar.solve(theta)
+    np.testing.assert_allclose(place['B'] - place['A'], [(0.3, 0.0)] * len(theta), atol=1e-15)
+    below = four_bar.solve(-0.5 * math.pi)
+    (x, y), (u, v) = below['Q'] - below['A'], below['B'] - below['A']
+    assert x * v - y * u < 0.0  # seen there, B is right of A -> Q; it is written left
+
+
+def test_a_scissor_lift_follows_from_the_cylinder_between_its_arms():
+    lines = [*map(str.strip, CASES['scissor lift'].lines.strip().splitlines()),
+             'C line O M 0.4*a', 'D line M F 0.5*a']
+    lift = mechanisms.create('custom', joints=lines, **CASES['scissor lift'].numbers)
+    foot = np.linspace(0.3, 1.8, 31)
+    height, length = (lift.joint_angles(foot, (name,))[name] for name in
+                      ('E.y', 'distance(C,D)'))
+    # Both triangles have the angle between the arms at M.
+    np.testing.assert_allclose(height, 2 * np.sqrt(4.0 - foot ** 2) + 0.1, rtol=1e-15)
+    opened = 1.0 - foot ** 2 / 2.0
+    np.testing.assert_allclose(length, np.sqrt(0.36 + 0.25 - 0.6 * opened), rtol=2e-15)
+    for stroke, at in zip(length, foot):
+        np.testing.assert_allclose(lift.input_for('distance(C,D)', stroke), [at], rtol=1e-14)
+        assert lift.follow('distance(C,D)', float(stroke), 1.0)[0] == pytest.approx(at)
+
+
+def test_a_clamp_is_locked_where_handle_and_rod_are_in_line():
+    clamp = made('toggle clamp')
+    (_, locked), _ = clamp.extremes('QB', [(-0.5, 1.5)])[0]
+    o, a, b = (clamp.solve(locked)[name] @ (1, 1j) for name in 'OAB')
+    assert abs(cross(a - o, b - a)) < 1e-7 * abs(a - o) * abs(b - a)
+    assert abs(clamp.joint_rates(locked)['QB']) < 1e-6
+    assert clamp.transmission_angles(locked)['B'] > 0.5
+
+
+@pytest.mark.parametrize('name, joint, size', [
+    ('Scotch yoke', 'C', 0.3), ('Cardan gears', 'B', 0.2)])
+def test_circles_in_circles_draw_an_exact_straight_line(name, joint, size):
+    linkage, theta = made(name), np.linspace(-math.pi, math.pi, 361)
+    place, rate = linkage.solve(theta)[joint], linkage.velocity(theta)[joint]
+    np.testing.assert_allclose(place[:, 0], size * np.cos(theta), atol=1e-16)
+    np.testing.assert_allclose(rate[:, 0], -size * np.sin(theta), atol=2e-16)
+    assert max(np.abs(place[:, 1]).max(), np.abs(rate[:, 1]).max()) < 2e-16
+
+
+def test_a_gripper_opens_as_a_slider_crank_does_and_its_servo_has_a_ratio():
+    gripper, theta = made('gripper'), np.linspace(0.0, 0.8, 41)
+    opened = 40 * np.cos(theta) + np.sqrt(17.5 ** 2 - (40 * np.sin(theta) - 13) ** 2)
+    np.testing.assert_allclose(gripper.solve(theta)['S'][:, 0], opened, rtol=1e-15)
+    lines = [line.strip() for line in CASES['gripper'].lines.strip().splitlines()]
+    lines[2:3] = ['H ground 60 0', 'M crank H 5', 'A crank O m geared crank -0.4 15deg']
+    geared = mechanisms.create('custom', joints=lines, **CASES['gripper'].numbers)
+    servo = (math.radians(15.0) - theta) / 0.4
+    np.testing.assert_allclose(geared.solve(servo)['S'][:, 0], opened, rtol=1e-15)
+    ends = [(math.radians(15.0) - end) / 0.4 for end in gripper.reach()[0][::-1]]
+    assert geared.reach()[0] == pytest.approx(ends)
+    np.testing.assert_allclose(geared.input_for('S.x', opened[5]), sorted(
+        (math.radians(15.0) - gripper.input_for('S.x', opened[5])) / 0.4))
+
+
+def test_a_trammel_draws_an_ellipse():
+    trammel = made('trammel of Archimedes')
+    x, y = trammel.solve(np.linspace(-0.5, 0.5, 101))['P'].T
+    np.testing.assert_allclose((x / 0.3) ** 2 + (y / 0.8) ** 2, 1.0, rtol=1e-14)
+    assert trammel.dead_points() == [-0.5, 0.5]
+
+
+def test_a_rack_steers_both_wheels_alike_and_the_inner_one_more():
+    steering, turn = made('rack steering'), np.linspace(-0.07, 0.07, 29)
+    right, left = (np.degrees(turned(steering, 0.35 + turn, *bar)) for bar in ('QC', 'KD'))
+    right, left = right - right[14], left - left[14]
+    np.testing.assert_allclose(left, -right[::-1], atol=1e-12)
+    assert np.all(np.abs(right[:10]) < np.abs(left[:10]) - 0.2) or np.all(
+        np.abs(right[:10]) > np.abs(left[:10]) + 0.2)
+
+
+def test_the_long_bars_of_an_antiparallelogram_cross_on_an_ellipse():
+    linkage, theta = made('antiparallelogram'), np.linspace(0.1, 3.0, 59)
+    o, q, a, b = (linkage.solve(theta)[name] @ (1, 1j) for name in 'OQAB')
+    part = cross(b - q, q - o) / cross(b - q, a - o)
+    meet = o + part * (a - o)
+    np.testing.assert_allclose(abs(meet - o) + abs(meet - q), 0.25, rtol=1e-13)
+
+
+def test_an_elbow_has_a_motor_of_its_own():
+    arm, inputs = made('elbow motor'), given(poses('elbow motor', 40))
+    np.testing.assert_allclose(arm.solve(inputs)['B'] @ (1, 1j), 0.4 * np.exp(1j * inputs[0])
+                               - 0.3 * np.exp(1j * (inputs[0] + inputs[1])), atol=1e-15)
+    far = arm.joint_angles(inputs, ('distance(O,B)',))['distance(O,B)']
+    np.testing.assert_allclose(
+        far, np.sqrt(0.4 ** 2 + 0.3 ** 2 - 2 * 0.4 * 0.3 * np.cos(inputs[1])), rtol=1e-14)

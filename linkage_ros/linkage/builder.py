@@ -393,6 +393,8 @@ class Builder:
         ends = self.points[first], self.points[second]
         if ends[0].home == ends[1].home == GROUND:
             vector = ends[1].place - ends[0].place
+            if vector.length().value == 0.0:
+                raise ConstructionError(f'{first} and {second} are at the same place')
             return _Vector(vector, vector.length(), GROUND)
         return self._bar_between(first, second)
 
