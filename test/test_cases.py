@@ -6,9 +6,12 @@
 import math
 
 from linkage_ros import mechanisms, scene
+from linkage_ros.render.command import main
+from linkage_ros.robot_model import urdf
 from mpmath import mp, mpc, mpf
 import numpy as np
 import pytest
+from robots import Pinocchio
 from truth.accuracy_rule import RULE
 from truth.cases import CASES, CRANK, FOOT, IDLER, TIP
 from truth.closed_loops import ClosedLoops, cross
@@ -415,3 +418,16 @@ def test_what_drives_nothing_or_has_nowhere_to_go_is_refused():
             ('A crank O 1', 'L block A 1 1'): 'A is no joint of a block'}.items():
         with pytest.raises(ValueError, match=problem):
             mechanisms.create('custom', joints=('O ground 0 0', 'X ground 1 0', *lines))
+
+
+def test_a_carriage_alone_is_a_linkage_and_has_a_picture(tmp_path):
+    rail = ['O ground 0 0', 'X ground 1 0', 'R carriage O along X -0.2 0.7']
+    linkage = mechanisms.create('custom', joints=rail)
+    assert linkage.reach() == [(-0.2, 0.7)] and linkage.input_for('R.x', 0.3) == [0.3]
+    assert linkage.extremes('R.x') == [((-0.2, -0.2), (0.7, 0.7))]
+    machine = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': rail}).machines['m']
+    assert Pinocchio(urdf.describe([machine], 'world')).joints == ['m_carriage']
+    path = tmp_path / 'rail.yaml'
+    path.write_text(
+        f'/**: {{ros__parameters: {{mechanisms: [m], m.type: custom, m.joints: {rail}}}}}')
+    assert main([str(path), '--out', str(tmp_path / 'rail.png')]) == 0
