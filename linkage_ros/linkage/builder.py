@@ -140,7 +140,8 @@ class Builder:
                 start = arctangent(along.y, along.x)
         else:
             parent, along, start = self._direction(centre, zero)
-        crank = planar.Crank(self.points[centre].place, length, along, turning)
+        crank = planar.Crank(self.points[centre].place, length, along, turning,
+                             backwards=len(self.mirrors) % 2 == 1)
         bar = crank.bar() if parent == GROUND else planar.turned(along, turning, length)
         self._hang(centre, name, bar, length, link, parent, start)
         self.joint_values[link] = turning
