@@ -17,7 +17,7 @@ from truth.cases import CASES, CRANK, FOOT, IDLER, TIP
 from truth.closed_loops import ClosedLoops, cross
 
 # What a velocity or rate may be off by, as a part of its top speed, beyond what lengths tell.
-SPEED = 1e-13
+SPEED = 5e-15
 
 
 def made(name, size=1.0, branches=None):
