@@ -23,6 +23,7 @@ from ..formula.expression import (
     cosine,
     cross,
     dimension,
+    dot,
     Number,
     Real,
     real,
@@ -168,14 +169,26 @@ class Builder:
     def carriage(self, name: str, origin: str, towards: str, low: Real, high: Real,
                  geared: Optional[Gear] = None) -> None:
         """Drive a joint along the line from a joint towards another of one link, low to high."""
-        parent, along, direction = self._direction(origin, towards)
         word = self._numbered('carriage')
         place = self._drive(Input(word, LENGTH, low, high), geared)
-        self._slide(word, parent, origin, name, place, along, direction)
+        self._ride(word, name, origin, towards, place, abs(low) + abs(high))
+
+    def yoke(self, name: str, pin: str, origin: str, towards: str) -> None:
+        """Slide a block along a line between two joints; a pin runs in a slot across it."""
+        _, along, _ = self._direction(origin, towards)
+        start, end = self.points[origin], self.points[pin]
+        self._ride(self._numbered('block'), name, origin, towards,
+                   dot(along, end.place - start.place), end.span + start.span, pin)
+
+    def _ride(self, link: str, name: str, origin: str, towards: str, place: Real, way: Real,
+              *others: str) -> None:
+        """Place a joint on the line of two others, as the block that slides there."""
+        parent, along, direction = self._direction(origin, towards)
+        self._slide(link, parent, origin, name, place, along, direction)
         start = self.points[origin]
         self.points[name] = _Point(
-            start.place + along * place, word, start.span + abs(low) + abs(high),
-            frozenset((origin, towards)) | start.stands_on | self.points[towards].stands_on)
+            start.place + along * place, link, start.span + way, frozenset().union(
+                *({x} | self.points[x].stands_on for x in (origin, towards, *others))))
 
     def block(self, name: str, joint: str, along: Real, across: Real) -> None:
         """Add a joint to the block that slides with a joint: along its line, and to its left."""

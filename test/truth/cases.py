@@ -171,15 +171,14 @@ CASES = {
                             'P': 0.08 + 0.1j},
         lambda x, n, u: (x.O, x.Q - n.g - 1j * n.h, x.A - n.m * cis(u), bar(x.A, x.B, n.b),
                          bar(x.B, x.Q, n.c), bar(x.Q, x.P, n.e), bar(x.B, x.P, n.f))),
-    # Its yoke goes as far as two cranks of half its size, geared against each other.
     'Scotch yoke': Case("""
         O ground 0 0
-        A crank O r/2
-        B crank O r/2 geared crank -1 0
-        C parallelogram O A B""",
-        {'r': 0.3}, ((0.2,), (2.9,)), {'O': 0, 'A': 0.15, 'B': 0.15, 'C': 0.3},
-        lambda x, n, u: (x.O, x.A - n.r * cis(u) / 2, x.B - n.r * cis(-u) / 2,
-                         x.C - n.r * cis(u).real)),
+        X ground r 0
+        A crank O r
+        C yoke A O along X
+        D block C r 0""",
+        {'r': 0.3}, ((0.2,), (2.9,)), {'O': 0, 'X': 0.3, 'A': 0.3, 'C': 0.3, 'D': 0.6},
+        lambda x, n, u: (x.O, x.X - n.r, x.A - n.r * cis(u), x.C - x.A.real, x.D - x.C - n.r)),
     'geared five-bar': Case("""
         O ground 0 0
         Q ground g 0
@@ -216,19 +215,17 @@ CASES = {
         {'O': 0, 'X': 0.5, 'A': -0.4, 'B': 0.3j, 'P': 0.24 + 0.48j},
         lambda x, n, u: (x.O, x.X - n.l, x.A - u, x.B.real, bar(x.A, x.B, n.l),
                          x.P - ahead(x.A, x.B, n.d))),
-    # The middle of the cross turns twice as fast as the shafts A and B; both slots hold it.
+    # The cross slides on the first shaft's O-A; the other's shaft is in a slot square to that.
     'Oldham coupling': Case("""
         O ground 0 0
         Q ground e 0
-        M ground e/2 0
         A crank O r
-        B crank Q r geared crank 1 90deg
-        C crank M e/2 geared crank 2 0""",
+        C yoke Q O along A
+        B block C 0 r""",
         {'e': 0.01, 'r': 0.04}, ((0.3,), (5.9,)),
-        {'O': 0, 'Q': 0.01, 'M': 0.005, 'A': 0.04, 'B': 0.01 + 0.04j, 'C': 0.01},
-        lambda x, n, u: (x.O, x.Q - n.e, x.M - n.e / 2, x.A - n.r * cis(u),
-                         x.B - x.Q - 1j * n.r * cis(u), cross(x.C - x.O, cis(u)),
-                         cross(x.C - x.Q, 1j * cis(u)))),
+        {'O': 0, 'Q': 0.01, 'A': 0.04, 'C': 0.01, 'B': 0.01 + 0.04j},
+        lambda x, n, u: (x.O, x.Q - n.e, x.A - n.r * cis(u), cross(x.C - x.O, cis(u)),
+                         cross(x.C - x.Q, 1j * cis(u)), x.B - x.C - 1j * n.r * cis(u))),
     'rack steering': Case("""
         G ground 0 0
         H ground t 0
