@@ -114,6 +114,14 @@ def test_a_wrong_line_is_refused_with_the_line_and_what_is_allowed(line, problem
         made(line)
 
 
+@pytest.mark.parametrize('line', [
+    'P crank R 1 zero O', 'P carriage R along O 0 1', 'P slider A 1 R along O out',
+    'P dyad R O 1 1 left', 'P cylinder R O 1 left'])
+def test_joints_at_the_same_place_have_no_direction(line):
+    with pytest.raises(ValueError, match=f'joint line "{line}": R and O are at the same place'):
+        made('R ground 0 0', line)
+
+
 def test_a_name_that_calls_python_is_only_a_name():
     with pytest.raises(ValueError, match='is no number, dimension or arithmetic on them'):
         made('P ground __import__("os") 0')

@@ -6,6 +6,7 @@
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
+from truth.cases import CASES
 
 # One of every construction, by two inputs; the mirror line O-H is askew and joints lie on it.
 ALL = ('O ground 0 0', 'H ground 1 2', 'K ground 1 0', 'Q ground 1.5 -0.3', 'A crank K 0.2',
@@ -72,3 +73,29 @@ def test_an_image_may_be_mirrored_again():
 def test_a_mirror_line_that_cannot_be_is_refused(line, text):
     with pytest.raises(ValueError, match=text):
         mechanisms.create('custom', joints=('O ground 0 0', 'H ground 1 0', 'A crank O 1', line))
+
+
+def check_images(lines, inputs, **dimensions):
+    """Hold each joint of a linkage against where an askew mirror line shows it."""
+    linkage = mechanisms.create('custom', joints=(
+        *lines, 'y1 ground 0.3 0.1', 'y2 ground 0.5 0.9', 'm mirrored y1 y2'), **dimensions)
+    for values in inputs:
+        places, images = seen(linkage.solve(values[0] if len(values) == 1 else values), 'y1', 'y2')
+        near = 1e-14 * max(map(abs, places.values()))
+        assert all(abs(images[name] - place) < near for name, place in (
+            (name[:-1], place) for name, place in places.items() if name.endswith('m')))
+
+
+@pytest.mark.parametrize('name', CASES)
+def test_a_case_has_its_image_in_a_line_askew(name):
+    check_images(CASES[name].joints, np.linspace(*CASES[name].path, 5).tolist(),
+                 **CASES[name].numbers)
+
+
+@pytest.mark.parametrize('zero', ['', ' up', ' zero Z'])
+@pytest.mark.parametrize('ground', ['0.6 0', '0 0.6', '-0.48 0.36', '0.36 -0.48', '-0.6 0'])
+@pytest.mark.parametrize('line', ['B dyad A Q 0.6 0.2 left', 'B dyad A Q 0.9 0.5 right',
+                                  'B slider A 0.2 O 0.4 out', 'B slider A 0.2 O 90deg in'])
+def test_an_image_passes_change_points_as_what_it_shows_does(line, ground, zero):
+    check_images(('O ground 0 0', 'Z ground 0.1 -0.2', f'Q ground {ground}',
+                  f'A crank O 0.2{zero}', line), [[x] for x in np.linspace(-3.1, 3.1, 13)])

@@ -15,6 +15,7 @@ from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD, shapes
 import numpy as np
 import pytest
 from robots import LIBRARIES, Pinocchio, Yourdfpy
+from truth.cases import CASES
 
 TOLERANCE = 1e-12
 SLIDES = {'slide', 'block', 'cylinder', 'left0_block', 'left1_block', 'right0_block',
@@ -51,6 +52,10 @@ MACHINES = {
     'boom': lambda: machine('custom', BOOM[:4], scale=2.0),
     'boom and arm': lambda: machine('custom', BOOM, scale=2.0),
 }
+OWN = {name: lambda case=case, pairs=2 if name == 'Cardan gears' else 1: machine(
+    'custom', case.joints, leg_pairs=pairs,
+    **{f'dimensions__{key}': value for key, value in case.numbers.items()})
+    for name, case in CASES.items()}
 CUTS = {'water_drop': 1, 'jansen': 3, 'peaucellier': 3, 'slotted_lever': 1,
         'walker of 3 pairs': 18, 'gripper': 1, 'engine': 1, 'boxer engine': 4, 'five_bar': 1,
         'five-bar with a block': 2, 'boom': 1, 'boom and arm': 2}
@@ -111,12 +116,12 @@ def limits(one):
 
 
 @pytest.mark.parametrize('name, library, count', [
-    *((name, Pinocchio, 6) for name in MACHINES),
+    *((name, Pinocchio, 6) for name in (*MACHINES, *OWN)),
     *((name, Yourdfpy, 6) for name in ('jansen', 'slotted_lever', 'boxer engine')),
     *(pytest.param(name, library, 41, marks=pytest.mark.long)
       for name in MACHINES for library in LIBRARIES)])
 def test_every_joint_is_met_and_every_loop_is_closed(name, library, count):
-    one = MACHINES[name]()
+    one = {**MACHINES, **OWN}[name]()
     text = description(one)
     robot = library(text)
     frames = [link for link in links(text) if not re.search('_link$|^world$', link)]

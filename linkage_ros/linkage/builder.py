@@ -23,6 +23,7 @@ from ..formula.expression import (
     cosine,
     cross,
     dimension,
+    dot,
     Number,
     Real,
     real,
@@ -140,8 +141,9 @@ class Builder:
                 start = arctangent(along.y, along.x)
         else:
             parent, along, start = self._direction(centre, zero)
-        crank = planar.Crank(self.points[centre].place, length, along, turning)
-        bar = crank.bar() if parent == GROUND else planar.turned(along, turning) * length
+        crank = planar.Crank(self.points[centre].place, length, along, turning,
+                             backwards=len(self.mirrors) % 2 == 1)
+        bar = crank.bar() if parent == GROUND else planar.turned(along, turning, length)
         self._hang(centre, name, bar, length, link, parent, start)
         self.joint_values[link] = turning
         self._place(name, centre, bar, link, length, () if zero is None else (zero,))
@@ -167,14 +169,26 @@ class Builder:
     def carriage(self, name: str, origin: str, towards: str, low: Real, high: Real,
                  geared: Optional[Gear] = None) -> None:
         """Drive a joint along the line from a joint towards another of one link, low to high."""
-        parent, along, direction = self._direction(origin, towards)
         word = self._numbered('carriage')
         place = self._drive(Input(word, LENGTH, low, high), geared)
-        self._slide(word, parent, origin, name, place, along, direction)
+        self._ride(word, name, origin, towards, place, abs(low) + abs(high))
+
+    def yoke(self, name: str, pin: str, origin: str, towards: str) -> None:
+        """Slide a block along a line between two joints; a pin runs in a slot across it."""
+        _, along, _ = self._direction(origin, towards)
+        start, end = self.points[origin], self.points[pin]
+        self._ride(self._numbered('block'), name, origin, towards,
+                   dot(along, end.place - start.place), end.span + start.span, pin)
+
+    def _ride(self, link: str, name: str, origin: str, towards: str, place: Real, way: Real,
+              *others: str) -> None:
+        """Place a joint on the line of two others, as the block that slides there."""
+        parent, along, direction = self._direction(origin, towards)
+        self._slide(link, parent, origin, name, place, along, direction)
         start = self.points[origin]
         self.points[name] = _Point(
-            start.place + along * place, word, start.span + abs(low) + abs(high),
-            frozenset((origin, towards)) | start.stands_on | self.points[towards].stands_on)
+            start.place + along * place, link, start.span + way, frozenset().union(
+                *({x} | self.points[x].stands_on for x in (origin, towards, *others))))
 
     def block(self, name: str, joint: str, along: Real, across: Real) -> None:
         """Add a joint to the block that slides with a joint: along its line, and to its left."""
@@ -393,6 +407,8 @@ class Builder:
         ends = self.points[first], self.points[second]
         if ends[0].home == ends[1].home == GROUND:
             vector = ends[1].place - ends[0].place
+            if vector.length().value == 0.0:
+                raise ConstructionError(f'{first} and {second} are at the same place')
             return _Vector(vector, vector.length(), GROUND)
         return self._bar_between(first, second)
 

@@ -20,6 +20,7 @@ Linkages written down: one line a joint, in the order they are placed.
     L slot Q A e out d        tip, d from Q, of a lever about Q; A in its slot, e to its left
     S slider A r G p out      block on a line through G in direction p [rad], on a rod r from A
     S slider A r G along H out    the same on the line G -> H of any link
+    Y yoke A G along H        block on the line G -> H whose slot, square to it, A runs in
     T block S x y             on the block of S, x ahead of it and y to its left
     C antiparallelogram B A D     corner opposite B where the bars cross that a parallelogram has
 
@@ -69,6 +70,7 @@ FORMS = {
     'crank': ('crank CENTRE LENGTH [up] [zero JOINT] [geared INPUT RATIO ANGLE]',),
     'cylinder': ('cylinder BASE PIVOT LENGTH left|right [geared INPUT RATIO DISTANCE]',),
     'carriage': ('carriage ORIGIN along TOWARDS DISTANCE DISTANCE [geared INPUT RATIO DISTANCE]',),
+    'yoke': ('yoke PIN ORIGIN along TOWARDS',),
     'block': ('block JOINT X Y',),
     'dyad': ('dyad FIRST SECOND LENGTH LENGTH left|right',),
     'rigid': ('rigid FIRST SECOND LENGTH LENGTH left|right',),

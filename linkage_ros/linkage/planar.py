@@ -54,12 +54,17 @@ GRAZE = 8 * 2.0 ** -53
 
 @dataclass(frozen=True)
 class Crank:
-    """A crank: its centre, length [m], direction of the angle zero, and the angle [rad]."""
+    """
+    A crank: its centre, length [m], direction of the angle zero, and the angle [rad].
+
+    That of a mirror image turns backwards.
+    """
 
     centre: Complex
     length: Real
     zero: Complex
     angle: Real
+    backwards: bool = False
 
     def bar(self) -> Complex:
         """Return the vector from the centre to the pin."""
@@ -84,10 +89,10 @@ def unit(vector: Complex, length: Real) -> Complex:
     return along
 
 
-def turned(vector: Complex, theta: Real) -> Complex:
-    """Return a vector of constant length turned by an angle [rad]."""
-    turning = spin(vector)
-    return with_spin(vector * Complex(cosine(theta), sine(theta)), Rate(
+def turned(along: Complex, theta: Real, length: Real) -> Complex:
+    """Return a bar of a length [m], turned from a direction by an angle [rad]."""
+    turning = spin(along)
+    return with_spin(along * Complex(cosine(theta), sine(theta)) * length, Rate(
         (theta, *turning.of), lambda rate, *rates: rate + turning.formula(*rates)))
 
 
@@ -237,9 +242,10 @@ class CrankArm(Arm):
         return self._crank.centre + self._line * Complex(along, across)
 
     def _first_sign(self, sign: float) -> Real:
-        """Return the sign that makes s (sign +1) or h positive for crank angles in (0, pi)."""
-        left = where(0.0 <= self._turn.y, sign, -sign)
-        return where(0.0 <= self._turn.x, 1.0, left)
+        """Return the sign that makes s (sign +1) or h positive at the first quarter turn."""
+        ahead, behind = (-sign, 1.0) if self._crank.backwards else (1.0, sign)
+        beyond = where(0.0 <= self._turn.y, behind, -behind)
+        return where(-GRAZE <= self._turn.x, ahead, beyond)
 
     def inverse_of_isosceles(self) -> Optional[Complex]:
         """Return 1 / conjugate(arm) where foot and pin are as far from the centre, else None."""

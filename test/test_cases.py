@@ -1,0 +1,433 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Linkages that people have, held to the lengths of their bars and to what is published."""
+
+import math
+
+from linkage_ros import mechanisms, scene
+from linkage_ros.render.command import main
+from linkage_ros.robot_model import urdf
+from mpmath import mp, mpc, mpf
+import numpy as np
+import pytest
+from robots import Pinocchio
+from truth.accuracy_rule import RULE
+from truth.cases import CASES, CRANK, FOOT, IDLER, TIP
+from truth.closed_loops import ClosedLoops, cross
+
+# What a velocity or rate may be off by, as a part of its top speed, beyond what lengths tell.
+SPEED = 5e-15
+
+
+def made(name, size=1.0, branches=None):
+    """Return the linkage of a case, larger by a factor."""
+    numbers = {key: value * size for key, value in CASES[name].numbers.items()}
+    return mechanisms.create('custom', joints=CASES[name].joints, branches=branches, **numbers)
+
+
+def poses(name, count=5):
+    """Return the inputs along a case's path, shape (poses, inputs)."""
+    return np.linspace(*CASES[name].path, count)
+
+
+def given(inputs):
+    """Return inputs, with the last axis for each, as a mechanism takes them."""
+    columns = list(np.moveaxis(np.asarray(inputs), -1, 0))
+    return columns[0] if len(columns) == 1 else columns
+
+
+def in_digits(place):
+    """Return a joint as a number with many digits."""
+    return mpc(*map(float, place))
+
+
+@pytest.mark.parametrize('name', CASES)
+def test_a_case_keeps_every_length_to_the_last_digits(name):
+    case, linkage, path = CASES[name], made(name), poses(name).tolist()
+    for inputs, (exact, spread) in zip(path, ClosedLoops(case.law, case.numbers).follow(
+            case.sketch, path)):
+        for joint, place in linkage.solve(given(inputs)).items():
+            assert abs(in_digits(place) - exact[joint]) <= RULE * spread[joint], (inputs, joint)
+
+
+@pytest.mark.parametrize('name', CASES)
+def test_its_rates_by_each_input_are_those_of_its_bars(name):
+    case, linkage = CASES[name], made(name)
+    loops, inputs = ClosedLoops(case.law, case.numbers), poses(name)[2].tolist()
+    near = {joint: complex(*place) for joint, place in linkage.solve(given(inputs)).items()}
+    for by in range(len(inputs)):
+        with mp.workdps(50):
+            step = mpf(10) ** -20 * (1.0 if linkage.inputs[by].turns else inputs[by])
+            after, before = (loops.refined(near, [
+                mpf(x) + sign * step * (i == by) for i, x in enumerate(inputs)])[0]
+                for sign in (1, -1))
+            exact = {joint: (after[joint] - before[joint]) / (2 * step) for joint in near}
+        rates, top = linkage.velocity(given(inputs), by=by), max(map(abs, exact.values()))
+        for joint, rate in rates.items():
+            assert abs(in_digits(rate) - exact[joint]) <= SPEED * top, (by, joint)
+        turning = linkage.joint_rates(given(inputs), by=by)
+        for link in linkage.links:
+            if link.name in [each.name for each in linkage.inputs]:
+                assert turning[link.name] == (link.name == linkage.inputs[by].name)
+
+
+@pytest.mark.parametrize('name', CASES)
+def test_arrays_functions_and_machine_code_say_the_same(name):
+    linkage, inputs = made(name), poses(name, 6).reshape(3, 2, -1)
+    whole, quick = linkage.solve(given(inputs)), linkage.accelerated().solve(given(inputs))
+    pose = linkage.function(None, linkage.joints)
+    angles = linkage.joint_angles(given(inputs))
+    for index in np.ndindex(3, 2):
+        values = pose(*map(float, inputs[index]))
+        np.testing.assert_array_equal(
+            values[:2 * len(whole)], np.ravel([place[index] for place in whole.values()]))
+        np.testing.assert_allclose(
+            values[2 * len(whole):], [angle[index] for angle in angles.values()], rtol=4e-16)
+    for joint, place in whole.items():
+        np.testing.assert_array_equal(quick[joint], place)
+
+
+@pytest.mark.parametrize('power', [-600, -30, 40, 600])
+@pytest.mark.parametrize('name', CASES)
+def test_a_case_of_another_size_is_the_same_to_the_bit(name, power):
+    size, plain = 2.0 ** power, made(name)
+    linkage, lengths = made(name, size), np.array([
+        1.0 if input_.turns else size for input_ in plain.inputs])
+    inputs, held = poses(name), poses(name)[0][1:]
+    for joint, place in linkage.solve(given(inputs * lengths)).items():
+        np.testing.assert_array_equal(place, size * plain.solve(given(inputs))[joint])
+    assert linkage.reach(*held * lengths[1:]) == [
+        tuple(end * lengths[0] for end in arc) for arc in plain.reach(*held)]
+    assert linkage.dead_points(*held * lengths[1:]) == [
+        dead * lengths[0] for dead in plain.dead_points(*held)]
+
+
+@pytest.mark.parametrize('name', CASES)
+def test_the_reach_is_where_all_joints_have_a_place(name):
+    linkage, held = made(name), poses(name)[0][1:].tolist()
+    first, arcs = linkage.inputs[0], linkage.reach(*held)
+    value = np.linspace(first.low, first.high, 4002)[1:-1]
+    placed = np.all([np.isfinite(place).all(axis=-1) for place in linkage.solve(
+        [value, *([x] * len(value) for x in held)] if held else value).values()], axis=0)
+    assert np.array_equal(first.on(arcs, value), placed) and placed.any()
+    for end in (end for arc in arcs for end in arc):
+        assert np.isfinite(list(linkage.solve([end, *held] if held else end).values())).all()
+
+
+@pytest.mark.parametrize('name', CASES)
+def test_a_dead_point_is_where_a_transmission_angle_is_flat(name):
+    linkage, held = made(name), poses(name)[0][1:].tolist()
+    for angle in linkage.transmission_angles(given(poses(name, 50))).values():
+        assert np.all((angle >= 0.0) & (angle <= math.pi))
+    for value in linkage.dead_points(*held):
+        angles = linkage.transmission_angles([value, *held] if held else value).values()
+        assert any(math.isnan(angle) or math.sin(angle) < 1e-6 for angle in angles), value
+        assert linkage.distance_to_dead_point(value, *held) == 0.0
+
+
+@pytest.mark.parametrize('name', CASES)
+def test_the_inverse_finds_the_first_input_from_where_every_joint_is(name):
+    linkage, inputs = made(name), poses(name)[1].tolist()
+    first, *held = inputs
+    for joint, rate in linkage.velocity(given(inputs)).items():
+        for axis in np.flatnonzero(np.abs(rate) > 1e-9):
+            output, value = f'{joint}.{"xy"[axis]}', linkage.solve(given(inputs))[joint][axis]
+            answers = linkage.input_for(output, value, others=held)
+            assert np.abs(answers - first).min() < 1e-9, output
+            back = linkage.solve([answers, *(x + 0.0 * answers for x in held)]
+                                 if held else answers)[joint][:, axis]
+            np.testing.assert_allclose(back, value, atol=1e-12 * linkage.longest)
+
+
+# --- what is published about them --------------------------------------------------------------
+
+def turned(linkage, theta, first, second):
+    """Return the angles from one joint to another [rad], without jumps."""
+    name = f'angle({first},{second})'
+    return np.unwrap(linkage.joint_angles(theta, (name,))[name])
+
+
+def corner(one, other, opposite):
+    """Return the angle between two sides of a triangle, in digits: the law of cosines."""
+    return mp.acos((one ** 2 + other ** 2 - opposite ** 2) / (2 * one * other))
+
+
+@pytest.mark.parametrize('piston', [-0.6, -0.3, 0.0, 0.2, 0.35])
+def test_an_excavator_turns_by_the_law_of_cosines(piston):
+    linkage, n = made('excavator'), {key: mpf(x) for key, x in CASES['excavator'].numbers.items()}
+    boom, arm, bucket = (40 * piston + zero for zero in (98.779, 130.89, 120.459))
+    place = {name: in_digits(at) for name, at in linkage.solve([boom, arm, bucket]).items()}
+
+    def angle(pivot, one, other):
+        return abs(mp.arg((place[one] - place[pivot]) / (place[other] - place[pivot])))
+
+    idler = IDLER + corner(n['e'], n['i'], mpf(120.459)) - corner(n['e'], n['i'], bucket)
+    across = mp.sqrt(n['i'] ** 2 + n['g'] ** 2 - 2 * n['i'] * n['g'] * mp.cos(idler))
+    for found, exact in ((angle('O', 'P', 'B'), corner(n['p'], n['b'], boom)),
+                         (angle('A', 'C', 'D'), corner(n['c'], n['d'], arm)),
+                         (angle('E', 'G', 'H'), idler),
+                         (angle('H', 'E', 'J'), corner(n['g'], across, n['i'])
+                          + corner(across, n['m'], n['k']))):
+        assert abs(found - min(exact, 2 * mp.pi - exact)) < 8e-15
+
+
+def test_the_longest_piston_of_the_excavator_is_longer_than_its_triangles():
+    # 40 x 0.6 + 130.89 cm are more than the 112.156 + 41.031 cm that arm and boom leave.
+    linkage = made('excavator')
+    longest = [40 * 0.6 + zero for zero in (98.779, 130.89, 120.459)]
+    over = [length > input_.high for length, input_ in zip(longest, linkage.inputs)]
+    assert over == [False, True, True]
+    place = linkage.solve(longest)
+    assert np.isfinite(place['B']).all() and np.isnan(place['D']).all()
+
+
+def test_both_cranks_of_a_leg_on_one_shaft_hold_its_foot_between_them():
+    leg, (a, b) = made('five-bar leg'), CASES['five-bar leg'].numbers.values()
+    first, second = poses('five-bar leg', 40).T
+    half, middle = 0.5 * (second - first), 0.5 * (second + first)
+    far = a * np.cos(half) + np.sqrt(b ** 2 - (a * np.sin(half)) ** 2)
+    np.testing.assert_allclose(leg.solve([first, second])['F'] @ (1, 1j),
+                               far * np.exp(1j * middle), rtol=1e-14)
+    assert np.isnan(leg.solve([0.3, 0.3])['F']).all()
+
+
+def test_two_parallelograms_keep_the_tool_level():
+    arm, inputs = made('parallelogram arm'), given(poses('parallelogram arm', 40))
+    place = arm.solve(inputs)
+    np.testing.assert_allclose(place['L'] - place['W'], place['G'] - place['O'], atol=1e-12)
+    np.testing.assert_allclose(
+        place['W'] @ (1, 1j),
+        142.07 * np.exp(1j * inputs[0]) - 158.81 * np.exp(1j * inputs[1]), rtol=1e-14)
+    # Driven the other way: the motor of the lower arm holds, that of the upper arm follows.
+    assert not np.any(arm.velocity(inputs, by=1)['A'])
+
+
+def test_a_finger_that_mimics_its_driver_is_off_by_two_degrees():
+    finger, theta = made('2F-85 finger'), np.linspace(0.0, 0.8, 81)
+    follower = np.degrees(turned(finger, theta, 'P', 'F'))
+    assert np.ptp(follower) == pytest.approx(1.85, abs=0.005)
+    np.testing.assert_allclose(finger.solve(0.0)['T'] @ (1, 1j), TIP, atol=1e-16)
+
+
+def test_the_side_of_a_nearly_folded_dyad_is_not_that_of_its_zero_pose():
+    toe, ahead_of = made("Cassie's toe"), np.angle(FOOT - CRANK)
+    tarsus, heel = np.angle(FOOT), math.atan2(0.006, 0.05512)
+
+    def foot(linkage, crank):
+        pins = linkage.solve([tarsus, crank - ahead_of])
+        return np.angle((pins['B'] - pins['F']) @ (1, 1j)) - heel
+
+    # Of the keyframe the soft closure is 2 mm open, which is 0.035 rad at the foot.
+    assert foot(toe, -1.52439) == pytest.approx(-1.59681, abs=0.04)
+    assert foot(made("Cassie's toe", branches={'B': 1}), 0.0) == pytest.approx(0.0, abs=1e-12)
+    assert abs(foot(toe, 0.0)) > 0.1
+
+
+def test_the_closed_four_bar_of_gazebo_stays_a_parallelogram():
+    four_bar, theta = made('closed SDF four-bar'), np.linspace(-math.pi, math.pi, 91)
+    place = four_bar.solve(theta)
+    np.testing.assert_allclose(place['B'] - place['A'], [(0.3, 0.0)] * len(theta), atol=1e-15)
+    below = four_bar.solve(-0.5 * math.pi)
+    (x, y), (u, v) = below['Q'] - below['A'], below['B'] - below['A']
+    assert x * v - y * u < 0.0  # seen there, B is right of A -> Q; it is written left
+
+
+def test_a_scissor_lift_follows_from_the_cylinder_between_its_arms():
+    lift = scene.load('config/scissor_lift.yaml').machines['lift'].linkage
+    foot = np.linspace(0.6, 1.7, 31)
+    height, length = (lift.joint_angles(foot, (name,))[name] for name in
+                      ('P.y', 'distance(C,D)'))
+    np.testing.assert_allclose(height, 0.2 + 2 * np.sqrt(1.8 ** 2 - foot ** 2), rtol=1e-15)
+    # C, 0.6 a, and D, 0.5 a from where the arms cross, see the foot's triangle smaller.
+    square = (0.1 * 0.9) ** 2 + 0.6 * 0.5 * foot ** 2
+    np.testing.assert_allclose(length, np.sqrt(square), rtol=2e-15)
+    for stroke, at in zip(length.tolist(), foot):
+        np.testing.assert_allclose(lift.input_for('distance(C,D)', stroke), [at], rtol=1e-14)
+        assert lift.follow('distance(C,D)', stroke, 1.0)[0] == pytest.approx(at, rel=1e-14)
+
+
+def test_a_clamp_is_locked_where_handle_and_rod_are_in_line():
+    clamp = made('toggle clamp')
+    (_, locked), _ = clamp.extremes('QB', [(-0.5, 1.5)])[0]
+    o, a, b = (clamp.solve(locked)[name] @ (1, 1j) for name in 'OAB')
+    assert abs(cross(a - o, b - a)) < 1e-7 * abs(a - o) * abs(b - a)
+    assert abs(clamp.joint_rates(locked)['QB']) < 1e-6
+    assert clamp.transmission_angles(locked)['B'] > 0.5
+
+
+@pytest.mark.parametrize('name, joint, size', [
+    ('Scotch yoke', 'C', 0.3), ('Cardan gears', 'B', 0.2)])
+def test_circles_in_circles_draw_an_exact_straight_line(name, joint, size):
+    linkage, theta = made(name), np.linspace(-math.pi, math.pi, 361)
+    place, rate = linkage.solve(theta)[joint], linkage.velocity(theta)[joint]
+    np.testing.assert_allclose(place[:, 0], size * np.cos(theta), atol=1e-16)
+    np.testing.assert_allclose(rate[:, 0], -size * np.sin(theta), atol=2e-16)
+    assert max(np.abs(place[:, 1]).max(), np.abs(rate[:, 1]).max()) < 2e-16
+
+
+def test_a_gripper_opens_as_a_slider_crank_does_and_its_servo_has_a_ratio():
+    gripper, theta = made('gripper'), np.linspace(0.0, 0.8, 41)
+    opened = 40 * np.cos(theta) + np.sqrt(17.5 ** 2 - (40 * np.sin(theta) - 13) ** 2)
+    np.testing.assert_allclose(gripper.solve(theta)['S'][:, 0], opened, rtol=1e-15)
+    lines = [*CASES['gripper'].joints]
+    lines[2:3] = ['H ground 60 0', 'M crank H 5', 'A crank O m geared crank -0.4 15deg']
+    geared = mechanisms.create('custom', joints=lines, **CASES['gripper'].numbers)
+    servo = (math.radians(15.0) - theta) / 0.4
+    np.testing.assert_allclose(geared.solve(servo)['S'][:, 0], opened, rtol=1e-15)
+    ends = [(math.radians(15.0) - end) / 0.4 for end in gripper.reach()[0][::-1]]
+    assert geared.reach()[0] == pytest.approx(ends)
+    np.testing.assert_allclose(geared.input_for('S.x', opened[5]), sorted(
+        (math.radians(15.0) - gripper.input_for('S.x', opened[5])) / 0.4))
+
+
+def test_a_trammel_draws_an_ellipse():
+    trammel = made('trammel of Archimedes')
+    x, y = trammel.solve(np.linspace(-0.5, 0.5, 101))['P'].T
+    np.testing.assert_allclose((x / 0.3) ** 2 + (y / 0.8) ** 2, 1.0, rtol=1e-14)
+    assert trammel.dead_points() == [-0.5, 0.5]
+
+
+def test_a_rack_steers_both_wheels_alike_and_the_inner_one_more():
+    steering = scene.load('config/rack_steering.yaml').machines['steering'].linkage
+    right, left = (np.degrees(turned(steering, np.linspace(0.28, 0.42, 29), *ends))
+                   for ends in ('ME', 'NF'))
+    right, left = right - right[14], left - left[14]
+    np.testing.assert_allclose(left, -right[::-1], atol=1e-12)
+    assert np.all(right[:10] < left[:10] - 0.2) and right[0] < -20.0
+    # Ackermann: the axles meet on the line of the rear one, a wheelbase behind.
+    wheelbase = 1.3 / (1.0 / np.tan(np.radians(left[:10])) - 1.0 / np.tan(np.radians(right[:10])))
+    assert np.ptp(np.abs(wheelbase)) < 1.0 and 2.0 < abs(wheelbase[0]) < 3.0
+
+
+def test_the_long_bars_of_an_antiparallelogram_cross_on_an_ellipse():
+    linkage, theta = made('antiparallelogram'), np.linspace(0.1, 3.0, 59)
+    o, q, a, b = (linkage.solve(theta)[name] @ (1, 1j) for name in 'OQAB')
+    part = cross(b - q, q - o) / cross(b - q, a - o)
+    meet = o + part * (a - o)
+    np.testing.assert_allclose(abs(meet - o) + abs(meet - q), 0.25, rtol=1e-13)
+
+
+def test_an_elbow_has_a_motor_of_its_own():
+    arm, inputs = made('elbow motor'), given(poses('elbow motor', 40))
+    np.testing.assert_allclose(arm.solve(inputs)['B'] @ (1, 1j), 0.4 * np.exp(1j * inputs[0])
+                               - 0.3 * np.exp(1j * (inputs[0] + inputs[1])), atol=1e-15)
+    far = arm.joint_angles(inputs, ('distance(O,B)',))['distance(O,B)']
+    np.testing.assert_allclose(
+        far, np.sqrt(0.4 ** 2 + 0.3 ** 2 - 2 * 0.4 * 0.3 * np.cos(inputs[1])), rtol=1e-14)
+
+
+# --- gears, strokes and rails, asked where they are awkward --------------------------------------
+
+GEARED = ('O ground 0 0', 'Q ground g 0', 'A crank O a', 'B crank Q b geared crank {} 0.7',
+          'P dyad A B e f left')
+
+
+@pytest.mark.parametrize('ratio', ['1/2', '1/3', '-1.7', '2', '-2', '3', '0'])
+def test_the_reach_of_geared_cranks_is_that_of_one_turn_of_the_first(ratio):
+    rng = np.random.default_rng(len(ratio))
+    for _ in range(4):
+        lengths = dict(zip('gabef', rng.uniform((0.5, 0.3, 0.3, 0.8, 0.8),
+                                                (3.0, 1.5, 1.5, 2.5, 2.5))))
+        linkage = mechanisms.create('custom', joints=[
+            line.format(ratio) for line in GEARED], **lengths)
+        theta = np.linspace(-math.pi, math.pi, 4002)[1:-1]
+        placed = np.isfinite(linkage.solve(theta)['P']).all(axis=1)
+        arcs = linkage.reach()
+        assert np.array_equal(linkage.inputs[0].on(arcs, theta), placed)
+        for arc in arcs:
+            assert np.isfinite(linkage.solve(np.linspace(*arc, 101))['P']).all()
+        for place in linkage.solve(theta[placed][::400])['P']:
+            answers = linkage.input_for('P.x', place[0])
+            np.testing.assert_allclose(linkage.solve(answers)['P'][:, 0], place[0], atol=1e-12)
+            assert np.any(np.abs(linkage.solve(answers)['P'][:, 1] - place[1]) < 1e-7)
+
+
+def test_a_crank_at_half_speed_is_back_after_two_turns():
+    linkage = mechanisms.create('custom', joints=[
+        'O ground 0 0', 'A crank O 1', 'B crank A 1 zero O geared crank -1/2 0'])
+    here, turned_once, turned_twice = (linkage.solve(0.3 + turns * math.tau)['B']
+                                       for turns in (0, 1, 2))
+    np.testing.assert_allclose(turned_twice, here, atol=1e-14)
+    assert np.abs(turned_once - here).max() > 1.0
+
+
+def test_a_chain_of_gears_turns_exactly_as_it_is_geared():
+    chain = mechanisms.create('custom', joints=[
+        'O ground 0 0', 'A crank O 1', 'B crank A 1 zero O geared crank 2 0',
+        'C crank B 1 zero A geared crank2 -3 0.1', 'D crank C 1 zero B geared crank3 1/8 0'])
+    theta = np.linspace(-3.0, 3.0, 13)
+    angles, rates = chain.joint_angles(theta), chain.joint_rates(theta)
+    for name, ratio, offset in (('crank2', 2, 0.0), ('crank3', -6, 0.1),
+                                ('crank4', -0.75, 0.0125)):
+        np.testing.assert_allclose(angles[name], ratio * theta + offset, rtol=4e-16)
+        assert (rates[name] == ratio).all()
+    total = theta[:, None] * np.cumsum([1, 2, -6, -0.75]) + np.cumsum([0, 0, 0.1, 0.0125])
+    bars = np.exp(1j * total) * (1, -1, 1, -1)
+    np.testing.assert_allclose(chain.solve(theta)['D'] @ (1, 1j), bars.sum(axis=1), atol=4e-15)
+    np.testing.assert_allclose(chain.input_for('crank2', 1.0), [0.5 - math.pi, 0.5], rtol=1e-15)
+    np.testing.assert_allclose(chain.input_for('crank3', 1.0)[[0, -1]], [
+        -0.15 - 2.0 * math.pi / 3.0, -0.15 + math.pi], rtol=1e-14)
+
+
+def test_a_cylinder_geared_to_another_takes_its_stroke_from_both():
+    pair = mechanisms.create('custom', joints=[
+        'O ground 0 0', 'X ground 1 0', 'B cylinder X O 0.5 left',
+        'D cylinder O X 0.5 left geared cylinder -1 1.8'])
+    (low, high), = pair.reach()
+    assert (low, high) == (0.5, pytest.approx(1.3, rel=1e-14))
+    length = np.linspace(low, high, 25)
+    far = pair.joint_angles(length, ('distance(O,D)', 'cylinder2'))
+    np.testing.assert_allclose(far['distance(O,D)'], 1.8 - length, rtol=4e-15)
+    np.testing.assert_array_equal(far['cylinder2'], 1.8 - length)
+
+
+def test_a_cylinder_may_close_to_nothing():
+    boom = mechanisms.create('custom', joints=[
+        'O ground 0 0', 'P ground 0.5 0', 'B cylinder P O 0.5 left'])
+    assert boom.reach() == [(0.0, 1.0)] and boom.dead_points() == [0.0, 1.0]
+    length = np.array([0.0, 0.02, 0.3, 0.99, 1.0])
+    np.testing.assert_allclose(np.hypot(*(boom.solve(length)['B'] - (0.5, 0.0)).T), length,
+                               rtol=1e-14, atol=1e-16)
+    np.testing.assert_allclose(np.abs(boom.joint_angles(length)['OB']),
+                               2.0 * np.arcsin(length), rtol=1e-14)
+
+
+def test_a_rail_that_does_not_begin_at_its_joint_carries_a_motor():
+    rail = mechanisms.create('custom', joints=[
+        'O ground 0 0', 'X ground 0 2', 'R carriage O along X -0.7 -0.2', 'L block R -0.5 0.1',
+        'A crank R 0.3 zero L', 'S carriage R along L 0.1 0.2', 'B dyad S A 0.3 0.3 left'])
+    assert [input_.name for input_ in rail.inputs] == ['carriage', 'crank', 'carriage2']
+    assert rail.reach(0.4, 0.15) == [(-0.7, -0.2)] and rail.dead_points(0.4, 0.15) == []
+    place = {name: at @ (1, 1j) for name, at in rail.solve([-0.4, 0.4, 0.15]).items()}
+    along = -0.5j - 0.1
+    assert place['R'] == -0.4j and place['L'] == pytest.approx(-0.4j + along, rel=1e-15)
+    assert place['A'] - place['R'] == pytest.approx(
+        0.3 * np.exp(0.4j) * along / abs(along), rel=1e-15)
+    for by, rate in enumerate((1j, 0.0, 0.0)):
+        assert rail.velocity([-0.4, 0.4, 0.15], by=by)['L'] @ (1, 1j) == rate
+    np.testing.assert_allclose(rail.input_for('B.y', place['B'].imag, others=(0.4, 0.15)), [-0.4])
+
+
+def test_what_drives_nothing_or_has_nowhere_to_go_is_refused():
+    for lines, problem in {
+            ('R carriage O along X 0.2 0.2',): 'must have a way to go',
+            ('R carriage O along X 0.2 0.1',): 'must have a way to go',
+            ('A crank O 1 geared crank 1 0',): 'a linkage needs a line that drives it',
+            ('B cylinder O X 1 left', 'A crank O 1 geared cylinder 1 0'): 'cannot be geared',
+            ('A crank O 1', 'L block A 1 1'): 'A is no joint of a block'}.items():
+        with pytest.raises(ValueError, match=problem):
+            mechanisms.create('custom', joints=('O ground 0 0', 'X ground 1 0', *lines))
+
+
+def test_a_carriage_alone_is_a_linkage_and_has_a_picture(tmp_path):
+    rail = ['O ground 0 0', 'X ground 1 0', 'R carriage O along X -0.2 0.7']
+    linkage = mechanisms.create('custom', joints=rail)
+    assert linkage.reach() == [(-0.2, 0.7)] and linkage.input_for('R.x', 0.3) == [0.3]
+    assert linkage.extremes('R.x') == [((-0.2, -0.2), (0.7, 0.7))]
+    machine = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': rail}).machines['m']
+    assert Pinocchio(urdf.describe([machine], 'world')).joints == ['m_carriage']
+    path = tmp_path / 'rail.yaml'
+    path.write_text(
+        f'/**: {{ros__parameters: {{mechanisms: [m], m.type: custom, m.joints: {rail}}}}}')
+    assert main([str(path), '--out', str(tmp_path / 'rail.png')]) == 0
