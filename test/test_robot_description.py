@@ -99,7 +99,7 @@ def test_one_robot_state_publisher_sees_all_loops_of_the_scene_closed(graph):
             assert np.abs(places[cut] - places[cut[:-4]]).max() < 1e-11
         # The markers are in a frame that moves: among each other and from its origin they are
         # where the robot's are.
-        _, spheres = turn([theta, 0.5 - theta], drawn).markers
+        spheres = turn([theta, 0.5 - theta], drawn).markers[1]
         assert spheres.header.frame_id == 'arm_AB_link'
         for point, sphere in zip(points, spheres.points):
             far = np.linalg.norm(places[point] - places['arm_AB_link'])

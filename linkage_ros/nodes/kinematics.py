@@ -465,14 +465,12 @@ class MechanismPublisher:
 
     def _solve(self) -> Optional[InputState]:
         """Solve for those who listen; return for what, None if for nobody or nothing is known."""
-        if None in self._values:
+        listened = (self._joint_states.get_subscription_count() > 0,
+                    self._markers.get_subscription_count() > 0, self._whole.is_heard)
+        if None in self._values or True not in listened:
             return None
-        driven = InputState(
-            tuple(self._values), () if None in self._speeds else tuple(self._speeds),
-            self._joint_states.get_subscription_count() > 0,
-            self._markers.get_subscription_count() > 0, self._whole.is_heard)
-        if not (driven.joints or driven.markers or driven.whole):
-            return None
+        speeds = () if None in self._speeds else tuple(self._speeds)
+        driven = InputState(tuple(self._values), speeds, *listened)
         if driven != self._driven:
             # What is said again is not solved again.
             self._driven = driven
