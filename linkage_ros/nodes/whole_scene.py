@@ -40,7 +40,7 @@ class WholeScene:
         self._descriptions = node.create_publisher(String, 'robot_description', LATCHED)
         same = self._joint_states.topic_name == node.resolve_topic_name('crank_states')
         self._own_ears, self._said = int(same), frozenset(sources if same else ())
-        self._logger, self._message_of_joints = node.get_logger(), JointStates()
+        self._logger, self._joints = node.get_logger(), JointStates()
         self._stamp = self._kind = self._wire = None
         self._description, self.is_heard = '', False
 
@@ -49,8 +49,8 @@ class WholeScene:
         self.is_heard = self._joint_states.get_subscription_count() > self._own_ears
 
     def describe(self, text: str):
-        """Publish a robot model where it is another."""
-        if text != self._description:
+        """Publish a robot model, if there is one and it is another."""
+        if text not in ('', self._description):
             self._description = text
             self._descriptions.publish(String(data=text))
 
@@ -88,8 +88,8 @@ class WholeScene:
             *(model.joints(pose) for model, pose in shown)))
         chosen = [name not in self._said for name in names]
         known = all(pose.moving for _, pose in shown)
-        return self._message_of_joints.message(stamp, names[chosen].tolist(), positions[chosen],
-                                               velocities[chosen] if known else ())
+        return self._joints.message(stamp, names[chosen].tolist(), positions[chosen],
+                                    velocities[chosen] if known else ())
 
 
 def _with(shown, values):
