@@ -41,7 +41,7 @@ ARGUMENTS = (
     ('rviz', 'false', 'Whether to start RViz.'),
     ('robot_model', 'false',
      'Whether to start a robot_state_publisher for each mechanism, for frames and robot models.'),
-    ('frame_prefix', '', "Put before the names of the robot models' frames, as in left/."),
+    ('frame_prefix', '', "Put before all frames, as in left/; empty: the scene's."),
     ('use_sim_time', 'false', 'Whether time comes from the topic /clock.'),
 )
 
@@ -60,10 +60,11 @@ def _started(context):
     viewer, rviz_wanted, robot_model, use_sim_time = (
         switched(name, chosen[name]) for name in ('viewer', 'rviz', 'robot_model', 'use_sim_time'))
     port = numbered('port', chosen['port'])
-    prefix = chosen['frame_prefix'].strip('/') and f'{chosen["frame_prefix"].strip("/")}/'
     share = Path(get_package_share_directory(PACKAGE))
     path = _scene_path(share, chosen['scene'])
     shown = scene.load(str(path))
+    prefix = chosen['frame_prefix'].strip('/')
+    prefix = f'{prefix}/' if prefix else shown.frame_prefix
     common = {'namespace': chosen['namespace'], 'output': 'screen'}
     time = {'use_sim_time': use_sim_time}
     # First what may not be installed: then nothing is left running.
@@ -80,7 +81,7 @@ def _started(context):
         adapted.write_text(yaml.safe_dump(config))
         nodes.append(Node(package='rviz2', executable='rviz2', arguments=['-d', str(adapted)],
                           parameters=[time], **common))
-    if robot_model and prefix:
+    if prefix and (robot_model or rviz_wanted):
         nodes.append(_transform(shown.frame_id, prefix + shown.frame_id, time, common))
     elif rviz_wanted and not robot_model:
         nodes.append(_transform(shown.frame_id, FRAME, time, common))
@@ -89,7 +90,8 @@ def _started(context):
     elif viewer:
         nodes.append(Node(package=PACKAGE, executable=VIEWER, parameters=[{'port': port}],
                           **common))
-    return nodes + [Node(package=PACKAGE, executable=name, parameters=[str(path), time], **common)
+    return nodes + [Node(package=PACKAGE, executable=name, **common,
+                         parameters=[str(path), time, {'frame_prefix': prefix}])
                     for name in NODES]
 
 

@@ -619,3 +619,107 @@ def test_the_driver_tells_what_the_motor_would(graph, told):
     low, high = crank.sweep or (-math.inf, math.inf)
     assert all(low <= state.position[0] <= high for state in states)
     assert all(abs(state.velocity[0]) == pytest.approx(1.0) for state in states)
+
+
+KNEE = {'mechanisms': ['left', 'right'], 'left.type': 'four_bar', 'right.type': 'slotted_lever',
+        'left.crank.source': 'left_knee_motor', 'right.crank.source': 'right_hip_motor',
+        'left.joint_names': ['AB=left_shin', 'QB=-left_ankle+0.35'], 'left.only_named': True,
+        'right.joint_names': ['crank=right_hip_motor', 'slide=-right_slide']}
+SHARED = ['--ros-args', '-r', 'crank_states:=joint_states']
+
+
+def by_name(numbers, state):
+    return dict(zip(state.name, numbers, strict=True))
+
+
+def test_joints_are_published_under_the_robots_own_names_signs_and_zeros(graph):
+    graph.start(Kinematics, {**KNEE, 'left.only_named': False})
+    states = graph.listen(JointState, 'left/joint_states')
+    graph.listen(MarkerArray, 'left/markers')
+    linkage, turn = mechanisms.create('four_bar'), graph.crank(['left_knee_motor'])
+    for theta in (0.4, 0.9):
+        state = turn([theta], states, [2.0])
+        angles, rates = linkage.joint_angles(theta), linkage.joint_rates(theta)
+        assert by_name(state.position, state) == pytest.approx({
+            'left_crank': theta, 'left_shin': angles['AB'], 'left_ankle': 0.35 - angles['QB']})
+        assert by_name(state.velocity, state) == pytest.approx({
+            'left_crank': 2.0, 'left_shin': 2.0 * rates['AB'], 'left_ankle': -2.0 * rates['QB']})
+
+
+def test_a_sign_and_a_zero_hold_where_some_legs_are_left_out(graph):
+    bench = Bench(graph, 'walker', {**WALKER, 'walker.dimensions.m': 24.0})
+    plain = bench.joints_at(0.2)
+    assert bench.set(walker__joint_names=['right1_EF=-ankle+0.5', 'left0_EF=gone'],
+                     walker__only_named=True).successful
+    named = bench.joints_at(0.2)
+    assert named.name == ['ankle']
+    assert named.position[0] == 0.5 - by_name(plain.position, plain)['walker_right1_EF']
+    assert bench.set(walker__joint_names=['crank=-shaft+1'], walker__only_named=True).successful
+    assert by_name((state := bench.joints_at(0.2)).position, state) == {'shaft': 0.8}
+
+
+def test_motors_and_passive_joints_share_a_topic_and_nobody_hears_himself(graph):
+    graph.start(Kinematics, KNEE, cli_args=SHARED)
+    said, answers, heard = [], [], graph.listen(Log, '/rosout')
+
+    def sort(message):
+        (answers if 'right_slide' in message.name else said).append(message)
+
+    graph.node.create_subscription(JointState, 'joint_states', sort, 100)
+    graph.crank(['right_hip_motor'], 'joint_states')([0.2], answers)
+    state = graph.crank(['left_knee_motor', 'wheel'], 'joint_states')([0.9, 7.0], answers)
+    bars, lever = (mechanisms.create(name) for name in ('four_bar', 'slotted_lever'))
+    own, slid = bars.joint_angles(0.9), lever.joint_angles(0.2)
+    assert by_name(state.position, state) == pytest.approx({
+        'left_shin': own['AB'], 'left_ankle': 0.35 - own['QB'],
+        'right_lever': slid['lever'], 'right_slide': -slid['slide']})
+    graph.until(lambda: [m for m in heard if 'nothing is called wheel;' in m.msg])
+    graph.crank(['left_knee_motor'], 'joint_states')([1.0], answers)
+    assert len(answers) <= len(said)
+    assert len([m for m in heard if 'nothing is called' in m.msg]) == 1
+
+
+def test_all_joints_of_the_scene_come_in_one_message(graph):
+    node = graph.start(Kinematics)
+    states = graph.listen(JointState, 'joint_states')
+    own = {name: graph.listen(JointState, f'{name}/joint_states') for name in LENGTHS}
+    turn = graph.crank([f'{name}_crank' for name in LENGTHS])
+    for theta, speeds in ((0.3, [1.0, 2.0, 3.0, 4.0]), (0.4, []), (0.5, [1.0] * 4)):
+        state = turn([theta] * 4, states, speeds)
+        parts = [graph.until(lambda name=name, at=state.header.stamp: [
+            m for m in own[name] if m.header.stamp == at])[0] for name in LENGTHS]
+        assert state.name == [name for part in parts for name in part.name]
+        assert list(state.position) == [x for part in parts for x in part.position]
+        assert list(state.velocity) == [x for part in parts for x in part.velocity]
+    # Out of reach the cell is left out, and comes again.
+    gone = turn([0.6, 0.6, 2.0, 0.6], states)
+    assert not [name for name in gone.name if 'peaucellier' in name] and len(gone.name) > 10
+    assert turn([0.7] * 4, states).name == state.name
+    states.clear()
+    assert graph.set(node, jansen__joint_names=['EF=toe+1']).successful
+    changed = graph.until(lambda: states)[0]
+    assert changed.header.stamp.sec > state.header.stamp.sec and 'toe' in changed.name
+
+
+def test_what_was_heard_before_anybody_listened_is_in_the_scenes_message(graph):
+    graph.start(Kinematics, {'mechanisms': ['water_drop', 'jansen']})
+    turn = graph.crank(['water_drop_crank'])
+    turn([0.3], graph.listen(MarkerArray, 'water_drop/markers'))
+    states = graph.listen(JointState, 'joint_states')
+    state = graph.crank(['jansen_crank'])([0.5], states)
+    crank = by_name(state.position, state)
+    assert (crank['water_drop_crank'], crank['jansen_crank']) == (0.3, 0.5)
+
+
+def test_each_mechanism_has_a_frame_and_all_a_prefix(graph):
+    node = graph.start(Kinematics, {
+        'mechanisms': ['jansen', 'klann'], 'frame_prefix': 'left/', 'frame_id': 'base',
+        'klann.frame_id': 'thigh'})
+    turn = graph.crank(['jansen_crank', 'klann_crank'])
+    for name, frame in (('jansen', 'left/base'), ('klann', 'left/thigh')):
+        locus = graph.until(graph.listen(Marker, f'{name}/locus', LATCHED).copy)[0]
+        shown = turn([0.3, 0.3], graph.listen(MarkerArray, f'{name}/markers')).markers
+        assert {marker.header.frame_id for marker in (locus, *shown)} == {frame}
+    again = graph.listen(MarkerArray, 'klann/markers')
+    assert graph.set(node, klann__frame_id='').successful
+    assert turn([0.4, 0.4], again).markers[0].header.frame_id == 'left/base'

@@ -19,6 +19,7 @@ from linkage_ros import scene  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.urdf_command import main  # noqa: E402
 from linkage_ros.robot_model import urdf  # noqa: E402
+from rcl_interfaces.msg import Log  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from robots import Pinocchio, Yourdfpy  # noqa: E402
 from ros_harness import Process  # noqa: E402
@@ -31,7 +32,10 @@ CATALOGUE = Path(__file__).parents[1] / 'config' / 'all.yaml'
 POSE = [0.3, -0.2, 0.92, math.pi / 2.0, 0.4, -1.1]
 SCENES = {
     'water_drop': {}, 'jansen': {}, 'jansen with six legs': {'m.leg_pairs': 3}, 'peaucellier': {},
-    'slotted_lever': {'m.dimensions.e': 20.0}, 'slider_crank': {}}
+    'slotted_lever': {'m.dimensions.e': 20.0}, 'slider_crank': {},
+    'slotted_lever of a robot': {'m.joint_names': ['crank=-hip+0.4', 'slide=-rod+0.1']},
+    'jansen of a robot': {'m.leg_pairs': 2, 'm.joint_names': [
+        'crank=shaft-1', 'left1_EF=-ankle+0.35', 'right0_BC=knee']}}
 
 
 def given(name):
@@ -68,6 +72,53 @@ def test_joint_states_put_the_robot_where_the_markers_are(graph, name, library):
             wanted = in_frame(spheres.pose, point)
             assert np.abs(found[frame] - wanted).max() < 1e-12 * 0.01 * machine.linkage.longest
     assert spheres.header.frame_id == 'world'
+
+
+ROBOT = {'mechanisms': ['hand', 'arm', 'foot'], 'frame_id': 'torso', 'arm.type': 'four_bar',
+         'hand.type': 'slider_crank', 'foot.type': 'four_bar', 'foot.only_named': True,
+         'foot.frame_id': 'shin', 'arm.pose': POSE, 'hand.pose': [0.1, 0.2, 0.3, 0.4, 0.5, 0.6],
+         'hand.frame_id': 'arm_AB_link', 'hand.joint_names': ['block=-hand_rod+2']}
+
+
+def test_one_robot_state_publisher_sees_all_loops_of_the_scene_closed(graph):
+    node = graph.start(Kinematics, ROBOT)
+    descriptions = graph.listen(String, 'robot_description', LATCHED)
+    states = graph.listen(JointState, 'joint_states')
+    drawn = graph.listen(MarkerArray, 'hand/markers')
+    text = graph.until(lambda: descriptions)[0].data
+    robot = Pinocchio(text)
+    points = [f'hand_{point}' for point in node.scene.machines['hand'].points]
+    ends = [link.get('name') for link in ElementTree.fromstring(text).iter('link')]
+    cuts = [end for end in ends if end.endswith('_cut')]
+    assert {cut[:4] for cut in cuts} == {'arm_', 'hand'} and 'foot' not in text
+    turn = graph.crank(['hand_crank', 'arm_crank'])
+    for theta in (-1.0, 0.3, 2.9):
+        state = turn([theta, 0.5 - theta], states)
+        places = robot.places(dict(zip(state.name, state.position)), [*ends, 'arm_AB_link'])
+        for cut in cuts:
+            assert np.abs(places[cut] - places[cut[:-4]]).max() < 1e-11
+        # The markers are in a frame that moves: among each other and from its origin they are
+        # where the robot's are.
+        spheres = turn([theta, 0.5 - theta], drawn).markers[1]
+        assert spheres.header.frame_id == 'arm_AB_link'
+        for point, sphere in zip(points, spheres.points):
+            far = np.linalg.norm(places[point] - places['arm_AB_link'])
+            assert np.linalg.norm(in_frame(spheres.pose, sphere)) == pytest.approx(far)
+    assert graph.set(node, arm__frame_id='pelvis').successful
+    graph.until(lambda: len(descriptions) == 2)
+    assert ElementTree.fromstring(descriptions[1].data).find('link').get('name') == 'pelvis'
+
+
+def test_frames_of_another_robot_make_no_robot_of_the_scene(graph):
+    heard = graph.listen(Log, '/rosout')
+    graph.until(lambda: graph.node.count_publishers('/rosout'))
+    graph.start(Kinematics, {**ROBOT, 'foot.only_named': False})
+    own = graph.listen(String, 'foot/robot_description', LATCHED)
+    whole = graph.listen(String, 'robot_description', LATCHED)
+    assert '<link name="shin" />' in graph.until(lambda: own)[0].data
+    message = graph.until(lambda: [m.msg for m in heard if 'robot_description' in m.msg])[0]
+    assert 'frame_id must be the same for all' in message and 'torso, shin' in message
+    assert not whole
 
 
 def test_whoever_comes_late_hears_the_description_once(graph):

@@ -144,6 +144,20 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     *[({'frame_id': text}, 'frame_id must be a text .* 1 to 100 letters') for text in (
         '', ' ', '/world', 'my world', 'world\n', 'w\0', '\t', '-x', 'w' * 101, 'w' * 10 ** 6,
         '<world/>', 'w"', "w'", 'w&', 'w\u200bw', '\u2028')],
+    ({'frame_prefix': '/left'}, 'frame_prefix must be a text .* up to 100 letters'),
+    ({'jansen.frame_id': 'my thigh'}, 'jansen.frame_id must be a text .* up to 100 letters'),
+    *[({'jansen.joint_names': [text]}, 'jansen.joint_names must be texts such as .* each about '
+       'another of crank, BC, .*, not ') for text in (
+        '', 'BC', 'BC=', '=shin', 'BC=3', 'BC=left shin', 'ZZ=shin', 'left0_BC=shin', 'BC=shin+',
+        'BC=shin+x', 'BC=shin+1+1', 'BC==shin', 'BC=--shin', 'BC=' + 'x' * 900 + '!')],
+    ({'jansen.joint_names': ['BC=a', 'BC=b']}, "jansen.joint_names must be .* another .*'BC=b'"),
+    ({'jansen.joint_names': ['BC=knee', 'EF=-knee']}, 'jansen.joint_names must give each joint '
+     'of the scene a name of its own: jansen.BC and jansen.EF are both knee'),
+    ({'jansen.joint_names': ['BC=water_drop_CB']}, 'jansen.joint_names must give .* '
+     'water_drop.CB and jansen.BC are both water_drop_CB'),
+    ({'mechanisms': ['leg', 'leg_left0'], 'leg.type': 'jansen', 'leg.leg_pairs': 2,
+      'leg_left0.type': 'jansen'}, 'leg_left0.joint_names must give .* both leg_left0_BC'),
+    ({'jansen.only_named': 1}, 'jansen.only_named must be true or false'),
     ({'mechanisms': ['jansen\n']}, 'mechanisms must be'),
     ({'mechanisms': ['j' * 65]}, 'mechanisms must be .* up to 64 letters'),
     ({'jansen.type': 'j' * 10 ** 6}, 'jansen.type must be'),
@@ -170,6 +184,17 @@ def test_a_wrong_parameter_is_named_with_what_is_allowed(given, named):
     with pytest.raises(scene.SceneError, match='^' + named) as refused:
         scene.read(given)
     assert '\n' not in str(refused.value) and len(str(refused.value)) < 300
+
+
+def test_joints_bear_a_robots_own_names_signs_and_zeros():
+    lines = ['crank=hip', 'left0_BC=-left-knee', 'right1_EF=-ankle.2-1.5e-1']
+    joints = scene.read({'jansen.leg_pairs': 2, 'jansen.only_named': True,
+                         'jansen.joint_names': lines}).machines['jansen'].joints
+    named = {joint: called for joint, called in joints.items() if called.published}
+    assert named == {'crank': ('hip', 1.0, 0.0, True),
+                     'left0_BC': ('left-knee', -1.0, 0.0, True),
+                     'right1_EF': ('ankle.2', -1.0, -0.15, True)}
+    assert joints['left1_BC'].name == 'jansen_left1_BC' and len(joints) == 1 + 4 * 6
 
 
 def test_a_whole_number_is_taken_for_the_number_that_it_is():

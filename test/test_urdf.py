@@ -49,6 +49,9 @@ MACHINES = {
     'engine': lambda: machine('custom', ENGINE),
     'boxer engine': lambda: machine('custom', ENGINE, leg_pairs=2),
     'five-bar with a block': lambda: machine('custom', FIVE_BAR, scale=1.0),
+    'engine with zeros elsewhere': lambda: machine('custom', ENGINE, leg_pairs=2, joint_names=[
+        'crank=-m_crank+0.3', 'left0_block=-m_left0_block+0.7', 'right1_block=m_right1_block-2',
+        'right0_AB=-m_right0_AB', 'left1_AB=m_left1_AB+2.5']),
     'boom': lambda: machine('custom', BOOM[:4], scale=2.0),
     'boom and arm': lambda: machine('custom', BOOM, scale=2.0),
 }
@@ -77,14 +80,14 @@ def posed(one, thetas):
     assembly, points = one.assembly(), one.linkage.points
     solution = assembly.solution(points, assembly.joints)
     solution.solve(thetas.tolist())
-    positions = {f'm_{input_}': theta for input_, theta in zip(one.inputs, thetas)}
-    places = {}
+    positions, places = dict(zip(one.inputs, thetas)), {}
     for prefix, row in zip(assembly.legs, solution.rows):
         start = f'm_{prefix}'
         places.update(zip([start + point for point in points],
                           row[:2 * len(points)].reshape(-1, 2)))
-        positions.update(zip([start + joint for joint in assembly.joints], row[2 * len(points):]))
-    return positions, places
+        positions.update(zip([prefix + joint for joint in assembly.joints], row[2 * len(points):]))
+    return {called.name: called.of(positions[joint])
+            for joint, called in one.joints.items()}, places
 
 
 def in_space(pose, place):
@@ -267,11 +270,48 @@ def test_the_points_that_are_drawn_as_markers_make_no_difference():
     assert description(machine('jansen', points=['G'])) == description(machine('jansen'))
 
 
-def test_names_that_meet_are_refused():
+@pytest.mark.parametrize('given, named', [
+    ({'leg.leg_pairs': 2, 'leg_left0.only_named': True}, 'two joints leg_left0_O_fixed'),
+    ({'leg.joint_names': ['BC=leg_O_fixed']}, 'leg.joints .* two joints leg_O_fixed')])
+def test_names_that_meet_are_refused(given, named):
     machines = scene.read({'mechanisms': ['leg', 'leg_left0'], 'leg.type': 'jansen',
-                           'leg.leg_pairs': 2, 'leg_left0.type': 'jansen'}).machines
-    with pytest.raises(scene.SceneError, match='two joints leg_left0_O_fixed'):
+                           'leg_left0.type': 'jansen', **given}).machines
+    with pytest.raises(scene.SceneError, match=named):
         urdf.describe(machines.values(), 'world')
+
+
+ARM = {'mechanisms': ['hand', 'arm'], 'arm.type': 'four_bar', 'hand.type': 'four_bar',
+       'arm.pose': POSE, 'hand.pose': [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]}
+
+
+@pytest.mark.parametrize('library', LIBRARIES)
+def test_a_mechanism_may_stand_on_a_link_of_another(library):
+    found = scene.read({**ARM, 'arm.frame_id': 'base', 'hand.frame_id': 'arm_AB_link'})
+    text = urdf.describe(found.machines.values(), 'world')
+    robot, near = library(text), TOLERANCE * 10.0
+    assert links(text)[0] == 'base' and 'world' not in links(text)
+    hand, arm = (found.machines[name] for name in ('hand', 'arm'))
+    for theta in np.linspace(0.0, 6.0, 7):
+        positions = {f'{one.name}_{joint}': angle for one in (hand, arm)
+                     for joint, angle in one.linkage.joint_angles(theta).items()}
+        places = robot.places(positions, ['arm_A', 'arm_B', 'arm_B_cut', 'hand_B', 'hand_B_cut',
+                                          'hand_ground_link'])
+        for end in 'arm_B', 'hand_B':
+            assert np.abs(places[end] - places[f'{end}_cut']).max() < near
+        # From the link's own frame on A to the hand's plane it is as far as the pose says.
+        apart = places['hand_ground_link'] - places['arm_A']
+        assert np.linalg.norm(apart) == pytest.approx(np.linalg.norm(hand.pose[:3]), abs=near)
+
+
+@pytest.mark.parametrize('frames, tops', [
+    (('thigh', 'shin'), 'thigh, shin'), (('thigh', ''), 'thigh, world'),
+    (('arm_AB_link', 'hand_AB_link'), '.*_AB_link, .*_AB_link')])
+def test_what_makes_no_tree_is_refused(frames, tops):
+    hand, arm = scene.read({**ARM, 'hand.frame_id': frames[0], 'arm.frame_id': frames[1]}
+                           ).machines.values()
+    with pytest.raises(scene.SceneError, match=f'frame_id must be the same .* not {tops}$'):
+        urdf.describe([hand, arm], 'world')
+    assert links(urdf.describe([hand], 'world'))[0] == frames[0]
 
 
 @pytest.mark.parametrize('kind', ['four_bar', 'slider_crank'])

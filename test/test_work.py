@@ -74,6 +74,21 @@ def test_a_topic_nobody_listens_to_is_not_built(graph, monkeypatch):
         '/jansen/joint_states'}
 
 
+def test_the_nodes_own_ears_on_joint_states_are_nobody_who_listens(graph, work):
+    graph.start(Kinematics, cli_args=['--ros-args', '-r', 'crank_states:=joint_states'])
+    turn = graph.crank(CRANKS, 'joint_states')
+    turn([0.1] * 4, graph.listen(MarkerArray, 'jansen/markers'))
+    assert {key[0] for key in work} == {'jansen'}
+    states = graph.listen(JointState, 'joint_states')
+    graph.until(lambda: turn([0.2] * 4, states) and len(set(key[0] for key in work)) == 4)
+
+
+def test_a_scene_with_plain_names_changes_no_number(graph, monkeypatch):
+    monkeypatch.setattr(kinematics.Model, '_change', None)
+    graph.start(Kinematics)
+    graph.crank(CRANKS)([0.1] * 4, graph.listen(JointState, 'jansen/joint_states'), [1.0] * 4)
+
+
 def test_only_what_the_wanted_points_stand_on_is_computed():
     leg = mechanisms.create('jansen')
     operations = {point: len(_operations(leg, point)) for point in leg.points}

@@ -11,7 +11,7 @@ leg at pi - (theta - 2 pi j/N), on the same crank pin.
 from functools import cached_property
 import math
 from struct import Struct
-from typing import Callable, NamedTuple, Optional, Sequence, Union
+from typing import Callable, List, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 
@@ -141,6 +141,11 @@ class Assembly:
         # How far one of several inputs reaches depends on the others: only a pose tells.
         self.is_limited = len(inputs) == 1 and not linkage.inputs[0].is_whole(self.reach)
         self._scale = scale
+
+    @property
+    def all_joints(self) -> List[str]:
+        """The joints of all legs, with what their names begin with."""
+        return [prefix + joint for prefix in self.legs for joint in self.joints]
 
     @cached_property
     def _fastest(self) -> Mechanism:

@@ -12,13 +12,14 @@ from typing import NamedTuple, Optional, Sequence, Tuple
 import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from . import joint_state_reader, messages, scene_node
 from .message_layout import pack, unpack, Unreadable, Wire
+from .whole_scene import LATCHED, WholeScene
 from .. import scene
 from ..linkage.walker import Layout
 from ..robot_model import shapes, urdf
@@ -26,7 +27,6 @@ from ..words import listed
 
 # Any source will do; what comes while the node is kept waiting, 50 ms at 1000 Hz, is not lost.
 ANY = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 SECONDS_BETWEEN_WARNINGS = 5.0
 # How long inputs that nobody sends are waited for [s], and how many names that are no input's are
 # remembered so that each is said once.
@@ -46,13 +46,15 @@ class Kinematics(scene_node.SceneNode):
         self._mechanisms = {}
         self._drawing, self._ended = Lock(), False
         super().__init__(scene.KINEMATICS, **kwargs)
-        self._mechanisms = {name: MechanismPublisher(self, machine)
-                         for name, machine in self.scene.machines.items()}
         # Each input that a source tells of, by the source's name.
-        self._inputs = {}
+        self._inputs = {drive.source: [] for machine in self.scene.machines.values()
+                        for drive in machine.inputs.values()}
+        self._whole, self._own = WholeScene(self, self._inputs), frozenset()
+        self._mechanisms = {name: MechanismPublisher(self, machine, self._whole)
+                            for name, machine in self.scene.machines.items()}
         for name, machine in self.scene.machines.items():
             for i, drive in enumerate(machine.inputs.values()):
-                self._inputs.setdefault(drive.source, []).append((self._mechanisms[name], i))
+                self._inputs[drive.source].append((self._mechanisms[name], i))
         self._unheard, self._strangers = set(self._inputs), set()
         self._reader = joint_state_reader.Reader(self._routed)
         self._patience = self.create_timer(
@@ -69,16 +71,30 @@ class Kinematics(scene_node.SceneNode):
         return f'moves {listed(self.scene.machines, 200)} by crank_states'
 
     def prepare(self, new):
-        """Return what shows each mechanism: another for each that has changed."""
-        return {name: self._mechanisms[name].prepared(machine, new.frame_id)
-                for name, machine in new.machines.items()}
+        """Return what shows each mechanism, another for each that has changed; the whole robot."""
+        models = {name: self._mechanisms[name].prepared(
+            machine, machine.frame_id or new.frame_id, new.frame_prefix)
+            for name, machine in new.machines.items()}
+        # Where only named joints are published, they are in a robot model of somebody else's.
+        robots = [model.robot for model in models.values() if not model.machine.only_named]
+        try:
+            return models, urdf.together(robots) if robots else ''
+        except scene.SceneError as error:
+            self.get_logger().info(f'no robot_description of the whole scene: {error}', once=True)
+            return models, ''
 
     def adopt(self, prepared):
         """Show the mechanisms so from now on."""
+        models, robot = prepared
         with self._drawing:
-            for name, model in prepared.items():
-                if not self._ended:
-                    self._mechanisms[name].adopt(model)
+            if self._ended:
+                return
+            self._own = frozenset(called.name for model in models.values()
+                                  for called in model.machine.joints.values())
+            for name, model in models.items():
+                self._mechanisms[name].adopt(model)
+            self._whole.describe(robot)
+            self._whole.send(self._mechanisms.values())
 
     def say_goodbye(self):
         """Take what is drawn out of the picture, for good."""
@@ -113,8 +129,11 @@ class Kinematics(scene_node.SceneNode):
             return
         if stamp == NEVER:
             stamp = pack(self.get_clock().now().to_msg())
+        self._whole.look()
         for shown, places, known in routes:
             shown.turn(stamp, places, positions, speeds if known else ())
+        if routes:
+            self._whole.send(self._mechanisms.values(), stamp)
 
     def _routed(self, message):
         """Return the mechanisms that a message turns, where it says how far, and if how fast."""
@@ -137,7 +156,7 @@ class Kinematics(scene_node.SceneNode):
         """Say once which names are no input's."""
         room = STRANGERS - len(self._strangers)
         new = room and [name for name in dict.fromkeys(names) if name not in self._inputs
-                        and hash(name) not in self._strangers][:room]
+                        and name not in self._own and hash(name) not in self._strangers][:room]
         if new:
             # Names may be long, and many.
             self._strangers.update(map(hash, new))
@@ -164,11 +183,12 @@ class InputState(NamedTuple):
     speeds: Tuple[float, ...]
     joints: bool
     markers: bool
+    whole: bool
 
     @property
     def wanted(self):
         """Whether joint states, markers and velocities are."""
-        return self.joints, self.markers, len(self.speeds) > 0
+        return self.joints or self.whole, self.markers, len(self.speeds) > 0
 
 
 class Pose(NamedTuple):
@@ -201,16 +221,15 @@ class Model:
 
     """
 
-    def __init__(self, machine: scene.Machine, frame_id: str):
-        self.machine, self.made_for = machine, (machine, frame_id)
+    def __init__(self, machine: scene.Machine, frame_id: str, prefix: str):
+        self.machine, self.made_for = machine, (machine, frame_id, prefix)
         self.drives = list(machine.inputs.values())
         self.robot = urdf.describe([machine], frame_id)
         self.assembly = machine.assembly()
-        self.inputs = [f'{machine.name}_{input_}' for input_ in machine.inputs]
-        self._joint_names = np.array([
-            [f'{machine.name}_{prefix}{joint}' for joint in self.assembly.joints]
-            for prefix in self.assembly.legs])
-        drawn = machine.name, frame_id, machine.pose
+        self._names, self._signs, self._offsets, self._published = map(
+            np.array, zip(*machine.joints.values()))
+        self._is_plain = bool((self._signs > 0.0).all()) and not self._offsets.any()
+        drawn = machine.name, prefix + frame_id, machine.pose
         size = urdf.size(machine)
         self._points, shown = _shown(machine)
         self.drawn = *drawn, size, shown
@@ -218,7 +237,7 @@ class Model:
         self.joint_state = messages.JointStates()
         curve = self.assembly.locus(machine.tracer)
         self.locus = messages.locus(*drawn, curve, size) if len(curve) > 1 else None
-        self._solutions, self._wires = {}, {}
+        self._solutions, self._changes, self._wires = {}, {}, {}
 
     def solution(self, joints: bool, markers: bool, moving: bool):
         """Return what solves the legs for those who listen."""
@@ -247,7 +266,19 @@ class Model:
                                      and np.isfinite(driven.speeds).all())
         if held is not None and held.all():
             held = None
+        if layout.joints and not self._is_plain:
+            signs, offsets = self._change(layout)
+            values *= signs
+            values += offsets
         return Pose(layout, values, held, moving)
+
+    def _change(self, layout: Layout):
+        """Return by what all values are multiplied, and what is added, to be what is published."""
+        if layout not in self._changes:
+            self._changes[layout] = (
+                _arranged(layout, 1.0, self._signs, self._signs),
+                _arranged(layout, 0.0, self._offsets, 0.0 * self._offsets))
+        return self._changes[layout]
 
     def wire(self, publisher, build, pose: Pose, logger) -> Wire:
         """Return a publisher of messages of all legs that patches one that is built once."""
@@ -260,13 +291,19 @@ class Model:
 
     def joint_message(self, pose: Pose, stamp) -> JointState:
         """Return the joint states of the legs that can be assembled."""
-        legs = slice(None) if pose.held is None else pose.held
-        names = [*self.inputs, *self._joint_names[legs].ravel().tolist()]
-        layout, rows, driven = pose.layout, pose.rows(), pose.layout.driven(pose.values)
-        values, speeds = driven[:layout.inputs], driven[layout.inputs:]
-        return self.joint_state.message(
-            stamp, names, [*values, *rows[:, layout.coordinates:layout.posed].flat],
-            [*speeds, *rows[:, layout.posed:].flat] if pose.moving else ())
+        names, positions, velocities = self.joints(pose)
+        return self.joint_state.message(stamp, names.tolist(), positions, velocities)
+
+    def joints(self, pose: Pose):
+        """Return names, positions and, where known, velocities of what is published of a pose."""
+        layout, n, chosen = pose.layout, pose.layout.inputs, self._published
+        if pose.held is not None:
+            chosen = chosen & np.append([True] * n, pose.held.repeat(layout.joints))
+        rows, driven = layout.rows(pose.values), layout.driven(pose.values)
+        positions = np.append(driven[:n], rows[:, layout.coordinates:layout.posed])
+        velocities = np.append(driven[n:], rows[:, layout.posed:])
+        return (self._names[chosen], positions[chosen],
+                velocities[chosen] if pose.moving else velocities[:0])
 
     def marker_message(self, pose: Pose, stamp) -> MarkerArray:
         """Return the markers of the legs that can be assembled."""
@@ -289,11 +326,22 @@ def _shown(machine: scene.Machine):
     return tuple(points), shown
 
 
+def _arranged(layout: Layout, rest: float, joints: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """Return numbers for joints, inputs first, for their velocities and for the rest."""
+    values, n = np.full(layout.size, rest), layout.inputs
+    rows, driven = layout.rows(values), layout.driven(values)
+    driven[:n], rows[:, layout.coordinates:layout.posed].flat = np.split(joints, [n])
+    if layout.velocities:
+        driven[n:], rows[:, layout.posed:].flat = np.split(rates, [n])
+    return values
+
+
 class MechanismPublisher:
     """The topics of one mechanism, and the last that was heard of each of its inputs."""
 
-    def __init__(self, node_, machine: scene.Machine):
-        self.name = name = machine.name
+    def __init__(self, node_, machine: scene.Machine, whole: WholeScene):
+        self.name, self._whole = machine.name, whole
+        name = machine.name
         self._joint_states = node_.create_publisher(JointState, f'{name}/joint_states', 10)
         self._markers = node_.create_publisher(MarkerArray, f'{name}/markers', 1)
         self._locus = node_.create_publisher(Marker, f'{name}/locus', LATCHED)
@@ -307,11 +355,11 @@ class MechanismPublisher:
         # The markers in the picture, and whether the locus is.
         self._drawn, self._curved = frozenset(), False
 
-    def prepared(self, machine: scene.Machine, frame_id: str) -> Model:
+    def prepared(self, *wanted) -> Model:
         """Return what shows a mechanism, ready for who listens now; the same where it is."""
-        if self._model and self._model.made_for == (machine, frame_id):
+        if self._model and self._model.made_for == wanted:
             return self._model
-        model = Model(machine, frame_id)
+        model = Model(*wanted)
         if driven := self._driven:
             model.solution(*driven.wanted).finish()
             pose = model.solve(driven)
@@ -329,9 +377,9 @@ class MechanismPublisher:
             self._description.publish(String(data=model.robot))
         self._draw_locus(model)
         self._delete(self._drawn - model.marker_array.ids)
-        if driven := self._driven:
+        if self._driven:
             self._driven = None
-            self._show(self._stamp, driven.values, driven.speeds)
+            self._show()
 
     def _draw_locus(self, model):
         if model.locus:
@@ -379,9 +427,8 @@ class MechanismPublisher:
                 value, speed = self._understood(drive, value, speed, self._values[i])
             if value is not None:
                 self._values[i], self._speeds[i] = value, speed
-        if None not in self._values:
-            self._show(stamp, tuple(self._values),
-                       () if None in self._speeds else tuple(self._speeds))
+        self._stamp = stamp
+        self._show()
 
     def _understood(self, drive, position, speed, near):
         """Return an input and its speed as its source tells; None if they cannot be."""
@@ -393,27 +440,42 @@ class MechanismPublisher:
             return None, None
         return value, speed
 
-    def _show(self, stamp, values, speeds):
+    def known(self) -> Optional[Tuple[Model, Pose]]:
+        """Return how the mechanism is now, for the whole scene; None if that is not known."""
+        if not self._solve():
+            return None
+        held = self._pose.held
+        return (self._model, self._pose) if held is None or held.any() else None
+
+    def _show(self):
         """Publish what is listened to."""
-        driven = InputState(values, speeds, self._joint_states.get_subscription_count() > 0,
-                            self._markers.get_subscription_count() > 0)
-        if not (driven.joints or driven.markers):
+        driven = self._solve()
+        if not driven:
             return
-        self._stamp = stamp
-        if driven != self._driven:
-            # What is said again is not solved again.
-            self._driven = driven
-            self._pose = self._model.solve(driven)
         held = self._pose.held
         if held is not None:
-            self._warn(values, held)
+            self._warn(driven.values, held)
         if held is None or held.any():
             for publisher, build in self._listening(self._model, driven):
-                self._send(publisher, build, stamp)
+                self._send(publisher, build, self._stamp)
             if driven.markers:
                 self._drawn = self._model.marker_array.ids
         else:
             self._delete(self._drawn)
+
+    def _solve(self) -> Optional[InputState]:
+        """Solve for those who listen; return for what, None if for nobody or nothing is known."""
+        listened = (self._joint_states.get_subscription_count() > 0,
+                    self._markers.get_subscription_count() > 0, self._whole.is_heard)
+        if None in self._values or True not in listened:
+            return None
+        speeds = () if None in self._speeds else tuple(self._speeds)
+        driven = InputState(tuple(self._values), speeds, *listened)
+        if driven != self._driven:
+            # What is said again is not solved again.
+            self._driven = driven
+            self._pose = self._model.solve(driven)
+        return driven
 
     def _listening(self, model, driven):
         if driven.joints:

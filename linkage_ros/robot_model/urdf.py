@@ -11,7 +11,7 @@ is closed::
 
     <frame_id>
       <mechanism>_ground_link             at the mechanism's pose; its plane is x-y
-        <mechanism>_<link>_link           moved by the joint <mechanism>_<link>
+        <mechanism>_<link>_link           moved by <mechanism>_<link>, or by its joint_names
           <mechanism>_<point>             fixed, one for each joint of the linkage
           <mechanism>_<point>_cut         fixed, on the link that has to meet that joint
 
@@ -25,7 +25,8 @@ from __future__ import annotations
 
 from collections import Counter
 import math
-from typing import Dict, Iterable, Optional, Sequence, Tuple
+import re
+from typing import Dict, Iterable, Optional, Sequence, Set, Tuple
 from xml.etree import ElementTree
 
 from . import shapes
@@ -33,6 +34,7 @@ from .. import palette
 from ..linkage.builder import GROUND
 from ..linkage.output_range import common_reach, ground_frame, Travel, travels
 from ..scene import Machine, SceneError
+from ..words import listed
 
 COLOURS = {'orange': palette.ORANGE, 'blue': palette.BLUE, 'green': palette.GREEN,
            'vermilion': palette.VERMILION, 'sky': palette.SKY, 'purple': palette.PURPLE,
@@ -41,6 +43,10 @@ COLOURS = {'orange': palette.ORANGE, 'blue': palette.BLUE, 'green': palette.GREE
 
 # As parts of the longest bar: radii of bars, joints and barrels, thickness of guides and blocks.
 BAR, JOINT, BARREL, GUIDE, BLOCK = 1 / 80, 1 / 40, 1 / 32, 1 / 80, 1 / 20
+
+# The links and joints of a model as it is written here, and its root.
+_NAMED = re.compile(r'^  <(link|joint) name="([^"]*)"', re.MULTILINE)
+_ROOT = '  <link name="{}" />\n'
 
 # Sizes [m] between which nothing that is drawn is lost in single precision, as displays have it.
 SMALLEST, LARGEST = 1e-30, 1e30
@@ -55,7 +61,7 @@ def describe(machines: Iterable[Machine], frame_id: str) -> str:
     machines : iterable of Machine
         What is in it; the model of a single one bears its name.
     frame_id : str
-        The root link: the frame that the mechanisms' poses are in.
+        The root link: the frame of the poses of those that have none of their own.
 
     Returns
     -------
@@ -65,19 +71,54 @@ def describe(machines: Iterable[Machine], frame_id: str) -> str:
     Raises
     ------
     SceneError
-        If two links or two joints would have the same name, or something is too large or small.
+        If two links or two joints would have the same name, the whole would be no tree, or
+        something is too large or small.
 
     """
-    machines = list(machines)
-    robot = _Robot(machines[0].name if len(machines) == 1 else 'linkages', frame_id)
-    for machine in machines:
-        robot.owner = machine.name
-        try:
-            _Model(robot, machine).add_to(frame_id)
-        except OverflowError as error:
-            raise SceneError(f'{machine.name}.pose, {machine.name}.scale and {machine.name}'
-                             f'.dimensions must keep everything within {LARGEST:g} m, not at '
-                             f'{error}') from None
+    return together([_described(machine, machine.frame_id or frame_id) for machine in machines])
+
+
+def together(models: Sequence[str]) -> str:
+    """
+    Return robot models of mechanisms as one; raise SceneError if they make no tree.
+
+    All have the same root link, or that of one is a link of another.
+    """
+    if len(models) == 1:
+        return models[0]
+    named = [_NAMED.findall(model) for model in models]
+    root = _root(named)
+    twice = [key for key, count in Counter(key for keys in named for key in keys[1:]).items()
+             if count > 1]
+    if twice:
+        raise SceneError(_doubled('mechanisms', *twice[0]))
+    parts = [model.partition(_ROOT.format(keys[0][1])) for model, keys in zip(models, named)]
+    materials = parts[0][0].partition('\n')[2]
+    bodies = [body.removesuffix('</robot>') for *_, body in parts]
+    return f'<robot name="linkages">\n{materials}{_ROOT.format(root)}{"".join(bodies)}</robot>'
+
+
+def _root(named) -> str:
+    """Return the link that all models hang on, by the names in each, its root's first."""
+    frames = [keys[0][1] for keys in named]
+    above = {name: keys[0][1] for keys in named for tag, name in keys[1:] if tag == 'link'}
+    for _ in named:
+        frames = [above.get(frame, frame) for frame in frames]
+    tops = dict.fromkeys(frames)
+    if len(tops) > 1 or frames[0] in above:
+        raise SceneError('frame_id must be the same for all mechanisms of one robot model, or a '
+                         f'link of another one of them, not {listed(tops, 120)}')
+    return frames[0]
+
+
+def _described(machine: Machine, frame_id: str) -> str:
+    robot = _Robot(machine.name, frame_id)
+    try:
+        _Model(robot, machine).add_to(frame_id)
+    except OverflowError as error:
+        raise SceneError(f'{machine.name}.pose, {machine.name}.scale and {machine.name}'
+                         f'.dimensions must keep everything within {LARGEST:g} m, not at '
+                         f'{error}') from None
     return robot.text()
 
 
@@ -140,11 +181,20 @@ class _Model:
             travel = -travel[1], -travel[0]
         if travel and prismatic:
             travel = self._machine.scale * travel[0], self._machine.scale * travel[1]
-        place = self._place(side, link.parent, link.joint)
+        x, y = self._place(side, link.parent, link.joint)
+        called = self._machine.joints[prefix + link.name]
+        # Where the link is when what is published is zero.
+        back = -called.sign * called.offset
+        if prismatic:
+            x, y = x + side * back * math.cos(zero), y + side * back * math.sin(zero)
+        else:
+            zero += back
+        if travel:
+            travel = min(ends := [*map(called.of, travel)]), max(ends)
         return self._robot.move(
-            f'{self._machine.name}_{prefix}{link.name}', link.kind,
-            self._link(prefix, link.parent), self._link(prefix, link.name),
-            (*place, 0.0, 0.0, 0.0, zero), axis, travel)
+            called.name, link.kind, self._link(prefix, link.parent),
+            self._link(prefix, link.name), (x, y, 0.0, 0.0, 0.0, zero),
+            [called.sign * part for part in axis], travel)
 
     def _draw(self, side, link, element, colour):
         """Add bars as rods, and what slides on a link or is the slide."""
@@ -211,9 +261,8 @@ class _Robot:
 
     def __init__(self, name: str, root: str):
         self._element = ElementTree.Element('robot', name=name)
-        self._root = root
-        self.owner: Optional[str] = None
-        self._owners: Dict[Tuple[str, str], Optional[str]] = {}
+        self._name, self._root = name, root
+        self._names: Set[Tuple[str, str]] = set()
         for colour, code in COLOURS.items():
             material = ElementTree.SubElement(self._element, 'material', name=colour)
             ElementTree.SubElement(material, 'color', rgba=_numbers(*palette.rgb(code), 1.0))
@@ -249,18 +298,16 @@ class _Robot:
         return element
 
     def _named(self, tag, name, **attributes):
-        if (tag, name) in self._owners:
-            raise self._doubled(tag, name)
-        self._owners[tag, name] = self.owner
+        if (tag, name) == ('link', self._root) and self._names:
+            raise SceneError(f'frame_id must be no link of the robot model, not {name!r}')
+        if (tag, name) in self._names:
+            raise SceneError(_doubled(f'{self._name}.joints', tag, name))
+        self._names.add((tag, name))
         return ElementTree.SubElement(self._element, tag, name=name, **attributes)
 
-    def _doubled(self, tag, name):
-        if (tag, name) == ('link', self._root):
-            return SceneError(f'frame_id must be no link of the robot model, not {name!r}')
-        own = self._owners[tag, name] == self.owner
-        whose = f'{self.owner}.joints' if own else 'mechanisms'
-        return SceneError(f'{whose} must be other names: the robot model would have two {tag}s '
-                          f'{name}')
+
+def _doubled(whose, tag, name) -> str:
+    return f'{whose} must be other names: the robot model would have two {tag}s {name}'
 
 
 def _draw_rod(element, colour, radius, start, end):

@@ -18,6 +18,7 @@ import math
 import re
 from typing import Any, Dict, List, Optional, Tuple
 
+from .joint_names import check_distinct, JointName, read_joint_names
 from .parameters import Field, Parameter, plain, SceneError, Values
 from .. import mechanisms
 from ..linkage.inputs import Arc, Input
@@ -54,6 +55,11 @@ MECHANISMS = Field(
 FRAME_ID = Field('string', 'Frame that the poses are in.', readers=(KINEMATICS,),
                  rule='1 to 100 letters, digits and _ . : - /, the first a letter, digit or _',
                  pattern=re.compile(r'\w[\w.:/-]{0,99}', re.ASCII))
+FRAME_PREFIX = Field(
+    'string', 'Put before the frames of markers and loci, as robot_state_publisher does.',
+    readers=(KINEMATICS,),
+    rule='up to 100 letters, digits and _ . : - /, the first a letter, digit or _',
+    pattern=re.compile(r'(\w[\w.:/-]{0,99})?', re.ASCII))
 RATE = Field('double', 'Crank messages in a second [Hz]; 0: none.', 0.0, 1000.0, readers=(DRIVER,))
 TYPE = Field('string', 'Type of the mechanism.', readers=ALL, read_only=True,
              rule=f'one of {", ".join(TYPES)}')
@@ -71,6 +77,14 @@ MIRRORED = Field('bool', 'Whether each leg has a mirror image on the other side;
 POINTS = Field('string_array', 'Joints that are wanted in the markers.', readers=(KINEMATICS,))
 POSE = Field('double_array', "Pose of the linkage's plane in frame_id: "
              'x, y, z [m], roll, pitch, yaw [rad].', rule='six of them', readers=(KINEMATICS,))
+OWN_FRAME_ID = Field('string', "Frame that its pose is in; empty: the scene's.",
+                     readers=(KINEMATICS,), rule=FRAME_PREFIX.rule, pattern=FRAME_PREFIX.pattern)
+JOINT_NAMES = Field(
+    'string_array', "The robot's own names of joints; a joint that is not listed keeps its name.",
+    readers=(KINEMATICS,),
+    rule="such as 'BC=left_shin', or 'EF=-left_ankle+0.35' for 0.35 minus its position")
+ONLY_NAMED = Field('bool', 'Whether only the joints in joint_names are published.',
+                   readers=(KINEMATICS,))
 SPEED = Field('double', 'Speed of the {0} [{1}/s].', -FASTEST, FASTEST, readers=(DRIVER,))
 START = Field('double', 'Where the {0} starts [{1}]; a new value moves it there.',
               readers=(DRIVER,))
@@ -142,6 +156,9 @@ class Machine:
     points: Tuple[str, ...]
     pose: Tuple[float, ...]
     inputs: Mapping[str, Drive]
+    frame_id: str
+    joints: Mapping[str, JointName]
+    only_named: bool
     given: Mapping[str, Any] = some(compare=False, repr=False)
     parameters: Tuple[Parameter, ...] = some(compare=False, repr=False)
 
@@ -208,6 +225,7 @@ class Scene:
 
     machines: Mapping[str, Machine]
     frame_id: str
+    frame_prefix: str
     rate: float
     general: Tuple[Parameter, ...]
 
@@ -268,14 +286,16 @@ def read(given: Mapping[str, Any], before: Optional[Scene] = None, strict: bool 
     if not names or len(set(names)) < len(names):
         raise MECHANISMS.error('mechanisms', names)
     frame_id = values.take('frame_id', FRAME_ID, 'world')
+    frame_prefix = values.take('frame_prefix', FRAME_PREFIX, '')
     rate = values.take('rate', RATE, 50.0)
     known = before.machines if before else {}
     machines = {name: _machine(name, parts.pop(name, {}), known.get(name), strict)
                 for name in names}
-    allowed = ['mechanisms', 'frame_id', 'rate', *(f'{name}.*' for name in names)]
+    check_distinct({name: machine.joints for name, machine in machines.items()})
+    allowed = ['mechanisms', 'frame_id', 'frame_prefix', 'rate', *(f'{name}.*' for name in names)]
     for left in (values.left(), *parts.values()):
         _refuse_unknown(left, allowed)
-    return Scene(machines, frame_id, rate, tuple(values.parameters))
+    return Scene(machines, frame_id, frame_prefix, rate, tuple(values.parameters))
 
 
 def in_words(arcs) -> str:
@@ -319,9 +339,14 @@ def _machine(name: str, given: Mapping[str, Any], old: Optional[Machine], strict
               for input_ in linkage.inputs}
     for drive in inputs.values():
         _check_measures(name, linkage, drive)
+    frame_id = values.take(f'{name}.frame_id', OWN_FRAME_ID, '')
+    only_named = values.take(f'{name}.only_named', ONLY_NAMED, False)
+    joints = read_joint_names(
+        name, [*inputs, *Assembly(linkage, leg_pairs, mirrored, scale, reach).all_joints],
+        values.take(f'{name}.joint_names', JOINT_NAMES, ()), only_named)
     _refuse_unknown(values.left(), [parameter.name for parameter in values.parameters])
-    return Machine(name, linkage, reach, scale, leg_pairs, mirrored, points, pose, inputs, given,
-                   tuple(values.parameters))
+    return Machine(name, linkage, reach, scale, leg_pairs, mirrored, points, pose, inputs,
+                   frame_id, joints, only_named, given, tuple(values.parameters))
 
 
 def _linkage(name, type_, values):

@@ -1,0 +1,99 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The topics of the whole scene, for one robot_state_publisher: all joints, and a robot model."""
+
+from typing import Optional
+
+import numpy as np
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from .message_layout import unpack, Wire
+from .messages import JointStates
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class WholeScene:
+    """
+    Publishes `joint_states` and `robot_description`.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        Whose topics they are.
+    sources : iterable of str
+        The joints that it hears on `crank_states`: where that is the same topic, they are not
+        said again.
+
+    Attributes
+    ----------
+    is_heard : bool
+        Whether anybody but the node itself listened to the joints when that was last looked at.
+
+    """
+
+    def __init__(self, node, sources):
+        self._joint_states = node.create_publisher(JointState, 'joint_states', 10)
+        self._descriptions = node.create_publisher(String, 'robot_description', LATCHED)
+        same = self._joint_states.topic_name == node.resolve_topic_name('crank_states')
+        self._own_ears, self._said = int(same), frozenset(sources if same else ())
+        self._logger, self._joints = node.get_logger(), JointStates()
+        self._stamp = self._kind = self._wire = None
+        self._description, self.is_heard = '', False
+
+    def look(self):
+        """See whether anybody listens to the joints."""
+        self.is_heard = self._joint_states.get_subscription_count() > self._own_ears
+
+    def describe(self, text: str):
+        """Publish a robot model, if there is one and it is another."""
+        if text not in ('', self._description):
+            self._description = text
+            self._descriptions.publish(String(data=text))
+
+    def send(self, mechanisms, stamp: Optional[bytes] = None):
+        """
+        Publish the joints that are known, if anybody listens.
+
+        Parameters
+        ----------
+        mechanisms : iterable of MechanismPublisher
+            What is in the scene.
+        stamp : bytes, optional
+            The time, packed; the last one if it is left out.
+
+        """
+        self._stamp = stamp = stamp or self._stamp
+        shown = [known for mechanism in mechanisms
+                 if (known := mechanism.known())] if stamp and self.is_heard else []
+        if not shown:
+            return
+        if any(pose.held is not None for _, pose in shown):
+            self._joint_states.publish(self._message(unpack(stamp), shown))
+            return
+        values = np.concatenate([pose.values for _, pose in shown])
+        kind = [(model, pose.layout, pose.moving) for model, pose in shown]
+        if kind != self._kind:
+            self._kind, self._wire = kind, Wire(
+                self._joint_states,
+                lambda stamp, values: self._message(stamp, _with(shown, values)),
+                len(values), self._logger)
+        self._wire.send(stamp, values)
+
+    def _message(self, stamp, shown) -> JointState:
+        names, positions, velocities = map(np.concatenate, zip(
+            *(model.joints(pose) for model, pose in shown)))
+        chosen = [name not in self._said for name in names]
+        known = all(pose.moving for _, pose in shown)
+        return self._joints.message(stamp, names[chosen].tolist(), positions[chosen],
+                                    velocities[chosen] if known else ())
+
+
+def _with(shown, values):
+    """Return models with poses of other values, which follow each other."""
+    ends = np.cumsum([pose.values.size for _, pose in shown])
+    return [(model, pose._replace(values=part))
+            for (model, pose), part in zip(shown, np.split(values, ends))]

@@ -1,0 +1,58 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What joints are called where they are published: a robot's own names, signs and zeros."""
+
+from __future__ import annotations
+
+import re
+from typing import Any, Dict, Iterable, Mapping, NamedTuple, Sequence
+
+from .parameters import SceneError
+from ..words import elided, listed
+
+# A sign and a figure after a name are an offset; before a letter a hyphen is part of the name.
+_LINE = re.compile(r'(\w+)=(-?)([A-Za-z_][\w./:]*(?:-[A-Za-z_][\w./:]*)*)'
+                   r'([+-](?:\d{1,99}\.?\d{0,99}|\.\d{1,99})(?:[eE][+-]?\d\d?)?)?', re.ASCII)
+
+
+class JointName(NamedTuple):
+    """What a joint is called; published is sign * position + offset [rad or m], or nothing."""
+
+    name: str
+    sign: float = 1.0
+    offset: float = 0.0
+    published: bool = True
+
+    def of(self, position: Any) -> Any:
+        """Return what is published for a position."""
+        return self.sign * position + self.offset
+
+
+def read_joint_names(mechanism: str, joints: Sequence[str], lines: Iterable[str],
+                     only_named: bool) -> Dict[str, JointName]:
+    """Return the names of all joints of a mechanism; raise SceneError if a line fits none."""
+    usual = {joint: JointName(f'{mechanism}_{joint}', published=not only_named)
+             for joint in joints}
+    own: Dict[str, JointName] = {}
+    for line in lines:
+        match = _LINE.fullmatch(line)
+        if not match or match[1] not in usual or match[1] in own:
+            raise SceneError(
+                f"{mechanism}.joint_names must be texts such as 'BC=left_shin' or "
+                f"'EF=-left_ankle+0.35', each about another of {listed(joints, 90)}, not "
+                f'{elided(line)!r}')
+        own[match[1]] = JointName(match[3], -1.0 if match[2] else 1.0, float(match[4] or 0.0))
+    return {**usual, **own}
+
+
+def check_distinct(names: Mapping[str, Mapping[str, JointName]]) -> None:
+    """Raise SceneError if two joints of a scene, by mechanism, are published under one name."""
+    owners: Dict[str, str] = {}
+    for mechanism, joints in names.items():
+        for joint, called in joints.items():
+            own = f'{mechanism}.{joint}'
+            other = owners.setdefault(called.name, own) if called.published else own
+            if other != own:
+                raise SceneError(f'{mechanism}.joint_names must give each joint of the scene a '
+                                 f'name of its own: {other} and {own} are both {called.name}')
