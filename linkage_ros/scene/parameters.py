@@ -7,12 +7,19 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 import re
-from typing import Any, List, Optional, Tuple, Type
+from typing import Any, Iterable, List, Optional, Tuple, Type
 
-from ..words import elided, MESSAGE, quoted
+from ..words import elided, listed, MESSAGE, quoted
+
+# Which nodes act on a parameter, and whose value counts where several do.
+DRIVER, KINEMATICS, INVERSE = ALL = 'crank_driver', 'kinematics', 'servo_inverse'
+OWNER = KINEMATICS
+
+# What the client library declares for itself.
+_ROS = re.compile(r'(use_sim_time|start_type_description_service|qos_overrides\..*)$')
 
 KINDS = {
     'bool': (bool, 'true or false'),
@@ -72,6 +79,10 @@ class Field:
     pattern: re.Pattern = TEXT
     readers: Tuple[str, ...] = ()
     read_only: bool = False
+
+    def about(self, *words: str) -> Field:
+        """Return the same with these words in its meaning."""
+        return replace(self, meaning=self.meaning.format(*words))
 
     @property
     def shared(self) -> bool:
@@ -157,6 +168,15 @@ class Values:
         value = field.checked(name, self._left.pop(name)) if name in self._left else default
         self.parameters.append(Parameter(name, field, value))
         return value
+
+
+def refuse_unknown(names: Iterable[str], known: List[str]) -> None:
+    """Raise SceneError for a name that neither is a parameter nor the client library's own."""
+    for name in names:
+        known = [f'{name}.type', *known] if f'{name}.*' in known else known
+        if not _ROS.match(name):
+            raise SceneError(f'{elided(name)} is not a parameter of the scene; allowed: '
+                             f'{listed(known, 180)}')
 
 
 def plain(value: Any) -> Any:

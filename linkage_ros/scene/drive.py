@@ -1,0 +1,176 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""How an input of a scene moves and who tells of it: speed, start, sweep, source, and the rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+import math
+from typing import Iterable, Optional, Tuple
+
+from .parameters import ALL, DRIVER, Field, SceneError, Values
+from ..linkage.inputs import Arc, Input
+from ..linkage.servo import Mechanism
+from ..words import quoted
+
+# What an input that swings by default leaves of its reach at each end, as a part of its width.
+MARGIN = 0.01
+# The narrowest sweep, of a length as a part of its size.
+NARROWEST_SWEEP = 1e-6
+# Angles beyond this [rad] have lost digits that a crank needs.
+FARTHEST = 1e6
+FASTEST = 100.0
+
+SPEED = Field('double', 'Speed of the {0} [{1}/s].', -FASTEST, FASTEST, readers=(DRIVER,))
+START = Field('double', 'Where the {0} starts [{1}]; a new value moves it there.',
+              readers=(DRIVER,))
+SOURCE = Field('string', 'Joint in messages that tells of the {0}; empty: its name, or that of '
+               'what is measured, after <mechanism>_.', readers=ALL, read_only=True)
+MEASURES = Field('string', 'Output that the source measures, from which the {0} follows; empty: '
+                 'the {0} itself.', readers=ALL, read_only=True)
+RATIO = Field('double', 'How far the {0} moves for each unit of its source [1].', readers=ALL,
+              rule='not zero')
+OFFSET = Field('double', 'Where the {0} is when its source is at zero [{1}].', readers=ALL)
+SWEEP = Field('double_array', 'Between which values [{1}] the {0} moves to and fro; '
+              'empty: through its reach, or all round.', readers=ALL,
+              rule=f'the lower end and the higher end, within {FARTHEST:g} of zero, or none')
+
+
+@dataclass(frozen=True)
+class Drive:
+    """
+    How an input moves, an angle [rad] or a length [m], the scale included.
+
+    Attributes
+    ----------
+    input : Input
+        What moves.
+    reach : tuple of (float, float)
+        Where it can be.
+    speed, start : float
+        How fast, and from where.
+    sweep : (float, float), optional
+        Between which ends it moves to and fro; None: it turns all round.
+    ends : (float, float), optional
+        The ends that were set, beyond which no answer lies either; None: all its reach.
+    source : str
+        The joint in messages that tells of it.
+    ratio, offset : float
+        It is ratio * position + offset; so is what is measured instead.
+    measures : str
+        The output that is measured instead; empty: the input itself.
+
+    """
+
+    input: Input
+    reach: Tuple[Arc, ...]
+    speed: float
+    start: float
+    sweep: Optional[Arc]
+    ends: Optional[Arc] = None
+    source: str = ''
+    ratio: float = 1.0
+    offset: float = 0.0
+    measures: str = ''
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether its source tells the input as it is."""
+        return (self.ratio, self.offset, self.measures) == (1.0, 0.0, '')
+
+
+def in_words(arcs: Iterable[Arc]) -> str:
+    """Return arcs as text, for messages."""
+    return ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in arcs)
+
+
+def _scaled(input_: Input, linkage: Mechanism, reach: Tuple[Arc, ...],
+            scale: float) -> Tuple[Input, Tuple[Arc, ...]]:
+    """Return an input and its reach, a length times the scale."""
+    if len(linkage.inputs) > 1:
+        # How far one of several reaches depends on the others.
+        reach = ((input_.low, input_.high),)
+    if input_.turns:
+        return input_, reach
+    return (input_._replace(low=scale * input_.low, high=scale * input_.high),
+            tuple((scale * low, scale * high) for low, high in reach))
+
+
+def read_drive(name: str, linkage: Mechanism, input_: Input, reach: Tuple[Arc, ...], scale: float,
+               values: Values, old: Optional[Drive], strict: bool) -> Drive:
+    """Return how an input of a mechanism moves; `old` is how it did before, if it was there."""
+    drive = _read(name, *_scaled(input_, linkage, reach, scale), values, old, strict)
+    _check_measures(name, linkage, drive)
+    return drive
+
+
+def _read(name: str, input_: Input, reach: Tuple[Arc, ...], values: Values, old: Optional[Drive],
+          strict: bool) -> Drive:
+    speed_field, start_field, sweep_field = (
+        field.about(input_.name, input_.unit) for field in (SPEED, START, SWEEP))
+    if input_.turns:
+        start_field = replace(start_field, low=-4.0 * math.pi, high=4.0 * math.pi)
+    name = f'{name}.{input_.name}'
+    speed = values.take(f'{name}.speed', speed_field, _usual_speed(input_, reach))
+    chosen = values.left(f'{name}.start')
+    start = values.take(f'{name}.start', start_field, 0.0)
+    sweep = values.take(f'{name}.sweep', sweep_field, ())
+    told = _told(name, input_, values)
+    if sweep:
+        _check_sweep(f'{name}.sweep', sweep, input_, reach)
+    elif input_.is_whole(reach):
+        return Drive(input_, reach, speed, start, None, None, *told)
+    arcs = [sweep] if sweep else reach
+    home = [arc for arc in arcs if input_.holds(arc, start, start)]
+    low, high = (home or arcs)[0]
+    trimmed = 0.0 if sweep else MARGIN * (high - low)
+    drive = Drive(input_, reach, speed, start, (low + trimmed, high - trimmed),
+                  tuple(sweep) or None, *told)
+    settled = not strict or old and (old.start, old.sweep) == (drive.start, drive.sweep)
+    if chosen and not home and not settled:
+        raise SceneError(f'{name}.start must be inside the {"sweep" if sweep else "reach"} '
+                         f'{in_words(arcs)} {input_.unit}, not {start}')
+    return drive
+
+
+def _told(name: str, input_: Input, values: Values) -> Tuple[str, float, float, str]:
+    """Return how messages tell of an input: source, ratio, offset, and what is measured."""
+    source, measures, ratio, offset = (
+        values.take(f'{name}.{key}', field.about(input_.name, input_.unit), default)
+        for key, field, default in (('source', SOURCE, ''), ('measures', MEASURES, ''),
+                                    ('ratio', RATIO, 1.0), ('offset', OFFSET, 0.0)))
+    if not ratio:
+        raise RATIO.error(f'{name}.ratio', ratio)
+    mechanism = name.partition('.')[0]
+    return source or f'{mechanism}_{measures or input_.name}', ratio, offset, measures
+
+
+def _check_measures(name: str, linkage: Mechanism, drive: Drive) -> None:
+    if not drive.measures:
+        return
+    key = f'{name}.{drive.input.name}.measures'
+    if len(linkage.inputs) > 1:
+        raise SceneError(f'{key} must be empty: only a linkage with one input can be solved for '
+                         f'an output, and {name} has {len(linkage.inputs)}')
+    try:
+        linkage.check_output(drive.measures)
+    except ValueError as error:
+        raise SceneError(f'{key}: {error}') from None
+
+
+def _usual_speed(input_: Input, reach: Tuple[Arc, ...]) -> float:
+    """Return the speed where none is given: a stroke takes about three seconds."""
+    if input_.turns:
+        return 1.0
+    return float(f'{min(max(high - low for low, high in reach) / 3.0, FASTEST):.2g}')
+
+
+def _check_sweep(name: str, sweep: Tuple[float, ...], input_: Input,
+                 reach: Tuple[Arc, ...]) -> None:
+    if (len(sweep) != 2 or not sweep[0] + NARROWEST_SWEEP * input_.size <= sweep[1]
+            or max(map(abs, sweep)) > FARTHEST):
+        raise SWEEP.error(name, sweep)
+    if not input_.is_whole(reach) and not any(input_.holds(arc, *sweep) for arc in reach):
+        raise SceneError(f'{name} must be inside the reach {in_words(reach)} {input_.unit}, '
+                         f'not {quoted(list(sweep))}')

@@ -1,0 +1,258 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A mechanism of a scene: its linkage, size, legs, look and inputs, read from its parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field as some, replace
+from functools import lru_cache
+import re
+from typing import Any, Dict, Mapping, Optional, Tuple
+
+from .drive import Drive, read_drive
+from .joint_names import JointName, read_joint_names
+from .parameters import (
+    ALL,
+    Field,
+    INVERSE,
+    KINEMATICS,
+    Parameter,
+    refuse_unknown,
+    SceneError,
+    Values,
+)
+from .. import mechanisms
+from ..linkage.design import Design
+from ..linkage.inputs import Arc
+from ..linkage.servo import Mechanism
+from ..linkage.walker import Assembly
+from ..words import listed, quoted
+
+TYPES = (*mechanisms.TYPES, mechanisms.CUSTOM)
+
+# What a frame may be called, or is not.
+FRAME = re.compile(r'(\w[\w.:/-]{0,99})?', re.ASCII)
+FRAME_RULE = 'up to 100 letters, digits and _ . : - /, the first a letter, digit or _'
+
+TYPE = Field('string', 'Type of the mechanism.', readers=ALL, read_only=True,
+             rule=f'one of {", ".join(TYPES)}')
+JOINTS = Field('string_array', 'The linkage, one line a joint.', readers=ALL, read_only=True)
+TRACER = Field('string', 'Joint whose curve is the locus; empty: the last.', readers=ALL,
+               read_only=True)
+DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [m].', positive=True,
+                  readers=ALL)
+BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the usual one.', -1, 1, readers=ALL)
+SCALE = Field('double', 'Factor of every length.', positive=True, readers=(KINEMATICS, INVERSE))
+LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.', 1, 50,
+                  readers=(KINEMATICS,))
+MIRRORED = Field('bool', 'Whether each leg has a mirror image on the other side; '
+                 'if never set: where there is more than one pair.', readers=(KINEMATICS,))
+POINTS = Field('string_array', 'Joints that are wanted in the markers.', readers=(KINEMATICS,))
+POSE = Field('double_array', "Pose of the linkage's plane in frame_id: "
+             'x, y, z [m], roll, pitch, yaw [rad].', rule='six of them', readers=(KINEMATICS,))
+OWN_FRAME_ID = Field('string', "Frame that its pose is in; empty: the scene's.",
+                     readers=(KINEMATICS,), rule=FRAME_RULE, pattern=FRAME)
+JOINT_NAMES = Field(
+    'string_array', "The robot's own names of joints; a joint that is not listed keeps its name.",
+    readers=(KINEMATICS,),
+    rule="such as 'BC=left_shin', or 'EF=-left_ankle+0.35' for 0.35 minus its position")
+ONLY_NAMED = Field('bool', 'Whether only the joints in joint_names are published.',
+                   readers=(KINEMATICS,))
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A mechanism in a scene: one leg, its reach and scale, its legs, its look and its inputs."""
+
+    name: str
+    linkage: Mechanism
+    reach: Tuple[Arc, ...]
+    scale: float
+    leg_pairs: int
+    mirrored: bool
+    points: Tuple[str, ...]
+    pose: Tuple[float, ...]
+    inputs: Mapping[str, Drive]
+    frame_id: str
+    joints: Mapping[str, JointName]
+    only_named: bool
+    given: Mapping[str, Any] = some(compare=False, repr=False)
+    parameters: Tuple[Parameter, ...] = some(compare=False, repr=False)
+
+    def is_of(self, given: Mapping[str, Any]) -> bool:
+        """Return whether it was read from these very values."""
+        return self.given.keys() == given.keys() and all(
+            self.given[key] is value for key, value in given.items())
+
+    @property
+    def first(self) -> Drive:
+        """The first input, for most linkages the only one."""
+        return next(iter(self.inputs.values()))
+
+    def scale_of(self, output: str) -> float:
+        """Return by what an output is multiplied to be seen in the scene."""
+        return 1.0 if self.linkage.is_angle(output) else self.scale
+
+    def measured(self, output: str, value: float, near: float) -> Tuple[float, float]:
+        """
+        Return the input that an output tells [rad or m], and d output / d input there.
+
+        It goes on from where it was near, without a jump where it can; NaN outside the reach or
+        the sweep that is set.
+        """
+        drive, own, unit = self.first, self.scale_of(self.first.input.name), self.scale_of(output)
+        ends = drive.ends and (drive.ends[0] / own, drive.ends[1] / own)
+        found, rate = self.linkage.follow(output, value / unit, near / own)
+        if not (ends[0] <= found <= ends[1] if ends else found == found):
+            found, rate = map(float, self.linkage.servo_for(
+                output, value / unit, near / own, ends))
+        return found * own, rate * unit / own
+
+    def understood(self, drive: Drive, position: float, speed: Optional[float],
+                   near: Optional[float]) -> Tuple[float, Optional[float]]:
+        """Return an input and its speed as its source tells, going on from where it was near."""
+        value, speed = drive.ratio * position + drive.offset, speed and drive.ratio * speed
+        if not drive.measures:
+            return value, speed
+        found, rate = self.measured(drive.measures, value, drive.start if near is None else near)
+        return found, speed / rate if speed is not None and rate else None
+
+    def told(self, drive: Drive, value: float, speed: float) -> Tuple[float, float]:
+        """Return an input and its speed as its source would tell it."""
+        if output := drive.measures:
+            own, unit = self.scale_of(drive.input.name), self.scale_of(output)
+            rate = float(self.linkage.joint_rates(value / own, [output])[output]) * unit / own
+            value = float(self.linkage.joint_angles(value / own, [output])[output]) * unit
+            speed = rate * speed
+        return (value - drive.offset) / drive.ratio, speed / drive.ratio
+
+    def assembly(self) -> Assembly:
+        """Return its legs on their inputs."""
+        return Assembly(self.linkage, self.leg_pairs, self.mirrored, self.scale, self.reach)
+
+    @property
+    def tracer(self) -> str:
+        """The joint whose curve is shown, the linkage's own tracer if it is wanted."""
+        return self.linkage.tracer if self.linkage.tracer in self.points else self.points[-1]
+
+
+def read_machine(name: str, given: Mapping[str, Any], old: Optional[Machine],
+                 strict: bool) -> Machine:
+    """Return a mechanism from its values; the one before, where they are the same."""
+    if old and old.is_of(given):
+        return old
+    values = Values(given)
+    type_ = values.take(f'{name}.type', TYPE, name)
+    if type_ not in TYPES:
+        raise SceneError(f'{name}.type must be {TYPE.rule}, not {quoted(type_)}')
+    linkage, reach = _linkage(name, type_, values)
+    scale = values.take(f'{name}.scale', SCALE, 1.0)
+    leg_pairs, mirrored = _legs(name, linkage, values)
+    points, pose = _points(name, linkage, values), _pose(name, values)
+    settled = old.inputs if old else {}
+    inputs = {input_.name: read_drive(name, linkage, input_, reach, scale, values,
+                                      settled.get(input_.name), strict)
+              for input_ in linkage.inputs}
+    frame_id = values.take(f'{name}.frame_id', OWN_FRAME_ID, '')
+    only_named = values.take(f'{name}.only_named', ONLY_NAMED, False)
+    joints = read_joint_names(
+        name, [*inputs, *Assembly(linkage, leg_pairs, mirrored, scale, reach).all_joints],
+        values.take(f'{name}.joint_names', JOINT_NAMES, ()), only_named)
+    refuse_unknown(values.left(), [parameter.name for parameter in values.parameters])
+    return Machine(name, linkage, reach, scale, leg_pairs, mirrored, points, pose, inputs,
+                   frame_id, joints, only_named, given, tuple(values.parameters))
+
+
+def _linkage(name: str, type_: str, values: Values) -> Tuple[Mechanism, Tuple[Arc, ...]]:
+    design = _design(name, type_, values)
+    dimensions = _dimensions(name, design, values)
+    branches = _branches(name, design, values)
+    try:
+        linkage, reach = _built(design, tuple(dimensions.items()), tuple(branches.items()))
+    except ValueError as error:
+        raise SceneError(f'{name}.dimensions: {error}') from None
+    if not reach:
+        # Those that are not the usual ones first: of many only some are named.
+        usual = sorted(dimensions, key=lambda key: dimensions[key] == design.dimensions[key])
+        lengths = listed(f'{key}={dimensions[key]:g}' for key in usual)
+        raise SceneError(f'{name}.dimensions must let the {type_} be assembled at some '
+                         f'{linkage.inputs[0].kind}, which {lengths} do not')
+    return linkage, reach
+
+
+def _design(name: str, type_: str, values: Values) -> Design:
+    if type_ in mechanisms.TYPES:
+        return mechanisms.design(type_)
+    joints = values.take(f'{name}.joints', JOINTS, ())
+    tracer = values.take(f'{name}.tracer', TRACER, '')
+    start = f'{name}.dimensions.'
+    dimensions = [key[len(start):] for key in values.left(start)]
+    try:
+        return mechanisms.design(type_, joints, tracer or None, dimensions)
+    except ValueError as error:
+        raise SceneError(f'{name}.joints: {error}') from None
+
+
+def _dimensions(name: str, design: Design, values: Values) -> Dict[str, float]:
+    taken = {}
+    for key in design.dimensions:
+        field = replace(DIMENSION.about(key, design.name), positive=key not in design.signed)
+        taken[key] = values.take(f'{name}.dimensions.{key}', field, design.dimensions[key])
+    return taken
+
+
+def _branches(name: str, design: Design, values: Values) -> Dict[str, int]:
+    taken = {}
+    for key, sign in design.branches.items():
+        field = BRANCH.about(key, design.name)
+        taken[key] = values.take(f'{name}.branches.{key}', field, sign) or sign
+    return taken
+
+
+@lru_cache(maxsize=16)
+def _built(design: Design, dimensions: tuple,
+           branches: tuple) -> Tuple[Mechanism, Tuple[Arc, ...]]:
+    """Return a linkage and its reach; the same ones for the same dimensions."""
+    own: Dict[str, Any] = {} if design.name in mechanisms.TYPES else {
+        'joints': design.joints, 'tracer': design.tracer}
+    linkage = mechanisms.create(design.name, branches=dict(branches), **own, **dict(dimensions))
+    # How far one of several inputs reaches depends on the others: only a pose tells.
+    first, *others = linkage.inputs
+    return linkage, ((first.low, first.high),) if others else tuple(linkage.reach())
+
+
+def _legs(name: str, linkage: Mechanism, values: Values) -> Tuple[int, bool]:
+    able = _can_have_more_legs(linkage)
+    # A slider for what cannot be changed would only be refused.
+    pairs, mirrored = (replace(field, read_only=not able) for field in (LEG_PAIRS, MIRRORED))
+    pairs = values.take(f'{name}.leg_pairs', pairs, 1)
+    mirrored = values.take(f'{name}.mirrored', mirrored, pairs > 1)
+    if (pairs > 1 or mirrored) and not able:
+        what, allowed = ('leg_pairs', '1') if pairs > 1 else ('mirrored', 'false')
+        raise SceneError(f'{name}.{what} must be {allowed}: only a linkage whose one crank '
+                         'turns about x = 0, its angle counted from +x, can have more legs')
+    return pairs, mirrored
+
+
+def _can_have_more_legs(linkage: Mechanism) -> bool:
+    first, *others = linkage.inputs
+    if others or not first.turns:
+        return False
+    crank = next(link for link in linkage.links if link.name == first.name)
+    return not crank.zero and linkage.solve(0.0, (crank.joint,))[crank.joint][0] == 0.0
+
+
+def _points(name: str, linkage: Mechanism, values: Values) -> Tuple[str, ...]:
+    points = values.take(f'{name}.points', POINTS, linkage.points)
+    if not points or len(set(points)) < len(points) or set(points) - set(linkage.points):
+        raise SceneError(f'{name}.points must name some of {listed(linkage.points)}, each '
+                         f'once, not {quoted(list(points))}')
+    return points
+
+
+def _pose(name: str, values: Values) -> Tuple[float, ...]:
+    pose = values.take(f'{name}.pose', POSE, (0.0,) * 6)
+    if len(pose) != 6:
+        raise POSE.error(f'{name}.pose', pose)
+    return pose
