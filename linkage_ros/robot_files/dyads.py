@@ -1,25 +1,33 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Joint lines of a planar linkage: what drives, then dyad after dyad."""
+"""Joint lines of a planar linkage: what drives it, then dyad after dyad."""
 
 from __future__ import annotations
 
-from cmath import phase as _angle
+from cmath import phase
 from itertools import combinations, permutations
-from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 from .loops import Flat, Loop
 from .readers import SLIDE
 
 
 class Drive(NamedTuple):
-    """An input: the joint whose position it is, times a ratio, and its value in the pose."""
+    """An input: its name, the joint that it is, times a ratio, and its value in the pose."""
 
     name: str
     joint: Flat
     ratio: float
     value: float
+
+
+def short(value: float, near: float = 2e-16) -> str:
+    """Return the shortest number near another."""
+    if abs(value) <= 5.0 * near:
+        return '0'
+    return next(text for text in (f'{value:.{digits}g}' for digits in range(1, 18))
+                if abs(float(text) - value) <= near)
 
 
 class Drawing:
@@ -29,30 +37,40 @@ class Drawing:
     Attributes
     ----------
     lines : list of str
-    names : dict
-        Where each joint of the lines is.
+    places : dict
+        Where each joint of the lines is in the pose of the file.
     drives : list of Drive
-    on : dict
-        The joints of the lines on each body.
     bars : dict
-        Of each body that is placed the two joints that its link is between.
+        Of each body that is placed, between which joints of the lines its link is; on a block
+        they are the same.
 
     """
 
     def __init__(self, loop: Loop, drives: Sequence[str]):
-        self.loop = loop
-        self.near = 1e-9 * loop.size
+        self.loop, self.near = loop, 1e-9 * loop.size
         self.lines: List[str] = []
-        self.names: Dict[str, complex] = {}
+        self.places: Dict[str, complex] = {}
         self.drives: List[Drive] = []
-        self.driven = [joint for joint in loop.joints if joint.joint.name in drives]
+        self.driven = [joint for joint in loop.joints if joint.name in drives]
         self.bodies = list(dict.fromkeys(b for joint in loop.joints for b in joint.bodies))
-        self.on: Dict[str, List[str]] = {body: [] for body in self.bodies}
-        self.bars: Dict[str, Tuple[str, str]] = {loop.ground: ('', '')}
-        self.rails: Dict[str, complex] = {}
-        self.pins = self._pins()
-        self._finish(loop.ground)
-        while any(step() for step in (self._drive, self._pair)):
+        self.bars: Dict[str, Tuple[str, str]] = {}
+        self._on: Dict[str, List[str]] = {body: [] for body in self.bodies}
+        # The body that each joint of the lines was placed with: others turn against that.
+        self._home: Dict[str, str] = {}
+        # Which way blocks slide.
+        self._rails: Dict[str, complex] = {}
+        self._pins: List[Tuple[complex, set]] = []
+        for joint in loop.joints:
+            if joint.kind != SLIDE:
+                same = [pin for pin in self._pins if pin[1] & {*joint.bodies}
+                        and abs(pin[0] - joint.places[0]) < self.near]
+                self._pins = [pin for pin in self._pins if pin not in same] + [
+                    (joint.places[0], {*joint.bodies}.union(*(pin[1] for pin in same)))]
+        self._place({loop.ground: ('', '')})
+        while any(self._drive(joint, *way) for joint in self.driven for way in (
+                (*joint.bodies, 1.0), (*joint.bodies[::-1], -1.0))) or any(
+                rule(*pair) for pair in permutations(self.left, 2)
+                for rule in (self._dyad, self._slider, self._slot, self._cylinder)):
             pass
 
     @property
@@ -60,240 +78,206 @@ class Drawing:
         """The bodies that are not placed."""
         return [body for body in self.bodies if body not in self.bars]
 
-    def _pins(self) -> List[Tuple[complex, set]]:
-        """Return each place with the bodies that turn about it."""
-        pins: List[Tuple[complex, set]] = []
-        for joint in self.loop.joints:
-            if joint.joint.kind != SLIDE:
-                bodies = set(joint.bodies)
-                same = [pin for pin in pins if pin[1] & bodies
-                        and abs(pin[0] - joint.places[0]) < self.near]
-                pins = [pin for pin in pins if pin not in same]
-                pins.append((joint.places[0], bodies.union(*(pin[1] for pin in same))))
-        return pins
+    def seen(self, joint: Flat) -> Optional[Tuple[str, str, float]]:
+        """Return the ends of the link that tells a joint's position, and its sign, if any does."""
+        if not self.bars.keys() >= {*joint.bodies}:
+            return None
+        parent, child = joint.bodies
+        if joint.kind == SLIDE:
+            block = child if child in self._rails else parent
+            sign = 1.0 if (self._rails.get(block, 0.0) / joint.along).real > 0.0 else -1.0
+            return (*self.bars[block], sign if block == child else -sign)
+        pin = self._known(child, joint.places[0]) or ''
+        turns = child if self._home[pin] == parent else parent
+        if self._home[pin] not in joint.bodies:
+            return None
+        tip = self.bars[turns][1]
+        if self.bars[turns][0] != pin or tip == pin:
+            # A triangle on its link shows how that turns against the one that the pin is on.
+            other = self._other(turns, pin)
+            start, end = self.places[pin], self.places[other]
+            side = self._say(abs(end - start))
+            tip = self._name(start + (end - start) * complex(0.5, 0.75 ** 0.5), turns,
+                             f'dyad {pin} {other} {side} {side} left')
+        return pin, tip, joint.sign if turns == child else -joint.sign
 
-    def _of(self, body: str) -> List[complex]:
-        return [place for place, bodies in self.pins if body in bodies]
-
-    def _slides(self, body: str) -> Iterator[Tuple[Flat, str]]:
-        """Yield the slides of a body, each with the body at its other end."""
-        for joint in self.loop.joints:
-            if joint.joint.kind == SLIDE and body in joint.bodies:
-                yield joint, joint.bodies[joint.bodies[0] == body]
+    def _say(self, value: float) -> str:
+        return short(value, 1e-15 * self.loop.size)
 
     def _name(self, place: complex, body: str, line: str) -> str:
-        """Write a line that places a joint, and return its name."""
-        count = len(self.names)
+        """Write the line that places a joint, and return its name."""
+        count = len(self.places)
         name = 'ABCDEFGHIJKLMNPQRSTUVWXYZ'[count % 25] + str(count // 25 or '')
-        self.names[name] = place
-        for each in {body}.union(*(pin[1] for pin in self.pins
-                                   if body in pin[1] and abs(pin[0] - place) < self.near)):
-            self.on[each].append(name)
+        self.places[name], self._home[name] = place, body
+        for each in {body}.union(*(bodies for at, bodies in self._pins
+                                   if body in bodies and abs(at - place) < self.near)):
+            self._on[each].append(name)
         self.lines.append(f'{name} {line}')
         return name
 
     def _known(self, body: str, place: complex) -> Optional[str]:
-        return next((name for name in self.on[body]
-                     if abs(self.names[name] - place) < self.near), None)
+        return next((name for name in self._on[body]
+                     if abs(self.places[name] - place) < self.near), None)
 
     def _fixed(self, body: str, place: complex) -> str:
         """Return the joint at a place on a body that is placed, a new one if there is none."""
         if name := self._known(body, place):
             return name
+        say = self._say
         if body == self.loop.ground:
-            return self._name(place, body, f'ground {self.say(place.real)} {self.say(place.imag)}')
-        if body in self.rails:
-            first = self.on[body][0]
-            seen = (place - self.names[first]) / self.rails[body]
+            return self._name(place, body, f'ground {say(place.real)} {say(place.imag)}')
+        if body in self._rails:
+            pin = self.bars[body][0]
+            seen = self._from(pin, place, self._rails[body])
+            return self._name(place, body, f'block {pin} {say(seen.real)} {say(seen.imag)}')
+        # On the bar from which the triangle is the least flat.
+        bars = [(self._from(first, place, self.places[second] - self.places[first]), first, second)
+                for first, second in combinations(self._on[body], 2)]
+        if not bars:
+            raise ValueError(f'{body} is a barrel with another joint, which no word can place')
+        seen, first, second = max(bars, key=lambda bar: abs(bar[0].imag))
+        start, end = self.places[first], self.places[second]
+        if abs(seen.imag * (end - start)) < self.near:
             return self._name(place, body,
-                              f'block {first} {self.say(seen.real)} {self.say(seen.imag)}')
+                              f'line {first} {second} {say(seen.real * abs(end - start))}')
+        return self._name(place, body, f'rigid {self._bars(place, first, second)}')
 
-        def flatness(pair: Tuple[str, str]) -> float:
-            start, end = (self.names[name] for name in pair)
-            return -abs(((place - start) / (end - start)).imag)
+    def _from(self, name: str, place: complex, along: complex) -> complex:
+        return (place - self.places[name]) / along
 
-        first, second = min(combinations(self.on[body], 2), key=flatness)
-        start, end = self.names[first], self.names[second]
-        seen = (place - start) * abs(end - start) / (end - start)
-        if abs(seen.imag) < self.near:
-            return self._name(place, body, f'line {first} {second} {self.say(seen.real)}')
-        return self._name(place, body, f'rigid {first} {second} {self.say(abs(place - start))} '
-                          f'{self.say(abs(place - end))} {self._side(first, second, place)}')
+    def _bars(self, place: complex, first: str, second: str) -> str:
+        """Return what a line says of two bars that meet."""
+        start, end = self.places[first], self.places[second]
+        side = 'left' if self._from(first, place, end - start).imag > 0.0 else 'right'
+        return (f'{first} {second} {self._say(abs(place - start))} '
+                f'{self._say(abs(place - end))} {side}')
 
-    def _finish(self, body: str) -> None:
-        """Place what else there is on a body."""
-        for place in self._of(body):
-            self._fixed(body, place)
+    def _other(self, body: str, name: str) -> str:
+        """Return another joint of a body that is placed."""
+        return next((other for other in self._on[body] if other != name), None) or self._fixed(
+            body, self.places[name] + self.loop.size * self._rails.get(body, 1.0))
 
-    def _side(self, first: str, second: str, place: complex) -> str:
-        start, end = self.names[first], self.names[second]
-        return 'left' if ((place - start) / (end - start)).imag > 0.0 else 'right'
+    def _towards(self, body: str, origin: str, along: complex) -> Tuple[str, complex]:
+        """Return another joint of a body on the line through one, and where it is from there."""
+        name = next((name for name in self._on[body] if name != origin and abs(self._from(
+            origin, self.places[name], along).imag) < 1e-12 * self.loop.size), None)
+        name = name or self._fixed(body, self.places[origin] + self.loop.size * along)
+        way = self.places[name] - self.places[origin]
+        return name, way / abs(way)
 
-    def _drive(self) -> bool:
+    def _place(self, bars: Dict[str, Tuple[str, str]]) -> bool:
+        """Note the bars of bodies that are placed, and place what else there is on them."""
+        self.bars.update(bars)
+        for body in bars:
+            for place, bodies in self._pins:
+                if body in bodies:
+                    self._fixed(body, place)
+        return True
+
+    def _drive(self, joint: Flat, base: str, body: str, sign: float) -> bool:
         """Place the body that a motor moves on one that is placed."""
-        for joint in self.driven:
-            for (base, body), sign in ((joint.bodies, 1.0), (joint.bodies[::-1], -1.0)):
-                if base in self.bars and body not in self.bars and (
-                        self._carriage if joint.joint.kind == SLIDE else self._crank)(
-                            joint, base, body, sign):
-                    self._finish(body)
-                    return True
-        return False
-
-    def _input(self, word: str, joint: Flat, ratio: float, value: float) -> None:
-        same = sum(drive.name.rstrip('0123456789') == word for drive in self.drives)
-        self.drives.append(Drive(f'{word}{same + 1}' if same else word, joint, ratio, value))
-
-    def _crank(self, joint: Flat, base: str, body: str, sign: float) -> bool:
-        centre = self._fixed(base, joint.places[0])
-        start = self.names[centre]
-        place = next((place for place in self._of(body) if abs(place - start) > self.near),
-                     start + self.loop.size * next(
-                         (slide.along for slide, _ in self._slides(body)), 1.0))
-        zero, along = '', 1.0 + 0.0j
-        if base != self.loop.ground:
-            mark = next(name for name in self.on[base] if name != centre)
-            zero, along = f' zero {mark}', self.names[mark] - start
-        name = self._name(place, body, f'crank {centre} {self.say(abs(place - start))}{zero}')
-        self.bars[body] = centre, name
-        self._input('crank', joint, sign * joint.sign, _angle((place - start) / along))
-        return True
-
-    def _carriage(self, joint: Flat, base: str, body: str, sign: float) -> bool:
-        ratio, along = sign, joint.along
-        place = next(iter(self._of(body)), None)
-        if place is None or self._known(body, place):
+        if base not in self.bars or body in self.bars:
             return False
-        value = ratio * (joint.joint.position or 0.0)
-        origin = self._fixed(base, place - along * value)
-        towards = self._on_line(base, origin, along)
-        ends = [ratio * end for end in joint.joint.limits or (
-            (joint.joint.position or 0.0) + off for off in (-self.loop.size, self.loop.size))]
-        if (self.names[towards] - self.names[origin]) / along != 0 and (
-                (self.names[towards] - self.names[origin]) / along).real < 0.0:
-            ratio, along, value, ends = -ratio, -along, -value, [-end for end in ends]
-        name = self._name(place, body, f'carriage {origin} along {towards} '
-                          f'{self.say(min(ends))} {self.say(max(ends))}')
-        self.bars[body], self.rails[body] = (name, name), along
-        self._input('carriage', joint, ratio, value)
+        places = [place for place, bodies in self._pins if body in bodies]
+        if joint.kind == SLIDE:
+            place = places[0]
+            origin = self._fixed(base, place - joint.along * sign * joint.position)
+            towards, along = self._towards(base, origin, joint.along)
+            ratio = sign if (along / joint.along).real > 0.0 else -sign
+            value, size = self._from(origin, place, along).real, self.loop.size
+            name = self._name(place, body, f'carriage {origin} along {towards} '
+                              f'{self._say(value - size)} {self._say(value + size)}')
+            self._rails[body] = along
+            return self._driven_by('carriage', joint, ratio, value) and self._place(
+                {body: (name, name)})
+        centre, zero, along = self._fixed(base, joint.places[0]), '', 1.0 + 0.0j
+        start = self.places[centre]
+        place = next((place for place in places if abs(place - start) > self.near),
+                     start + self.loop.size * next((
+                         each.along for each in self.loop.joints
+                         if each.kind == SLIDE and body in each.bodies), along))
+        if base != self.loop.ground:
+            mark = self._other(base, centre)
+            zero, along = f' zero {mark}', self.places[mark] - start
+        name = self._name(place, body, f'crank {centre} {self._say(abs(place - start))}{zero}')
+        return self._driven_by('crank', joint, sign * joint.sign, phase(
+            (place - start) / along)) and self._place({body: (centre, name)})
+
+    def _driven_by(self, word: str, joint: Flat, ratio: float, value: float) -> bool:
+        same = sum(drive.name.rstrip('0123456789') == word for drive in self.drives)
+        self.drives.append(Drive(f'{word}{same + 1 if same else ""}', joint, ratio, float(value)))
         return True
-
-    def _on_line(self, body: str, origin: str, along: complex) -> str:
-        """Return a second joint of a body on the line through one."""
-        for name in self.on[body]:
-            seen = (self.names[name] - self.names[origin]) / along
-            if name != origin and abs(seen.imag) < self.near / 1000.0:
-                return name
-        return self._fixed(body, self.names[origin] + along * self.loop.size)
-
-    def _pair(self) -> bool:
-        """Place two bodies, or with a cylinder three, that hang on what is placed."""
-        return any(step(*pair) for pair in permutations(self.left, 2)
-                   for step in (self._dyad, self._slider, self._slot, self._cylinder))
 
     def _shared(self, first: str, second: str) -> Optional[complex]:
-        """Return where a pin is of two bodies, not placed yet."""
-        return next((place for place, bodies in self.pins
-                     if {first, second} <= bodies and not self._known(first, place)), None)
+        """Return where two bodies share a pin that is not placed, while the first holds one."""
+        return next((place for place, bodies in self._pins if {first, second} <= bodies
+                     and self._on[first] and not self._known(first, place)), None)
+
+    def _slides(self, body: str, driven: bool = False) -> List[Tuple[Flat, str]]:
+        """Return the slides of a body, each with the body at its other end."""
+        return [(joint, joint.bodies[joint.bodies[0] == body]) for joint in self.loop.joints
+                if joint.kind == SLIDE and body in joint.bodies
+                and (joint in self.driven) is driven]
 
     def _dyad(self, first: str, second: str) -> bool:
         place = self._shared(first, second)
-        if place is None or not self.on[first] or not self.on[second]:
+        if place is None or not self._on[second] or self._on[first][0] == self._on[second][0] \
+                or any({first, second} == {*joint.bodies} for joint in self.driven):
             return False
-        ends = self.on[first][0], self.on[second][0]
-        if ends[0] == ends[1] or {joint for joint in self.driven if joint.bodies in (
-                (first, second), (second, first))}:
-            return False
-        bars = [self.say(abs(place - self.names[end])) for end in ends]
-        name = self._name(place, first, self._parallel(*ends, place) or
-                          f'dyad {" ".join(ends)} {" ".join(bars)} {self._side(*ends, place)}')
-        self.bars[first], self.bars[second] = (ends[0], name), (ends[1], name)
-        self._finish(first)
-        self._finish(second)
-        return True
-
-    def _parallel(self, first: str, second: str, place: complex) -> Optional[str]:
-        """Return the line of a parallelogram, which passes its flat poses; None if it is none."""
-        start, end = self.names[first], self.names[second]
-        for corner, at in self.names.items():
-            links = [{body for body in self.bars if {corner, other} <= {*self.on[body]}}
-                     for other in (first, second)]
-            if corner not in (first, second) and all(links) and links[0] != links[1]:
-                if abs(start + end - at - place) < self.near:
-                    return f'parallelogram {corner} {first} {second}'
-                mirrored = start + (end - start) * ((at - start) / (end - start)).conjugate()
-                if abs(mirrored - place) < self.near:
-                    return f'antiparallelogram {corner} {first} {second}'
-        return None
+        ends = self._on[first][0], self._on[second][0]
+        line = f'dyad {self._bars(place, *ends)}'
+        for corner, at in self.places.items():
+            links = [{body for body in self.bars if {corner, end} <= {*self._on[body]}}
+                     for end in ends]
+            if corner not in ends and all(links) and links[0] != links[1] and abs(
+                    self.places[ends[0]] + self.places[ends[1]] - at - place) < self.near:
+                # So that it stays one beyond its flat poses.
+                line = f'parallelogram {corner} {" ".join(ends)}'
+        name = self._name(place, first, line)
+        return self._place({first: (ends[0], name), second: (ends[1], name)})
 
     def _slider(self, rod: str, block: str) -> bool:
         place = self._shared(rod, block)
         for slide, base in self._slides(block):
-            if place is not None and self.on[rod] and base in self.bars \
-                    and slide not in self.driven:
-                pin = self.on[rod][0]
-                at = slide.joint.position or 0.0
-                sign = 1.0 if slide.joint.child == block else -1.0
-                origin = self._fixed(base, place - slide.along * at * sign)
-                along, way = slide.along, self.say(_angle(slide.along))
+            if place is not None and base in self.bars:
+                pin, sign = self._on[rod][0], 1.0 if slide.bodies[1] == block else -1.0
+                origin = self._fixed(base, place - slide.along * slide.position * sign)
+                along, way = slide.along, short(phase(slide.along))
                 if base != self.loop.ground:
-                    towards = self._on_line(base, origin, along)
-                    along, way = self.names[towards] - self.names[origin], f'along {towards}'
-                ahead = ((place - self.names[pin]) / along).real > 0.0
-                name = self._name(place, rod, f'slider {pin} '
-                                  f'{self.say(abs(place - self.names[pin]))} {origin} {way} '
-                                  f'{"out" if ahead else "in"}')
-                self.bars[rod], self.bars[block] = (pin, name), (name, name)
-                self.rails[block] = along / abs(along)
-                self._finish(rod)
-                self._finish(block)
-                return True
+                    towards, along = self._towards(base, origin, along)
+                    way = f'along {towards}'
+                half = 'out' if self._from(pin, place, along).real > 0.0 else 'in'
+                name = self._name(place, rod, f'slider {pin} {self._say(abs(place - self.places[pin]))} '
+                                  f'{origin} {way} {half}')
+                self._rails[block] = along
+                return self._place({rod: (pin, name), block: (name, name)})
         return False
 
     def _slot(self, lever: str, block: str) -> bool:
         for slide, other in self._slides(lever):
-            if other == block and slide not in self.driven and self.on[lever] and self.on[block]:
-                pivot, pin = self.on[lever][0], self.on[block][0]
-                seen = (self.names[pin] - self.names[pivot]) / slide.along
-                along = slide.along if seen.real > 0.0 else -slide.along
-                offset = seen.imag if seen.real > 0.0 else -seen.imag
-                name = self._name(self.names[pivot] + along * abs(seen), lever,
-                                  f'slot {pivot} {pin} {self.say(offset)} out '
-                                  f'{self.say(abs(seen))}')
-                self.bars[lever], self.bars[block] = (pivot, name), (pin, pin)
-                self.rails[block] = along
-                self.on[block].sort(key=lambda each: each != pin)
-                self._finish(lever)
-                self._finish(block)
-                return True
+            if other == block and self._on[lever] and self._on[block]:
+                pivot, pin = self._on[lever][0], self._on[block][0]
+                seen = self._from(pivot, self.places[pin], slide.along)
+                sign = 1.0 if seen.real > 0.0 else -1.0
+                self._rails[block] = sign * slide.along
+                name = self._name(self.places[pivot] + abs(seen) * self._rails[block], lever,
+                                  f'slot {pivot} {pin} {self._say(sign * seen.imag)} out '
+                                  f'{self._say(abs(seen))}')
+                return self._place({lever: (pivot, name), block: (pin, pin)})
         return False
 
-    def _cylinder(self, barrel: str, rod: str) -> bool:
-        for slide, other in self._slides(barrel):
-            if other != rod or slide not in self.driven or not self.on[barrel]:
+    def _cylinder(self, barrel: str, bar: str) -> bool:
+        for slide, rod in self._slides(barrel, driven=True):
+            place = self._shared(bar, rod)
+            if place is None or not self._on[barrel] or rod in self.bars:
                 continue
-            for bar in self.left:
-                place = self._shared(rod, bar)
-                if bar in (barrel, rod) or place is None or not self.on[bar]:
-                    continue
-                base, pivot = self.on[barrel][0], self.on[bar][0]
-                seen = (place - self.names[base]) / slide.along
-                if base == pivot or abs(seen.imag) > self.near:
-                    continue
-                name = self._name(place, rod, f'cylinder {base} {pivot} '
-                                  f'{self.say(abs(place - self.names[pivot]))} '
-                                  f'{self._side(base, pivot, place)}')
-                sign = 1.0 if slide.joint.child == rod else -1.0
-                self._input('cylinder', slide, sign if seen.real > 0.0 else -sign, abs(seen))
-                self.bars[barrel], self.bars[rod] = (base, base), (name, name)
-                self.bars[bar], self.rails[rod] = (pivot, name), slide.along
-                self._finish(bar)
-                self._finish(rod)
-                return True
+            base, pivot = self._on[barrel][0], self._on[bar][0]
+            seen = self._from(base, place, slide.along)
+            if base != pivot and abs(seen.imag) < self.near:
+                _, _, _, length, side = self._bars(place, base, pivot).split()
+                name = self._name(place, bar, f'cylinder {base} {pivot} {length} {side}')
+                self._rails[rod] = slide.along * seen.real / abs(seen)
+                sign = 1.0 if (slide.bodies[1] == rod) == (seen.real > 0.0) else -1.0
+                return self._driven_by('cylinder', slide, sign, abs(seen)) and self._place(
+                    {barrel: (base, name), rod: (name, name), bar: (pivot, name)})
         return False
-
-    def say(self, value: float) -> str:
-        """Return the shortest number that is this one, but for its last digits."""
-        return next((text for text in (f'{value + 0.0:.{digits}g}' for digits in range(1, 18))
-                     if abs(float(text) - value) <= 3e-16 * self.loop.size), '0') \
-            if abs(value) > 3e-16 * self.loop.size else '0'

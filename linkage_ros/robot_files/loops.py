@@ -1,178 +1,148 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The closed loops of a robot, each linkage in its plane, closed."""
+"""The closed loops of a robot, each linkage in its plane, and closed."""
 
 from __future__ import annotations
 
-from collections import deque
-from dataclasses import dataclass, replace
-from typing import Dict, Iterator, List, Sequence, Tuple
+from cmath import phase
+from typing import Dict, Iterator, List, NamedTuple, Sequence, Set, Tuple
 
 import numpy as np
 
 from .readers import BALL, FIXED, HINGE, Joint, Robot, SLIDE
 
-# Axes that differ by more [rad] are not parallel; files often have an angle as 1.5708.
+# Axes that differ by more [rad] are not parallel: files have angles such as 1.5708.
 ASKEW = 1e-4
 
 
-@dataclass
-class Flat:
-    """A joint in its plane: where it is on parent and child, its direction, its axis' sign."""
+class Flat(NamedTuple):
+    """A joint in its plane: its places on both bodies, which way it slides or turns."""
 
-    joint: Joint
+    name: str
+    kind: str
+    bodies: Tuple[str, str]
     places: Tuple[complex, complex]
     along: complex
     sign: float
-
-    @property
-    def bodies(self) -> Tuple[str, str]:
-        """The two bodies that it joins."""
-        return self.joint.parent, self.joint.child
+    position: float
+    is_named: bool
 
 
-@dataclass
-class Loop:
-    """A linkage of closed loops in the plane that `frame` is, seen from its ground."""
+class Loop(NamedTuple):
+    """Joints of a linkage, on a ground, whose plane is `frame` in the frame of a body there."""
 
     ground: str
-    joints: List[Flat]
+    frame_id: str
     frame: np.ndarray
+    joints: List[Flat]
     size: float
     gap: float = 0.0
 
 
-def blocks(robot: Robot) -> Iterator[Tuple[str, List[Joint]]]:
-    """Yield the joints of each group of closed loops that share bars, and its ground."""
-    home = _merged(robot)
-    joints = [replace(joint, parent=home[joint.parent], child=home[joint.child])
-              for joint in robot.joints if home[joint.parent] != home[joint.child]]
-    way: Dict[str, List[int]] = {}
-    for root in (home[robot.root], *home.values()):
-        if root not in way:
-            way[root] = []
-            _walk(joints, root, way)
-    groups: List[set] = []
-    for i, joint in enumerate(joints):
-        first, second = way[joint.parent], way[joint.child]
-        cycle = {i} | set(first) ^ set(second)
-        if len(cycle) > 1:
-            for group in [group for group in groups if group & cycle]:
-                groups.remove(group)
-                cycle |= group
-            groups.append(cycle)
-    for group in groups:
-        found = [joints[i] for i in sorted(group)]
-        bodies = [body for joint in found for body in (joint.parent, joint.child)]
-        yield min(bodies, key=lambda body: len(way[body])), found
-
-
-def _merged(robot: Robot) -> Dict[str, str]:
-    """Return the body that each one is fixed to, the one nearest the root."""
+def groups(robot: Robot) -> Iterator[Tuple[str, str, List[Joint]]]:
+    """Yield the loops that share bars: their ground, its name in the file, their joints."""
     home = {body: body for body in robot.frames}
     for joint in robot.joints:
         if joint.kind == FIXED:
-            ends = home[joint.parent], home[joint.child]
-            if robot.root in ends:
-                ends = robot.root, next((end for end in ends if end != robot.root), robot.root)
-            home = {body: ends[0] if at == ends[1] else at for body, at in home.items()}
-    return home
+            new, old = sorted((home[body] for body in joint.bodies), key=robot.root.__ne__)
+            home = {body: new if at == old else at for body, at in home.items()}
+    joints = [joint for joint in robot.joints if home[joint.bodies[0]] != home[joint.bodies[1]]]
+    ends = [tuple(home[body] for body in joint.bodies) for joint in joints]
+    way: Dict[str, Set[int]] = {}
+    for root in (home[robot.root], *home.values()):
+        way.setdefault(root, set())
+        while step := next(((a, b, i) for i, pair in enumerate(ends) for a, b in (pair, pair[::-1])
+                            if a in way and b not in way), None):
+            way[step[1]] = way[step[0]] | {step[2]}
+    found: List[Set[int]] = []
+    for i, (first, second) in enumerate(ends):
+        if cycle := {i} ^ way[first] ^ way[second]:
+            shared = [group for group in found if group & cycle]
+            found = [group for group in found if group not in shared] + [cycle.union(*shared)]
+    for group in found:
+        ground = min((end for i in group for end in ends[i]), key=lambda end: len(way[end]))
+        name = next(body for i in sorted(group) for body in joints[i].bodies
+                    if home[body] == ground)
+        yield ground, name, [joints[i]._replace(bodies=ends[i]) for i in sorted(group)]
 
 
-def _walk(joints: Sequence[Joint], root: str, way: Dict[str, List[int]]) -> None:
-    """Note the joints on the way from a root to each body."""
-    waiting = deque([root])
-    while waiting:
-        body = waiting.popleft()
-        for i, joint in enumerate(joints):
-            ends = joint.parent, joint.child
-            for end in ends:
-                if body in ends and end not in way:
-                    way[end] = [*way[body], i]
-                    waiting.append(end)
-
-
-def flat(robot: Robot, ground: str, joints: Sequence[Joint], drives: Sequence[str]) -> Loop:
-    """Return a group of loops in its plane; raise ValueError with what is not planar."""
+def flat(robot: Robot, ground: str, frame_id: str, joints: Sequence[Joint],
+         drives: Sequence[str]) -> Loop:
+    """Return loops in their plane; raise ValueError with what is not planar."""
     hinges = sorted((joint for joint in joints if joint.kind == HINGE),
-                    key=lambda joint: joint.name not in drives)
-    others = [joint.name for joint in joints if joint.kind not in (HINGE, SLIDE, BALL)]
-    if others or not hinges:
-        raise ValueError(f'not planar: {", ".join(others) or "no joint"} is no hinge')
-    base = robot.frames[ground]
-    normal = base[:3, :3].T @ hinges[0].axis
+                    key=lambda joint: (joint.name not in drives, ground not in joint.bodies))
     for joint in joints:
-        axis, lean = base[:3, :3].T @ joint.axis, 0.0
-        if joint.kind == HINGE:
-            lean = np.linalg.norm(np.cross(axis, normal))
-        elif joint.kind == SLIDE:
-            lean = abs(axis @ normal)
+        if joint.kind not in (HINGE, SLIDE, BALL) or not hinges:
+            raise ValueError(f'not planar: {joint.name} is a {joint.kind}')
+        lean = np.linalg.norm(np.cross(joint.axis, hinges[0].axis)) if joint.kind == HINGE \
+            else abs(joint.axis @ hinges[0].axis) if joint.kind == SLIDE else 0.0
         if lean > ASKEW:
-            what = 'parallel to' if joint.kind == HINGE else 'across'
-            raise ValueError(f'not planar: the axis of {joint.name} is not {what} that of '
-                             f'{hinges[0].name}, by {np.degrees(np.arcsin(min(lean, 1.0))):.3g} '
-                             'degrees')
-    right = np.eye(3)[0 if abs(normal[0]) < 0.9 else 1]
-    right = right - (right @ normal) * normal
-    right /= np.linalg.norm(right)
+            raise ValueError(f'not planar: the axes of {hinges[0].name} and {joint.name} are '
+                             f'{np.degrees(np.arcsin(min(lean, 1.0))):.3g} degrees from it')
+    base = robot.frames[frame_id]
+    normal = base[:3, :3].T @ hinges[0].axis
+    right = np.eye(3)[int(abs(normal[0]) > 0.9)]
+    right = (right - right @ normal * normal) / np.linalg.norm(right - right @ normal * normal)
     frame = np.eye(4)
     frame[:3, :3] = np.column_stack([right, np.cross(normal, right), normal])
-    frame[:3, 3] = (np.linalg.inv(base) @ np.append(next(
-        (joint for joint in hinges if ground in (joint.parent, joint.child)),
-        hinges[0]).places[0], 1.0))[:3]
-    seen = np.linalg.inv(base @ frame)
-    found = []
+    origin = next((joint for joint in hinges if ground in joint.bodies), hinges[0])
+    frame[:3, 3] = base[:3, :3].T @ (origin.places[0] - base[:3, 3])
+    seen, found = np.linalg.inv(base @ frame), []
     for joint in joints:
-        ends = [complex(*(seen @ np.append(place, 1.0))[:2]) for place in joint.places]
+        first, second = (complex(*(seen @ [*place, 1.0])[:2]) for place in joint.places)
         axis = seen[:3, :3] @ joint.axis
-        found.append(Flat(joint, (ends[0], ends[1]), complex(*axis[:2]), float(np.sign(axis[2]))))
+        found.append(Flat(joint.name, joint.kind, joint.bodies, (first, second),
+                          complex(*axis[:2]), float(np.sign(axis[2])), joint.position or 0.0,
+                          joint.position is not None))
     places = [place for joint in found for place in joint.places]
-    size = max(abs(a - b) for a in places for b in places)
-    return Loop(ground, found, frame, size)
+    return Loop(ground, frame_id, frame, found, max(abs(a - b) for a in places for b in places))
 
 
 def closed(loop: Loop, held: Sequence[str]) -> Loop:
-    """Return the loops closed, by Newton's method, with the joints held that drive them."""
-    bodies = [body for body in dict.fromkeys(
-        body for joint in loop.joints for body in joint.bodies) if body != loop.ground]
+    """Return the loops closed, by Newton's method, while the joints that drive them are held."""
+    bodies = dict.fromkeys(body for joint in loop.joints for body in joint.bodies)
     where = {body: 3 * i for i, body in enumerate(bodies)}
 
-    def moved(at: np.ndarray, body: str) -> Tuple[complex, complex]:
-        x, y, turn = at[where[body]:where[body] + 3] if body in where else (0.0, 0.0, 0.0)
-        return complex(x, y) * loop.size, np.exp(1j * turn)
+    def turn(at: np.ndarray, body: str) -> complex:
+        return complex(np.exp(1j * at[where[body] + 2]))
 
     def place(at: np.ndarray, joint: Flat, end: int) -> complex:
-        shift, turn = moved(at, joint.bodies[end])
-        return shift + turn * joint.places[end]
+        x, y, _ = at[where[joint.bodies[end]]:][:3]
+        return loop.size * complex(x, y) + turn(at, joint.bodies[end]) * joint.places[end]
 
     def misses(at: np.ndarray) -> np.ndarray:
-        found: List[float] = []
+        found = list(at[where[loop.ground]:][:3])
         for joint in loop.joints:
-            turns = [moved(at, body)[1] for body in joint.bodies]
+            first, second = (turn(at, body) for body in joint.bodies)
             apart = (place(at, joint, 1) - place(at, joint, 0)) / loop.size
-            angle = (turns[1] / turns[0]).imag
-            drives = joint.joint.name in held
-            if joint.joint.kind == SLIDE:
+            angle = (second / first).imag
+            if joint.kind == SLIDE:
                 start = (joint.places[1] - joint.places[0]) / loop.size
-                apart = apart / (turns[0] * joint.along) - start / joint.along
-                found += [apart.imag, angle, *([apart.real] if drives else [])]
+                apart = (apart / first - start) / joint.along
+                found += [apart.imag, angle, apart.real * (joint.name in held)]
             else:
-                found += [apart.real, apart.imag, *([angle] if drives else [])]
+                found += [apart.real, apart.imag, angle * (joint.name in held)]
         return np.array(found)
 
-    at = np.zeros(3 * len(bodies))
-    gap = float(np.max(np.abs(misses(at)))) * loop.size
+    def moved(joint: Flat) -> float:
+        first, second = (turn(at, body) for body in joint.bodies)
+        if joint.kind != SLIDE:
+            return joint.sign * phase(second / first)
+        apart = (place(at, joint, 1) - place(at, joint, 0)) / first
+        return ((apart - joint.places[1] + joint.places[0]) / joint.along).real
+
+    at = np.zeros(3 * len(where))
+    gap = loop.size * float(np.max(np.abs(misses(at))))
     for _ in range(60):
-        miss, step = misses(at), 1e-6 * np.eye(len(at))
-        if np.max(np.abs(miss)) < 1e-16:
-            break
-        slope = np.array([(misses(at + h) - misses(at - h)) / 2e-6 for h in step]).T
-        change = np.linalg.lstsq(slope, -miss, rcond=1e-9)[0]
+        slope = np.array([misses(at + step) - misses(at - step)
+                          for step in 1e-6 * np.eye(len(at))]).T / 2e-6
+        change = np.linalg.lstsq(slope, -misses(at), rcond=1e-9)[0]
         at = at + change * min(1.0, 0.3 / max(np.max(np.abs(change)), 1e-300))
-    if np.max(np.abs(misses(at))) > 1e-12:
-        raise ValueError(f'not closed: its loops are open by {gap:.3g} m in the pose of the file, '
-                         'and cannot be closed from there')
-    return replace(loop, gap=gap, joints=[
-        replace(joint, places=(place(at, joint, 0), place(at, joint, 1)),
-                along=joint.along * moved(at, joint.bodies[0])[1]) for joint in loop.joints])
+        if np.max(np.abs(change)) < 1e-15:
+            break
+    if np.max(np.abs(misses(at))) > 1e-13:
+        raise ValueError(f'open by {gap:.3g} m in the pose of the file, and cannot be closed')
+    return loop._replace(gap=gap, joints=[joint._replace(
+        places=(place(at, joint, 0), place(at, joint, 1)), position=joint.position + moved(joint),
+        along=joint.along * turn(at, joint.bodies[0])) for joint in loop.joints])
