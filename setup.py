@@ -72,7 +72,7 @@ setup(
         'fast': ['llvmlite>=0.44'],
         'mjcf': ['mujoco>=3'],
         'render': ['matplotlib>=3.6', 'pyyaml', 'tqdm'],
-        'test': ['gmpy2', 'hypothesis', 'mpmath', 'pytest', 'pyyaml'],
+        'test': ['gmpy2', 'hypothesis', 'mpmath', 'mujoco>=3', 'pytest', 'pyyaml'],
         'viewer': ['aiohttp>=3.9'],
     },
     zip_safe=True,

@@ -7,12 +7,11 @@ import math
 from pathlib import Path
 import re
 
+from linkage_ros import scene
+from linkage_ros.robot_files import command
 import numpy as np
 import pytest
 from robots import LIBRARIES
-
-from linkage_ros import scene
-from linkage_ros.robot_files import command
 
 ROBOTS = Path(__file__).with_name('robot_files')
 
@@ -137,6 +136,39 @@ def test_a_parallelogram_that_hangs_in_its_file_stays_one(imported):
             assert math.remainder(joints[name] - value, math.tau) == pytest.approx(0.0, abs=1e-14)
 
 
+def test_a_motor_at_the_knee_drives_as_well(imported, tmp_path):
+    loops = tmp_path / 'loops.yaml'
+    loops.write_text('{closed_loop: [[front_foot, back_foot]], type: [3d], '
+                     'name_mot: [mot_front, front_knee]}')
+    machine, = imported('five_bar.urdf', '--loops', loops).values()
+    robot = LIBRARIES[0]((ROBOTS / 'five_bar.urdf').read_text())
+    for knee in np.linspace(-0.3, 0.3, 7):
+        joints = published(machine, mot_front=0.2, front_knee=knee)
+        places = robot.places(joints, ['front_foot', 'back_foot'])
+        assert places['front_foot'] == pytest.approx(places['back_foot'], abs=2e-15)
+
+
+def test_a_rack_drives_a_finger_and_a_motor_on_that_its_tip(imported):
+    rack, tip = imported('rack.sdf').values()
+    assert [rack.frame_id, tip.frame_id] == ['palm', 'finger']
+    for position in np.linspace(-0.005, 0.01, 7):
+        places = rack.linkage.solve(position * rack.first.ratio + rack.first.offset)
+        turned = published(rack, rack_slide=position)['finger_joint']
+        finger = 0.05 + 0.03j * np.exp(1j * turned)
+        assert abs(finger - complex(0.01 - position, 0.02)) == pytest.approx(
+            abs(0.04 + 0.01j), abs=1e-16)
+        assert complex(*places['E']) == pytest.approx(finger - 0.05, abs=1e-16)
+
+
+def test_angles_that_are_rounded_in_the_file_are_in_one_plane(imported, tmp_path):
+    rounded = written(tmp_path, 'four_bar.urdf', (
+        'xyz="0.3 0 0"/><axis xyz="0 -1 0"/>',
+        'xyz="0.3 0 0" rpy="1.5708 0 0"/><axis xyz="0 0 1"/>'), (
+        '<child_origin xyz="0 0 0.2"/>', '<child_origin xyz="0 0.2 0"/>'))
+    machine, = imported(rounded).values()
+    assert machine.linkage.solve(machine.first.offset)['D'] == pytest.approx([0.3, -0.2], abs=1e-5)
+
+
 def test_a_jaw_slides_as_its_crank_and_rod_say(imported):
     machine, = imported('slider_crank.sdf').values()
     start = 0.0175 * complex(math.cos(0.4), math.sin(0.4))
@@ -168,9 +200,9 @@ def refused(capsys, *args):
 
 def test_a_change_point_that_is_no_parallelogram_is_passed(imported, tmp_path):
     bars = written(tmp_path, 'four_bar.sdf', (
-        '<link name="BC"><pose>0 0 -0.2 0 0 0</pose>', '<link name="BC"><pose>0 0 -0.2 0 0 0</pose>'),
-        ('<pose>0.3 0 0 0 0 0</pose>', '<pose>0.5 0 0 0 0 0</pose>'),
-        ('      <pose>0 0 -0.2 0 0 0</pose>\n', f'      <pose relative_to="__model__">{pin(-1)}</pose>\n'))
+        '<pose>0.3 0 0 0 0 0</pose>', '<pose>0.5 0 0 0 0 0</pose>'), (
+        '      <pose>0 0 -0.2 0 0 0</pose>',
+        f'      <pose relative_to="__model__">{pin(-1)}</pose>'))
     machine, = imported(bars).values()
     for angle in np.linspace(-3.0, 3.0, 61):
         place = machine.linkage.solve(machine.first.offset + angle)['D']
@@ -195,12 +227,14 @@ def test_what_is_left_out_is_named_with_the_reason(capsys, tmp_path):
 
 
 BAD = [('<robot', 'is no XML: '), ('<a/>', 'must be MJCF, SDF or URDF, not <a>'),
-       ('<robot/>', 'a URDF has one root link, not 0'), ('<sdf/>', 'the SDF has no model with joints'),
+       ('<robot/>', 'a URDF has one root link, not 0'),
+       ('<sdf/>', 'the SDF has no model with joints'),
        ('<sdf><model><joint/></model></sdf>', ''), ('<mujoco><b/></mujoco>', 'Schema violation'),
        ('<robot><link name="a"/><joint name="j"><child link="b"/></joint></robot>',
         "joint j is on '', which is no link"),
        ('<robot><link name="a"/><link name="b"/><joint name="j" type="revolute">'
-        '<parent link="a"/><child link="b"/><axis xyz="0 a"/></joint></robot>', 'cannot be read: ValueError')]
+        '<parent link="a"/><child link="b"/><axis xyz="0 a"/></joint></robot>',
+        'cannot be read: ValueError')]
 
 
 @pytest.mark.parametrize('text, why', BAD)

@@ -9,7 +9,8 @@ from itertools import combinations
 import math
 import re
 import sys
-from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
+from textwrap import indent
+from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -19,9 +20,9 @@ from .. import command, mechanisms, scene
 from ..linkage.mechanism import Mechanism
 
 NAME = 'from_robot'
-NEEDS = 'pip install mujoco for MJCF, pip install pyyaml for --loops'
-# Of the size of a linkage, by how much a pose of the scene may differ from that of the file.
-ROUNDING = 1e-12
+NEEDS = 'pip install pyyaml, and mujoco for MJCF'
+# Of the size of a linkage, what is rounding, and what may be left of a parallelogram made exact.
+ROUNDING, NEARLY = 1e-12, 1e-9
 _OTHER = {'left': 'right', 'right': 'left', 'out': 'in', 'in': 'out'}
 
 
@@ -32,6 +33,8 @@ def main(args: Optional[List[str]] = None) -> int:
 
 def show(args: Optional[List[str]]) -> None:
     """Print what a command line asks for."""
+    import yaml
+
     parser = command.Parser(NAME, description='Print the scene of the planar closed loops in a '
                             'robot: MJCF, SDF or URDF.')
     parser.add_argument('file', metavar='FILE', help='the robot')
@@ -43,7 +46,11 @@ def show(args: Optional[List[str]]) -> None:
     robot.driven = asked.driven or robot.driven
     given, said = described(robot)
     print(f'# From {asked.file}.', *(f'# {line}' for line in said), '/**:',
-          '  ros__parameters:', *_yaml(given), sep='\n')
+          '  ros__parameters:', sep='\n')
+    for key, value in given.items():
+        flow = None if key.endswith('.pose') else False
+        text = yaml.safe_dump({key: value}, default_flow_style=flow, width=1000)
+        print(indent(text, '    '), end='')
     print(*(f'{NAME}: {line}' for line in said), sep='\n', file=sys.stderr)
 
 
@@ -70,14 +77,16 @@ def described(robot: readers.Robot) -> Tuple[Dict[str, Any], List[str]]:
         given.update((f'{name}.{key}', value) for key, value in _parameters(robot, drawing))
     machines = scene.read(given).machines
     for name, drawing in drawn.items():
-        error, gap = _apart(machines[name].linkage, drawing), drawing.loop.gap
-        if not error <= ROUNDING:
+        off, gap = _apart(machines[name].linkage, drawing), drawing.loop.gap
+        if not off <= NEARLY:
             raise command.RequestError(
-                f'{name} is {error:.2g} of its size away from the pose of the file, in which it is '
+                f'{name} is {off:.2g} of its size away from the pose of the file, where it is '
                 'nearly stretched or folded')
         was = f', whose loops are open by {gap:.2g} m and were closed' \
             if gap > ROUNDING * drawing.loop.size else ''
-        said.append(f'Checked: {name} has the pose of the file{was}, to {error:.0e} of its size.')
+        exact = '; its bars were made exactly parallel' if off > ROUNDING else ''
+        said.append(f'Checked: {name} has the pose of the file{was}, to {off:.0e} of its size'
+                    f'{exact}.')
     return given, said
 
 
@@ -138,16 +147,17 @@ def _apart(linkage: Mechanism, drawing: Drawing, *names: str) -> float:
 
 
 def _parameters(robot: readers.Robot, drawing: Drawing) -> Iterator[Tuple[str, Any]]:
-    seen = [(joint, found) for joint in drawing.loop.joints
-            if joint.is_named and joint not in drawing.driven and (found := drawing.seen(joint))]
+    seen = [(joint, joint.position, found) for joint in drawing.loop.joints
+            if joint.position is not None and joint not in drawing.driven
+            and (found := drawing.seen(joint))]
     linkage, frame = _linkage(drawing), drawing.loop.frame
     yield 'type', 'custom'
     yield 'joints', drawing.lines
     yield 'frame_id', drawing.loop.frame_id
-    yield 'pose', [float(short(value)) for value in (*frame[:3, 3], *_rpy(frame))]
+    yield 'pose', [float(short(value)) for value in (*frame[:3, 3], *_rpy(frame[:3, :3]))]
     for drive in drawing.drives:
         source, ratio = drive.joint.name, drive.ratio
-        offset = drive.value - ratio * drive.joint.position
+        offset = drive.value - ratio * (drive.joint.position or 0.0)
         if source in robot.follows and source not in robot.driven:
             source, factor, start = robot.follows[source]
             ratio, offset = ratio * factor, offset + ratio * start
@@ -156,30 +166,20 @@ def _parameters(robot: readers.Robot, drawing: Drawing) -> Iterator[Tuple[str, A
         yield f'{drive.name}.offset', float(short(offset))
         yield f'{drive.name}.start', float(short(drive.value, 1e-15))
     angles, names = linkage.joint_angles(_values(drawing)), []
-    for joint, (base, tip, sign) in seen:
+    for joint, position, (base, tip, sign) in seen:
         link = next(link.name for link in linkage.links if link.tip == tip and (
             link.joint == base or base == tip and link.kind == 'prismatic'))
-        offset = short(joint.position - sign * float(angles[link]))
-        names.append(f'{link}={"-" if sign < 0.0 else ""}{joint.name}'
-                     f'{"" if offset == "0" else f"{float(offset):+}"}')
+        zero = float(short(position - sign * float(angles[link])))
+        names.append(f'{link}={"-" * (sign < 0.0)}{joint.name}' + (f'{zero:+}' if zero else ''))
     yield 'joint_names', names
     yield 'only_named', True
 
 
-def _rpy(frame: np.ndarray) -> Tuple[float, float, float]:
-    if abs(frame[2, 0]) > 1.0 - 1e-12:
-        return (math.atan2(-frame[1, 2], frame[1, 1]),
-                -math.copysign(math.pi / 2.0, frame[2, 0]), 0.0)
-    return (math.atan2(frame[2, 1], frame[2, 2]), -math.asin(frame[2, 0]),
-            math.atan2(frame[1, 0], frame[0, 0]))
+def _rpy(turned: np.ndarray) -> Tuple[float, float, float]:
+    a, b = turned[:2, 0]
+    yaw = math.atan2(b, a) if math.hypot(a, b) > 1e-9 else 0.0
+    sin, cos = math.sin(yaw), math.cos(yaw)
+    ahead, aside = turned[:2, 2], turned[:2, 1]
+    return (math.atan2(sin * ahead[0] - cos * ahead[1], cos * aside[1] - sin * aside[0]),
+            math.atan2(-turned[2, 0], cos * a + sin * b), yaw)
 
-
-def _yaml(given: Mapping[str, Any]) -> Iterator[str]:
-    for key, value in given.items():
-        if key.endswith(('.joints', '.joint_names')) and value:
-            yield f'    {key}:'
-            yield from (f'      - "{line}"' for line in value)
-        else:
-            text = str(value).lower() if isinstance(value, bool) else str(value).replace("'", '')
-            # YAML takes 2e-16 for a text.
-            yield f'    {key}: ' + re.sub(r'(?<=[ \[-])(\d+)e', r'\1.0e', f' {text}').strip()

@@ -9,15 +9,15 @@ from cmath import phase
 from itertools import combinations, permutations
 from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
-from .loops import Flat, Loop
-from .readers import SLIDE
+from .loops import Loop
+from .readers import Joint, SLIDE
 
 
 class Drive(NamedTuple):
     """An input: its name, the joint that it is, times a ratio, and its value in the pose."""
 
     name: str
-    joint: Flat
+    joint: Joint
     ratio: float
     value: float
 
@@ -78,14 +78,14 @@ class Drawing:
         """The bodies that are not placed."""
         return [body for body in self.bodies if body not in self.bars]
 
-    def seen(self, joint: Flat) -> Optional[Tuple[str, str, float]]:
+    def seen(self, joint: Joint) -> Optional[Tuple[str, str, float]]:
         """Return the ends of the link that tells a joint's position, and its sign, if any does."""
         if not self.bars.keys() >= {*joint.bodies}:
             return None
         parent, child = joint.bodies
         if joint.kind == SLIDE:
             block = child if child in self._rails else parent
-            sign = 1.0 if (self._rails.get(block, 0.0) / joint.along).real > 0.0 else -1.0
+            sign = 1.0 if (self._rails.get(block, 0.0) / joint.axis).real > 0.0 else -1.0
             return (*self.bars[block], sign if block == child else -sign)
         pin = self._known(child, joint.places[0]) or ''
         turns = child if self._home[pin] == parent else parent
@@ -99,7 +99,7 @@ class Drawing:
             side = self._say(abs(end - start))
             tip = self._name(start + (end - start) * complex(0.5, 0.75 ** 0.5), turns,
                              f'dyad {pin} {other} {side} {side} left')
-        return pin, tip, joint.sign if turns == child else -joint.sign
+        return pin, tip, joint.axis if turns == child else -joint.axis
 
     def _say(self, value: float) -> str:
         return short(value, 1e-15 * self.loop.size)
@@ -174,16 +174,16 @@ class Drawing:
                     self._fixed(body, place)
         return True
 
-    def _drive(self, joint: Flat, base: str, body: str, sign: float) -> bool:
+    def _drive(self, joint: Joint, base: str, body: str, sign: float) -> bool:
         """Place the body that a motor moves on one that is placed."""
         if base not in self.bars or body in self.bars:
             return False
         places = [place for place, bodies in self._pins if body in bodies]
         if joint.kind == SLIDE:
             place = places[0]
-            origin = self._fixed(base, place - joint.along * sign * joint.position)
-            towards, along = self._towards(base, origin, joint.along)
-            ratio = sign if (along / joint.along).real > 0.0 else -sign
+            origin = self._fixed(base, place - joint.axis * sign * (joint.position or 0.0))
+            towards, along = self._towards(base, origin, joint.axis)
+            ratio = sign if (along / joint.axis).real > 0.0 else -sign
             value, size = self._from(origin, place, along).real, self.loop.size
             name = self._name(place, body, f'carriage {origin} along {towards} '
                               f'{self._say(value - size)} {self._say(value + size)}')
@@ -194,16 +194,16 @@ class Drawing:
         start = self.places[centre]
         place = next((place for place in places if abs(place - start) > self.near),
                      start + self.loop.size * next((
-                         each.along for each in self.loop.joints
+                         each.axis for each in self.loop.joints
                          if each.kind == SLIDE and body in each.bodies), along))
         if base != self.loop.ground:
             mark = self._other(base, centre)
             zero, along = f' zero {mark}', self.places[mark] - start
         name = self._name(place, body, f'crank {centre} {self._say(abs(place - start))}{zero}')
-        return self._driven_by('crank', joint, sign * joint.sign, phase(
+        return self._driven_by('crank', joint, sign * joint.axis, phase(
             (place - start) / along)) and self._place({body: (centre, name)})
 
-    def _driven_by(self, word: str, joint: Flat, ratio: float, value: float) -> bool:
+    def _driven_by(self, word: str, joint: Joint, ratio: float, value: float) -> bool:
         same = sum(drive.name.rstrip('0123456789') == word for drive in self.drives)
         self.drives.append(Drive(f'{word}{same + 1 if same else ""}', joint, ratio, float(value)))
         return True
@@ -213,7 +213,7 @@ class Drawing:
         return next((place for place, bodies in self._pins if {first, second} <= bodies
                      and self._on[first] and not self._known(first, place)), None)
 
-    def _slides(self, body: str, driven: bool = False) -> List[Tuple[Flat, str]]:
+    def _slides(self, body: str, driven: bool = False) -> List[Tuple[Joint, str]]:
         """Return the slides of a body, each with the body at its other end."""
         return [(joint, joint.bodies[joint.bodies[0] == body]) for joint in self.loop.joints
                 if joint.kind == SLIDE and body in joint.bodies
@@ -241,13 +241,14 @@ class Drawing:
         for slide, base in self._slides(block):
             if place is not None and base in self.bars:
                 pin, sign = self._on[rod][0], 1.0 if slide.bodies[1] == block else -1.0
-                origin = self._fixed(base, place - slide.along * slide.position * sign)
-                along, way = slide.along, short(phase(slide.along))
+                origin = self._fixed(base, place - slide.axis * sign * (slide.position or 0.0))
+                along, way = slide.axis, short(phase(slide.axis))
                 if base != self.loop.ground:
                     towards, along = self._towards(base, origin, along)
                     way = f'along {towards}'
                 half = 'out' if self._from(pin, place, along).real > 0.0 else 'in'
-                name = self._name(place, rod, f'slider {pin} {self._say(abs(place - self.places[pin]))} '
+                size = self._say(abs(place - self.places[pin]))
+                name = self._name(place, rod, f'slider {pin} {size} '
                                   f'{origin} {way} {half}')
                 self._rails[block] = along
                 return self._place({rod: (pin, name), block: (name, name)})
@@ -257,9 +258,9 @@ class Drawing:
         for slide, other in self._slides(lever):
             if other == block and self._on[lever] and self._on[block]:
                 pivot, pin = self._on[lever][0], self._on[block][0]
-                seen = self._from(pivot, self.places[pin], slide.along)
+                seen = self._from(pivot, self.places[pin], slide.axis)
                 sign = 1.0 if seen.real > 0.0 else -1.0
-                self._rails[block] = sign * slide.along
+                self._rails[block] = sign * slide.axis
                 name = self._name(self.places[pivot] + abs(seen) * self._rails[block], lever,
                                   f'slot {pivot} {pin} {self._say(sign * seen.imag)} out '
                                   f'{self._say(abs(seen))}')
@@ -272,11 +273,11 @@ class Drawing:
             if place is None or not self._on[barrel] or rod in self.bars:
                 continue
             base, pivot = self._on[barrel][0], self._on[bar][0]
-            seen = self._from(base, place, slide.along)
+            seen = self._from(base, place, slide.axis)
             if base != pivot and abs(seen.imag) < self.near:
                 _, _, _, length, side = self._bars(place, base, pivot).split()
                 name = self._name(place, bar, f'cylinder {base} {pivot} {length} {side}')
-                self._rails[rod] = slide.along * seen.real / abs(seen)
+                self._rails[rod] = slide.axis * seen.real / abs(seen)
                 sign = 1.0 if (slide.bodies[1] == rod) == (seen.real > 0.0) else -1.0
                 return self._driven_by('cylinder', slide, sign, abs(seen)) and self._place(
                     {barrel: (base, name), rod: (name, name), bar: (pivot, name)})

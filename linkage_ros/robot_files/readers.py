@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Tuple
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
@@ -17,14 +17,15 @@ HINGE, SLIDE, BALL, FIXED = 'hinge', 'slide', 'ball', 'fixed'
 KINDS = {'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE, 'spherical': BALL}
 
 
-class Joint(NamedTuple):
+@dataclass(eq=False)
+class Joint:
     """What joins two bodies: its place on each, and its axis; a position where it can be named."""
 
     name: str
     kind: str
     bodies: Tuple[str, str]
-    places: Tuple[np.ndarray, np.ndarray]
-    axis: np.ndarray
+    places: Any
+    axis: Any
     position: Optional[float] = None
 
 
@@ -239,8 +240,10 @@ def _origin(part: ElementTree.Element, tag: str) -> np.ndarray:
 def _pose(text: str) -> np.ndarray:
     x, y, z, roll, pitch, yaw = _numbers(text)
     (cr, cp, cy), (sr, sp, sy) = np.cos((roll, pitch, yaw)), np.sin((roll, pitch, yaw))
-    return _frame((x, y, z), np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-                  @ [[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]] @ [[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    about_z, about_y, about_x = np.array([
+        [[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]], [[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]],
+        [[1, 0, 0], [0, cr, -sr], [0, sr, cr]]])
+    return _frame((x, y, z), about_z @ about_y @ about_x)
 
 
 def _frame(place: Any, turned: Any = ((1, 0, 0), (0, 1, 0), (0, 0, 1))) -> np.ndarray:
