@@ -79,7 +79,7 @@ def test_mujoco_sees_both_fingers_of_a_gripper_closed(imported):
 
 
 def test_a_rod_with_ball_ends_on_a_moving_tarsus_keeps_its_length(imported):
-    import mujoco
+    mujoco = pytest.importorskip('mujoco')
     machine, = imported('toe_rod.xml').values()
     assert machine.frame_id == 'tarsus'
     model = mujoco.MjModel.from_xml_path(str(ROBOTS / 'toe_rod.xml'))
@@ -134,6 +134,23 @@ def test_a_parallelogram_that_hangs_in_its_file_stays_one(imported):
         turned = {'joint_B': -angle, 'joint_C': angle, 'joint_D': angle}
         for name, value in turned.items():
             assert math.remainder(joints[name] - value, math.tau) == pytest.approx(0.0, abs=1e-14)
+
+
+def test_hinges_that_cross_at_the_end_of_a_rod_are_a_ball(imported, capsys, tmp_path):
+    ball = ('<link name="a"/><link name="b"/><joint name="elbow_y" type="continuous">'
+            '<parent link="crank"/><child link="a"/><origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>'
+            '</joint><joint name="elbow_x" type="continuous"><parent link="a"/><child link="b"/>'
+            '<axis xyz="1 0 0"/></joint><joint name="elbow" type="continuous">'
+            '<parent link="b"/><child link="coupler"/><axis xyz="0 0 1"/>')
+    hinge = ('<joint name="elbow" type="continuous">\n    <parent link="crank"/><child link='
+             '"coupler"/><origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>')
+    rod = [(hinge, ball), ('name="wrist" type="revolute"', 'name="wrist" type="spherical"')]
+    machine, = imported(written(tmp_path, 'four_bar.urdf', *rod)).values()
+    assert published(machine, motor=0.4)['shoulder'] == pytest.approx(-0.4)
+    loose = written(tmp_path, 'four_bar.urdf', *rod, (
+        'name="shoulder" type="continuous"', 'name="shoulder" type="spherical"'))
+    assert 'not planar: coupler hangs on balls alone, and is no rod' in re.sub(
+        'rocker hangs', 'coupler hangs', refused(capsys, loose))
 
 
 def test_a_motor_at_the_knee_drives_as_well(imported, tmp_path):

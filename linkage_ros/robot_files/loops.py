@@ -15,6 +15,10 @@ from .readers import BALL, FIXED, HINGE, Joint, Robot, SLIDE
 
 # Axes that differ by more [rad] are not parallel: files have angles such as 1.5708.
 ASKEW = 1e-4
+# Hinges nearer to each other [m] cross in a point.
+TOGETHER = 1e-6
+# A joint, and the two bodies that it joins, fixed ones as one.
+Joined = Tuple[Joint, Tuple[str, str]]
 
 
 class Loop(NamedTuple):
@@ -39,7 +43,9 @@ def groups(robot: Robot) -> Iterator[Tuple[str, str, List[Joint]]]:
         if joint.kind == FIXED:
             new, old = sorted((home[body] for body in joint.bodies), key=robot.root.__ne__)
             home = {body: new if at == old else at for body, at in home.items()}
-    ends = {joint: (home[joint.bodies[0]], home[joint.bodies[1]]) for joint in robot.joints}
+    joints = _with_balls(robot, [(joint, (home[joint.bodies[0]], home[joint.bodies[1]]))
+                                 for joint in robot.joints])
+    ends = dict(joints)
     way: Dict[str, Set[Joint]] = {}
     for root in (home[robot.root], *home.values()):
         way.setdefault(root, set())
@@ -54,9 +60,29 @@ def groups(robot: Robot) -> Iterator[Tuple[str, str, List[Joint]]]:
     for group in found:
         ground = min((end for joint in group for end in ends[joint]),
                      key=lambda end: len(way[end]))
-        joints = [joint for joint in robot.joints if joint in group]
-        frame_id = next(body for joint in joints for body in joint.bodies if home[body] == ground)
-        yield ground, frame_id, [replace(joint, bodies=ends[joint]) for joint in joints]
+        chosen = [joint for joint in ends if joint in group]
+        frame_id = next(body for joint in chosen for body in joint.bodies if home[body] == ground)
+        yield ground, frame_id, [replace(joint, bodies=ends[joint]) for joint in chosen]
+
+
+def _with_balls(robot: Robot, joints: List[Joined]) -> List[Joined]:
+    """Return joints with one ball for each two or three hinges that cross in a point."""
+    for body in dict.fromkeys(end for _, ends in joints for end in ends):
+        own = [(joint, ends) for joint, ends in joints if body in ends and ends[0] != ends[1]]
+        if body != robot.root and len(own) == 2 and not any(joint.name in robot.driven or joint.kind not in (HINGE, BALL)
+                                     for joint, _ in own):
+            (first, one), (second, two) = own
+            outer = one[one[0] == body], two[two[0] == body]
+            places = first.places[one[1] == outer[0]], second.places[two[1] == outer[1]]
+            if outer[0] != outer[1] and np.linalg.norm(places[0] - places[1]) < TOGETHER \
+                    and np.linalg.norm(np.cross(first.axis, second.axis)) > ASKEW:
+                ball = replace(first, name=f'{first.name}+{second.name}', kind=BALL,
+                               places=places, position=None, bodies=(
+                                   first.bodies[one[1] == outer[0]],
+                                   second.bodies[two[1] == outer[1]]))
+                rest = [each for each in joints if each not in own]
+                return _with_balls(robot, [*rest, (ball, outer)])
+    return joints
 
 
 def flat(robot: Robot, ground: str, frame_id: str, joints: Sequence[Joint],
@@ -64,14 +90,17 @@ def flat(robot: Robot, ground: str, frame_id: str, joints: Sequence[Joint],
     """Return loops in their plane; raise ValueError with what is not planar."""
     hinges = sorted((joint for joint in joints if joint.kind == HINGE),
                     key=lambda joint: (joint.name not in drives, ground not in joint.bodies))
+    if not hinges:
+        raise ValueError('not planar: no hinge says in which plane')
     for joint in joints:
-        if joint.kind not in (HINGE, SLIDE, BALL) or not hinges:
-            raise ValueError(f'not planar: {joint.name} is a {joint.kind}')
+        if joint.kind not in (HINGE, SLIDE, BALL):
+            raise ValueError(f'not planar: {joint.name} is a joint of type {joint.kind}')
         across = np.linalg.norm(np.cross(joint.axis, hinges[0].axis))
         lean = {HINGE: across, SLIDE: abs(joint.axis @ hinges[0].axis), BALL: 0.0}[joint.kind]
         if lean > ASKEW:
             raise ValueError(f'not planar: the axes of {hinges[0].name} and {joint.name} are '
                              f'{np.degrees(np.arcsin(min(lean, 1.0))):.3g} degrees from it')
+    _check_rods(ground, joints)
     base = robot.frames[frame_id]
     normal = base[:3, :3].T @ hinges[0].axis
     right = np.eye(3)[int(abs(normal[0]) > 0.9)]
@@ -89,6 +118,18 @@ def flat(robot: Robot, ground: str, frame_id: str, joints: Sequence[Joint],
             axis=complex(*axis[:2]) if joint.kind == SLIDE else float(np.sign(axis[2]))))
     places = [place for joint in found for place in joint.places]
     return Loop(ground, frame_id, frame, found, max(abs(a - b) for a in places for b in places))
+
+
+def _check_rods(ground: str, joints: Sequence[Joint]) -> None:
+    """Raise ValueError if a body can leave the plane: only rods may be on balls alone."""
+    held = {ground}
+    while more := {end for joint in joints for end in joint.bodies if joint.kind != BALL
+                   and held & {*joint.bodies}} - held:
+        held |= more
+    for body in dict.fromkeys(end for joint in joints for end in joint.bodies):
+        own = [joint.bodies for joint in joints if body in joint.bodies]
+        if body not in held and (len(own) != 2 or not all(held & {*ends} for ends in own)):
+            raise ValueError(f'not planar: {body} hangs on balls alone, and is no rod')
 
 
 def closed(loop: Loop, held: Sequence[str]) -> Loop:

@@ -205,7 +205,8 @@ def _urdf(root: ElementTree.Element, loops: Mapping[str, Any]) -> Robot:
                    cut['axis'])
     for (first, second), kind in zip(loops.get('closed_loop', ()), loops.get('type', ())):
         robot.join(f'{first}={second}', FIXED if str(kind).lower() == '6d' else BALL,
-                   (first, second), robot.frames[first], other=robot.frames[second])
+                   (first, second), robot.frames.get(first, np.eye(4)),
+                   other=robot.frames.get(second))
     robot.driven = [*loops.get('independent', ()), *loops.get('name_mot', ()), *(
         str(joint.get('name')) for joint in (
             *root.findall('transmission/joint'),
