@@ -17,8 +17,6 @@ from .readers import BALL, FIXED, HINGE, Joint, Robot, SLIDE
 ASKEW = 1e-4
 # Hinges nearer to each other [m] cross in a point.
 TOGETHER = 1e-6
-# A joint, and the two bodies that it joins, fixed ones as one.
-Joined = Tuple[Joint, Tuple[str, str]]
 
 
 class Loop(NamedTuple):
@@ -43,45 +41,46 @@ def groups(robot: Robot) -> Iterator[Tuple[str, str, List[Joint]]]:
         if joint.kind == FIXED:
             new, old = sorted((home[body] for body in joint.bodies), key=robot.root.__ne__)
             home = {body: new if at == old else at for body, at in home.items()}
-    joints = _with_balls(robot, [(joint, (home[joint.bodies[0]], home[joint.bodies[1]]))
-                                 for joint in robot.joints])
-    ends = dict(joints)
+    moved = [replace(joint, bodies=(home[joint.bodies[0]], home[joint.bodies[1]]))
+             for joint in robot.joints]
+    joints = _with_balls(robot, [joint for joint in moved if len({*joint.bodies}) == 2])
     way: Dict[str, Set[Joint]] = {}
     for root in (home[robot.root], *home.values()):
         way.setdefault(root, set())
-        while step := next(((a, b, joint) for joint, pair in ends.items()
-                            for a, b in (pair, pair[::-1]) if a in way and b not in way), None):
+        while step := next(((a, b, joint) for joint in joints for a, b in (
+                joint.bodies, joint.bodies[::-1]) if a in way and b not in way), None):
             way[step[1]] = way[step[0]] | {step[2]}
     found: List[Set[Joint]] = []
-    for joint, (first, second) in ends.items():
-        if first != second and (cycle := {joint} ^ way[first] ^ way[second]):
+    for joint in joints:
+        first, second = joint.bodies
+        if cycle := {joint} ^ way[first] ^ way[second]:
             shared = [group for group in found if group & cycle]
             found = [group for group in found if group not in shared] + [cycle.union(*shared)]
     for group in found:
-        ground = min((end for joint in group for end in ends[joint]),
-                     key=lambda end: len(way[end]))
-        chosen = [joint for joint in ends if joint in group]
-        frame_id = next(body for joint in chosen for body in joint.bodies if home[body] == ground)
-        yield ground, frame_id, [replace(joint, bodies=ends[joint]) for joint in chosen]
+        chosen = [joint for joint in joints if joint in group]
+        ground = min((body for joint in chosen for body in joint.bodies),
+                     key=lambda body: len(way[body]))
+        names = {joint.name for joint in chosen}
+        yield ground, next((body for joint in robot.joints for body in joint.bodies
+                            if joint.name in names and home[body] == ground), ground), chosen
 
 
-def _with_balls(robot: Robot, joints: List[Joined]) -> List[Joined]:
+def _with_balls(robot: Robot, joints: List[Joint]) -> List[Joint]:
     """Return joints with one ball for each two or three hinges that cross in a point."""
-    for body in dict.fromkeys(end for _, ends in joints for end in ends):
-        own = [(joint, ends) for joint, ends in joints if body in ends and ends[0] != ends[1]]
-        if body != robot.root and len(own) == 2 and not any(joint.name in robot.driven or joint.kind not in (HINGE, BALL)
-                                     for joint, _ in own):
-            (first, one), (second, two) = own
-            outer = one[one[0] == body], two[two[0] == body]
-            places = first.places[one[1] == outer[0]], second.places[two[1] == outer[1]]
-            if outer[0] != outer[1] and np.linalg.norm(places[0] - places[1]) < TOGETHER \
-                    and np.linalg.norm(np.cross(first.axis, second.axis)) > ASKEW:
-                ball = replace(first, name=f'{first.name}+{second.name}', kind=BALL,
-                               places=places, position=None, bodies=(
-                                   first.bodies[one[1] == outer[0]],
-                                   second.bodies[two[1] == outer[1]]))
-                rest = [each for each in joints if each not in own]
-                return _with_balls(robot, [*rest, (ball, outer)])
+    for body in dict.fromkeys(body for joint in joints for body in joint.bodies):
+        own = [joint for joint in joints if body in joint.bodies and joint.name not in robot.driven
+               and joint.kind in (HINGE, BALL)]
+        if body == robot.root or own != [joint for joint in joints if body in joint.bodies] \
+                or len(own) != 2:
+            continue
+        (one, two), axes = ((joint, joint.bodies[0] == body) for joint in own), np.array(
+            [joint.axis for joint in own])
+        bodies = one[0].bodies[one[1]], two[0].bodies[two[1]]
+        places = one[0].places[one[1]], two[0].places[two[1]]
+        if bodies[0] != bodies[1] and np.linalg.norm(places[0] - places[1]) < TOGETHER \
+                and np.linalg.norm(np.cross(*axes)) > ASKEW:
+            ball = Joint(f'{own[0].name}+{own[1].name}', BALL, bodies, places, axes[0])
+            return _with_balls(robot, [*(joint for joint in joints if joint not in own), ball])
     return joints
 
 
