@@ -85,7 +85,9 @@ class Drawing:
         parent, child = joint.bodies
         if joint.kind == SLIDE:
             block = child if child in self._rails else parent
-            sign = 1.0 if (self._rails.get(block, 0.0) / joint.axis).real > 0.0 else -1.0
+            if block not in self._rails:
+                return None
+            sign = 1.0 if (self._rails[block] / joint.axis).real > 0.0 else -1.0
             return (*self.bars[block], sign if block == child else -sign)
         pin = self._known(child, joint.places[0]) or ''
         turns = child if self._home[pin] == parent else parent
@@ -176,9 +178,9 @@ class Drawing:
 
     def _drive(self, joint: Joint, base: str, body: str, sign: float) -> bool:
         """Place the body that a motor moves on one that is placed."""
-        if base not in self.bars or body in self.bars:
-            return False
         places = [place for place, bodies in self._pins if body in bodies]
+        if base not in self.bars or body in self.bars or not places:
+            return False
         if joint.kind == SLIDE:
             place = places[0]
             origin = self._fixed(base, place - joint.axis * sign * (joint.position or 0.0))
@@ -248,8 +250,7 @@ class Drawing:
                     way = f'along {towards}'
                 half = 'out' if self._from(pin, place, along).real > 0.0 else 'in'
                 size = self._say(abs(place - self.places[pin]))
-                name = self._name(place, rod, f'slider {pin} {size} '
-                                  f'{origin} {way} {half}')
+                name = self._name(place, rod, f'slider {pin} {size} {origin} {way} {half}')
                 self._rails[block] = along
                 return self._place({rod: (pin, name), block: (name, name)})
         return False

@@ -175,12 +175,12 @@ def _sdf(root: ElementTree.Element) -> Robot:
 
 def _urdf(root: ElementTree.Element, loops: Mapping[str, Any]) -> Robot:
     links = [str(link.get('name')) for link in root.findall('link')]
-    joints = {_end(joint, 'child'): joint for joint in root.findall('joint')}
+    joints = {_attribute(joint, 'child', 'link'): joint for joint in root.findall('joint')}
 
     def frame(link: str) -> np.ndarray:
         joint = joints.get(link)
-        return np.eye(4) if joint is None else frame(_end(joint, 'parent')) @ _origin(
-            joint, 'origin')
+        return np.eye(4) if joint is None else (
+            frame(_attribute(joint, 'parent', 'link')) @ _origin(joint, 'origin'))
 
     top, *others = [link for link in links if link not in joints] or ['']
     if others or not top:
@@ -188,18 +188,18 @@ def _urdf(root: ElementTree.Element, loops: Mapping[str, Any]) -> Robot:
     robot = Robot(top, {link: frame(link) for link in links})
     for child, joint in joints.items():
         name = str(joint.get('name'))
-        robot.join(name, str(joint.get('type')), (_end(joint, 'parent'), child), frame(child),
-                   _vector(joint, 'axis', '1 0 0'), position=0.0)
-        if (mimic := joint.find('mimic')) is not None:
-            robot.follows[name] = (str(mimic.get('joint')), float(mimic.get('multiplier', 1.0)),
-                                   float(mimic.get('offset', 0.0)))
+        ends = _attribute(joint, 'parent', 'link'), child
+        robot.join(name, str(joint.get('type')), ends, frame(child),
+                   _numbers(_attribute(joint, 'axis', 'xyz', '1 0 0')), position=0.0)
+        if master := _attribute(joint, 'mimic', 'joint'):
+            robot.follows[name] = (master, float(_attribute(joint, 'mimic', 'multiplier', '1')),
+                                   float(_attribute(joint, 'mimic', 'offset', '0')))
     for cut in (*root.findall('constraint'), *root.findall('loop_joint')):
-        ends = _end(cut, 'parent'), _end(cut, 'child')
+        ends = _attribute(cut, 'parent', 'link'), _attribute(cut, 'child', 'link')
         first, second = (robot.frames[end] @ _origin(cut, f'{tag}_origin')
                          for end, tag in zip(ends, ('parent', 'child')))
-        tag = 'axis' if cut.find('parent_axis') is None else 'parent_axis'
-        robot.join(str(cut.get('name')), str(cut.get('type')), ends, first,
-                   _vector(cut, tag, '0 0 1'), second)
+        axis = _attribute(cut, 'parent_axis', 'xyz', _attribute(cut, 'axis', 'xyz', '0 0 1'))
+        robot.join(str(cut.get('name')), str(cut.get('type')), ends, first, _numbers(axis), second)
     for i, cut in enumerate(loops.get('closures', ())):
         robot.join(f'closures[{i}]', HINGE, (cut['link_a'], cut['link_b']), _frame(cut['point']),
                    cut['axis'])
@@ -214,9 +214,9 @@ def _urdf(root: ElementTree.Element, loops: Mapping[str, Any]) -> Robot:
     return robot
 
 
-def _end(joint: ElementTree.Element, tag: str) -> str:
-    end = joint.find(tag)
-    return '' if end is None else str(end.get('link'))
+def _attribute(part: ElementTree.Element, tag: str, key: str, otherwise: str = '') -> str:
+    found = part.find(tag)
+    return otherwise if found is None else found.get(key, otherwise)
 
 
 def _text(part: ElementTree.Element, tag: str, otherwise: str = '') -> str:
@@ -227,15 +227,8 @@ def _numbers(text: str) -> np.ndarray:
     return np.array(text.split(), float)
 
 
-def _vector(part: ElementTree.Element, tag: str, otherwise: str) -> np.ndarray:
-    found = part.find(tag)
-    return _numbers(otherwise if found is None else found.get('xyz', otherwise))
-
-
 def _origin(part: ElementTree.Element, tag: str) -> np.ndarray:
-    found = part.find(tag)
-    return np.eye(4) if found is None else _pose(
-        f'{found.get("xyz", "0 0 0")} {found.get("rpy", "0 0 0")}')
+    return _pose(' '.join(_attribute(part, tag, key, '0 0 0') for key in ('xyz', 'rpy')))
 
 
 def _pose(text: str) -> np.ndarray:
