@@ -166,9 +166,9 @@ def _parameters(robot: readers.Robot, drawing: Drawing) -> Iterator[Tuple[str, A
         yield f'{drive.name}.offset', float(short(offset))
         yield f'{drive.name}.start', float(short(drive.value, 1e-15))
     angles, names = linkage.joint_angles(_values(drawing)), []
-    for joint, position, (base, tip, sign) in seen:
-        link = next(link.name for link in linkage.links if link.tip == tip and (
-            link.joint == base or base == tip and link.kind == 'prismatic'))
+    for joint, position, (ends, sign) in seen:
+        link = next(link.name for link in linkage.links if (link.joint, link.tip) == ends
+                    and (link.kind == 'prismatic') == (joint.kind == readers.SLIDE))
         zero = float(short(position - sign * float(angles[link])))
         names.append(f'{link}={"-" * (sign < 0.0)}{joint.name}' + (f'{zero:+}' if zero else ''))
     yield 'joint_names', names

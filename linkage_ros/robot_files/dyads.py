@@ -41,8 +41,8 @@ class Drawing:
         Where each joint of the lines is in the pose of the file.
     drives : list of Drive
     bars : dict
-        Of each body that is placed, between which joints of the lines its link is; on a block
-        they are the same.
+        Of each body that is placed, between which joints of the lines its link is; of a block
+        its pin, and where that is counted from.
 
     """
 
@@ -78,7 +78,7 @@ class Drawing:
         """The bodies that are not placed."""
         return [body for body in self.bodies if body not in self.bars]
 
-    def seen(self, joint: Joint) -> Optional[Tuple[str, str, float]]:
+    def seen(self, joint: Joint) -> Optional[Tuple[Tuple[str, str], float]]:
         """Return the ends of the link that tells a joint's position, and its sign, if any does."""
         if not self.bars.keys() >= {*joint.bodies}:
             return None
@@ -88,20 +88,20 @@ class Drawing:
             if block not in self._rails:
                 return None
             sign = 1.0 if (self._rails[block] / joint.axis).real > 0.0 else -1.0
-            return (*self.bars[block], sign if block == child else -sign)
+            return self.bars[block], sign if block == child else -sign
         pin = self._known(child, joint.places[0]) or ''
         turns = child if self._home[pin] == parent else parent
         if self._home[pin] not in joint.bodies:
             return None
         tip = self.bars[turns][1]
-        if self.bars[turns][0] != pin or tip == pin:
+        if self.bars[turns][0] != pin or turns in self._rails:
             # A triangle on its link shows how that turns against the one that the pin is on.
             other = self._other(turns, pin)
             start, end = self.places[pin], self.places[other]
             side = self._say(abs(end - start))
             tip = self._name(start + (end - start) * complex(0.5, 0.75 ** 0.5), turns,
                              f'dyad {pin} {other} {side} {side} left')
-        return pin, tip, joint.axis if turns == child else -joint.axis
+        return (pin, tip), joint.axis if turns == child else -joint.axis
 
     def _say(self, value: float) -> str:
         return short(value, 1e-15 * self.loop.size)
@@ -129,7 +129,7 @@ class Drawing:
         if body == self.loop.ground:
             return self._name(place, body, f'ground {say(place.real)} {say(place.imag)}')
         if body in self._rails:
-            pin = self.bars[body][0]
+            pin = self.bars[body][1]
             seen = self._from(pin, place, self._rails[body])
             return self._name(place, body, f'block {pin} {say(seen.real)} {say(seen.imag)}')
         # On the bar from which the triangle is the least flat.
@@ -191,7 +191,7 @@ class Drawing:
                               f'{self._say(value - size)} {self._say(value + size)}')
             self._rails[body] = along
             return self._driven_by('carriage', joint, ratio, value) and self._place(
-                {body: (name, name)})
+                {body: (origin, name)})
         centre, zero, along = self._fixed(base, joint.places[0]), '', 1.0 + 0.0j
         start = self.places[centre]
         place = next((place for place in places if abs(place - start) > self.near),
@@ -252,7 +252,7 @@ class Drawing:
                 size = self._say(abs(place - self.places[pin]))
                 name = self._name(place, rod, f'slider {pin} {size} {origin} {way} {half}')
                 self._rails[block] = along
-                return self._place({rod: (pin, name), block: (name, name)})
+                return self._place({rod: (pin, name), block: (origin, name)})
         return False
 
     def _slot(self, lever: str, block: str) -> bool:
@@ -265,7 +265,7 @@ class Drawing:
                 name = self._name(self.places[pivot] + abs(seen) * self._rails[block], lever,
                                   f'slot {pivot} {pin} {self._say(sign * seen.imag)} out '
                                   f'{self._say(abs(seen))}')
-                return self._place({lever: (pivot, name), block: (pin, pin)})
+                return self._place({lever: (pivot, name), block: (pivot, pin)})
         return False
 
     def _cylinder(self, barrel: str, bar: str) -> bool:
@@ -281,5 +281,5 @@ class Drawing:
                 self._rails[rod] = slide.axis * seen.real / abs(seen)
                 sign = 1.0 if (slide.bodies[1] == rod) == (seen.real > 0.0) else -1.0
                 return self._driven_by('cylinder', slide, sign, abs(seen)) and self._place(
-                    {barrel: (base, name), rod: (name, name), bar: (pivot, name)})
+                    {barrel: (base, name), rod: (base, name), bar: (pivot, name)})
         return False
