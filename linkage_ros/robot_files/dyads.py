@@ -227,16 +227,26 @@ class Drawing:
                 or any({first, second} == {*joint.bodies} for joint in self.driven):
             return False
         ends = self._on[first][0], self._on[second][0]
-        line = f'dyad {self._bars(place, *ends)}'
-        for corner, at in self.places.items():
-            links = [{body for body in self.bars if {corner, end} <= {*self._on[body]}}
-                     for end in ends]
-            if corner not in ends and all(links) and links[0] != links[1] and abs(
-                    self.places[ends[0]] + self.places[ends[1]] - at - place) < self.near:
-                # So that it stays one beyond its flat poses.
-                line = f'parallelogram {corner} {" ".join(ends)}'
+        line = self._alike(place, *ends) or f'dyad {self._bars(place, *ends)}'
         name = self._name(place, first, line)
         return self._place({first: (ends[0], name), second: (ends[1], name)})
+
+    def _alike(self, place: complex, first: str, second: str) -> Optional[str]:
+        """Return what a line says of bars like those from a corner: they pass their flat poses."""
+        start, end = self.places[first], self.places[second]
+        for corner, at in self.places.items():
+            links = [{body for body in self.bars if {corner, name} <= {*self._on[body]}}
+                     for name in (first, second)]
+            if corner in (first, second) or not all(links) or links[0] == links[1]:
+                continue
+            opposite, along = start + end - at, end - start
+            kite, crossed = (start + along * (self._from(first, each, along)).conjugate()
+                             for each in (at, opposite))
+            for word, seen in (('parallelogram', opposite), ('mirror', kite),
+                               ('antiparallelogram', crossed)):
+                if abs(seen - place) < self.near < abs(at - place):
+                    return f'{word} {corner} {first} {second}'
+        return None
 
     def _slider(self, rod: str, block: str) -> bool:
         place = self._shared(rod, block)
