@@ -23,11 +23,11 @@ class Drive(NamedTuple):
 
 
 def short(value: float, near: float = 2e-16) -> str:
-    """Return the shortest number near another."""
+    """Return a number, and one of few digits where that is as near to it as rounding."""
     if abs(value) <= 5.0 * near:
         return '0'
-    return next(text for text in (f'{value:.{digits}g}' for digits in range(1, 18))
-                if abs(float(text) - value) <= near)
+    return next((text for text in (f'{value:.{digits}g}' for digits in range(1, 13))
+                 if abs(float(text) - value) <= near), repr(float(value)))
 
 
 class Drawing:
