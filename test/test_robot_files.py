@@ -7,8 +7,8 @@ import math
 from pathlib import Path
 import re
 
-from linkage_ros import scene
-from linkage_ros.robot_files import command
+from linkage_ros import mechanisms, scene
+from linkage_ros.robot_files import command, readers
 import numpy as np
 import pytest
 from robots import LIBRARIES
@@ -310,3 +310,50 @@ def test_a_joint_that_follows_another_is_driven_by_it(imported, tmp_path):
     machine, = imported(geared, '--loops', loops).values()
     assert [drive.source for drive in machine.inputs.values()] == ['mot_front', 'mot_front']
     assert [drive.ratio for drive in machine.inputs.values()] == [1.0, -0.5]
+
+
+def robot_of(linkage, values):
+    """Return a linkage of the catalogue as a robot: a tree of its links, and cuts."""
+    places = {name: [*place, 0.0] for name, place in linkage.solve(values).items()}
+    robot, tips = readers.Robot('ground', {'ground': np.eye(4)}), {}
+    ends = {link.name: np.subtract(places[link.tip], places[link.joint]) for link in linkage.links}
+    for link in linkage.links:
+        robot.frames[link.name] = np.eye(4)
+        hinge, tip = np.eye(4), np.eye(4)
+        hinge[:3, 3], tip[:3, 3] = places[link.joint], places[link.tip]
+        if link.kind == 'prismatic':
+            robot.join(link.name, 'prismatic', (link.parent, link.name), tip,
+                       ends.get(link.parent, [1.0, 0.0, 0.0]), position=0.0)
+        else:
+            robot.join(link.name, 'revolute', (link.parent, link.name), hinge, position=0.0)
+        if link.tip in tips:
+            robot.join(f'cut_{link.name}', 'revolute', (link.name, tips[link.tip]), tip)
+        elif link.kind != 'prismatic':
+            tips[link.tip] = link.name
+    robot.driven = [each.name for each in linkage.inputs]
+    return robot
+
+
+@pytest.mark.parametrize('kind', mechanisms.TYPES)
+def test_a_linkage_of_the_catalogue_comes_back_from_a_robot(kind):
+    linkage = mechanisms.create(kind)
+    start = [0.3] if len(linkage.inputs) == 1 else [0.3, 1.9]
+    given, said = command.described(robot_of(linkage, start if len(start) > 1 else start[0]))
+    assert not any(line.startswith('Left out') for line in said)
+    machines = scene.read(given).machines.values()
+    names = [name for name in linkage.joints if name not in linkage.inputs]
+    for turned in np.linspace(-3.0, 3.0, 21):
+        now = [value + turned for value in start]
+        was, angles = (linkage.joint_angles(values if len(values) > 1 else values[0])
+                       for values in (start, now))
+        found = {}
+        for machine in machines:
+            found.update(published(machine, **{drive.source: turned
+                                               for drive in machine.inputs.values()}))
+        for name in names:
+            moved = angles[name] - was[name]
+            if not math.isnan(moved):
+                apart = found[name] - moved
+                size = 100.0 if name in ('slide', 'block') else 1.0
+                apart = apart if size > 1.0 else math.remainder(apart, math.tau)
+                assert apart == pytest.approx(0.0, abs=1e-13 * size), (name, turned)
