@@ -145,7 +145,10 @@ def test_hinges_that_cross_at_the_end_of_a_rod_are_a_ball(imported, capsys, tmp_
     hinge = ('<joint name="elbow" type="continuous">\n    <parent link="crank"/><child link='
              '"coupler"/><origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>')
     rod = [(hinge, ball), ('name="wrist" type="revolute"', 'name="wrist" type="spherical"')]
-    machine, = imported(written(tmp_path, 'four_bar.urdf', *rod)).values()
+    file = written(tmp_path, 'four_bar.urdf', *rod)
+    assert ('# Not published: elbow_y, elbow_x, elbow, which no angle in the plane tells.'
+            in printed(capsys, file))
+    machine, = imported(file).values()
     assert published(machine, motor=0.4)['shoulder'] == pytest.approx(-0.4)
     loose = written(tmp_path, 'four_bar.urdf', *rod, (
         'name="shoulder" type="continuous"', 'name="shoulder" type="spherical"'))
@@ -238,6 +241,9 @@ def pin(side):
 def test_what_is_left_out_is_named_with_the_reason(capsys, tmp_path):
     assert 'not planar: the axes of motor and shoulder are 11.3 degrees from it' in refused(
         capsys, written(tmp_path, 'four_bar.urdf', ('0 -1 0', '0 -1 0.2')))
+    assert 'not planar: wrist is open across the plane by 0.01 m' in refused(
+        capsys, written(tmp_path, 'four_bar.urdf', ('xyz="0 0 0.2"/><child_axis',
+                                                    'xyz="0 0.01 0.2"/><child_axis')))
     assert 'no joint of this robot closes a loop' in refused(capsys, ROBOTS / 'five_bar.urdf')
     assert 'world, AB, BC, CD: not driven: say by --driven' in refused(
         capsys, ROBOTS / 'four_bar.sdf', '--driven', 'nobody')

@@ -87,6 +87,12 @@ def described(robot: readers.Robot) -> Tuple[Dict[str, Any], List[str]]:
         exact = '; its bars were made exactly parallel' if off > ROUNDING else ''
         said.append(f'Checked: {name} has the pose of the file{was}, to {off:.0e} of its size'
                     f'{exact}.')
+        told = {called.name for called in machines[name].joints.values() if called.published}
+        told |= {joint.name for joint in drawing.driven}
+        own = [part for joint in drawing.loop.joints for part in joint.name.split('+')]
+        if lost := [joint.name for joint in robot.joints if joint.position is not None
+                    and joint.name in own and joint.name not in told]:
+            said.append(f'Not published: {", ".join(lost)}, which no angle in the plane tells.')
     return given, said
 
 

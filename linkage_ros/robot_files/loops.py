@@ -15,7 +15,7 @@ from .readers import BALL, FIXED, HINGE, Joint, Robot, SLIDE
 
 # Axes that differ by more [rad] are not parallel: files have angles such as 1.5708.
 ASKEW = 1e-4
-# Hinges nearer to each other [m] cross in a point.
+# Hinges nearer to each other [m] cross in a point; the ends of a loop [m] are in one plane.
 TOGETHER = 1e-6
 
 
@@ -111,9 +111,13 @@ def flat(robot: Robot, ground: str, frame_id: str, joints: Sequence[Joint],
     seen = np.linalg.inv(base @ frame)
     found = []
     for joint in joints:
+        first, second = (seen @ [*place, 1.0] for place in joint.places)
+        if abs(first[2] - second[2]) > TOGETHER:
+            raise ValueError(f'not planar: {joint.name} is open across the plane by '
+                             f'{abs(first[2] - second[2]):.3g} m')
         axis = seen[:3, :3] @ joint.axis
         found.append(replace(
-            joint, places=tuple(complex(*(seen @ [*place, 1.0])[:2]) for place in joint.places),
+            joint, places=(complex(*first[:2]), complex(*second[:2])),
             axis=complex(*axis[:2]) if joint.kind == SLIDE else float(np.sign(axis[2]))))
     places = [place for joint in found for place in joint.places]
     return Loop(ground, frame_id, frame, found, max(abs(a - b) for a in places for b in places))
