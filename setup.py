@@ -17,7 +17,8 @@ interfaces = Path(__file__).resolve().with_name('linkage_interfaces')
 # PATH, where names like `render` have no business.
 for_ros = sys.argv[1:2] != ['--help'] and {'install', 'develop'} & set(sys.argv)
 commands = {
-    'crank_driver': 'nodes.crank_driver', 'kinematics': 'nodes.kinematics', 'render': 'render',
+    'crank_driver': 'nodes.crank_driver', 'from_robot': 'robot_files.command',
+    'kinematics': 'nodes.kinematics', 'render': 'render',
     'servo_inverse': 'nodes.servo_inverse', 'urdf': 'nodes.urdf_command',
     'viewer': 'web.viewer'}
 
@@ -69,8 +70,9 @@ setup(
     install_requires=['setuptools', 'numpy'],
     extras_require={
         'fast': ['llvmlite>=0.44'],
+        'mjcf': ['mujoco>=3'],
         'render': ['matplotlib>=3.6', 'pyyaml', 'tqdm'],
-        'test': ['gmpy2', 'hypothesis', 'mpmath', 'pytest', 'pyyaml'],
+        'test': ['gmpy2', 'hypothesis', 'mpmath', 'mujoco>=3', 'pytest', 'pyyaml'],
         'viewer': ['aiohttp>=3.9'],
     },
     zip_safe=True,

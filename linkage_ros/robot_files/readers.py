@@ -1,0 +1,246 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Robots as MJCF, SDF and URDF describe them: bodies and joints, all in the pose of the file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Dict, List, Mapping, Optional, Tuple
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+
+from ..command import RequestError
+
+HINGE, SLIDE, BALL, FIXED = 'hinge', 'slide', 'ball', 'fixed'
+KINDS = {'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE, 'spherical': BALL}
+
+
+@dataclass(eq=False)
+class Joint:
+    """What joins two bodies: its place on each, and its axis; a position where it can be named."""
+
+    name: str
+    kind: str
+    bodies: Tuple[str, str]
+    places: Any
+    axis: Any
+    position: Optional[float] = None
+
+
+@dataclass
+class Robot:
+    """Frames of bodies, joints, which of them motors move, and which are a multiple of others."""
+
+    root: str
+    frames: Dict[str, np.ndarray] = field(default_factory=dict)
+    joints: List[Joint] = field(default_factory=list)
+    driven: List[str] = field(default_factory=list)
+    follows: Dict[str, Tuple[str, float, float]] = field(default_factory=dict)
+
+    def join(self, name: str, kind: str, bodies: Tuple[str, str], frame: np.ndarray,
+             axis: Any = (0.0, 0.0, 1.0), other: Optional[np.ndarray] = None,
+             position: Optional[float] = None) -> None:
+        """Add a joint by its frame on the parent, and on the child where that is another."""
+        for body in bodies:
+            if body not in self.frames:
+                raise RequestError(f'joint {name} is on {body!r}, which is no link')
+        kind, size = KINDS.get(kind, kind), np.linalg.norm(axis)
+        if kind in (HINGE, SLIDE) and not size > 0.0:
+            raise RequestError(f'the axis of joint {name} has no length')
+        places = frame[:3, 3], (frame if other is None else other)[:3, 3]
+        self.joints.append(Joint(name, kind, bodies, places, frame[:3, :3] @ axis / (size or 1.0),
+                                 position))
+
+
+def read(path: str, loops: Optional[str] = None) -> Robot:
+    """Return the robot in a file; raise RequestError if there is none."""
+    try:
+        root = ElementTree.parse(path).getroot()
+        if root.tag not in ('mujoco', 'sdf', 'robot'):
+            raise RequestError(f'{path} must be MJCF, SDF or URDF, not <{root.tag}>')
+        if root.tag == 'robot':
+            return _urdf(root, _loops(loops) if loops else {})
+        if loops:
+            raise RequestError(f'{path} has its own loops; --loops is for a URDF')
+        return _mjcf(path) if root.tag == 'mujoco' else _sdf(root)
+    except ElementTree.ParseError as error:
+        raise RequestError(f'{path} is no XML: {error}') from None
+    except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
+        raise RequestError(f'{path} cannot be read: {type(error).__name__}: {error}') from None
+
+
+def _loops(path: str) -> Mapping[str, Any]:
+    import yaml
+
+    try:
+        with open(path) as file:
+            found = yaml.safe_load(file)
+    except yaml.YAMLError as error:
+        raise RequestError(f'{path} is no YAML: {error}') from None
+    if not isinstance(found, dict) or not {'closures', 'closed_loop'} & found.keys():
+        raise RequestError(f'{path} must have closures: or closed_loop:')
+    return found
+
+
+def _mjcf(path: str) -> Robot:
+    import mujoco as mj
+
+    model = mj.MjModel.from_xml_path(path)
+    data = mj.MjData(model)
+    data.qpos[:] = model.key_qpos[0] if model.nkey else model.qpos0
+    mj.mj_kinematics(model, data)
+    bodies = [model.body(i).name or f'body{i}' for i in range(model.nbody)]
+    names = [model.joint(i).name or f'joint{i}' for i in range(model.njnt)]
+    robot = Robot(bodies[0], {body: _frame(data.xpos[i], data.xmat[i].reshape(3, 3))
+                              for i, body in enumerate(bodies)})
+    for i, body in list(enumerate(bodies))[1:]:
+        above, joints = bodies[model.body_parentid[i]], model.body_jntadr[i] + np.arange(
+            model.body_jntnum[i])
+        if not joints.size:
+            robot.join(body, FIXED, (above, body), robot.frames[body])
+        for j in joints:
+            # Between several joints of one body there are bodies without a name.
+            below = body if j == joints[-1] else f'{body}/{names[j]}'
+            robot.frames.setdefault(below, robot.frames[body])
+            kind = mj.mjtJoint(model.jnt_type[j]).name[6:].lower()
+            one = kind in (HINGE, SLIDE)
+            robot.join(names[j], kind, (above, below), _frame(data.xanchor[j]),
+                       data.xaxis[j] if one else (0.0, 0.0, 1.0),
+                       position=float(data.qpos[model.jnt_qposadr[j]]) if one else None)
+            above = below
+    for i in range(model.neq):
+        kind, given = mj.mjtEq(model.eq_type[i]).name[5:].lower(), model.eq_data[i]
+        ends, places = [model.eq_obj1id[i], model.eq_obj2id[i]], [given[:3], given[3:6]]
+        if kind == 'joint' and ends[1] >= 0 and not given[2:5].any():
+            robot.follows[names[ends[0]]] = names[ends[1]], float(given[1]), float(given[0])
+        if kind not in ('connect', 'weld') or not model.eq_active0[i]:
+            continue
+        if mj.mjtObj(model.eq_objtype[i]) == mj.mjtObj.mjOBJ_SITE:
+            ends, places = model.site_bodyid[ends], model.site_pos[ends]
+        first, second = (bodies[end] for end in ends)
+        robot.join(model.equality(i).name or f'equality{i}', BALL if kind == 'connect' else FIXED,
+                   (first, second), robot.frames[first] @ _frame(places[0]),
+                   other=robot.frames[second] @ _frame(places[1]))
+    for way, target in zip(model.actuator_trntype, model.actuator_trnid[:, 0]):
+        kind = mj.mjtTrn(way).name[6:].lower()
+        wraps = model.tendon_adr[target] + np.arange(model.tendon_num[target]) \
+            if kind == 'tendon' else ()
+        robot.driven += [names[target]] * (kind in ('joint', 'jointinparent')) + [
+            names[model.wrap_objid[i]] for i in wraps
+            if mj.mjtWrap(model.wrap_type[i]) == mj.mjtWrap.mjWRAP_JOINT]
+    return robot
+
+
+def _sdf(root: ElementTree.Element) -> Robot:
+    model = next((model for model in root.iter('model') if model.find('joint') is not None), None)
+    if model is None:
+        raise RequestError('the SDF has no model with joints')
+    if model.find('model') is not None or model.find('include') is not None:
+        raise RequestError(f'model {model.get("name")} has models in it, which are not read')
+    parts = {str(part.get('name')): part for part in model if part.tag in ('link', 'joint',
+                                                                           'frame')}
+
+    def frame(name: Optional[str]) -> np.ndarray:
+        if name in (None, '', 'world', '__model__'):
+            return np.eye(4)
+        part = parts[str(name)]
+        pose = part.find('pose')
+        base = pose.get('relative_to') if pose is not None else None
+        return frame(base or part.get('attached_to') or _text(part, 'child')) @ _pose(
+            _text(part, 'pose', '0 0 0 0 0 0'))
+
+    def body(name: str) -> str:
+        part = parts.get(name)
+        if part is None or part.tag == 'link':
+            return name
+        return body(part.get('attached_to') or _text(part, 'child'))
+
+    joints = {name: (body(_text(part, 'parent')), body(_text(part, 'child')))
+              for name, part in parts.items() if part.tag == 'joint'}
+    parents, children = zip(*joints.values())
+    links = [name for name, part in parts.items() if part.tag == 'link']
+    bodies = ['world'] * ('world' in parents) + sorted(links, key=children.__contains__)
+    robot = Robot(bodies[0], {name: frame(name) for name in bodies})
+    for name, ends in joints.items():
+        seen, turned = parts[name].find('axis/xyz'), frame(name)
+        axis = _numbers(_text(parts[name], 'axis/xyz', '0 0 1'))
+        if seen is not None and seen.get('expressed_in'):
+            axis = turned[:3, :3].T @ frame(seen.get('expressed_in'))[:3, :3] @ axis
+        robot.join(name, str(parts[name].get('type')), ends, turned, axis, position=0.0)
+    robot.driven = [str(name.text).strip() for name in model.findall('plugin/joint_name')]
+    return robot
+
+
+def _urdf(root: ElementTree.Element, loops: Mapping[str, Any]) -> Robot:
+    links = [str(link.get('name')) for link in root.findall('link')]
+    joints = {_attribute(joint, 'child', 'link'): joint for joint in root.findall('joint')}
+
+    def frame(link: str) -> np.ndarray:
+        joint = joints.get(link)
+        return np.eye(4) if joint is None else (
+            frame(_attribute(joint, 'parent', 'link')) @ _origin(joint, 'origin'))
+
+    top, *others = [link for link in links if link not in joints] or ['']
+    if others or not top:
+        raise RequestError(f'a URDF has one root link, not {len(others) + bool(top)}')
+    robot = Robot(top, {link: frame(link) for link in links})
+    for child, joint in joints.items():
+        name = str(joint.get('name'))
+        ends = _attribute(joint, 'parent', 'link'), child
+        robot.join(name, str(joint.get('type')), ends, frame(child),
+                   _numbers(_attribute(joint, 'axis', 'xyz', '1 0 0')), position=0.0)
+        if master := _attribute(joint, 'mimic', 'joint'):
+            robot.follows[name] = (master, float(_attribute(joint, 'mimic', 'multiplier', '1')),
+                                   float(_attribute(joint, 'mimic', 'offset', '0')))
+    for cut in (*root.findall('constraint'), *root.findall('loop_joint')):
+        ends = _attribute(cut, 'parent', 'link'), _attribute(cut, 'child', 'link')
+        first, second = (robot.frames[end] @ _origin(cut, f'{tag}_origin')
+                         for end, tag in zip(ends, ('parent', 'child')))
+        axis = _attribute(cut, 'parent_axis', 'xyz', _attribute(cut, 'axis', 'xyz', '0 0 1'))
+        robot.join(str(cut.get('name')), str(cut.get('type')), ends, first, _numbers(axis), second)
+    for i, cut in enumerate(loops.get('closures', ())):
+        robot.join(f'closures[{i}]', HINGE, (cut['link_a'], cut['link_b']), _frame(cut['point']),
+                   cut['axis'])
+    for (first, second), kind in zip(loops.get('closed_loop', ()), loops.get('type', ())):
+        robot.join(f'{first}={second}', FIXED if str(kind).lower() == '6d' else BALL,
+                   (first, second), robot.frames.get(first, np.eye(4)),
+                   other=robot.frames.get(second))
+    robot.driven = [*loops.get('independent', ()), *loops.get('name_mot', ()), *(
+        str(joint.get('name')) for joint in (
+            *root.findall('transmission/joint'),
+            *root.findall('ros2_control/joint[command_interface]')))]
+    return robot
+
+
+def _attribute(part: ElementTree.Element, tag: str, key: str, otherwise: str = '') -> str:
+    found = part.find(tag)
+    return otherwise if found is None else found.get(key, otherwise)
+
+
+def _text(part: ElementTree.Element, tag: str, otherwise: str = '') -> str:
+    return (part.findtext(tag) or otherwise).strip()
+
+
+def _numbers(text: str) -> np.ndarray:
+    return np.array(text.split(), float)
+
+
+def _origin(part: ElementTree.Element, tag: str) -> np.ndarray:
+    return _pose(' '.join(_attribute(part, tag, key, '0 0 0') for key in ('xyz', 'rpy')))
+
+
+def _pose(text: str) -> np.ndarray:
+    x, y, z, roll, pitch, yaw = _numbers(text)
+    (cr, cp, cy), (sr, sp, sy) = np.cos((roll, pitch, yaw)), np.sin((roll, pitch, yaw))
+    about_z, about_y, about_x = np.array([
+        [[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]], [[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]],
+        [[1, 0, 0], [0, cr, -sr], [0, sr, cr]]])
+    return _frame((x, y, z), about_z @ about_y @ about_x)
+
+
+def _frame(place: Any, turned: Any = ((1, 0, 0), (0, 1, 0), (0, 0, 1))) -> np.ndarray:
+    made = np.eye(4)
+    made[:3, :3], made[:3, 3] = turned, place
+    return made

@@ -1,0 +1,365 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Scenes from robot descriptions: what they publish closes the loops of the file, everywhere."""
+
+import math
+from pathlib import Path
+import re
+
+from linkage_ros import mechanisms, scene
+from linkage_ros.robot_files import command, readers
+import numpy as np
+import pytest
+from robots import LIBRARIES
+
+ROBOTS = Path(__file__).with_name('robot_files')
+
+
+def printed(capsys, name, *more):
+    """Return what the command prints of a file, as a scene file."""
+    assert command.main([str(ROBOTS / name), *map(str, more)]) == 0
+    return capsys.readouterr().out
+
+
+@pytest.fixture
+def imported(capsys, tmp_path):
+    """Return a function that reads the scene of a file."""
+    pytest.importorskip('yaml')
+
+    def load(name, *more):
+        if str(name).endswith('.xml'):
+            pytest.importorskip('mujoco', reason='MJCF is read by MuJoCo: pip install mujoco')
+        file = tmp_path / 'scene.yaml'
+        file.write_text(printed(capsys, name, *more))
+        return scene.load(str(file)).machines
+    return load
+
+
+def published(machine, **motors):
+    """Return the positions of a robot's joints where its motors are, motors included."""
+    values = [drive.ratio * motors[drive.source] + drive.offset
+              for drive in machine.inputs.values()]
+    angles = machine.linkage.joint_angles(values if len(values) > 1 else values[0])
+    assert machine.only_named
+    return {**motors, **{called.name: float(called.of(angles[link]))
+                         for link, called in machine.joints.items() if called.published}}
+
+
+def error(file, positions):
+    """Return by how much MuJoCo sees equalities of a file open [m]."""
+    import mujoco
+    model = mujoco.MjModel.from_xml_path(str(ROBOTS / file))
+    data = mujoco.MjData(model)
+    for name, value in positions.items():
+        data.qpos[model.joint(name).qposadr] = value
+    mujoco.mj_forward(model, data)
+    return np.abs(data.efc_pos[data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)]).max()
+
+
+MODELS = {'four_bar.xml': np.linspace(-3.0, 3.0, 40), 'whitworth.xml': np.linspace(-0.9, 0.9, 40)}
+
+
+@pytest.mark.parametrize('file', MODELS)
+def test_mujoco_sees_the_loops_of_a_model_closed(imported, file):
+    machine, = imported(file).values()
+    for position in MODELS[file]:
+        joints = published(machine, **{machine.first.source: position})
+        assert error(file, joints) < 1e-14
+
+
+def test_mujoco_sees_both_fingers_of_a_gripper_closed(imported):
+    fingers = imported('gripper.xml').values()
+    assert [finger.frame_id for finger in fingers] == ['palm', 'palm']
+    for position in np.linspace(0.0, 0.8, 20):
+        joints = {}
+        for finger in fingers:
+            joints.update(published(finger, **{finger.first.source: position}))
+        assert error('gripper.xml', joints) < 1e-14
+
+
+def test_a_rod_with_ball_ends_on_a_moving_tarsus_keeps_its_length(imported):
+    mujoco = pytest.importorskip('mujoco')
+    machine, = imported('toe_rod.xml').values()
+    assert machine.frame_id == 'tarsus'
+    model = mujoco.MjModel.from_xml_path(str(ROBOTS / 'toe_rod.xml'))
+    data, eye = mujoco.MjData(model), model.eq_data[0]
+    for position in np.linspace(-1.75, -0.1, 20):
+        for name, value in published(machine, foot_crank_joint=position).items():
+            data.qpos[model.joint(name).qposadr] = value
+        mujoco.mj_kinematics(model, data)
+        foot = model.body('foot').id
+        end = data.xpos[foot] + data.xmat[foot].reshape(3, 3) @ eye[3:6]
+        rod = np.linalg.norm(end - data.xpos[model.body('plantar_rod').id])
+        assert rod == pytest.approx(0.35012, abs=1e-14)
+        # The side of the keyframe, in which the rod is far from the foot's own pivot.
+        assert joint_near(data.qpos[model.joint('foot_joint').qposadr[0]], position)
+
+
+def joint_near(foot, crank):
+    """Tell whether the foot follows its crank, as in a parallelogram."""
+    return abs(foot - crank) < 0.35
+
+
+URDF = {
+    'four_bar.urdf': ((), {'motor': (-3.0, 3.0)}, [('wrist_a', 'wrist_b')]),
+    'boom.urdf': ((), {'boom_cylinder': (-0.3, 0.5)}, [('eye_a', 'eye_b')]),
+    'five_bar.urdf': (('--loops', ROBOTS / 'five_bar_loops.yaml'),
+                      {'mot_front': (-0.4, 0.4), 'mot_back': (0.5, -0.3)},
+                      [('front_foot', 'back_foot')]),
+    'palletiser.urdf': (('--loops', ROBOTS / 'palletiser_loops.yaml'),
+                        {'joint_2': (-0.5, 0.9), 'joint_3': (0.6, -0.8)},
+                        [('tail_a', 'tail_b'), ('level_a', 'level_b'), ('tool_a', 'tool_b')])}
+
+
+@pytest.mark.parametrize('library', LIBRARIES)
+@pytest.mark.parametrize('file', URDF)
+def test_the_joints_of_a_urdf_close_its_loops(imported, file, library):
+    more, motors, loops = URDF[file]
+    robot = library((ROBOTS / file).read_text())
+    machine, = imported(file, *more).values()
+    for part in np.linspace(0.0, 1.0, 15):
+        joints = published(machine, **{motor: low + part * (high - low)
+                                       for motor, (low, high) in motors.items()})
+        assert set(robot.joints) - joints.keys() <= {'swing'}
+        places = robot.places(joints, [name for pair in loops for name in pair])
+        for first, second in loops:
+            assert places[first] == pytest.approx(places[second], abs=2e-15)
+
+
+def test_a_parallelogram_that_hangs_in_its_file_stays_one(imported):
+    machine, = imported('four_bar.sdf').values()
+    for angle in np.linspace(-3.0, 3.0, 25):
+        joints = published(machine, joint_A=angle)
+        turned = {'joint_B': -angle, 'joint_C': angle, 'joint_D': angle}
+        for name, value in turned.items():
+            assert math.remainder(joints[name] - value, math.tau) == pytest.approx(0.0, abs=1e-14)
+
+
+def test_hinges_that_cross_at_the_end_of_a_rod_are_a_ball(imported, capsys, tmp_path):
+    ball = ('<link name="a"/><link name="b"/><joint name="elbow_y" type="continuous">'
+            '<parent link="crank"/><child link="a"/><origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>'
+            '</joint><joint name="elbow_x" type="continuous"><parent link="a"/><child link="b"/>'
+            '<axis xyz="1 0 0"/></joint><joint name="elbow" type="continuous">'
+            '<parent link="b"/><child link="coupler"/><axis xyz="0 0 1"/>')
+    hinge = ('<joint name="elbow" type="continuous">\n    <parent link="crank"/><child link='
+             '"coupler"/><origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>')
+    rod = [(hinge, ball), ('name="wrist" type="revolute"', 'name="wrist" type="spherical"')]
+    file = written(tmp_path, 'four_bar.urdf', *rod)
+    assert ('# Not published: elbow_y, elbow_x, elbow, which no angle in the plane tells.'
+            in printed(capsys, file))
+    machine, = imported(file).values()
+    assert published(machine, motor=0.4)['shoulder'] == pytest.approx(-0.4)
+    loose = written(tmp_path, 'four_bar.urdf', *rod, (
+        'name="shoulder" type="continuous"', 'name="shoulder" type="spherical"'))
+    assert 'not planar: coupler hangs on balls alone, and is no rod' in re.sub(
+        'rocker hangs', 'coupler hangs', refused(capsys, loose))
+
+
+def test_a_motor_at_the_knee_drives_as_well(imported, tmp_path):
+    loops = tmp_path / 'loops.yaml'
+    loops.write_text('{closed_loop: [[front_foot, back_foot]], type: [3d], '
+                     'name_mot: [mot_front, front_knee]}')
+    machine, = imported('five_bar.urdf', '--loops', loops).values()
+    robot = LIBRARIES[0]((ROBOTS / 'five_bar.urdf').read_text())
+    for knee in np.linspace(-0.3, 0.3, 7):
+        joints = published(machine, mot_front=0.2, front_knee=knee)
+        places = robot.places(joints, ['front_foot', 'back_foot'])
+        assert places['front_foot'] == pytest.approx(places['back_foot'], abs=2e-15)
+
+
+def test_a_rack_drives_a_finger_and_a_motor_on_that_its_tip(imported):
+    rack, tip = imported('rack.sdf').values()
+    assert [rack.frame_id, tip.frame_id] == ['palm', 'finger']
+    for position in np.linspace(-0.005, 0.01, 7):
+        places = rack.linkage.solve(position * rack.first.ratio + rack.first.offset)
+        turned = published(rack, rack_slide=position)['finger_joint']
+        finger = 0.05 + 0.03j * np.exp(1j * turned)
+        assert abs(finger - complex(0.01 - position, 0.02)) == pytest.approx(
+            abs(0.04 + 0.01j), abs=1e-16)
+        assert complex(*places['E']) == pytest.approx(finger - 0.05, abs=1e-16)
+
+
+def test_angles_that_are_rounded_in_the_file_are_in_one_plane(imported, tmp_path):
+    rounded = written(tmp_path, 'four_bar.urdf', (
+        'xyz="0.3 0 0"/><axis xyz="0 -1 0"/>',
+        'xyz="0.3 0 0" rpy="1.5708 0 0"/><axis xyz="0 0 1"/>'), (
+        '<child_origin xyz="0 0 0.2"/>', '<child_origin xyz="0 0.2 0"/>'))
+    machine, = imported(rounded).values()
+    assert machine.linkage.solve(machine.first.offset)['D'] == pytest.approx([0.3, -0.2], abs=1e-5)
+
+
+def test_a_jaw_slides_as_its_crank_and_rod_say(imported):
+    machine, = imported('slider_crank.sdf').values()
+    start = 0.0175 * complex(math.cos(0.4), math.sin(0.4))
+    rod = abs(complex(0.0548, 0.013) - start)
+    for angle in np.linspace(-2.0, 2.0, 25):
+        pin = 0.0175 * complex(math.cos(0.4 + angle), math.sin(0.4 + angle))
+        slide = pin.real + math.sqrt(rod ** 2 - (0.013 - pin.imag) ** 2) - 0.0548
+        assert published(machine, servo=angle)['finger_slide'] == pytest.approx(slide, abs=1e-16)
+
+
+def written(tmp_path, file, *changes):
+    """Return a file that is another with some of its text changed."""
+    text = (ROBOTS / file).read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / file
+    path.write_text(text)
+    return path
+
+
+def refused(capsys, *args):
+    """Return the sentence that refuses a file."""
+    assert command.main([str(arg) for arg in args]) == 1
+    out, err = capsys.readouterr()
+    assert not out and err.count('\n') == 1 and 'Traceback' not in err
+    return err
+
+
+def test_a_change_point_that_is_no_parallelogram_is_passed(imported, tmp_path):
+    bars = written(tmp_path, 'four_bar.sdf', (
+        '<pose>0.3 0 0 0 0 0</pose>', '<pose>0.5 0 0 0 0 0</pose>'), (
+        '      <pose>0 0 -0.2 0 0 0</pose>',
+        f'      <pose relative_to="__model__">{pin(-1)}</pose>'))
+    machine, = imported(bars).values()
+    for angle in np.linspace(-3.0, 3.0, 61):
+        place = machine.linkage.solve(machine.first.offset + angle)['D']
+        assert not np.isnan(place).any()
+
+
+def pin(side):
+    """Return the place of joint C [m] of a four-bar of 0.2, 0.4, 0.3 and 0.5, its crank down."""
+    crank, base = complex(0.0, -0.2), complex(0.5, 0.0)
+    arm = base - crank
+    along = (abs(arm) ** 2 + 0.4 ** 2 - 0.3 ** 2) / (2.0 * abs(arm))
+    place = crank + arm / abs(arm) * complex(along, side * math.sqrt(0.4 ** 2 - along ** 2))
+    return f'{place.real!r} 0 {place.imag!r} 0 0 0'
+
+
+def test_what_is_left_out_is_named_with_the_reason(capsys, tmp_path):
+    assert 'not planar: the axes of motor and shoulder are 11.3 degrees from it' in refused(
+        capsys, written(tmp_path, 'four_bar.urdf', ('0 -1 0', '0 -1 0.2')))
+    assert 'not planar: wrist is open across the plane by 0.01 m' in refused(
+        capsys, written(tmp_path, 'four_bar.urdf', ('xyz="0 0 0.2"/><child_axis',
+                                                    'xyz="0 0.01 0.2"/><child_axis')))
+    assert 'no joint of this robot closes a loop' in refused(capsys, ROBOTS / 'five_bar.urdf')
+    assert 'world, AB, BC, CD: not driven: say by --driven' in refused(
+        capsys, ROBOTS / 'four_bar.sdf', '--driven', 'nobody')
+
+
+BAD = [('<robot', 'is no XML: '), ('<a/>', 'must be MJCF, SDF or URDF, not <a>'),
+       ('<robot/>', 'a URDF has one root link, not 0'),
+       ('<sdf/>', 'the SDF has no model with joints'),
+       ('<sdf><model><joint/></model></sdf>', ''), ('<mujoco><b/></mujoco>', 'Schema violation'),
+       ('<robot><link name="a"/><joint name="j"><child link="b"/></joint></robot>',
+        "joint j is on '', which is no link"),
+       ('<robot><link name="a"/><link name="b"/><joint name="j" type="revolute">'
+        '<parent link="a"/><child link="b"/><axis xyz="0 a"/></joint></robot>',
+        'cannot be read: ValueError')]
+
+
+@pytest.mark.parametrize('text, why', BAD)
+def test_a_bad_file_is_refused_in_one_sentence(capsys, tmp_path, text, why):
+    file = tmp_path / 'robot.xml'
+    file.write_text(text)
+    if '<mujoco' in text:
+        pytest.importorskip('mujoco')
+    assert why in refused(capsys, file)
+
+
+def test_what_is_missing_is_said_in_one_sentence(capsys, tmp_path):
+    assert 'nowhere.urdf: No such file' in refused(capsys, tmp_path / 'nowhere.urdf')
+    loops = tmp_path / 'loops.yaml'
+    loops.write_text('closures: [{link_a: front')
+    assert 'is no YAML' in refused(capsys, ROBOTS / 'five_bar.urdf', '--loops', loops)
+    loops.write_text('loops: []')
+    assert 'must have closures: or closed_loop:' in refused(
+        capsys, ROBOTS / 'five_bar.urdf', '--loops', loops)
+
+
+def test_rods_that_hold_each_other_are_named(capsys, tmp_path):
+    pins = {'1': '0 0 0', '2': '1 0 0', '3': '0.4 1 0'}
+    eyes = {'1': '0.3 0.3 0', '2': '0.8 0.35 0', '3': '0.5 0.7 0'}
+    links = ''.join(f'<link name="rod{i}"><pose>{pins[i]} 0 0 0</pose></link>' for i in pins)
+    joints = ''.join(
+        f'<joint name="base{i}" type="revolute"><parent>{"crank" if i == "1" else "world"}'
+        f'</parent><child>rod{i}</child></joint><joint name="eye{i}" type="revolute">'
+        f'<pose relative_to="__model__">{eyes[i]} 0 0 0</pose><parent>rod{i}</parent>'
+        '<child>platform</child></joint>' for i in pins)
+    file = tmp_path / 'platform.sdf'
+    file.write_text(f"""<sdf version="1.9"><model name="platform"><link name="platform"/>
+        <link name="crank"><pose>-0.2 0 0 0 0 0</pose></link>{links}{joints}
+        <joint name="motor" type="revolute"><parent>world</parent><child>crank</child></joint>
+        <plugin name="p" filename="p"><joint_name>motor</joint_name></plugin></model></sdf>""")
+    assert command.main([str(file)]) == 0
+    assert ('Left out: rod1, platform, rod2, rod3: not of dyads: all of them hold each other'
+            in capsys.readouterr().err)
+
+
+def test_a_finger_with_a_spring_is_not_driven(capsys, tmp_path):
+    pytest.importorskip('mujoco')
+    spring = written(tmp_path, 'gripper.xml', (
+        '<body name="right_coupler" pos="0 0.0315 -0.0041">',
+        '<body name="right_coupler" pos="0 0.0315 -0.0041"><joint name="spring" axis="1 0 0"/>'))
+    assert command.main([str(spring)]) == 0
+    assert ('Left out: right_coupler, right_spring_link, right_follower: not driven: 1 more of '
+            'right_spring_link_joint' in re.sub(r'spring, ', '', capsys.readouterr().err))
+
+
+def test_a_joint_that_follows_another_is_driven_by_it(imported, tmp_path):
+    geared = written(tmp_path, 'five_bar.urdf', (
+        '<axis xyz="0 -1 0"/>', '<axis xyz="0 -1 0"/><mimic joint="mot_front" multiplier="0.5"/>'))
+    loops = tmp_path / 'loops.yaml'
+    loops.write_text('{closed_loop: [[front_foot, back_foot]], type: [3d], name_mot: [mot_front]}')
+    machine, = imported(geared, '--loops', loops).values()
+    assert [drive.source for drive in machine.inputs.values()] == ['mot_front', 'mot_front']
+    assert [drive.ratio for drive in machine.inputs.values()] == [1.0, -0.5]
+
+
+def robot_of(linkage, values):
+    """Return a linkage of the catalogue as a robot: a tree of its links, and cuts."""
+    places = {name: [*place, 0.0] for name, place in linkage.solve(values).items()}
+    robot, tips = readers.Robot('ground', {'ground': np.eye(4)}), {}
+    ends = {link.name: np.subtract(places[link.tip], places[link.joint]) for link in linkage.links}
+    for link in linkage.links:
+        robot.frames[link.name] = np.eye(4)
+        hinge, tip = np.eye(4), np.eye(4)
+        hinge[:3, 3], tip[:3, 3] = places[link.joint], places[link.tip]
+        if link.kind == 'prismatic':
+            robot.join(link.name, 'prismatic', (link.parent, link.name), tip,
+                       ends.get(link.parent, [1.0, 0.0, 0.0]), position=0.0)
+        else:
+            robot.join(link.name, 'revolute', (link.parent, link.name), hinge, position=0.0)
+        if link.tip in tips:
+            robot.join(f'cut_{link.name}', 'revolute', (link.name, tips[link.tip]), tip)
+        elif link.kind != 'prismatic':
+            tips[link.tip] = link.name
+    robot.driven = [each.name for each in linkage.inputs]
+    return robot
+
+
+@pytest.mark.parametrize('kind', mechanisms.TYPES)
+def test_a_linkage_of_the_catalogue_comes_back_from_a_robot(kind):
+    linkage = mechanisms.create(kind)
+    start = [0.3] if len(linkage.inputs) == 1 else [0.3, 1.9]
+    given, said = command.described(robot_of(linkage, start if len(start) > 1 else start[0]))
+    assert not any(line.startswith('Left out') for line in said)
+    machines = scene.read(given).machines.values()
+    names = [name for name in linkage.joints if name not in linkage.inputs]
+    for turned in np.linspace(-3.0, 3.0, 21):
+        now = [value + turned for value in start]
+        was, angles = (linkage.joint_angles(values if len(values) > 1 else values[0])
+                       for values in (start, now))
+        found = {}
+        for machine in machines:
+            found.update(published(machine, **{drive.source: turned
+                                               for drive in machine.inputs.values()}))
+        for name in names:
+            moved = angles[name] - was[name]
+            if not math.isnan(moved):
+                apart = found[name] - moved
+                size = 100.0 if name in ('slide', 'block') else 1.0
+                apart = apart if size > 1.0 else math.remainder(apart, math.tau)
+                assert apart == pytest.approx(0.0, abs=1e-13 * size), (name, turned)
