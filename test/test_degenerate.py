@@ -264,3 +264,26 @@ def test_a_dead_point_is_between_minus_pi_and_pi(theta):
     ({'a': 1.0, 'b': 2.0, 'c': 3.0, 'd': 4.0}, [-math.pi])])
 def test_a_dead_point_at_zero_is_zero(lengths, expected):
     assert mechanisms.create('four_bar', **lengths).dead_points() == expected
+
+
+def test_a_reach_is_found_that_has_no_pose_in_its_middle():
+    # At zero A, B and C are in line and E is at A, so that nothing can be mirrored in A-E.
+    found = linkage('A ground 0 0', 'B ground 3 0', 'C crank A 0.3', 'E mirror A C B',
+                    'H mirror B A E', 'K slider H 7 B 90deg in')
+    assert found.reach() == [(-math.pi, math.pi)]
+
+
+@pytest.mark.parametrize('value, last', [
+    (1.5, 'S slider A 0.5 O 0 out'), (0.1, 'S slider A 0.5 O 90deg out')])
+def test_a_block_that_cannot_be_assembled_has_neither_coordinate(value, last):
+    found = linkage('O ground 0 0', 'A crank O 1', last)
+    assert np.isnan(found.solve(value)['S']).all()
+
+
+@pytest.mark.parametrize('geared, rate', [('', 0.0), (' geared crank -2 0.5', -2.0)])
+def test_what_drives_is_a_number_wherever_it_is(geared, rate):
+    found = linkage(*FOUR_BAR[:3], 'B dyad A Q 1 1 left', f'C crank B 1 zero A{geared}')
+    given = 0.3 if geared else [0.3, 0.7]
+    assert np.isnan(found.solve(given)['C']).all()
+    assert found.joint_angles(given)['crank2'] == (0.5 - 2 * 0.3 if geared else 0.7)
+    assert found.joint_rates(given)['crank2'] == rate

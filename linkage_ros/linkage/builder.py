@@ -119,7 +119,7 @@ class Builder:
         self.mirrors: Tuple[Tuple[str, ...], ...] = ()
         self._vectors: Dict[Tuple[str, str], _Vector] = {}
         self._axes: Dict[str, _Vector] = {}
-        self._driven: Dict[str, Tuple[Input, Real]] = {}
+        self.driven: Dict[str, Tuple[Input, Real]] = {}
         self._kites: Dict[Tuple[str, str], planar.CrankArm] = {}
 
     def ground(self, name: str, x: Number, y: Number) -> None:
@@ -208,13 +208,13 @@ class Builder:
             self.arguments.append(leaf)
             value = leaf if input_.turns else in_own_unit(leaf)
         else:
-            other, driving = self._driven.get(geared.input, (None, None))
+            other, driving = self.driven.get(geared.input, (None, None))
             if other is None or driving is None or other.turns != input_.turns:
-                alike = [name for name, (x, _) in self._driven.items() if x.turns == input_.turns]
+                alike = [name for name, (x, _) in self.driven.items() if x.turns == input_.turns]
                 raise ConstructionError(f'it cannot be geared to {geared.input}; there are: '
                                         f'{", ".join(alike) or "none"}')
             value = geared.ratio * driving + geared.offset
-        self._driven[input_.name] = input_, value
+        self.driven[input_.name] = input_, value
         return value
 
     def _direction(self, origin: str, towards: str) -> Tuple[str, Complex, Real]:

@@ -23,6 +23,8 @@ from .planar import Limit
 # Samples of a whole turn in search of ends without a closed form, samples of an arc at least, and
 # how often arcs inside arcs are searched.
 SAMPLES, FEWEST, ROUNDS = 720, 33, 4
+# Where an arc is looked at: in its middle, symmetric linkages may have an arm of no length.
+INSIDE = 0.49
 # What margins may differ by from turn to turn, as a part of their size, and be the same.
 ALIKE = 1e-6
 
@@ -103,7 +105,7 @@ def _touches(margins: Callable, theta: np.ndarray) -> np.ndarray:
 
 def _trimmed(assembled: Callable, lo: float, hi: float) -> Arc:
     """Return an arc whose ends can be assembled."""
-    ends, middle = np.array([lo, hi]), np.full(2, 0.5 * (lo + hi))
+    ends, middle = np.array([lo, hi]), np.full(2, lo + INSIDE * (hi - lo))
     low, high = np.where(assembled(ends), ends, refined(assembled, middle, ends)[0]).tolist()
     return low, high
 
@@ -124,7 +126,7 @@ def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
     They are joined across -pi and pi as well, unless that is not to be.
     """
     parts = input_.between(ends)
-    held = [arc for arc in parts if bool(reachable(0.5 * (arc[0] + arc[1])))]
+    held = [arc for arc in parts if bool(reachable(arc[0] + INSIDE * (arc[1] - arc[0])))]
     if held == parts:
         return [(input_.low, input_.high)]
     found: List[Arc] = []

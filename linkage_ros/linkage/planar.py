@@ -123,7 +123,7 @@ class Arm:
         # A constant tells nothing of a point that cannot be assembled.
         self.square = vector.squared() if length is None else gated(
             square(length), abs(vector.x), real(0.0))
-        self._span = span
+        self._span, self._length = span, length
 
     def offset(self, point: Complex) -> Real:
         """Return the cross product of the arm and the vector from its foot to a point."""
@@ -149,7 +149,7 @@ class Arm:
         margin = self._with_rate(margin, radius, sign)
         # At the limit the length is the radius: the square moves by that times what lengths do.
         # A tolerance is a constant: where a cylinder makes the radius, it is no longer than size.
-        bound = size if radius.varies else abs(radius)
+        bound = (self._length or size) if radius.varies else abs(radius)
         return Limit(margin, GRAZE * bound * (size + self._span))
 
 
@@ -293,7 +293,9 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True,
     roots = [x.smooth if smooth and x.smooth else x.root() for x in limits]
     twice = 2.0 * arm.square
     skew = (first - second) * (first + second) / twice
-    u, v = 0.5 + skew, roots[0] * roots[1] / twice * side
+    v = roots[0] * roots[1] / twice * side
+    skew = _known_with(v, arm.vector, skew)
+    u = 0.5 + skew
     bars = arm.vector * Complex(u, v), arm.vector * Complex(skew - 0.5, v)
     bars = bars if longest is None else (bars[0] / first, bars[1])
 
@@ -307,6 +309,13 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True,
 
     return Dyad(with_turning(bars[0], u, first), with_turning(bars[1], skew - 0.5, second),
                 limits)
+
+
+def _known_with(other: Real, vector: Complex, part: Real) -> Real:
+    """Return one part of a factor of a vector, NaN where the other is, for the product to be."""
+    # A product with zero is left out, and with it that it has no value.
+    axial = 0.0 in (vector.x.value, vector.y.value)
+    return gated(part, abs(other), real(0.0)) if axial else part
 
 
 def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
@@ -502,4 +511,5 @@ def slider(rail: Rail, rod: Real, side: float) -> Slider:
     """
     limits = rail.limits(rod)
     reach = reduce(lambda x, y: x * y, (limit.smooth or limit.root() for limit in limits)) * side
-    return Slider(rail.along * Complex(reach, -rail.height), rail.foot + reach, limits, reach)
+    height = _known_with(reach, rail.along, rail.height)
+    return Slider(rail.along * Complex(reach, -height), rail.foot + reach, limits, reach)
