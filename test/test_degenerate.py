@@ -11,6 +11,8 @@ from linkage_ros.linkage.inputs import CRANK
 from linkage_ros.linkage.inverse import distinct
 import numpy as np
 import pytest
+from truth import linkage_checks
+from truth.random_linkages import Design
 
 STEP = 1e-6
 
@@ -264,6 +266,18 @@ def test_a_dead_point_is_between_minus_pi_and_pi(theta):
     ({'a': 1.0, 'b': 2.0, 'c': 3.0, 'd': 4.0}, [-math.pi])])
 def test_a_dead_point_at_zero_is_zero(lengths, expected):
     assert mechanisms.create('four_bar', **lengths).dead_points() == expected
+
+
+@pytest.mark.parametrize('joints', [
+    ('A ground 0 0', 'C ground 0 -0.4', 'D crank A 1.9', 'H antiparallelogram A D C'),
+    ('A ground 0 0', 'C ground 0 -0.4', 'B cylinder C A 1.9 left', 'H antiparallelogram A B C')])
+def test_crossed_bars_keep_their_digits_next_to_the_flat_pose(joints):
+    subject = linkage_checks.Subject(Design(joints, {}, {}), np.random.default_rng(0))
+    flat = subject.mechanism.dead_points()[-1]
+    away = 10.0 ** np.arange(-15.0, 0.0, 0.5)
+    for sign in (-1.0, 1.0):
+        rows = subject.fitted(flat + sign * away[:, None])
+        assert not any(row.problem for row in rows) and max(row.ratio for row in rows) < 3.0
 
 
 def test_a_reach_is_found_that_has_no_pose_in_its_middle():

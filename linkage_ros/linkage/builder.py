@@ -290,10 +290,10 @@ class Builder:
     def mirror(self, name: str, point: str, first: str, second: str) -> None:
         """Mirror a joint in the line of two others: the far corner of a kite."""
         pin = self.points[first].crank
-        ends = [(self.points[end].place, self._side(end, point).vector)
-                for end in (second, first)]
-        arm = self._reflect(name, first, second, self.points[point].place, ends,
-                            self.distance(first, point), self.distance(second, point), point)
+        ends = [self._side(end, point).vector for end in (second, first)]
+        place, arm = self.points[point].place, self.arm(second, first)
+        self._reflect(name, first, second, arm, place, arm.offset(place, ends[0]), ends,
+                      self.distance(first, point), self.distance(second, point), point)
         if isinstance(arm, planar.CrankArm) and pin and pin.centre is self.points[point].place:
             self._kites[first, name] = arm
 
@@ -311,22 +311,21 @@ class Builder:
     def antiparallelogram(self, name: str, corner: str, first: str, second: str) -> None:
         """Join two bars as long as those from a corner, but crossed."""
         to_first, to_second = (self._side(corner, end) for end in (first, second))
+        arm = self.arm(second, first)
         opposite = self.points[first].place + to_second.vector
-        ends = [(self.points[second].place, to_first.vector),
-                (self.points[first].place, to_second.vector)]
-        self._reflect(name, first, second, opposite, ends, to_second.length, to_first.length,
+        offset = -arm.offset(self.points[corner].place, -to_second.vector)
+        self._reflect(name, first, second, arm, opposite, offset,
+                      (to_first.vector, to_second.vector), to_second.length, to_first.length,
                       corner)
 
-    def _reflect(self, name: str, first: str, second: str, point: Complex,
-                 ends: Sequence[Tuple[Complex, Complex]], to_first: Real, to_second: Real,
-                 *others: str) -> planar.Arm:
-        """Join two bars at the mirror image of a point; `ends` has the second end first."""
-        arm = self.arm(second, first)
-        self.folds.append(planar.Limit(arm.offset(point), planar.GRAZE * to_first * to_second))
-        place, from_second, from_first = planar.mirror(arm, point, ends)
+    def _reflect(self, name: str, first: str, second: str, arm: planar.Arm, point: Complex,
+                 offset: Real, ends: Sequence[Complex], to_first: Real, to_second: Real,
+                 *others: str) -> None:
+        """Join two bars at a point's mirror image, given its bars from second and first."""
+        self.folds.append(planar.Limit(offset, planar.GRAZE * to_first * to_second))
+        place, from_second, from_first = planar.mirror(arm, point, offset, ends)
         self._pair(name, first, second, planar.Dyad(from_first, from_second, ()), to_first,
                    to_second, *others, place=place)
-        return arm
 
     def inversor(self, names: Tuple[str, str, str], pole: str, pin: str, long: Real,
                  short: Real) -> None:

@@ -125,9 +125,9 @@ class Arm:
             square(length), abs(vector.x), real(0.0))
         self._span, self._length = span, length
 
-    def offset(self, point: Complex) -> Real:
-        """Return the cross product of the arm and the vector from its foot to a point."""
-        return cross(self.vector, point - self.foot)
+    def offset(self, point: Complex, seen: Complex) -> Real:
+        """Return the cross product of the arm and a point as seen from its foot."""
+        return cross(self.vector, seen)
 
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
@@ -137,9 +137,9 @@ class Arm:
         """Return the margin square - radius^2; the radius is made from lengths up to size."""
         return self._limit(radius, size, -1.0, self.square - square(radius))
 
-    def mirrored(self, point: Complex) -> Complex:
-        """Return the mirror image of a point in the line of the arm."""
-        return point - self.vector.turned() * (2.0 * self.offset(point) / self.square)
+    def across(self, point: Complex, offset: Real) -> Complex:
+        """Return the vector from a point of this offset to its mirror image in the arm's line."""
+        return self.vector.turned() * (-2.0 * offset / self.square)
 
     def _with_rate(self, margin: Real, radius: Real, sign: float) -> Real:
         return with_rate(margin, self.square, radius, formula=lambda rate, growth: (
@@ -183,21 +183,19 @@ class CrankArm(Arm):
     def _is_isosceles(self) -> Real:
         return abs(self._g - self._m) <= 0.0
 
-    def offset(self, point: Complex) -> Real:
-        """Return the cross product of the arm and the vector from its foot to a point."""
-        if point is self._crank.centre:
-            return self._area
-        return super().offset(point)
+    def offset(self, point: Complex, seen: Complex) -> Real:
+        """Return the cross product of the arm and a point as seen from its foot."""
+        return self._area if point is self._crank.centre else super().offset(point, seen)
 
-    def mirrored(self, point: Complex) -> Complex:
-        """Return the mirror image of a point in the line of the arm."""
-        image = super().mirrored(point)
+    def across(self, point: Complex, offset: Real) -> Complex:
+        """Return the vector from a point of this offset to its mirror image in the arm's line."""
+        vector = super().across(point, offset)
         if point is not self._crank.centre:
-            return image
+            return vector
         s, m = self._s, self._m
-        centre = point + self._line.turned() * Complex(self._h, s) * (2.0 * m * s)
-        return Complex(where(self._is_isosceles, centre.x, image.x),
-                       where(self._is_isosceles, centre.y, image.y))
+        centre = self._line.turned() * Complex(self._h, s) * (2.0 * m * s)
+        return Complex(where(self._is_isosceles, centre.x, vector.x),
+                       where(self._is_isosceles, centre.y, vector.y))
 
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
@@ -333,18 +331,19 @@ def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
     return Complex(0.5 + (first - second) * (first + second) / twice, height / twice * side)
 
 
-def mirror(arm: Arm, point: Complex,
-           ends: Sequence[Tuple[Complex, Complex]]) -> Tuple[Complex, ...]:
+def mirror(arm: Arm, point: Complex, offset: Real,
+           ends: Sequence[Complex]) -> Tuple[Complex, ...]:
     """
     Return the mirror image of a point in the line of an arm, and the bars from both ends to it.
 
-    For each end of the arm, its foot first, its place and its bar to the point are given; a bar's
-    image turns twice as fast as the arm, less what the bar itself turns.
+    The point's offset from the arm and, for each end of it, its foot first, the bar to the point
+    are given; a bar's image turns twice as fast as the arm, less what the bar itself turns.
     """
-    image, turning, bars = arm.mirrored(point), spin(arm.vector), []
-    for place, bar in ends:
+    across, turning, bars = arm.across(point, offset), spin(arm.vector), []
+    image = point + across
+    for bar in ends:
         own = spin(bar)
-        bars.append(with_spin(image - place, Rate(
+        bars.append(with_spin(bar + across, Rate(
             (*turning.of, *own.of), lambda *rates, own=own: gated(
                 2.0 * turning.formula(*rates[:len(turning.of)])
                 - own.formula(*rates[len(turning.of):]), abs(image.x + image.y), real(0.0)))))

@@ -180,7 +180,8 @@ class Measure:
             if grazed and out.what == 'slide':  # which has been moved on with the inputs
                 spread[i] += self.linkage.longest * mpfr(2) ** -NUDGE
         for name in closures:
-            slack[name] *= LOOSER if self._lines[name].word == 'cylinder' else 1
+            if self._lines[name].word == 'cylinder':
+                slack[name] = LOOSER * (slack[name] + half_ulp(self.linkage.longest))
         states = {name: _state(gap, slack[name]) for name, gap in closures.items()}
         states.update((name, 'undirected') for name, arm in arms.items()
                       if states.get(name, 'meets') == 'meets' and arm <= GRAZE * bent[name])

@@ -22,6 +22,8 @@ from .drawing import draw, FLOATS, Linkage
 TURN = 2 * math.pi
 # Arcs below this width, of an input about as large as an angle, are the rounding of one or two.
 NARROWEST = 1e-12
+# An arm that is shorter than this part of the longest length has no direction to speak of.
+SHORTEST = 1e-8
 # Seconds that a question about the inverse may take: the first of its output, and any further.
 FIRST, FURTHER = 1.0, 0.05
 
@@ -123,7 +125,8 @@ class Subject:
 
     def without_direction(self, value):
         """Tell whether something hangs on an arm of no length, at a value of the first input."""
-        return any(arm < 1e-9 for arm in self.drawn(value)[0].arms.values())
+        arms = self.drawn([value])[0].arms.values()
+        return any(not np.all(arm >= SHORTEST) for arm in arms)
 
     def away(self, value, others):
         """Return how far a value of the first input is from the nearest of others."""
@@ -346,7 +349,7 @@ def dead_points(subject):
     if any(value != 0.0 and abs(value) < 1e-300 * subject.scale for value in dead):
         yield 'dead point not quite zero', f'{dead}'
     for value in dead:
-        if not _is_dead(subject, value):
+        if not _is_dead(subject, value) and not subject.without_direction(value):
             yield 'dead point false', f'{value!r} of {dead}'
     for value in _vanishing(subject):
         if subject.away(value, dead) > 1e-5 * subject.scale \
