@@ -301,3 +301,21 @@ def test_what_drives_is_a_number_wherever_it_is(geared, rate):
     assert np.isnan(found.solve(given)['C']).all()
     assert found.joint_angles(given)['crank2'] == (0.5 - 2 * 0.3 if geared else 0.7)
     assert found.joint_rates(given)['crank2'] == rate
+
+
+def test_the_inverse_of_a_lever_is_that_of_the_input_its_crank_is_geared_to():
+    found = linkage('Q ground 0 0', 'O ground 1 0', 'A crank Q 0.3',
+                    'E crank O 1.1 geared crank -1 2.5', 'L slot Q E 0 out 2')
+    lever = found.joint_angles(0.8)['lever']
+    assert found.input_for('lever', lever) == pytest.approx([0.8])
+
+
+@pytest.mark.parametrize('ratio, arcs', [('-2', 1), ('0.5', 2), ('sqrt(2)', 2)])
+def test_an_arc_goes_on_past_pi_where_a_turn_later_all_is_the_same(ratio, arcs):
+    # The crank swings about pi; another one turns with it.
+    found = linkage('O ground 0 0', 'Q ground -3 0', 'A crank O 1', 'B dyad A Q 1.5 1.5 left',
+                    f'E crank Q 1 geared crank {ratio} 0')
+    assert len(found.reach()) == arcs and (found.reach()[-1][1] > math.pi) == (arcs == 1)
+    for theta in (3.1, -3.1):
+        assert found.input_for('E.y', found.solve(theta)['E'][1], near=theta) == \
+            pytest.approx(theta)

@@ -133,7 +133,8 @@ def outputs_of(linkage, rng):
     pairs = [rng.choice(linkage.points, 2, replace=False) for _ in range(4)]
     asked = [*(f'{kind}({first},{second})' for kind, (first, second) in zip(
         ('distance', 'angle') * 2, pairs)), *map(str, rng.choice(linkage.joints, 2))]
-    theta = np.linspace(*linkage.reach()[0], 203)[1:-1]
+    widest = max(linkage.reach(), key=lambda arc: arc[1] - arc[0])
+    theta = np.linspace(*widest, 202)[1:-1]
     for output in asked:
         size = 1.0 if linkage.is_angle(output) else linkage.longest
         values = linkage.joint_angles(theta, [output])[output]
