@@ -85,7 +85,7 @@ def test_linkages_of_each_word_hold(word):
 # --- that the check is a check ------------------------------------------------------------------
 
 def test_every_word_comes_up_and_a_third_is_degenerate():
-    words, refused, count = Counter(), 0, 120
+    words, refused, count = Counter(), 0, 150
     for seed in range(count):
         design = random_linkages.design(np.random.default_rng(seed))
         words.update(read(text).word for text in design.joints)

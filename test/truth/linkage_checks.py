@@ -87,7 +87,7 @@ class Subject:
 
     def _misfit(self, way):
         """Return at how many values the mechanism does not go this way past its change points."""
-        given = np.column_stack([self.rng.uniform(-math.pi, math.pi, 60) if input_.turns else
+        given = np.column_stack([self.rng.uniform(-TURN, TURN, 60) if input_.turns else
                                  self.rng.uniform(input_.low, input_.high, 60)
                                  for input_ in self.inputs])
         drawing, unit = self._drawn(list(given.T), way)
