@@ -150,7 +150,8 @@ def test_a_joint_that_cannot_be_assembled_has_no_velocity_by_any_crank():
 @pytest.mark.parametrize('last, lines', [
     ('R', ['P parallelogram O A Q', 'R parallelogram A M P']), ('L', ['L slot Q M 0.2 out 1']),
     ('D', ['D dyad Q M 1 0.8 left']), ('D', ['D dyad M Q 1 0.8 left', 'E rigid M D 1 1 left']),
-    ('E', ['C D E inversor Q M 2 1.8']), ('C', ['D dyad M A 2 2 left', 'C mirror D M A'])])
+    ('E', ['C D E inversor Q M 2 1.8']), ('C', ['D dyad M A 2 2 left', 'C mirror D M A']),
+    ('P', ['S slider M 9 O 90deg out', 'K block S 1 0.3', 'P dyad S K 1 0.5 left'])])
 def test_what_hangs_on_a_joint_that_is_not_there_has_no_angle_either(last, lines):
     found = linkage('O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'M dyad A Q 2.5 0.5 left',
                     *lines)
@@ -319,3 +320,13 @@ def test_an_arc_goes_on_past_pi_where_a_turn_later_all_is_the_same(ratio, arcs):
     for theta in (3.1, -3.1):
         assert found.input_for('E.y', found.solve(theta)['E'][1], near=theta) == \
             pytest.approx(theta)
+
+
+def test_a_block_on_a_short_bar_of_a_kite_keeps_the_digits_of_its_slide():
+    subject = linkage_checks.Subject(Design((
+        'A ground 0 0', 'B ground -0.098 0', 'C ground -0.295 0', 'D crank C 1.796 up',
+        'E dyad D B 1.202 0.926 left', 'F mirror B C E', 'H slider D 0.7 F along C in'), {}, {}),
+        np.random.default_rng(0))
+    rows = subject.fitted(np.linspace(2.6, 2.7, 40)[:, None])
+    slides = [row.ratio for row in rows if row.output.what == 'slide']
+    assert not any(row.problem for row in rows) and max(slides) < 4.0

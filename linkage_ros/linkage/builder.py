@@ -197,7 +197,8 @@ class Builder:
         if link is None:
             raise ConstructionError(f'{joint} is no joint of a block')
         offset = Complex(along, across)
-        self._place(name, joint, self._axes[link].vector * offset, link, offset.length(), ())
+        arm = planar.parallel(self._axes[link].vector * offset, self.points[joint].place)
+        self._place(name, joint, arm, link, offset.length(), ())
         self.frames[link][name] = self.frames[link][joint] + offset
 
     def _drive(self, input_: Input, geared: Optional[Gear]) -> Real:
@@ -220,7 +221,7 @@ class Builder:
     def _direction(self, origin: str, towards: str) -> Tuple[str, Complex, Real]:
         """Return the link of two joints, the direction between them, and its angle seen there."""
         side = self._side(origin, towards)
-        along = planar.unit(side.vector, side.length)
+        along = planar.unit(side.vector)
         seen = along
         if side.link != GROUND:
             frame = self.frames[side.link]
@@ -416,7 +417,7 @@ class Builder:
         if link == GROUND:
             return seen
         axis, (joint, start) = self._axes[link], next(iter(self.frames[link].items()))
-        along = planar.unit(axis.vector, axis.length)
+        along = planar.unit(axis.vector)
         return self.points[joint].place + along * (seen - start)
 
     def _shared_link(self, first: str, second: str) -> Optional[str]:

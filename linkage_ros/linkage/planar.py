@@ -82,11 +82,10 @@ class CrankEnds(NamedTuple):
     theta: Real
 
 
-def unit(vector: Complex, length: Real) -> Complex:
-    """Return the direction of a vector of this constant length."""
-    along = vector / length
-    along.spin = vector.spin
-    return along
+def unit(vector: Complex) -> Complex:
+    """Return the direction of a vector of constant length, itself as long as one exactly."""
+    along = vector.direction()
+    return with_spin(along, spin(vector)) if along.x.varies else along
 
 
 def turned(along: Complex, theta: Real, length: Real) -> Complex:

@@ -13,10 +13,10 @@ velocity of each of those joints. The rule is
 
     error <= 4 x sensitivity + 1 ulp of the result,
 
-for velocities and rates 8 x, with a number wherever everything that the joint stands on can be
-assembled and NaN wherever it cannot; within `GRAZE` sensitivities of a limit either will do, and
-of a cylinder's within `LOOSER` times as much.
-Angles are compared modulo a turn, so that their ulp is that of pi.
+for velocities and rates 8 x both, with a number wherever everything that the joint stands on can
+be assembled and NaN wherever it cannot; within `GRAZE` sensitivities of a limit, of a cylinder's
+within `LOOSER` times as much, either will do. Angles are compared modulo a turn, so that their
+ulp is that of pi.
 """
 
 import math
@@ -353,7 +353,7 @@ def _row(out, given, result, value, spread, due):
     elif due in ('number', 'maybe') or due == 'either' and not rate:
         error = float(_error(out, result, value))
         ulp = np.spacing(math.pi if out.what == 'angle' and not rate else np.max(np.abs(result)))
-        excess = max(0.0, error - float(ulp))
+        excess = max(0.0, error - float(ulp) * (RATE_RULE if rate else 1.0))
         # What the differencing leaves of a rate of zero is no error.
         still = rate and not spread and not np.any(result)
         ratio = 0.0 if not excess or still else excess / spread if spread else math.inf

@@ -23,7 +23,7 @@ TURN = 2 * math.pi
 # Arcs below this width, of an input about as large as an angle, are the rounding of one or two.
 NARROWEST = 1e-12
 # An arm that is shorter than this part of the longest length has no direction to speak of.
-SHORTEST = 1e-8
+SHORTEST = 1e-7
 # Seconds that a question about the inverse may take: the first of its output, and any further.
 FIRST, FURTHER = 1.0, 0.05
 
@@ -489,7 +489,8 @@ def _asked_back(subject, output, drawing, unit, held):
         if len(answers) > 40:
             yield 'inverse too many', f'{output} = {target!r}: {len(answers)} answers'
         yield from _false(subject, output, target, answers, turns, scale)
-        yield from _lost(subject, output, target, answers, turns, scale, value, good)
+        if not any(map(subject.without_direction, answers.tolist())):
+            yield from _lost(subject, output, target, answers, turns, scale, value, good)
 
 
 def _gap(value, target, turns):
