@@ -139,7 +139,9 @@ def outputs_of(linkage, rng):
         size = 1.0 if linkage.is_angle(output) else linkage.longest
         values = linkage.joint_angles(theta, [output])[output]
         known = np.isfinite(values)
-        steady = np.unwrap(values[known]) if linkage.is_angle(output) else values[known]
+        # A line that passes its own origin turns round, which is no motion.
+        steady = (np.unwrap(values[known], period=math.pi) if linkage.is_angle(output)
+                  else values[known])
         if known.any() and np.ptp(steady) > 1e-6 * size:
             yield output, size, theta[known], values[known]
 
