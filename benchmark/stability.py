@@ -191,7 +191,7 @@ def linkages(grid, rng, count, _):
             made += 1
             found += [tuple(problem) for problem in told[0]]
             for row in told[1]:
-                output = row.output.what + (' rate' if row.output.crank is not None else '')
+                output = row.output.what + (' rate' if row.output.by is not None else '')
                 if row.sensitivity and math.isfinite(row.ratio):
                     ratios.setdefault(output, []).append(row.ratio)
     return 'linkages', (count, made, ratios, found)

@@ -110,6 +110,33 @@ def test_the_reach_is_a_stroke_and_its_ends_are_dead_points():
     assert angle.min() > 0.0 and angle.max() < math.pi
 
 
+@pytest.mark.parametrize('far, placed', [(1, True), (40, False)])
+def test_a_stroke_ends_with_the_last_digits_of_its_short_base(far, placed):
+    linkage = mechanisms.create('custom', joints=(
+        'O ground 0 0', 'P ground 0.03125 0', 'B cylinder P O 1.25 left'))
+    end = linkage.reach()[0][1]
+    assert np.isfinite(linkage.solve(end + far * np.spacing(end))['B']).all() == placed
+
+
+def test_a_cylinder_beyond_its_stroke_gives_neither_coordinate():
+    linkage = mechanisms.create('custom', joints=(
+        'O ground 0 0', 'P ground 2 0', 'B cylinder P O 1 left'))
+    assert np.isnan(linkage.solve(3.5)['B']).all()
+
+
+@pytest.mark.parametrize('ends', ['-d 0', '0 d', '50*d 51*d'])
+def test_a_stroke_is_searched_on_its_own_scale(ends):
+    low, high = (end.replace('d', '3e-9') for end in ends.split())
+    linkage = mechanisms.create('custom', joints=(
+        'G ground 0 0', 'H ground 1 0', f'S carriage G along H {low} {high}',
+        f'F ground ({low}+{high})/2 1e-9', 'D dyad F S 1.5e-9 0.2e-9 left'))
+    middle = 0.5 * (linkage.inputs[0].low + linkage.inputs[0].high)
+    far, near = math.sqrt(1.7 ** 2 - 1.0) * 1e-9, math.sqrt(1.3 ** 2 - 1.0) * 1e-9
+    expected = [(middle - far, middle - near), (middle + near, middle + far)]
+    np.testing.assert_allclose(linkage.reach(), expected, rtol=0, atol=1e-20)
+    np.testing.assert_allclose(linkage.dead_points(), np.ravel(expected), rtol=0, atol=1e-20)
+
+
 def test_what_hangs_on_a_cylinder_limits_its_stroke():
     linkage = boom(g=0.3)
     low, high = linkage.inputs[0].low, linkage.inputs[0].high

@@ -11,6 +11,8 @@ from linkage_ros.linkage.inputs import CRANK
 from linkage_ros.linkage.inverse import distinct
 import numpy as np
 import pytest
+from truth import linkage_checks
+from truth.random_linkages import Design
 
 STEP = 1e-6
 
@@ -148,7 +150,8 @@ def test_a_joint_that_cannot_be_assembled_has_no_velocity_by_any_crank():
 @pytest.mark.parametrize('last, lines', [
     ('R', ['P parallelogram O A Q', 'R parallelogram A M P']), ('L', ['L slot Q M 0.2 out 1']),
     ('D', ['D dyad Q M 1 0.8 left']), ('D', ['D dyad M Q 1 0.8 left', 'E rigid M D 1 1 left']),
-    ('E', ['C D E inversor Q M 2 1.8']), ('C', ['D dyad M A 2 2 left', 'C mirror D M A'])])
+    ('E', ['C D E inversor Q M 2 1.8']), ('C', ['D dyad M A 2 2 left', 'C mirror D M A']),
+    ('P', ['S slider M 9 O 90deg out', 'K block S 1 0.3', 'P dyad S K 1 0.5 left'])])
 def test_what_hangs_on_a_joint_that_is_not_there_has_no_angle_either(last, lines):
     found = linkage('O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'M dyad A Q 2.5 0.5 left',
                     *lines)
@@ -264,3 +267,66 @@ def test_a_dead_point_is_between_minus_pi_and_pi(theta):
     ({'a': 1.0, 'b': 2.0, 'c': 3.0, 'd': 4.0}, [-math.pi])])
 def test_a_dead_point_at_zero_is_zero(lengths, expected):
     assert mechanisms.create('four_bar', **lengths).dead_points() == expected
+
+
+@pytest.mark.parametrize('joints', [
+    ('A ground 0 0', 'C ground 0 -0.4', 'D crank A 1.9', 'H antiparallelogram A D C'),
+    ('A ground 0 0', 'C ground 0 -0.4', 'B cylinder C A 1.9 left', 'H antiparallelogram A B C')])
+def test_crossed_bars_keep_their_digits_next_to_the_flat_pose(joints):
+    subject = linkage_checks.Subject(Design(joints, {}, {}), np.random.default_rng(0))
+    flat = subject.mechanism.dead_points()[-1]
+    away = 10.0 ** np.arange(-15.0, 0.0, 0.5)
+    for sign in (-1.0, 1.0):
+        rows = subject.fitted(flat + sign * away[:, None])
+        assert not any(row.problem for row in rows) and max(row.ratio for row in rows) < 3.0
+
+
+def test_a_reach_is_found_that_has_no_pose_in_its_middle():
+    # At zero A, B and C are in line and E is at A, so that nothing can be mirrored in A-E.
+    found = linkage('A ground 0 0', 'B ground 3 0', 'C crank A 0.3', 'E mirror A C B',
+                    'H mirror B A E', 'K slider H 7 B 90deg in')
+    assert found.reach() == [(-math.pi, math.pi)]
+
+
+@pytest.mark.parametrize('value, last', [
+    (1.5, 'S slider A 0.5 O 0 out'), (0.1, 'S slider A 0.5 O 90deg out')])
+def test_a_block_that_cannot_be_assembled_has_neither_coordinate(value, last):
+    found = linkage('O ground 0 0', 'A crank O 1', last)
+    assert np.isnan(found.solve(value)['S']).all()
+
+
+@pytest.mark.parametrize('geared, rate', [('', 0.0), (' geared crank -2 0.5', -2.0)])
+def test_what_drives_is_a_number_wherever_it_is(geared, rate):
+    found = linkage(*FOUR_BAR[:3], 'B dyad A Q 1 1 left', f'C crank B 1 zero A{geared}')
+    given = 0.3 if geared else [0.3, 0.7]
+    assert np.isnan(found.solve(given)['C']).all()
+    assert found.joint_angles(given)['crank2'] == (0.5 - 2 * 0.3 if geared else 0.7)
+    assert found.joint_rates(given)['crank2'] == rate
+
+
+def test_the_inverse_of_a_lever_is_that_of_the_input_its_crank_is_geared_to():
+    found = linkage('Q ground 0 0', 'O ground 1 0', 'A crank Q 0.3',
+                    'E crank O 1.1 geared crank -1 2.5', 'L slot Q E 0 out 2')
+    lever = found.joint_angles(0.8)['lever']
+    assert found.input_for('lever', lever) == pytest.approx([0.8])
+
+
+@pytest.mark.parametrize('ratio, arcs', [('-2', 1), ('0.5', 2), ('sqrt(2)', 2)])
+def test_an_arc_goes_on_past_pi_where_a_turn_later_all_is_the_same(ratio, arcs):
+    # The crank swings about pi; another one turns with it.
+    found = linkage('O ground 0 0', 'Q ground -3 0', 'A crank O 1', 'B dyad A Q 1.5 1.5 left',
+                    f'E crank Q 1 geared crank {ratio} 0')
+    assert len(found.reach()) == arcs and (found.reach()[-1][1] > math.pi) == (arcs == 1)
+    for theta in (3.1, -3.1):
+        assert found.input_for('E.y', found.solve(theta)['E'][1], near=theta) == \
+            pytest.approx(theta)
+
+
+def test_a_block_on_a_short_bar_of_a_kite_keeps_the_digits_of_its_slide():
+    subject = linkage_checks.Subject(Design((
+        'A ground 0 0', 'B ground -0.098 0', 'C ground -0.295 0', 'D crank C 1.796 up',
+        'E dyad D B 1.202 0.926 left', 'F mirror B C E', 'H slider D 0.7 F along C in'), {}, {}),
+        np.random.default_rng(0))
+    rows = subject.fitted(np.linspace(2.6, 2.7, 40)[:, None])
+    slides = [row.ratio for row in rows if row.output.what == 'slide']
+    assert not any(row.problem for row in rows) and max(slides) < 4.0

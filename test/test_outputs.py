@@ -133,12 +133,15 @@ def outputs_of(linkage, rng):
     pairs = [rng.choice(linkage.points, 2, replace=False) for _ in range(4)]
     asked = [*(f'{kind}({first},{second})' for kind, (first, second) in zip(
         ('distance', 'angle') * 2, pairs)), *map(str, rng.choice(linkage.joints, 2))]
-    theta = np.linspace(*linkage.reach()[0], 203)[1:-1]
+    widest = max(linkage.reach(), key=lambda arc: arc[1] - arc[0])
+    theta = np.linspace(*widest, 202)[1:-1]
     for output in asked:
         size = 1.0 if linkage.is_angle(output) else linkage.longest
         values = linkage.joint_angles(theta, [output])[output]
         known = np.isfinite(values)
-        steady = np.unwrap(values[known]) if linkage.is_angle(output) else values[known]
+        # A line that passes its own origin turns round, which is no motion.
+        steady = (np.unwrap(values[known], period=math.pi) if linkage.is_angle(output)
+                  else values[known])
         if known.any() and np.ptp(steady) > 1e-6 * size:
             yield output, size, theta[known], values[known]
 

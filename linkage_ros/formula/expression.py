@@ -61,7 +61,7 @@ class Real:
         other = real(other)
         if other.value == 0.0:
             return self
-        if self is other:
+        if self is other and not self.varies:  # what has no value has no difference either
             return real(0.0)
         if self.value == 0.0:
             return -other

@@ -119,7 +119,7 @@ class Builder:
         self.mirrors: Tuple[Tuple[str, ...], ...] = ()
         self._vectors: Dict[Tuple[str, str], _Vector] = {}
         self._axes: Dict[str, _Vector] = {}
-        self._driven: Dict[str, Tuple[Input, Real]] = {}
+        self.driven: Dict[str, Tuple[Input, Real]] = {}
         self._kites: Dict[Tuple[str, str], planar.CrankArm] = {}
 
     def ground(self, name: str, x: Number, y: Number) -> None:
@@ -197,7 +197,8 @@ class Builder:
         if link is None:
             raise ConstructionError(f'{joint} is no joint of a block')
         offset = Complex(along, across)
-        self._place(name, joint, self._axes[link].vector * offset, link, offset.length(), ())
+        arm = planar.parallel(self._axes[link].vector * offset, self.points[joint].place)
+        self._place(name, joint, arm, link, offset.length(), ())
         self.frames[link][name] = self.frames[link][joint] + offset
 
     def _drive(self, input_: Input, geared: Optional[Gear]) -> Real:
@@ -208,19 +209,19 @@ class Builder:
             self.arguments.append(leaf)
             value = leaf if input_.turns else in_own_unit(leaf)
         else:
-            other, driving = self._driven.get(geared.input, (None, None))
+            other, driving = self.driven.get(geared.input, (None, None))
             if other is None or driving is None or other.turns != input_.turns:
-                alike = [name for name, (x, _) in self._driven.items() if x.turns == input_.turns]
+                alike = [name for name, (x, _) in self.driven.items() if x.turns == input_.turns]
                 raise ConstructionError(f'it cannot be geared to {geared.input}; there are: '
                                         f'{", ".join(alike) or "none"}')
             value = geared.ratio * driving + geared.offset
-        self._driven[input_.name] = input_, value
+        self.driven[input_.name] = input_, value
         return value
 
     def _direction(self, origin: str, towards: str) -> Tuple[str, Complex, Real]:
         """Return the link of two joints, the direction between them, and its angle seen there."""
         side = self._side(origin, towards)
-        along = planar.unit(side.vector, side.length)
+        along = planar.unit(side.vector)
         seen = along
         if side.link != GROUND:
             frame = self.frames[side.link]
@@ -290,10 +291,10 @@ class Builder:
     def mirror(self, name: str, point: str, first: str, second: str) -> None:
         """Mirror a joint in the line of two others: the far corner of a kite."""
         pin = self.points[first].crank
-        ends = [(self.points[end].place, self._side(end, point).vector)
-                for end in (second, first)]
-        arm = self._reflect(name, first, second, self.points[point].place, ends,
-                            self.distance(first, point), self.distance(second, point), point)
+        ends = [self._side(end, point).vector for end in (second, first)]
+        place, arm = self.points[point].place, self.arm(second, first)
+        self._reflect(name, first, second, arm, place, arm.offset(place, ends[0]), ends,
+                      self.distance(first, point), self.distance(second, point), point)
         if isinstance(arm, planar.CrankArm) and pin and pin.centre is self.points[point].place:
             self._kites[first, name] = arm
 
@@ -311,22 +312,21 @@ class Builder:
     def antiparallelogram(self, name: str, corner: str, first: str, second: str) -> None:
         """Join two bars as long as those from a corner, but crossed."""
         to_first, to_second = (self._side(corner, end) for end in (first, second))
+        arm = self.arm(second, first)
         opposite = self.points[first].place + to_second.vector
-        ends = [(self.points[second].place, to_first.vector),
-                (self.points[first].place, to_second.vector)]
-        self._reflect(name, first, second, opposite, ends, to_second.length, to_first.length,
+        offset = -arm.offset(self.points[corner].place, -to_second.vector)
+        self._reflect(name, first, second, arm, opposite, offset,
+                      (to_first.vector, to_second.vector), to_second.length, to_first.length,
                       corner)
 
-    def _reflect(self, name: str, first: str, second: str, point: Complex,
-                 ends: Sequence[Tuple[Complex, Complex]], to_first: Real, to_second: Real,
-                 *others: str) -> planar.Arm:
-        """Join two bars at the mirror image of a point; `ends` has the second end first."""
-        arm = self.arm(second, first)
-        self.folds.append(planar.Limit(arm.offset(point), planar.GRAZE * to_first * to_second))
-        place, from_second, from_first = planar.mirror(arm, point, ends)
+    def _reflect(self, name: str, first: str, second: str, arm: planar.Arm, point: Complex,
+                 offset: Real, ends: Sequence[Complex], to_first: Real, to_second: Real,
+                 *others: str) -> None:
+        """Join two bars at a point's mirror image, given its bars from second and first."""
+        self.folds.append(planar.Limit(offset, planar.GRAZE * to_first * to_second))
+        place, from_second, from_first = planar.mirror(arm, point, offset, ends)
         self._pair(name, first, second, planar.Dyad(from_first, from_second, ()), to_first,
                    to_second, *others, place=place)
-        return arm
 
     def inversor(self, names: Tuple[str, str, str], pole: str, pin: str, long: Real,
                  short: Real) -> None:
@@ -417,7 +417,7 @@ class Builder:
         if link == GROUND:
             return seen
         axis, (joint, start) = self._axes[link], next(iter(self.frames[link].items()))
-        along = planar.unit(axis.vector, axis.length)
+        along = planar.unit(axis.vector)
         return self.points[joint].place + along * (seen - start)
 
     def _shared_link(self, first: str, second: str) -> Optional[str]:

@@ -23,11 +23,14 @@ from .planar import Limit
 # Samples of a whole turn in search of ends without a closed form, samples of an arc at least, and
 # how often arcs inside arcs are searched.
 SAMPLES, FEWEST, ROUNDS = 720, 33, 4
-# What margins may differ by from turn to turn, as a part of their size, and be the same.
+# Where an arc is looked at: in its middle, symmetric linkages may have an arm of no length.
+INSIDE = 0.49
+# What places may differ by from turn to turn, as a part of their size, and be the same.
 ALIKE = 1e-6
 
 
-def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Callable) -> List[Arc]:
+def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Callable,
+         places: Callable) -> List[Arc]:
     """
     Return the arcs (lo, hi) of the first input on which every margin is at least zero.
 
@@ -41,6 +44,8 @@ def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Calla
         What the margins belong to.
     value : callable
         From an expression of dimensions to its value.
+    places : callable
+        From values of the input, shape (n,), to the coordinates of all joints, shape (any, n).
 
     """
     def failing(theta: Any) -> Any:
@@ -55,13 +60,12 @@ def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Calla
 
     closed = [limit for limit in limits if limit.ends and limit.ends.theta.args[0] == 0]
     ends = [end for limit in closed for end in _crank_ends(limit, value)]
-    periodic = input_.turns and _is_periodic(margins)
-    if input_.turns and not periodic:
-        # What follows a turn later is another assembly: the arcs are those of [-pi, pi].
+    if input_.turns:
+        # What follows a turn later may be another assembly: the arcs are then those of [-pi, pi].
         ends.append(-math.pi)
     if any(x.margin.varies and x not in closed for x in limits):
         ends += [end for arc in input_.between(ends) for end in _limits(margins, failing, *arc)]
-    found = reachable_arcs(ends, assembled, input_, joined=periodic)
+    found = reachable_arcs(ends, assembled, input_, lambda: _is_periodic(places))
     return found if input_.is_whole(found) else [_trimmed(assembled, *arc) for arc in found]
 
 
@@ -103,28 +107,30 @@ def _touches(margins: Callable, theta: np.ndarray) -> np.ndarray:
 
 def _trimmed(assembled: Callable, lo: float, hi: float) -> Arc:
     """Return an arc whose ends can be assembled."""
-    ends, middle = np.array([lo, hi]), np.full(2, 0.5 * (lo + hi))
+    ends, middle = np.array([lo, hi]), np.full(2, lo + INSIDE * (hi - lo))
     low, high = np.where(assembled(ends), ends, refined(assembled, middle, ends)[0]).tolist()
     return low, high
 
 
-def _is_periodic(margins: Callable) -> bool:
-    """Return whether margins are the same a turn later."""
+def _is_periodic(places: Callable) -> bool:
+    """Return whether all joints are at the same places a turn later."""
     theta = np.linspace(-math.pi, math.pi, 66)[1:-1]
-    now, later = (np.nan_to_num(margins(theta + turn), nan=-1.0) for turn in (0.0, math.tau))
-    return bool(np.all(np.abs(now - later) <= ALIKE * np.abs(now).max(
-        axis=1, initial=0.0, keepdims=True)))
+    now, later = (places(theta + turn) for turn in (0.0, math.tau))
+    with np.errstate(invalid='ignore'):
+        alike = np.abs(now - later) <= ALIKE * np.fmax.reduce(np.abs(now), axis=None)
+    return bool(np.all(alike | (np.isnan(now) & np.isnan(later))))
 
 
 def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
-                   input_: Input = CRANK, joined: bool = True) -> List[Arc]:
+                   input_: Input = CRANK,
+                   joined: Callable[[], bool] = lambda: True) -> List[Arc]:
     """
     Return the arcs between values where reachability may change, in one where they touch.
 
     They are joined across -pi and pi as well, unless that is not to be.
     """
     parts = input_.between(ends)
-    held = [arc for arc in parts if bool(reachable(0.5 * (arc[0] + arc[1])))]
+    held = [arc for arc in parts if bool(reachable(arc[0] + INSIDE * (arc[1] - arc[0])))]
     if held == parts:
         return [(input_.low, input_.high)]
     found: List[Arc] = []
@@ -133,7 +139,8 @@ def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
             found[-1] = found[-1][0], hi
         else:
             found.append((lo, hi))
-    if joined and len(found) > 1 and found[0][0] + math.tau - found[-1][1] <= NARROWEST:
+    if (input_.turns and len(found) > 1 and found[0][0] + math.tau - found[-1][1] <= NARROWEST
+            and joined()):
         found[-1] = found[-1][0], found.pop(0)[1] + math.tau
     return [(lo - math.tau, hi - math.tau) if input_.turns and lo >= math.pi else (lo, hi)
             for lo, hi in found]

@@ -64,8 +64,8 @@ class Input(NamedTuple):
 
     @property
     def size(self) -> float:
-        """The power of two [m] that a length is counted in to be about as large as an angle."""
-        return 1.0 if self.turns else 2.0 ** (math.frexp(self.high)[1] - 2)
+        """The power of two [m] in which a stroke is about as long as a turn."""
+        return 1.0 if self.turns else 2.0 ** (math.frexp(self.high - self.low)[1] - 2)
 
     def counted(self) -> Input:
         """Return the same input counted in its size."""

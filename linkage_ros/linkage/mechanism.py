@@ -273,7 +273,8 @@ class Mechanism:
         first = self.inputs[0]
         return [(lo * first.size, hi * first.size) for lo, hi in arcs(
             lambda value: margins.searched(value * first.size, *others), first.counted(),
-            self._structure.built.limits, self._value)]
+            self._structure.built.limits, self._value,
+            lambda theta: self._ready('points', None)[1].searched(theta, *others))]
 
     def _remembered(self, what: str, about: tuple, find: Callable) -> Any:
         """Return what was found before, or find it."""

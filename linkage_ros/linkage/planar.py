@@ -82,11 +82,10 @@ class CrankEnds(NamedTuple):
     theta: Real
 
 
-def unit(vector: Complex, length: Real) -> Complex:
-    """Return the direction of a vector of this constant length."""
-    along = vector / length
-    along.spin = vector.spin
-    return along
+def unit(vector: Complex) -> Complex:
+    """Return the direction of a vector of constant length, itself as long as one exactly."""
+    along = vector.direction()
+    return with_spin(along, spin(vector)) if along.x.varies else along
 
 
 def turned(along: Complex, theta: Real, length: Real) -> Complex:
@@ -123,11 +122,11 @@ class Arm:
         # A constant tells nothing of a point that cannot be assembled.
         self.square = vector.squared() if length is None else gated(
             square(length), abs(vector.x), real(0.0))
-        self._span = span
+        self._span, self._length = span, length
 
-    def offset(self, point: Complex) -> Real:
-        """Return the cross product of the arm and the vector from its foot to a point."""
-        return cross(self.vector, point - self.foot)
+    def offset(self, point: Complex, seen: Complex) -> Real:
+        """Return the cross product of the arm and a point as seen from its foot."""
+        return cross(self.vector, seen)
 
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
@@ -137,9 +136,9 @@ class Arm:
         """Return the margin square - radius^2; the radius is made from lengths up to size."""
         return self._limit(radius, size, -1.0, self.square - square(radius))
 
-    def mirrored(self, point: Complex) -> Complex:
-        """Return the mirror image of a point in the line of the arm."""
-        return point - self.vector.turned() * (2.0 * self.offset(point) / self.square)
+    def across(self, point: Complex, offset: Real) -> Complex:
+        """Return the vector from a point of this offset to its mirror image in the arm's line."""
+        return self.vector.turned() * (-2.0 * offset / self.square)
 
     def _with_rate(self, margin: Real, radius: Real, sign: float) -> Real:
         return with_rate(margin, self.square, radius, formula=lambda rate, growth: (
@@ -149,7 +148,7 @@ class Arm:
         margin = self._with_rate(margin, radius, sign)
         # At the limit the length is the radius: the square moves by that times what lengths do.
         # A tolerance is a constant: where a cylinder makes the radius, it is no longer than size.
-        bound = size if radius.varies else abs(radius)
+        bound = (self._length or size) if radius.varies else abs(radius)
         return Limit(margin, GRAZE * bound * (size + self._span))
 
 
@@ -183,21 +182,19 @@ class CrankArm(Arm):
     def _is_isosceles(self) -> Real:
         return abs(self._g - self._m) <= 0.0
 
-    def offset(self, point: Complex) -> Real:
-        """Return the cross product of the arm and the vector from its foot to a point."""
-        if point is self._crank.centre:
-            return self._area
-        return super().offset(point)
+    def offset(self, point: Complex, seen: Complex) -> Real:
+        """Return the cross product of the arm and a point as seen from its foot."""
+        return self._area if point is self._crank.centre else super().offset(point, seen)
 
-    def mirrored(self, point: Complex) -> Complex:
-        """Return the mirror image of a point in the line of the arm."""
-        image = super().mirrored(point)
+    def across(self, point: Complex, offset: Real) -> Complex:
+        """Return the vector from a point of this offset to its mirror image in the arm's line."""
+        vector = super().across(point, offset)
         if point is not self._crank.centre:
-            return image
+            return vector
         s, m = self._s, self._m
-        centre = point + self._line.turned() * Complex(self._h, s) * (2.0 * m * s)
-        return Complex(where(self._is_isosceles, centre.x, image.x),
-                       where(self._is_isosceles, centre.y, image.y))
+        centre = self._line.turned() * Complex(self._h, s) * (2.0 * m * s)
+        return Complex(where(self._is_isosceles, centre.x, vector.x),
+                       where(self._is_isosceles, centre.y, vector.y))
 
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
@@ -293,7 +290,9 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True,
     roots = [x.smooth if smooth and x.smooth else x.root() for x in limits]
     twice = 2.0 * arm.square
     skew = (first - second) * (first + second) / twice
-    u, v = 0.5 + skew, roots[0] * roots[1] / twice * side
+    v = roots[0] * roots[1] / twice * side
+    skew = _known_with(v, arm.vector, skew)
+    u = 0.5 + skew
     bars = arm.vector * Complex(u, v), arm.vector * Complex(skew - 0.5, v)
     bars = bars if longest is None else (bars[0] / first, bars[1])
 
@@ -307,6 +306,13 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True,
 
     return Dyad(with_turning(bars[0], u, first), with_turning(bars[1], skew - 0.5, second),
                 limits)
+
+
+def _known_with(other: Real, vector: Complex, part: Real) -> Real:
+    """Return one part of a factor of a vector, NaN where the other is, for the product to be."""
+    # A product with zero is left out, and with it that it has no value.
+    axial = 0.0 in (vector.x.value, vector.y.value)
+    return gated(part, abs(other), real(0.0)) if axial else part
 
 
 def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
@@ -324,18 +330,19 @@ def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
     return Complex(0.5 + (first - second) * (first + second) / twice, height / twice * side)
 
 
-def mirror(arm: Arm, point: Complex,
-           ends: Sequence[Tuple[Complex, Complex]]) -> Tuple[Complex, ...]:
+def mirror(arm: Arm, point: Complex, offset: Real,
+           ends: Sequence[Complex]) -> Tuple[Complex, ...]:
     """
     Return the mirror image of a point in the line of an arm, and the bars from both ends to it.
 
-    For each end of the arm, its foot first, its place and its bar to the point are given; a bar's
-    image turns twice as fast as the arm, less what the bar itself turns.
+    The point's offset from the arm and, for each end of it, its foot first, the bar to the point
+    are given; a bar's image turns twice as fast as the arm, less what the bar itself turns.
     """
-    image, turning, bars = arm.mirrored(point), spin(arm.vector), []
-    for place, bar in ends:
+    across, turning, bars = arm.across(point, offset), spin(arm.vector), []
+    image = point + across
+    for bar in ends:
         own = spin(bar)
-        bars.append(with_spin(image - place, Rate(
+        bars.append(with_spin(bar + across, Rate(
             (*turning.of, *own.of), lambda *rates, own=own: gated(
                 2.0 * turning.formula(*rates[:len(turning.of)])
                 - own.formula(*rates[len(turning.of):]), abs(image.x + image.y), real(0.0)))))
@@ -502,4 +509,5 @@ def slider(rail: Rail, rod: Real, side: float) -> Slider:
     """
     limits = rail.limits(rod)
     reach = reduce(lambda x, y: x * y, (limit.smooth or limit.root() for limit in limits)) * side
-    return Slider(rail.along * Complex(reach, -rail.height), rail.foot + reach, limits, reach)
+    height = _known_with(reach, rail.along, rail.height)
+    return Slider(rail.along * Complex(reach, -height), rail.foot + reach, limits, reach)

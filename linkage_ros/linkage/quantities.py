@@ -163,8 +163,6 @@ class Structure:
 
     def _rates(self, names: Names, by: int = 0) -> List[Real]:
         known: Dict[Real, Real] = {}
-        inputs = {x.name for x in self.built.inputs}
-
         def d(expression: Real) -> Real:
             return derivative(expression, {by: 1.0}, known)
 
@@ -175,7 +173,7 @@ class Structure:
             return turned.formula(*map(d, turned.of))
 
         def rate(name: str) -> Real:
-            if not self.turns(name) or name in inputs:
+            if not self.turns(name) or name in self.built.driven:
                 return d(self._value(name))
             if arm := self._arm(name):
                 return turning(arm.vector)

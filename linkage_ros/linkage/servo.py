@@ -202,14 +202,14 @@ class Mechanism(Analysed):
 
 @lru_cache(maxsize=32)
 def _levers(structure: Structure) -> Dict[str, List[Answer]]:
-    """Return for each lever that the crank's pin moves both answers to its angle."""
+    """Return for each lever that an input crank's pin moves both answers to its angle."""
     built = structure.built
     links = {link.name: link for link in built.links}
     return {slide.parent: list(_lever(built, crank, slide,
                                       structure.branches[links[slide.parent].tip]))
             for slide in built.links if slide.kind == 'prismatic' and slide.parent != GROUND
             and links[slide.parent].parent == GROUND
-            and (crank := built.points[slide.tip].crank)}
+            and (crank := built.points[slide.tip].crank) and crank.angle in built.arguments}
 
 
 def _lever(built: Builder, crank: Crank, slide: Link, half: int) -> Iterator[Answer]:

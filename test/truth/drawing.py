@@ -9,7 +9,8 @@ or a circle and a line, meet on the side that is written; a rigid link is drawn 
 and laid on its bar. The same drawing is done in 96 digits (`DIGITS`), where such formulas cancel
 as badly as they like, and with numpy's complex numbers for thousands of angles at once (`FLOATS`).
 
-A change point is passed as the language says in words: the side changes each time that the crank
+An input is an angle or a length; one geared to another is a multiple of it, plus an offset. A
+change point is passed as the language says in words: the side changes each time that the crank
 passes the angle at which the dyad is stretched or folded, counted from a quarter turn.
 """
 
@@ -26,10 +27,14 @@ BITS = 320
 # A gap of the four bars that is smaller than this part of them may count as a change point.
 ROUNDING = 64 * 2.0 ** -53
 
+# What follows a word, but for the word `along`: j a joint, n a length, a an angle, s a side.
 _FORMS = {
-    'ground': 'nn', 'crank': 'jn', 'dyad': 'jjnns', 'rigid': 'jjnns', 'line': 'jjn',
-    'mirror': 'jjj', 'parallelogram': 'jjj', 'inversor': 'jjnn', 'slot': 'jjnsn',
-    'slider': 'jnjas'}
+    'ground': 'nn', 'crank': 'jn', 'cylinder': 'jjns', 'carriage': 'jjnn', 'block': 'jnn',
+    'dyad': 'jjnns', 'rigid': 'jjnns', 'line': 'jjn', 'mirror': 'jjj', 'parallelogram': 'jjj',
+    'antiparallelogram': 'jjj', 'inversor': 'jjnn', 'slot': 'jjnsn', 'slider': 'jnjas'}
+_SLIDER_ALONG = 'jnjjs'
+_INPUTS = 'crank', 'cylinder', 'carriage'
+SLIDING = 'cylinder', 'carriage', 'slot', 'slider'
 _SIDES = {'left': 1, 'right': -1, 'out': 1, 'in': -1}
 
 
@@ -48,6 +53,7 @@ class Digits:
     point = staticmethod(mpc)
     number = staticmethod(mpfr)
     floor = staticmethod(gmpy2.floor)
+    least = staticmethod(min)
 
     @staticmethod
     def turned(angle):
@@ -67,7 +73,7 @@ class Digits:
     @staticmethod
     def divided(x, y):
         """Return a quotient; one by nothing is nothing."""
-        return x / y if y else x * 0
+        return x / y if y != 0 else x * 0
 
     @staticmethod
     def pi():
@@ -80,6 +86,7 @@ class Floats:
 
     number = staticmethod(float)
     floor = staticmethod(np.floor)
+    least = staticmethod(np.minimum)
     direction = staticmethod(np.angle)
 
     @staticmethod
@@ -115,27 +122,49 @@ DIGITS, FLOATS = Digits(), Floats()
 # --- reading ------------------------------------------------------------------------------------
 
 class Line(NamedTuple):
-    """A line: the joints it places, its word, the joints it stands on, its numbers, its side."""
+    """
+    A line: the joints it places, its word, the joints it stands on, its numbers, its side.
+
+    `kinds` are those of the numbers, n a length, a an angle, r a ratio; `zero` is the joint from
+    which a crank is counted, `geared` the input that a line's own is a multiple of.
+    """
 
     names: tuple
     word: str
     joints: tuple
     numbers: tuple
+    kinds: str
     side: int
     up: bool
+    zero: str = ''
+    geared: str = ''
+
+    @property
+    def turns(self):
+        """Whether what drives it is an angle."""
+        return self.word == 'crank'
 
 
 def read(text):
     """Return a `Line` of the language."""
     parts = text.split()
     at = next(i for i, part in enumerate(parts) if part in _FORMS and i)
-    word, rest = parts[at], parts[at + 1:]
+    word, rest = parts[at], [part for part in parts[at + 1:] if part != 'along']
+    form = _SLIDER_ALONG if word == 'slider' and 'along' in parts else _FORMS[word]
     given = {kind: [] for kind in 'jnas'}
-    for kind, part in zip(_FORMS[word], rest):
+    for kind, part in zip(form, rest):
         given['n' if kind == 'a' else kind].append(part)
     side = _SIDES[given['s'][0]] if given['s'] else 1
-    return Line(tuple(parts[:at]), word, tuple(given['j']), tuple(given['n']), side,
-                rest[-1] == 'up')
+    zero, (geared, *gear) = _option(rest, 'zero', 1) or ('',), _option(rest, 'geared', 3) or ('',)
+    kinds = re.sub('[js]', '', form) + ('ra' if word == 'crank' else 'rn') * bool(gear)
+    return Line(tuple(parts[:at]), word, (*given['j'], *filter(None, zero)),
+                (*given['n'], *gear), kinds, side, rest[2:3] == ['up'],
+                *zero, geared)
+
+
+def _option(rest, word, count):
+    at = rest.index(word) + 1 if word in rest else len(rest)
+    return rest[at:at + count]
 
 
 class Value(NamedTuple):
@@ -265,10 +294,11 @@ class Passing(NamedTuple):
 
 class Drawing(NamedTuple):
     """
-    Points by name; gaps and slides by the joint that a line places first.
+    Points by name; gaps, slides and lines by the joint that a line places first.
 
-    A gap is negative where the line cannot be drawn. Folds vanish where a kite or a parallelogram
-    is flat; arms are the distances on which a dyad, kite, slot or cell stands.
+    Lines are the directions in which something slides. A gap is negative where the line cannot be
+    drawn. Folds vanish where a kite or a parallelogram is flat; arms are the distances on which a
+    dyad, cylinder, kite, slot or cell stands.
     """
 
     points: dict
@@ -276,6 +306,7 @@ class Drawing(NamedTuple):
     slides: dict
     folds: dict
     arms: dict
+    lines: dict
 
 
 class Linkage:
@@ -300,13 +331,17 @@ class Linkage:
         self.lines = [read(text) for text in joints]
         self.lines = [line._replace(side=(branches or {}).get(line.names[0], line.side))
                       for line in self.lines]
-        self.cranks = [line.names[0] for line in self.lines if line.word == 'crank']
+        self.inputs = [line for line in self.lines if line.word in _INPUTS and not line.geared]
         self.fixed = {line.names[0] for line in self.lines if line.word == 'ground'}
+        self.cranks = [line.names[0] for line in self.lines
+                       if line.word == 'crank' and self.fixed.issuperset(line.joints)]
         self.placed = [name for line in self.lines for name in line.names]
         self.numbers = self.values()
         self.longest = max((abs(number) for line, row in zip(self.lines, self.numbers)
-                            for kind, number in zip(re.sub('[js]', '', _FORMS[line.word]), row)
-                            if kind == 'n'), default=mpfr(1))
+                            for kind, number in zip(line.kinds, row) if kind == 'n'),
+                           default=mpfr(1))
+        self._drives = self._driven()
+        self.driven_names = set(self._drives.values())
         self._links()
         self._stand()
         self._templates = {}
@@ -333,6 +368,34 @@ class Linkage:
         return sorted({found for line in self.lines for text in line.numbers
                        for found in literals(text)})
 
+    def _driven(self):
+        """Return for each input or geared line the name that its input has."""
+        found = {}
+        for i, line in enumerate(self.lines):
+            if line.word in _INPUTS:
+                before = sum(self.lines[k].word == line.word for k in found)
+                found[i] = f'{line.word}{before + 1}' if before else line.word
+        return found
+
+    def driven(self, rows, values):
+        """Return the angle or length that drives each line, from the values of the inputs."""
+        values, found = iter(values), {}
+        for i, name in self._drives.items():
+            geared = self.lines[i].geared
+            found[name] = rows[i][-2] * found[geared] + rows[i][-1] if geared else next(values)
+        return {i: found[name] for i, name in self._drives.items()}
+
+    def geared(self, rows, values):
+        """Return (line, slack) of what is geared: half an ulp of the product and of the sum."""
+        driven = self.driven(rows, values)
+        return [(i, half_ulp(driven[i] - rows[i][-1]) + half_ulp(driven[i]))
+                for i in driven if self.lines[i].geared]
+
+    def zero_of(self, centre, pin):
+        """Return the bar from which a crank on a link is counted, in a tuple; none for others."""
+        line = self.placing(pin)
+        return (line.joints,) if line.zero and line.joints[0] == centre else ()
+
     def _links(self):
         """Note which joints are on one moving link: a line each, from bar to bar."""
         self.bodies = []
@@ -343,7 +406,7 @@ class Linkage:
             elif line.word == 'dyad':
                 self._body(i, joints[0], names[0])
                 self._body(i, joints[1], names[0])
-            elif line.word in ('mirror', 'parallelogram'):
+            elif line.word in ('mirror', 'parallelogram', 'antiparallelogram'):
                 for joint in joints[1:]:
                     self._body(i, joint, names[0])
             elif line.word == 'inversor':
@@ -351,15 +414,34 @@ class Linkage:
                 for pair in ((joints[0], right), (joints[1], right), (right, corner),
                              (joints[0], left), (joints[1], left), (left, corner)):
                     self._body(i, *pair)
-            elif line.word == 'slot':
+            elif line.word in ('slot', 'slider'):
                 self._body(i, joints[0], names[0])
-            elif line.word == 'slider':
-                self._body(i, joints[0], names[0])
+            elif line.word == 'cylinder':
+                self._body(i, joints[1], names[0])
+            elif line.word == 'block':
+                self._on_block(i, joints[0], names[0])
             elif line.word in LAID:
                 self.body_of(*joints).append(names[0])
 
     def _body(self, _, first, second):
         self.bodies.append([first, second])
+
+    def _on_block(self, i, joint, name):
+        blocks = [body for body in self.bodies if body[0] == joint
+                  and self.placing(body[1]).word == 'block']
+        for body in blocks:
+            body.append(name)
+        if not blocks:
+            self._body(i, joint, name)
+
+    def placing(self, name):
+        """Return the line that places a joint."""
+        return next(line for line in self.lines if name in line.names)
+
+    def line_of_block(self, joint):
+        """Return the first joint of the line that has a joint slide: one it places, or a slot."""
+        return next(line.names[0] for line in self.lines if line.word in SLIDING and joint == (
+            line.joints[1] if line.word == 'slot' else line.names[0]))
 
     def body_of(self, first, second):
         """Return the joints of the moving link that has both joints, None if there is none."""
@@ -368,10 +450,14 @@ class Linkage:
     def _stand(self):
         """Note the joints and the closures that each joint stands on, itself among them."""
         self.stands, self.closures = {}, {}
-        closed = ('dyad', 'inversor', 'slot', 'slider', 'mirror')
+        closed = ('dyad', 'cylinder', 'block', 'inversor', 'slot', 'slider', 'mirror',
+                  'antiparallelogram')
         for line in self.lines:
-            below = set().union(*(self.stands[name] for name in line.joints), line.joints)
-            needs = set().union(*(self.closures[name] for name in line.joints))
+            joints = line.joints
+            if line.word == 'block':
+                joints = (*joints, self.line_of_block(joints[0]))
+            below = set().union(*(self.stands[name] for name in joints), joints)
+            needs = set().union(*(self.closures[name] for name in joints))
             if line.word in closed:
                 needs = needs | {line.names[0]}
             for name in line.names:
@@ -387,9 +473,11 @@ class Linkage:
         """Return where a joint lies on the drawing of a link: the first joint at zero, along x."""
         if name == body[0]:
             return mpc(0)
+        i = next(i for i, line in enumerate(self.lines) if name in line.names)
+        if self.lines[i].word == 'block' and self.lines[i].joints[0] == body[0]:
+            return mpc(*numbers[i])
         if name == body[1]:
             return mpc(self._bar(numbers, body[0], name))
-        i = next(i for i, line in enumerate(self.lines) if name in line.names)
         first, second = (self._template(numbers, body, joint) for joint in self.lines[i].joints)
         return LAID[self.lines[i].word](first, second, numbers[i], self.lines[i].side)
 
@@ -397,7 +485,7 @@ class Linkage:
         """Return the length that is written, or follows, for a bar."""
         i = next(i for i, line in enumerate(self.lines) if second in line.names)
         line = self.lines[i]
-        if line.word in ('crank', 'slider'):
+        if line.word in ('crank', 'slider', 'cylinder'):
             return numbers[i][0]
         if line.word == 'slot':
             return numbers[i][1]
@@ -427,7 +515,7 @@ class Linkage:
             if line.word in LAID:
                 base = self.base(numbers, *line.joints)
                 row = (LAID[line.word](mpc(0), mpc(base), row, line.side) / base,)
-            elif line.word == 'slider':
+            elif line.word == 'slider' and len(row) > 1:
                 row = (row[0], DIGITS.turned(row[1]), row[1])
             rows.append(row)
         return rows
@@ -439,10 +527,11 @@ class Linkage:
         for line, row in zip(self.lines, self.prepared(self.numbers)):
             if line.word in LAID:
                 rows.append((complex(row[0]),))
-            elif line.word == 'slider':
+            elif line.word == 'slider' and len(row) > 1:
                 rows.append((float(row[0] / unit), complex(row[1]), float(row[2])))
             else:
-                rows.append(tuple(float(number / unit) for number in row))
+                rows.append(tuple(float(number / unit if kind == 'n' else number)
+                                  for kind, number in zip(line.kinds, row)))
         turns = {i: float(turn) for i, turn in self.turns(self.numbers, way).items()}
         return rows, turns, float(unit)
 
@@ -484,17 +573,17 @@ class Linkage:
             gaps = ground + m - b - c, abs(ground - m) - abs(b - c)
             turn = self._turn(self.numbers, line)
             unsure = abs(gmpy2.sin(turn + gmpy2.const_pi() / 2)) < ROUNDING
-        elif line.word == 'slider' and line.joints[0] in self.cranks:
+        elif line.word == 'slider' and line.joints[0] in self.cranks \
+                and self.fixed.issuperset(line.joints[1:]):
             crank = self._crank(line.joints[0])
             m = self.numbers[self.lines.index(crank)][0]
-            rod, angle = self.numbers[i]
-            line_of = DIGITS.turned(angle)
+            rod, line_of = self.numbers[i][0], self._rail(self.numbers, i)
             away = (self._fixed(self.numbers, crank.joints[0])
                     - self._fixed(self.numbers, line.joints[1]))
             height = (away * line_of.conjugate()).imag
             size = rod + abs(away) + m
             gaps = rod + height - m, rod - height - m
-            turn = self._turn_on_line(crank, line_of)
+            turn = self._turn_on_line(self.numbers, crank, line_of)
             unsure = gmpy2.const_pi() - abs(turn) < ROUNDING
         else:
             return []
@@ -511,12 +600,25 @@ class Linkage:
         foot, pin = self.arm_of_crank(line)
         crank = self._crank(pin)
         along = self._fixed(numbers, crank.joints[0]) - self._fixed(numbers, foot)
-        zero = mpc(0, 1) if crank.up else mpc(1)
-        return DIGITS.direction(zero * along.conjugate())
+        return DIGITS.direction(self._zero(numbers, crank) * along.conjugate())
 
-    def _turn_on_line(self, crank, line_of):
-        zero = mpc(0, 1) if crank.up else mpc(1)
-        return DIGITS.direction(zero * line_of.conjugate())
+    def _turn_on_line(self, numbers, crank, line_of):
+        return DIGITS.direction(self._zero(numbers, crank) * line_of.conjugate())
+
+    def _zero(self, numbers, crank):
+        """Return the direction from which a crank of the ground is counted."""
+        if crank.zero:
+            return self._direction(numbers, *crank.joints)
+        return mpc(0, 1) if crank.up else mpc(1)
+
+    def _rail(self, numbers, i):
+        """Return the direction of the line on the ground that a block slides on."""
+        _, *joints = self.lines[i].joints
+        return self._direction(numbers, *joints) if joints[1:] else DIGITS.turned(numbers[i][1])
+
+    def _direction(self, numbers, first, second):
+        away = self._fixed(numbers, second) - self._fixed(numbers, first)
+        return away / abs(away)
 
     def turns(self, numbers, way):
         """Return the angles from which the passes of change points are counted."""
@@ -524,8 +626,8 @@ class Linkage:
         for i in way:
             line = self.lines[i]
             found[i] = (self._turn(numbers, line) if line.word == 'dyad' else
-                        self._turn_on_line(self._crank(line.joints[0]),
-                                           DIGITS.turned(numbers[i][1])))
+                        self._turn_on_line(numbers, self._crank(line.joints[0]),
+                                           self._rail(numbers, i)))
         return found
 
 
@@ -541,12 +643,18 @@ def meet(do, p, radius_p, q, radius_q, side):
 
     That is the squared sine of the angle at which they meet; where they do not it is negative.
     """
+    meeting, square = _corner_of(do, p, radius_p, q, radius_q, side)
+    return meeting, square / (radius_p * radius_q) ** 2
+
+
+def _corner_of(do, p, radius_p, q, radius_q, side):
+    """Return a corner of a triangle, and its squared area times four, negative without one."""
     arm = q - p
     across = arm.real * arm.real + arm.imag * arm.imag
     along = (across + (radius_p * radius_p - radius_q * radius_q)) / 2
     square = radius_p * radius_p * across - along * along
     meeting = arm * along + _turned(do, arm) * (side * do.root(square))
-    return p + do.divided(meeting, across), square / (radius_p * radius_q) ** 2
+    return p + do.divided(meeting, across), square
 
 
 def _corner(first, second, row, side):
@@ -568,16 +676,16 @@ def _turned(do, vector):
     return vector * do.point(0, 1)
 
 
-def draw(do, linkage, rows, thetas, way=None, turns=None, moved=None):
+def draw(do, linkage, rows, values, way=None, turns=None, moved=None):
     """
     Return the `Drawing` of a linkage.
 
-    `rows` are its numbers as `prepared`, `thetas` its crank angles, `way` how it passes its change
-    points, `moved` what is added to joints.
+    `rows` are its numbers as `prepared`, `values` those of its inputs, `way` how it passes its
+    change points, `moved` what is added to joints.
     """
     way, moved = way or {}, moved or {}
-    points, gaps, slides, folds, arms = {}, {}, {}, {}, {}
-    cranks = iter(thetas)
+    points, gaps, slides, folds, arms, lines = {}, {}, {}, {}, {}, {}
+    driven = linkage.driven(rows, values)
     angle_of = {}
     for i, (line, row) in enumerate(zip(linkage.lines, rows)):
         word, name, at = line.word, line.names[0], [points[joint] for joint in line.joints]
@@ -585,9 +693,26 @@ def draw(do, linkage, rows, thetas, way=None, turns=None, moved=None):
         if word == 'ground':
             points[name] = do.point(*row)
         elif word == 'crank':
-            angle_of[name] = theta = next(cranks)
-            bar = do.turned(theta) * row[0]
+            angle_of[name] = driven[i]
+            bar = do.turned(driven[i]) * row[0]
+            if line.zero:
+                bar = bar * _unit(do, at[1] - at[0])
             points[name] = at[0] + (_turned(do, bar) if line.up else bar)
+        elif word == 'cylinder':
+            slides[name] = length = driven[i]
+            points[name], square = _corner_of(do, at[0], length, at[1], row[0], side)
+            # A length is not negative, even where circles meet.
+            gaps[name] = do.least(square / row[0] ** 3, length)
+            arms[name] = abs(at[1] - at[0])
+            lines[name] = do.divided(points[name] - at[0], length)
+        elif word == 'carriage':
+            slides[name], lines[name] = driven[i], _unit(do, at[1] - at[0])
+            points[name] = at[0] + lines[name] * driven[i]
+        elif word == 'block':
+            on = linkage.line_of_block(line.joints[0])
+            points[name] = at[0] + lines[on] * do.point(*row)
+            if linkage.placing(on).word == 'cylinder':  # of no length it has no direction
+                arms[name] = abs(slides[on])
         elif word == 'dyad':
             if i in way:
                 pin = linkage.arm_of_crank(line)[1]
@@ -602,6 +727,12 @@ def draw(do, linkage, rows, thetas, way=None, turns=None, moved=None):
             points[name] = at[1] + arm * ratio.conjugate()
             folds[name] = ratio.imag
             arms[name] = abs(arm)
+        elif word == 'antiparallelogram':
+            arm, middle = at[2] - at[1], (at[1] + at[2]) / 2
+            ratio = do.divided(at[0] - middle, arm)
+            points[name] = middle - arm * ratio.conjugate()
+            folds[name] = ratio.imag
+            arms[name] = abs(arm)
         elif word == 'parallelogram':
             points[name] = at[1] + (at[2] - at[0])
             folds[name] = ((at[1] - at[0]).conjugate() * (at[2] - at[0])).imag
@@ -613,20 +744,26 @@ def draw(do, linkage, rows, thetas, way=None, turns=None, moved=None):
             arms[name] = abs(at[1] - at[0])
         elif word == 'slot':
             points[name], gaps[name], slides[name], arms[name] = _slot(do, *at, row, side)
+            lines[name] = (points[name] - at[0]) / row[1]
         else:
             if i in way:
                 side = side * _block_passes(do, way[i], angle_of[line.joints[0]], turns[i])
-            seen = (at[0] - at[1]) * row[1].conjugate()
+            lines[name] = along = row[1] if len(row) > 1 else _unit(do, at[2] - at[1])
+            seen = (at[0] - at[1]) * along.conjugate()
             square = row[0] * row[0] - seen.imag * seen.imag
             gaps[name] = square / (row[0] * row[0])
             slides[name] = seen.real + side * do.root(square)
-            points[name] = at[1] + row[1] * slides[name]
+            points[name] = at[1] + along * slides[name]
         for each in line.names:
             if each in moved:
                 points[each] = points[each] + moved[each]
                 if word == 'slider':
-                    slides[name] = ((points[each] - at[1]) * row[1].conjugate()).real
-    return Drawing(points, gaps, slides, folds, arms)
+                    slides[name] = ((points[each] - at[1]) * along.conjugate()).real
+    return Drawing(points, gaps, slides, folds, arms, lines)
+
+
+def _unit(do, vector):
+    return do.divided(vector, abs(vector))
 
 
 def _slot(do, pivot, pin, row, side):

@@ -5,16 +5,18 @@
 How far an answer about any linkage may be from its drawing, where joints hang on each other.
 
 A result is measured in units of its *sensitivity*: what moving each thing that is rounded by half
-an ulp does to the true result. Rounded are the inputs (crank angles, dimensions, numbers in the
-lines, what is calculated from them), and each joint on the way but ground joints and crank pins:
-half an ulp of the largest coordinate on its line; a gap so small that it counts as a change point
-may be closed. For velocities and rates also the velocity of each of those joints. The rule is
+ulp does to the true result. Rounded are the inputs (angles, lengths, dimensions, numbers in the
+lines, what is calculated from them, what gears make of them), and each joint on the way but ground
+joints and the pins of cranks on the ground: half an ulp of the largest coordinate on its line; a
+gap so small that it counts as a change point may be closed. For velocities and rates also the
+velocity of each of those joints. The rule is
 
     error <= 4 x sensitivity + 1 ulp of the result,
 
-for velocities and rates 8 x, with a number wherever everything that the joint stands on can be
-assembled and NaN wherever it cannot; within `GRAZE` sensitivities of a limit either will do.
-Angles are compared modulo a turn, so that their ulp is that of pi.
+for velocities and rates 8 x both, with a number wherever everything that the joint stands on can
+be assembled and NaN wherever it cannot; within `GRAZE` sensitivities of a limit, of a cylinder's
+within `LOOSER` times as much, either will do. Angles are compared modulo a turn, so that their
+ulp is that of pi.
 """
 
 import math
@@ -24,11 +26,13 @@ import gmpy2
 from gmpy2 import mpc, mpfr
 import numpy as np
 
-from .drawing import DIGITS, draw, half_ulp, Linkage, precisely
+from .drawing import DIGITS, draw, half_ulp, Linkage, precisely, SLIDING
 
 RULE, RATE_RULE = 4.0, 8.0
 GRAZE = 32.0
-# Where an arm has no length exactly, its direction is that of an angle 2^-NUDGE further on.
+# The limits of a cylinder are as exact as its longest length.
+LOOSER = 8
+# Where an arm has no length exactly, its direction is that of inputs 2^-NUDGE further on.
 NUDGE = 150
 with gmpy2.context(gmpy2.get_context(), precision=320):
     STEP = mpfr(2) ** -100
@@ -38,18 +42,21 @@ class Output(NamedTuple):
     """
     One thing that a mechanism answers, and the joints that it stands on.
 
-    `what` is 'point', 'angle' or 'slide'; `parts` are the joints of the bar (and of its parent's
-    bar, and the quarter turns of the zero) or the joint whose line has the slide. `crank` is the
-    number of the crank by which it is differentiated, None for a pose.
+    `what` is 'point', 'angle' or 'slide'; `parts` are bars by their two joints, that of an angle
+    and that from which it is counted, from `quarters` of a turn; of one joint is what slides on
+    its line. `needs` are the joints without which it is NaN: none for what is driven. `by` is the
+    number of the input by which it is differentiated, None for a pose.
     """
 
     what: str
     name: str
     parts: tuple
-    crank: object = None
+    needs: tuple
+    quarters: int = 0
+    by: object = None
 
     def __str__(self):
-        rate = '' if self.crank is None else f' by crank {self.crank}'
+        rate = '' if self.by is None else f' by input {self.by}'
         return f'{self.what} {self.name}{rate}'
 
 
@@ -57,7 +64,7 @@ class Row(NamedTuple):
     """One output at one pose: `problem` is '', 'NaN', 'missed NaN' or 'rule'."""
 
     output: Output
-    thetas: tuple
+    values: tuple
     problem: str
     ratio: float
     error: float
@@ -68,30 +75,31 @@ class Row(NamedTuple):
 
 def outputs(linkage, links):
     """Return all outputs of a pose, given a mechanism's links."""
-    found = [Output('point', name, (name,)) for name in linkage.placed]
-    by_name = {link.name: link for link in links}
-    slides = iter(line.names[0] for line in linkage.lines if line.word in ('slot', 'slider'))
+    found = [Output('point', name, ((name,),), (name,)) for name in linkage.placed]
+    slides = iter(line.names[0] for line in linkage.lines if line.word in SLIDING)
+    bars = {}
     for link in links:
-        if link.kind == 'prismatic':
-            found.append(Output('slide', link.name, (next(slides),)))
-        else:
-            parent = by_name.get(link.parent)
-            quarters = round(link.zero / (math.pi / 2))
-            found.append(Output('angle', link.name, (
-                link.joint, link.tip, *((parent.joint, parent.tip) if parent else ()),
-                quarters)))
+        slides_on = link.kind == 'prismatic'
+        zero = linkage.zero_of(link.joint, link.tip)
+        parent = zero or ((bars[link.parent],) if link.parent in bars else ())
+        bars[link.name] = (next(slides),) if slides_on else (link.joint, link.tip)
+        parts = (bars[link.name], *parent * (not slides_on))
+        found.append(Output(
+            'slide' if slides_on else 'angle', link.name, parts,
+            () if link.name in linkage.driven_names else sum(parts, ()),
+            0 if zero or slides_on else round(link.zero / (math.pi / 2))))
     return found
 
 
-def answers(mechanism, thetas, poses, rates):
-    """Return {output: array} of a mechanism at crank angles, shape (n, cranks)."""
-    given = thetas.T if len(mechanism.inputs) > 1 else thetas[:, 0]
+def answers(mechanism, values, poses, rates):
+    """Return {output: array} of a mechanism at values of its inputs, shape (n, inputs)."""
+    given = values.T if len(mechanism.inputs) > 1 else values[:, 0]
     points, angles = mechanism.solve(given), mechanism.joint_angles(given)
     found = {out: (points if out.what == 'point' else angles)[out.name] for out in poses}
-    for crank in range(len(mechanism.inputs) if rates else 0):
-        points = mechanism.velocity(given, by=crank)
-        angles = mechanism.joint_rates(given, by=crank)
-        found.update((out._replace(crank=crank),
+    for by in range(len(mechanism.inputs) if rates else 0):
+        points = mechanism.velocity(given, by=by)
+        angles = mechanism.joint_rates(given, by=by)
+        found.update((out._replace(by=by),
                       (points if out.what == 'point' else angles)[out.name]) for out in poses)
     return found
 
@@ -113,6 +121,8 @@ class Measure:
         self._moved = {}
         self._pinned = linkage.fixed | set(linkage.cranks)
         self._lines = {name: line for line in linkage.lines for name in line.names}
+        # An angle is about as large as one; lengths are as large as the longest of them.
+        self._units = [1 if line.turns else linkage.longest for line in linkage.inputs]
 
     def _given(self, numbers):
         return _Moved(self.linkage.prepared(numbers), self.linkage.turns(numbers, self._way))
@@ -134,22 +144,23 @@ class Measure:
         return self._moved[side]
 
     @precisely
-    def at(self, thetas, rates=False):
-        """Return the `Truth` at crank angles."""
-        thetas = [mpfr(theta) for theta in thetas]
-        now = self._drawn(self._nominal, thetas)
+    def at(self, given, rates=False):
+        """Return the `Truth` at values of the inputs."""
+        given = [mpfr(value) for value in given]
+        now = self._drawn(self._nominal, given)
         grazed = self._undirected(now)
         if grazed:
-            thetas = [theta + mpfr(2) ** -NUDGE for theta in thetas]
-            now = self._drawn(self._nominal, thetas)
-        values = self._values(now, self._nominal, thetas, {}, {}, rates)
+            given = [value + unit * mpfr(2) ** -NUDGE
+                     for value, unit in zip(given, self._units)]
+            now = self._drawn(self._nominal, given)
+        values = self._values(now, self._nominal, given, {}, {}, rates)
         closures, arms = {**now.gaps}, now.arms
         bent = dict.fromkeys(arms, mpfr(0))
         spread, slack = [mpfr(0)] * len(values), dict.fromkeys(closures, mpfr(0))
-        speeds = self._speeds(thetas) if rates else []
+        speeds = self._speeds(given) if rates else []
         for side in (1, -1):
             one_side, one_slack = [mpfr(0)] * len(values), dict.fromkeys(closures, mpfr(0))
-            for moved in self._moves(now, thetas, speeds, side):
+            for moved in self._moves(now, given, speeds, side):
                 drawn = self._drawn(*moved[:3])
                 for i, (old, new) in enumerate(zip(values, self._values(drawn, *moved, rates))):
                     one_side[i] += self._distance(i, old, new)
@@ -158,13 +169,19 @@ class Measure:
                 for name, arm in arms.items():
                     bent[name] += abs(drawn.arms[name] - arm)
             for moved in self._displaced(now.points, self._pinned, side):
-                drawn = self._drawn(self._nominal, thetas, moved)
+                drawn = self._drawn(self._nominal, given, moved)
                 for name, gap in closures.items():
                     one_slack[name] += abs(drawn.gaps[name] - gap)
             spread = [max(pair) for pair in zip(spread, one_side)]
             slack = {name: max(slack[name], one_slack[name]) for name in slack}
             if all(abs(gap) > 100 * slack[name] for name, gap in closures.items()):
                 break  # far from a limit both sides are alike
+        for i, out in enumerate(self.poses):
+            if grazed and out.what == 'slide':  # which has been moved on with the inputs
+                spread[i] += self.linkage.longest * mpfr(2) ** -NUDGE
+        for name in closures:
+            if self._lines[name].word == 'cylinder':
+                slack[name] = LOOSER * (slack[name] + half_ulp(self.linkage.longest))
         states = {name: _state(gap, slack[name]) for name, gap in closures.items()}
         states.update((name, 'undirected') for name, arm in arms.items()
                       if states.get(name, 'meets') == 'meets' and arm <= GRAZE * bent[name])
@@ -177,24 +194,29 @@ class Measure:
         least = self.linkage.longest / mpfr(2) ** (NUDGE + 40)
         return [name for name, arm in drawn.arms.items() if arm < least]
 
-    def _drawn(self, given, thetas, moved=None):
-        return draw(DIGITS, self.linkage, given.rows, thetas, self._way, given.turns, moved)
+    def _drawn(self, numbers, given, moved=None):
+        return draw(DIGITS, self.linkage, numbers.rows, given, self._way, numbers.turns, moved)
 
-    def _moves(self, now, thetas, speeds, side):
-        """Yield what is drawn when one thing is moved: numbers, angles, joints, velocities."""
-        for given in self._sides(side):
-            yield given, thetas, {}, {}
-        for i, theta in enumerate(thetas):
-            if theta:
-                step = side * half_ulp(min(abs(float(theta)), math.pi))
-                yield (self._nominal, [*thetas[:i], theta + step, *thetas[i + 1:]], {}, {})
+    def _moves(self, now, given, speeds, side):
+        """Yield what is drawn when one thing is moved: numbers, inputs, joints, velocities."""
+        for numbers in self._sides(side):
+            yield numbers, given, {}, {}
+        for i, value in enumerate(given):
+            if value:
+                size = min(abs(value), math.pi) if self.linkage.inputs[i].turns else value
+                yield (self._nominal, [*given[:i], value + side * half_ulp(size), *given[i + 1:]],
+                       {}, {})
+        rows = self._nominal.rows
+        for i, slack in self.linkage.geared(rows, given):
+            moved = [*rows[:i], (*rows[i][:-1], rows[i][-1] + side * slack), *rows[i + 1:]]
+            yield self._nominal._replace(rows=moved), given, {}, {}
         hung = [name for name in self.linkage.placed if name not in self._pinned]
         for moved in self._displaced(now.points, hung, side):
-            yield self._nominal, thetas, moved, {}
-        for crank, speed in enumerate(speeds):
+            yield self._nominal, given, moved, {}
+        for by, speed in enumerate(speeds):
             for moved in self._displaced(speed, hung, side):
-                yield (self._nominal, thetas, {},
-                       {(name, crank): step for name, step in moved.items()})
+                yield (self._nominal, given, {},
+                       {(name, by): step for name, step in moved.items()})
 
     def _displaced(self, places, names, side):
         """Yield joints, each with what half an ulp adds to its x or y."""
@@ -209,42 +231,36 @@ class Measure:
         return max(abs(part) for each in (name, *self._lines[name].joints)
                    for part in (places[each].real, places[each].imag))
 
-    def _speeds(self, thetas):
-        """Return the velocities of the joints by each crank."""
+    def _speeds(self, given):
+        """Return the velocities of the joints by each input."""
         found = []
-        for crank in range(len(thetas)):
-            before, after = (self._drawn(self._nominal, self._turned(thetas, crank, step)).points
+        for by, unit in enumerate(self._units):
+            before, after = (self._drawn(self._nominal, _stepped(given, by, step * unit)).points
                              for step in (-STEP, STEP))
-            found.append({name: (after[name] - before[name]) / (2 * STEP) for name in after})
+            found.append({name: (after[name] - before[name]) / (2 * STEP * unit)
+                          for name in after})
         return found
 
-    def _turned(self, thetas, crank, step):
-        return [theta + step if i == crank else theta for i, theta in enumerate(thetas)]
-
-    def _values(self, drawn, given, thetas, moved, moving, rates):
+    def _values(self, drawn, numbers, given, moved, moving, rates):
         values = self._poses(drawn)
-        for crank in range(len(thetas) if rates else 0):
+        for by, unit in enumerate(self._units if rates else []):
             before, after = (self._poses(self._drawn(
-                given, self._turned(thetas, crank, step),
-                {**moved, **{name: velocity * step for (name, by), velocity in moving.items()
-                             if by == crank}})) for step in (-STEP, STEP))
-            values += [_difference(out, x, y) / (2 * STEP)
+                numbers, _stepped(given, by, step),
+                {**moved, **{name: velocity * step for (name, each), velocity in moving.items()
+                             if each == by}})) for step in (-STEP * unit, STEP * unit))
+            values += [_difference(out, x, y) / (2 * STEP * unit)
                        for out, x, y in zip(self.poses, before, after)]
         return values
 
     def _poses(self, drawn):
-        points, found = drawn.points, []
+        found = []
         for out in self.poses:
             if out.what == 'point':
-                found.append(points[out.name])
+                found.append(drawn.points[out.name])
             elif out.what == 'slide':
-                found.append(drawn.slides[out.parts[0]])
+                found.append(drawn.slides[out.parts[0][0]])
             else:
-                *ends, quarters = out.parts
-                bar = points[ends[1]] - points[ends[0]]
-                if len(ends) > 2:
-                    bar *= (points[ends[3]] - points[ends[2]]).conjugate()
-                found.append(bar * mpc(0, -1) ** quarters)
+                found.append(turned_bar(out, drawn) * mpc(0, -1) ** out.quarters)
         return found
 
     def _distance(self, i, old, new):
@@ -259,9 +275,8 @@ class Measure:
         At a limit that is reached it is 'either', and on an arm whose direction is all rounding
         'maybe' a number, which then is to be right.
         """
-        joints = [part for part in output.parts if isinstance(part, str)]
-        needs = {states[name] for joint in joints for name in self.linkage.closures[joint]
-                 if name in states}
+        needs = {states[name] for joint in output.needs
+                 for name in self.linkage.closures[joint] if name in states}
         if needs <= {'meets'}:
             return 'number'
         if 'fails' in needs:
@@ -285,6 +300,18 @@ class Truth(NamedTuple):
     slack: dict
 
 
+def turned_bar(output, drawn):
+    """Return the bar of an angle, turned back by the bar from which that is counted."""
+    bars = [drawn.lines[bar[0]] if len(bar) == 1 else drawn.points[bar[1]] - drawn.points[bar[0]]
+            for bar in output.parts]
+    return bars[0] * bars[1].conjugate() if bars[1:] else bars[0]
+
+
+def _stepped(given, by, step):
+    """Return values of the inputs, one of them a step further on."""
+    return [value + step if i == by else value for i, value in enumerate(given)]
+
+
 def _state(gap, slack):
     if abs(gap) <= GRAZE * slack:
         return 'grazes' if gap >= 0 else 'slips'
@@ -303,42 +330,42 @@ def _difference(out, before, after):
 
 
 @precisely
-def judge(measure, thetas, found, rates=False, exact=None):
-    """Return the `Row` of each output at crank angles, shape (n, cranks)."""
+def judge(measure, given, found, rates=False, exact=None):
+    """Return the `Row` of each output at values of the inputs, shape (n, inputs)."""
     rows = []
-    for index, row in enumerate(thetas):
+    for index, row in enumerate(given):
         truth = exact[index] if exact else measure.at(row, rates)
         outs = list(measure.poses)
-        for crank in range(len(row) if rates else 0):
-            outs += [out._replace(crank=crank) for out in measure.poses]
+        for by in range(len(row) if rates else 0):
+            outs += [out._replace(by=by) for out in measure.poses]
         for i, out in enumerate(outs):
             rows.append(_row(out, row, found[out][index], truth.values[i],
                              truth.sensitivity[i], measure.due(out, truth.states)))
     return rows
 
 
-def _row(out, thetas, result, value, spread, due):
-    error, ratio, problem, rate = math.nan, 0.0, '', out.crank is not None
-    if np.any(np.isnan(result)) or (rate and due != 'number' and np.any(np.isinf(result))):
+def _row(out, given, result, value, spread, due):
+    error, ratio, problem, rate = math.nan, 0.0, '', out.by is not None
+    if np.all(np.isnan(result)) or (rate and due != 'number' and np.any(np.isinf(result))):
         problem = 'NaN' if due == 'number' else ''
-    elif due == 'nan':
+    elif due == 'nan' or due == 'number' and np.any(np.isnan(result)):
         problem = 'missed NaN'
     elif due in ('number', 'maybe') or due == 'either' and not rate:
         error = float(_error(out, result, value))
         ulp = np.spacing(math.pi if out.what == 'angle' and not rate else np.max(np.abs(result)))
-        excess = max(0.0, error - float(ulp))
+        excess = max(0.0, error - float(ulp) * (RATE_RULE if rate else 1.0))
         # What the differencing leaves of a rate of zero is no error.
         still = rate and not spread and not np.any(result)
         ratio = 0.0 if not excess or still else excess / spread if spread else math.inf
         problem = 'rule' if not ratio <= (RATE_RULE if rate else RULE) else ''
-    return Row(out, tuple(map(float, thetas)), problem, math.inf if 'NaN' in problem else ratio,
+    return Row(out, tuple(map(float, given)), problem, math.inf if 'NaN' in problem else ratio,
                error, spread, result, value)
 
 
 def _error(out, result, value):
     if np.ndim(result):
         return abs(mpc(*map(float, result)) - value)
-    if out.what == 'angle' and out.crank is None:
+    if out.what == 'angle' and out.by is None:
         return abs(DIGITS.direction(value * DIGITS.turned(-mpfr(float(result)))))
     return abs(mpfr(float(result)) - value)
 

@@ -20,8 +20,10 @@ from . import drawing_accuracy, random_linkages
 from .drawing import draw, FLOATS, Linkage
 
 TURN = 2 * math.pi
-# Arcs below this width [rad] are the rounding of an angle or two.
+# Arcs below this width, of an input about as large as an angle, are the rounding of one or two.
 NARROWEST = 1e-12
+# An arm that is shorter than this part of the longest length has no direction to speak of.
+SHORTEST = 1e-7
 # Seconds that a question about the inverse may take: the first of its output, and any further.
 FIRST, FURTHER = 1.0, 0.05
 
@@ -34,30 +36,48 @@ class Problem(NamedTuple):
 
 
 class Subject:
-    """A mechanism and its drawing, further cranks held at an angle each."""
+    """
+    A mechanism and its drawing, further inputs held at a value each.
+
+    `values` are those of the first input at which brute force looks, `scale` is about how large
+    they are: 1 for an angle.
+    """
 
     def __init__(self, design, rng, samples=4000):
         self.design, self.rng = design, rng
         self.mechanism = mechanisms.create('custom', joints=design.joints,
                                            branches=design.branches, **design.dimensions)
         self.linkage = Linkage(design.joints, design.dimensions, design.branches)
-        self.cranks = len(self.mechanism.inputs)
-        self.held = tuple(float(x) for x in rng.uniform(-3.0, 3.0, self.cranks - 1))
+        self.inputs = self.mechanism.inputs
+        self.turns = self.inputs[0].turns
+        self.held = tuple(float(rng.uniform(-3.0, 3.0) if input_.turns
+                                else rng.uniform(input_.low, input_.high))
+                          for input_ in self.inputs[1:])
         self.poses = drawing_accuracy.outputs(self.linkage, self.mechanism.links)
-        self.theta = np.linspace(-math.pi, math.pi, 2 * samples + 1)[1::2]
+        self.values, self.scale = self._searched(samples)
         self.ways = sorted(self.linkage.passings(), key=self._misfit)
+
+    def _searched(self, samples):
+        middles = np.linspace(-1.0, 1.0, 2 * samples + 1)[1::2]
+        if self.turns:
+            return math.pi * middles, 1.0
+        low, high = self.inputs[0].low, self.inputs[0].high
+        if self.linkage.inputs[0].word == 'cylinder':
+            middles = 1.05 * middles  # beyond its stroke it must not be assembled
+        return (0.5 * low + 0.5 * high + (0.5 * high - 0.5 * low) * middles,
+                max(abs(low), abs(high)) / math.pi)
 
     def __str__(self):
         held = f' others={self.held}' if self.held else ''
         return f'{self.design}{held}'
 
-    def fitted(self, thetas, rates=False):
+    def fitted(self, given, rates=False):
         """Measure all answers, on the way past the change points that fits them best."""
-        found = drawing_accuracy.answers(self.mechanism, thetas, self.poses, rates)
+        found = drawing_accuracy.answers(self.mechanism, given, self.poses, rates)
         best = None
         for way in self.ways:
             measure = drawing_accuracy.Measure(self.linkage, self.poses, way)
-            rows = drawing_accuracy.judge(measure, thetas, found, rates)
+            rows = drawing_accuracy.judge(measure, given, found, rates)
             count = sum(bool(row.problem) for row in rows)
             if best is None or count < best[0]:
                 best = count, rows
@@ -66,36 +86,51 @@ class Subject:
         return best[1]
 
     def _misfit(self, way):
-        """Return at how many angles the mechanism does not go this way past its change points."""
-        theta = self.rng.uniform(-math.pi, math.pi, (60, self.cranks))
-        rows, turns, unit = self.linkage.in_floats(way)
-        with np.errstate(all='ignore'):
-            points = draw(FLOATS, self.linkage, rows, list(theta.T), way, turns).points
-        found, count = self.mechanism.solve(_given(theta, (60,))), 0
+        """Return at how many values the mechanism does not go this way past its change points."""
+        given = np.column_stack([self.rng.uniform(-TURN, TURN, 60) if input_.turns else
+                                 self.rng.uniform(input_.low, input_.high, 60)
+                                 for input_ in self.inputs])
+        drawing, unit = self._drawn(list(given.T), way)
+        found, count = self.mechanism.solve(_given(given, (60,))), 0
         for name, place in found.items():
-            count += np.sum(np.abs(place @ (1, 1j) / unit - points[name]) > 1e-6)
+            count += np.sum(np.abs(place @ (1, 1j) / unit - drawing.points[name]) > 1e-6)
         return count
 
     @property
-    def two_turns(self):
-        """Whether the linkage is the same again only after two turns."""
-        return any(passing.stretched != passing.folded
-                   for way in self.ways for passing in way.values())
+    def periodic(self):
+        """Whether the joints are where they were, a turn later, but for a few rounded places."""
+        now, later = (self.drawn(self.values[::40] + turn)[0].points for turn in (0.0, TURN))
+        return self.turns and all(np.mean(np.abs(place - later[name]) > 1e-6) < 0.1
+                                  for name, place in now.items())
 
-    def drawn(self, theta):
-        """Return the drawing in float64 at angles of the first crank, and the unit of length."""
-        rows, turns, unit = self.linkage.in_floats(self.ways[0])
+    def drawn(self, values):
+        """Return the drawing in float64 at values of the first input, and the unit of length."""
+        return self._drawn([np.asarray(values, float), *self.held], self.ways[0])
+
+    def _drawn(self, given, way):
+        rows, turns, unit = self.linkage.in_floats(way)
+        given = [value if input_.turns else value / unit
+                 for value, input_ in zip(given, self.inputs)]
         with np.errstate(all='ignore'):
-            return draw(FLOATS, self.linkage, rows, [np.asarray(theta, float), *self.held],
-                        self.ways[0], turns), unit
+            return draw(FLOATS, self.linkage, rows, given, way, turns), unit
 
     def measure(self):
         """Return the measure in many digits."""
         return drawing_accuracy.Measure(self.linkage, self.poses, self.ways[0])
 
-    def states(self, theta):
-        """Return the states of all closures at an angle of the first crank, in many digits."""
-        return set(self.measure().at([theta, *self.held]).states.values())
+    def states(self, value):
+        """Return the states of all closures at a value of the first input, in many digits."""
+        return set(self.measure().at([value, *self.held]).states.values())
+
+    def without_direction(self, value):
+        """Tell whether something hangs on an arm of no length, at a value of the first input."""
+        arms = self.drawn([value])[0].arms.values()
+        return any(not np.all(arm >= SHORTEST) for arm in arms)
+
+    def away(self, value, others):
+        """Return how far a value of the first input is from the nearest of others."""
+        return min((abs((value - other + math.pi) % TURN - math.pi) if self.turns
+                    else abs(value - other) for other in others), default=math.inf)
 
     def place(self, output, drawing, unit):
         """Return an output of a drawing, in metres or radians."""
@@ -105,19 +140,15 @@ class Subject:
             return unit * (place.real if axis == 'x' else place.imag) * np.ones(1)
         pose = next(pose for pose in self.poses if pose.what != 'point' and pose.name == output)
         if pose.what == 'slide':
-            return unit * drawing.slides[pose.parts[0]] * np.ones(1)
-        *ends, quarters = pose.parts
-        points = drawing.points
-        bar = points[ends[1]] - points[ends[0]]
-        if len(ends) > 2:
-            bar = bar * np.conj(points[ends[3]] - points[ends[2]])
-        return np.angle(bar * (-1j) ** quarters) * np.ones(1)
+            return unit * drawing.slides[pose.parts[0][0]] * np.ones(1)
+        bar = drawing_accuracy.turned_bar(pose, drawing)
+        return np.angle(bar * (-1j) ** pose.quarters) * np.ones(1)
 
     def reachable(self, drawing):
         """Tell for every sample whether all closures are met."""
-        held = np.ones(self.theta.shape, bool)
+        held = np.ones(self.values.shape, bool)
         for gap in drawing.gaps.values():
-            held &= gap * np.ones(self.theta.shape) >= 0.0
+            held &= gap * np.ones(self.values.shape) >= 0.0
         return held
 
 
@@ -152,11 +183,11 @@ def spots(subject):
 
 
 def asked(subject, count):
-    """Return crank angles to ask for; further cranks are held for half of them."""
-    thetas = random_linkages.angles(subject.rng, count, spots(subject), subject.cranks)
+    """Return values of the inputs to ask for; further inputs are held for half of them."""
+    given = random_linkages.given(subject.rng, count, spots(subject), subject.inputs)
     if subject.held:
-        thetas[::2, 1:] = subject.held
-    return thetas
+        given[::2, 1:] = subject.held
+    return given
 
 
 @checked('poses')
@@ -171,12 +202,12 @@ def rates(subject, count=1):
     yield from _broken(subject, asked(subject, count), True)
 
 
-def _broken(subject, thetas, with_rates):
-    rows = subject.fitted(thetas, with_rates)
+def _broken(subject, given, with_rates):
+    rows = subject.fitted(given, with_rates)
     subject.rows = getattr(subject, 'rows', []) + rows
     for row in drawing_accuracy.broken(rows)[:2]:
-        what = f'{row.output.what} {"rate " * (row.output.crank is not None)}{row.problem}'
-        yield what, (f'{row.output} at {row.thetas}: got {row.result}, true is '
+        what = f'{row.output.what} {"rate " * (row.output.by is not None)}{row.problem}'
+        yield what, (f'{row.output} at {row.values}: got {row.result}, true is '
                      f'{complex(row.value)}, ratio {row.ratio:.3g}, error {row.error:.3g}, '
                      f'sensitivity {row.sensitivity:.3g}')
 
@@ -186,16 +217,16 @@ def _broken(subject, thetas, with_rates):
 @checked('forms')
 def forms(subject):
     """Ask for arrays of every shape and in one function what is asked for one pose."""
-    mechanism, theta = subject.mechanism, asked(subject, 6)
-    whole = _all(mechanism, _given(theta, (3, 2)))
+    mechanism, given = subject.mechanism, asked(subject, 6)
+    whole = _all(mechanism, _given(given, (3, 2)))
     for name, value in whole.items():
         if value.shape[:2] != (3, 2):
             yield 'shape', f'{name} has shape {value.shape}'
-    for name, value in _all(mechanism, _given(theta[:0], (0,))).items():
+    for name, value in _all(mechanism, _given(given[:0], (0,))).items():
         if value.shape[:1] != (0,):
-            yield 'shape', f'{name} has shape {value.shape} for no angles'
+            yield 'shape', f'{name} has shape {value.shape} for no values'
     for index in ((0, 0), (2, 1)):
-        row = theta[index[0] * 2 + index[1]]
+        row = given[index[0] * 2 + index[1]]
         for shape, pick in (((), ()), ((1,), 0)):
             for name, value in _all(mechanism, _given(row[None], shape)).items():
                 if not _same(name, value[pick], whole[name][index]):
@@ -204,11 +235,11 @@ def forms(subject):
         joints = mechanism.joints
         wanted = [*(part for name in mechanism.points for part in whole[f'solve {name}'][index]),
                   *(whole[f'joint_angles {name}'][index] for name in joints),
-                  *(whole[f'joint_rates {name} {crank}'][index]
-                    for crank in range(subject.cranks) for name in joints)]
+                  *(whole[f'joint_rates {name} {by}'][index]
+                    for by in range(len(subject.inputs)) for name in joints)]
         names = [*(f'solve {name}' for name in mechanism.points for _ in 'xy'),
                  *(f'joint_angles {name}' for name in joints),
-                 *(f'joint_rates {name}' for _ in range(subject.cranks) for name in joints)]
+                 *(f'joint_rates {name}' for _ in subject.inputs for name in joints)]
         found = mechanism.function(None, joints, joints)(*map(float, row))
         for name, one, other in zip(names, found, wanted):
             if not _same(name, one, other):
@@ -219,29 +250,29 @@ def forms(subject):
 @checked('accelerated')
 def accelerated(subject):
     """Compare machine code with plain code."""
-    theta = _given(asked(subject, 4), (4,))
-    plain, quick = _all(subject.mechanism, theta), _all(subject.mechanism.accelerated(), theta)
+    given = _given(asked(subject, 4), (4,))
+    plain, quick = _all(subject.mechanism, given), _all(subject.mechanism.accelerated(), given)
     for name, value in plain.items():
         if not _same(name, quick[name], value):
             yield 'accelerated() differs', f'{name} is {quick[name]}, not {value}'
 
 
-def _given(thetas, shape):
-    """Return crank angles, shape (n, cranks), as a mechanism takes them."""
-    columns = [column.reshape(shape)[()] for column in thetas.T]
+def _given(given, shape):
+    """Return values of inputs, shape (n, inputs), as a mechanism takes them."""
+    columns = [column.reshape(shape)[()] for column in given.T]
     columns = [float(column) if shape == () else column for column in columns]
     return columns[0] if len(columns) == 1 else columns
 
 
-def _all(mechanism, theta):
+def _all(mechanism, given):
     found = {}
     for ask in ('solve', 'joint_angles', 'transmission_angles'):
-        answers = getattr(mechanism, ask)(theta)
+        answers = getattr(mechanism, ask)(given)
         found.update((f'{ask} {name}', np.asarray(value)) for name, value in answers.items())
-    for crank in range(len(mechanism.inputs)):
+    for by in range(len(mechanism.inputs)):
         for ask in ('velocity', 'joint_rates'):
-            answers = getattr(mechanism, ask)(theta, by=crank)
-            found.update((f'{ask} {name} {crank}', np.asarray(value))
+            answers = getattr(mechanism, ask)(given, by=by)
+            found.update((f'{ask} {name} {by}', np.asarray(value))
                          for name, value in answers.items())
     return found
 
@@ -263,38 +294,38 @@ def _same(name, one, other):
 def reach(subject):
     """Compare the reach with brute force; its ends and what lies on it must have a pose."""
     arcs = subject.mechanism.reach(*subject.held)
-    drawing, _ = subject.drawn(subject.theta)
+    drawing, _ = subject.drawn(subject.values)
     held = subject.reachable(drawing)
-    inside = _inside(arcs, subject.theta)
-    if subject.two_turns:
-        past = _inside(arcs, subject.theta + TURN) & ~_inside(arcs, subject.theta, 0.0)
-        inside, held = inside & ~past, held & ~past
+    inside = _inside(arcs, subject.values, TURN if subject.periodic else 0.0)
     for i in _some(np.flatnonzero(held != inside)):
-        theta = float(subject.theta[i])
-        states = subject.states(theta)
+        value = float(subject.values[i])
+        states = subject.states(value)
         if held[i] and states <= {'meets', 'undirected'}:
-            yield 'reach misses', f'{theta!r} can be assembled, reach {arcs}'
+            yield 'reach misses', f'{value!r} can be assembled, reach {arcs}'
         if inside[i] and 'fails' in states and 'slips' not in states:
-            yield 'reach too far', f'{theta!r} cannot be assembled, reach {arcs}'
+            yield 'reach too far', f'{value!r} cannot be assembled, reach {arcs}'
     for lo, hi in arcs:
-        if not -math.pi <= lo < math.pi or not lo < hi <= lo + TURN:
+        first = subject.inputs[0]
+        if not first.low <= lo < first.high or not lo < hi <= (
+                lo + TURN if subject.turns else first.high):
             yield 'reach arcs', f'{arcs}'
-        for theta in (lo, hi, *subject.rng.uniform(lo, hi, 3)):
+        for value in (lo, hi, *subject.rng.uniform(lo, hi, 3)):
             missing = [name for name, place in subject.mechanism.solve(
-                _with(subject, float(theta))).items() if np.any(np.isnan(place))]
-            if missing and hi - lo > NARROWEST:
-                where = 'end' if theta in (lo, hi) else 'inside'
-                yield f'reach {where} is NaN', f'{missing} at {float(theta)!r}, reach {arcs}'
+                _with(subject, float(value))).items() if np.any(np.isnan(place))]
+            if missing and hi - lo > NARROWEST * subject.scale \
+                    and not subject.without_direction(float(value)):
+                where = 'end' if value in (lo, hi) else 'inside'
+                yield f'reach {where} is NaN', f'{missing} at {float(value)!r}, reach {arcs}'
 
 
-def _with(subject, theta):
-    return [theta, *subject.held] if subject.held else theta
+def _with(subject, value):
+    return [value, *subject.held] if subject.held else value
 
 
-def _inside(arcs, theta, turns=TURN):
-    held = np.zeros(np.shape(theta), bool)
+def _inside(arcs, values, turn):
+    held = np.zeros(np.shape(values), bool)
     for lo, hi in arcs:
-        away = np.mod(theta - lo, turns) if turns else theta - lo
+        away = np.mod(values - lo, turn) if turn else values - lo
         held |= (away >= 0.0) & (away <= hi - lo)
     return held
 
@@ -310,27 +341,24 @@ def dead_points(subject):
     """Compare the dead points with where closures vanish; transmission angles lie in [0, pi]."""
     mechanism = subject.mechanism
     dead = mechanism.dead_points(*subject.held)
-    if dead != sorted(dead) or not all(-math.pi <= theta < math.pi for theta in dead):
+    low, high = subject.inputs[0].low, subject.inputs[0].high
+    if dead != sorted(dead) or not all(low <= value < high or not subject.turns
+                                       and value == high for value in dead):
         yield 'dead points out of order', f'{dead}'
-    if any(theta != 0.0 and abs(theta) < 1e-300 for theta in dead):
+    if any(value != 0.0 and abs(value) < 1e-300 * subject.scale for value in dead):
         yield 'dead point not quite zero', f'{dead}'
-    for theta in dead:
-        if not _is_dead(subject, theta):
-            yield 'dead point false', f'{theta!r} of {dead}'
-    for theta in _vanishing(subject):
-        if _away(theta, dead) > 1e-5:
-            yield 'dead point missed', f'{theta!r} is not in {dead}'
-    away = mechanism.distance_to_dead_point(subject.theta[::400], *subject.held)
-    true = np.min([np.full(away.shape, np.inf), *(
-        abs(np.mod(subject.theta[::400] - theta + math.pi, TURN) - math.pi) for theta in dead)],
-        axis=0)
-    if not np.allclose(away, true, atol=1e-9):
+    for value in dead:
+        if not _is_dead(subject, value) and not subject.without_direction(value):
+            yield 'dead point false', f'{value!r} of {dead}'
+    for value in _vanishing(subject):
+        if subject.away(value, dead) > 1e-5 * subject.scale \
+                and not subject.without_direction(value):
+            yield 'dead point missed', f'{value!r} is not in {dead}'
+    values = subject.values[::400]
+    away = mechanism.distance_to_dead_point(values, *subject.held)
+    true = [subject.away(value, dead) for value in values]
+    if not np.allclose(away, true, atol=1e-9 * subject.scale):
         yield 'distance to dead point', f'{away} is not {true}'
-
-
-def _away(theta, others):
-    return min((abs((theta - other + math.pi) % TURN - math.pi) for other in others),
-               default=math.inf)
 
 
 def _closures(drawing, size):
@@ -339,37 +367,37 @@ def _closures(drawing, size):
                      for value in (*drawing.gaps.values(), *drawing.folds.values())])
 
 
-def _is_dead(subject, theta):
-    """Tell whether a closure vanishes within 1e-6 rad of an angle."""
-    steps = np.array([-1e-6, -1e-9, 0.0, 1e-9, 1e-6])
-    values = np.abs(_closures(subject.drawn(theta + steps)[0], steps.shape))
+def _is_dead(subject, value):
+    """Tell whether a closure vanishes within 1e-6 of a value."""
+    steps = subject.scale * np.array([-1e-6, -1e-9, 0.0, 1e-9, 1e-6])
+    values = np.abs(_closures(subject.drawn(value + steps)[0], steps.shape))
     return any(np.min(row) <= max(2e-3 * np.max(row), 1e-10) for row in values)
 
 
 def _vanishing(subject):
-    """Return the angles on the reach where a closure changes its sign or touches zero."""
-    drawing, _ = subject.drawn(subject.theta)
-    held, theta = subject.reachable(drawing), subject.theta
+    """Return the values on the reach where a closure changes its sign or touches zero."""
+    drawing, _ = subject.drawn(subject.values)
+    held, values = subject.reachable(drawing), subject.values
     found = []
-    for k, row in enumerate(_closures(drawing, theta.shape)):
+    for k, row in enumerate(_closures(drawing, values.shape)):
         if not np.all(np.isfinite(row)) or np.max(np.abs(row)) < 1e-12:
             continue
         changes = np.flatnonzero((row[:-1] < 0.0) != (row[1:] < 0.0))
         for i in changes[held[changes] | held[changes + 1]][:20]:
-            found.append(_crossing(subject, k, theta[i], theta[i + 1]))
+            found.append(_crossing(subject, k, values[i], values[i + 1]))
         if k >= len(drawing.gaps):
             continue  # a fold that only touches zero is no more than a doubt
         inner = np.abs(row[1:-1])
         dips = np.flatnonzero((inner <= np.abs(row[:-2])) & (inner <= np.abs(row[2:]))
                               & (inner < 1e-4) & held[1:-1]) + 1
         for i in dips[:20]:
-            found.append(_touching(subject, k, theta[i - 1], theta[i + 1]))
+            found.append(_touching(subject, k, values[i - 1], values[i + 1]))
     return [each for each in found if each is not None and _on_reach(subject, each)]
 
 
-def _closure(subject, k, theta):
-    theta = np.atleast_1d(theta)
-    return _closures(subject.drawn(theta)[0], theta.shape)[k]
+def _closure(subject, k, values):
+    values = np.atleast_1d(values)
+    return _closures(subject.drawn(values)[0], values.shape)[k]
 
 
 def _crossing(subject, k, lo, hi):
@@ -399,9 +427,9 @@ def _touching(subject, k, lo, hi):
     return float(middle) if abs(truth.gaps[name]) <= truth.slack[name] else None
 
 
-def _on_reach(subject, theta):
-    """Tell whether an angle is on the reach, by more than a graze of its other closures."""
-    beside = subject.drawn(np.array([theta - 1e-6, theta + 1e-6]))[0]
+def _on_reach(subject, value):
+    """Tell whether a value is on the reach, by more than a graze of its other closures."""
+    beside = subject.drawn(value + 1e-6 * subject.scale * np.array([-1.0, 1.0]))[0]
     gaps = [value * np.ones(2) for value in beside.gaps.values()]
     return not gaps or bool(np.any(np.min(gaps, axis=0) > 0.0))
 
@@ -410,9 +438,9 @@ def _on_reach(subject, theta):
 
 @checked('inverse')
 def inverse(subject, count=2):
-    """Ask which crank angles give values that outputs have."""
+    """Ask which values of the first input give values that outputs have."""
     mechanism, rng = subject.mechanism, subject.rng
-    drawing, unit = subject.drawn(subject.theta)
+    drawing, unit = subject.drawn(subject.values)
     held = subject.reachable(drawing)
     moving = [name for name in mechanism.points if name not in subject.linkage.fixed]
     outputs = [*(f'{name}.{axis}' for name in moving for axis in 'xy'), *mechanism.joints]
@@ -427,7 +455,7 @@ def _asked_back(subject, output, drawing, unit, held):
     turns = '.' not in output and not any(
         pose.what == 'slide' and pose.name == output for pose in subject.poses)
     scale = 1.0 if turns else unit
-    value = subject.place(output, drawing, unit) * np.ones(subject.theta.shape)
+    value = subject.place(output, drawing, unit) * np.ones(subject.values.shape)
     good = held & np.isfinite(value)
     wanted, spread = [0.1 * scale], 0.0
     if good.any():
@@ -461,7 +489,8 @@ def _asked_back(subject, output, drawing, unit, held):
         if len(answers) > 40:
             yield 'inverse too many', f'{output} = {target!r}: {len(answers)} answers'
         yield from _false(subject, output, target, answers, turns, scale)
-        yield from _lost(subject, output, target, answers, turns, scale, value, good)
+        if not any(map(subject.without_direction, answers.tolist())):
+            yield from _lost(subject, output, target, answers, turns, scale, value, good)
 
 
 def _gap(value, target, turns):
@@ -472,7 +501,8 @@ def _gap(value, target, turns):
 def _false(subject, output, target, answers, turns, scale):
     """Yield answers that do not give the value back."""
     for answer in answers[:10]:
-        steps = float(answer) + np.multiply.outer([-1.0, 1.0], [0.0, 5e-16, 1e-14, 1e-12, 1e-9])
+        steps = float(answer) + subject.scale * np.multiply.outer(
+            [-1.0, 1.0], [0.0, 5e-16, 1e-14, 1e-12, 1e-9])
         drawing, unit = subject.drawn(steps.ravel())
         gap = np.abs(_gap(subject.place(output, drawing, unit) * np.ones(steps.size), target,
                           turns))
@@ -488,7 +518,7 @@ def _lost(subject, output, target, answers, turns, scale, value, good):
     change = (gap[:-1] < 0.0) != (gap[1:] < 0.0)
     change &= good[:-1] & good[1:] & (np.abs(np.diff(gap)) < 0.2 * scale)
     for i in np.flatnonzero(change)[:20]:
-        lo, hi = subject.theta[i], subject.theta[i + 1]
+        lo, hi = subject.values[i], subject.values[i + 1]
         below = gap[i] < 0.0
         for _ in range(12):
             grid = np.linspace(lo, hi, 17)
@@ -498,7 +528,7 @@ def _lost(subject, output, target, answers, turns, scale, value, good):
             lo, hi = grid[at - 1], grid[at]
         if not abs(row[at]) < 1e-7 * scale:
             continue  # a jump
-        if _away(hi, answers) > 1e-5 + 1e3 * abs(row[at]) / scale:
+        if subject.away(hi, answers) > subject.scale * (1e-5 + 1e3 * abs(row[at]) / scale):
             slope = abs(value[i + 1] - value[i]) / scale
             # It may have crossed in a narrow gap of the reach.
             if slope > 1e-9 and not {'fails', 'slips'} & subject.states(float(hi)):

@@ -7,7 +7,8 @@ Random linkages of every word of the language, a third of them nearly degenerate
 A linkage is drawn joint by joint from a pose that it has: a joint is put somewhere, and the
 lengths that are written are the distances found there. So nearly all can be assembled at some
 angle. What is degenerate is made on purpose: equal bars by one name or one number, change points,
-kites over arms of no length, pins that pass the pivot, offsets of zero, flat triangles, guides.
+kites over arms of no length, pins that pass the pivot, offsets of zero, flat triangles, guides,
+cylinders that can be as short as nothing. Gears come with ratios of one, whole and broken ones.
 """
 
 import cmath
@@ -17,13 +18,17 @@ from typing import NamedTuple
 import numpy as np
 
 DEGENERATE = 0.35
+RIGHT_ANGLES = 0.0, math.pi, -math.pi, math.pi / 2, -math.pi / 2
 # How far from exactly degenerate.
 NEAR = (0.0, 0.0, 0.0, 1e-16, 1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9)
 # The words, and how often they come up.
 WORDS = {
-    'dyad': 6, 'rigid': 2, 'line': 2, 'mirror': 2, 'parallelogram': 1, 'inversor': 1, 'slot': 2,
-    'slider': 2,
+    'dyad': 6, 'rigid': 2, 'line': 2, 'mirror': 2, 'parallelogram': 1, 'antiparallelogram': 1,
+    'inversor': 1, 'slot': 2, 'slider': 3, 'block': 2, 'geared': 2,
 }
+# What adds an input or is geared to one, and how often.
+INPUTS = {'crank': 3, 'cylinder': 1, 'carriage': 1}
+RATIOS = (1.0, -1.0, -2.0, 2.0, 0.5, -0.5, 1.618, -math.sqrt(2.0))
 
 
 class Design(NamedTuple):
@@ -45,11 +50,12 @@ def design(rng):
     return _Writer(rng).written()
 
 
-def angles(rng, count, spots=(), cranks=1):
-    """Return crank angles, (count, cranks): uniform, at spots, near them, after many turns."""
-    spots = [0.0, math.pi, -math.pi, math.pi / 2, -math.pi / 2, *spots]
-    return np.array([[_angle(rng, spots if crank == 0 else spots[:5]) for crank in range(cranks)]
-                     for _ in range(count)])
+def given(rng, count, spots, inputs):
+    """Return values of inputs, (count, inputs); `spots` of the first are asked for more often."""
+    spots = [spots, *([] for _ in inputs[1:])]
+    return np.array([[_angle(rng, [*RIGHT_ANGLES, *near]) if input_.turns
+                      else _length(rng, input_, [input_.low, input_.high, *near])
+                      for input_, near in zip(inputs, spots)] for _ in range(count)])
 
 
 def _angle(rng, spots):
@@ -64,6 +70,15 @@ def _angle(rng, spots):
     return rng.uniform(-math.pi, math.pi) + 2 * math.pi * rng.choice((1, -3, 1e3, 1e6, 1e9, -1e9))
 
 
+def _length(rng, input_, spots):
+    """Return a length inside the stroke, or at, next to and a little beyond a spot."""
+    if rng.random() < 0.5:
+        return rng.uniform(input_.low, input_.high)
+    spot, size = spots[rng.integers(len(spots))], max(abs(input_.low), abs(input_.high))
+    return spot + rng.choice((-1.0, 1.0)) * rng.choice((
+        0.0, np.spacing(abs(spot) or size), size * 10.0 ** rng.integers(-15, 0)))
+
+
 def _log_uniform(rng, low, high):
     return math.exp(rng.uniform(math.log(low), math.log(high)))
 
@@ -75,9 +90,9 @@ class _Writer:
         self._rng = rng
         self._lines, self._dimensions = [], {}
         self._names = iter('ABCDEFGHJKLMNPQRSTUVWXYZ')
-        self._place, self._kind, self._crank_of = {}, {}, {}
+        self._place, self._kind = {}, {}
         self._bodies, self._texts = [], {}
-        self._arms = []
+        self._arms, self._along, self._inputs = [], {}, {}
         self._degenerate = rng.random() < DEGENERATE
         self._literal = rng.choice((0.0, 0.0, 0.3, 1.0))
         self._size = 1.0
@@ -90,25 +105,25 @@ class _Writer:
         """Return the `Design`."""
         rng = self._rng
         self._ground()
-        cranks = int(rng.choice((1, 1, 1, 1, 2, 3)))
-        for _ in range(int(rng.integers(1, 3)) + cranks - 1):
+        inputs = int(rng.choice((1, 1, 1, 1, 2, 3)))
+        for _ in range(int(rng.integers(1, 3)) + inputs - 1):
             self._ground()
         if self._degenerate and rng.random() < 0.5:
             self._special_start()
-        else:
-            self._crank()
-        while sum(line.split()[1] == 'crank' for line in self._lines) < cranks:
-            self._crank()
+        while len(self._inputs) < inputs:
+            self._driven()
+        if not self._bodies:
+            self._dyad()
         moving = int(rng.integers(2, 10))
         for _ in range(10 * moving):
-            if len(self._place) - len(self._fixed) >= moving + cranks:
+            if len(self._place) - len(self._fixed) >= moving + inputs:
                 break
             word = rng.choice(list(WORDS), p=np.array(list(WORDS.values())) / sum(WORDS.values()))
             getattr(self, f'_{word}')()
         branches = {}
         for line in self._lines:
             parts = line.split()
-            if parts[1] in ('dyad', 'slot', 'slider') and rng.random() < 0.1:
+            if parts[1] in ('dyad', 'cylinder', 'slot', 'slider') and rng.random() < 0.1:
                 branches[parts[0]] = int(rng.choice((-1, 1)))
         return Design(tuple(self._lines), self._dimensions, branches)
 
@@ -120,7 +135,8 @@ class _Writer:
 
     @property
     def _pins(self):
-        return [name for name, kind in self._kind.items() if kind == 'crank']
+        """The pins of cranks on the ground, or of whatever moves if there are none."""
+        return [name for name, kind in self._kind.items() if kind == 'crank'] or self._moving
 
     @property
     def _moving(self):
@@ -189,7 +205,7 @@ class _Writer:
             pair = pair if rng.random() < 0.5 else pair[::-1]
         else:
             pair = tuple(map(str, rng.choice(names, 2, replace=False)))
-        if not any(name in self._moving for name in pair):
+        if not any(name in self._moving for name in pair) or pair[0] == pair[1]:
             return self._two()
         self._arms.append(pair)
         return pair
@@ -218,18 +234,143 @@ class _Writer:
             return -self._worth(text[1:])
         return 0.0 if text == '0' else self._texts[text]
 
-    def _turn_crank(self, name, centre, length, text, up):
+    def _driven(self, geared=False):
+        """Add an input, or what is geared to one."""
+        word = str(self._rng.choice(list(INPUTS), p=np.array(list(INPUTS.values())) / sum(
+            INPUTS.values())))
+        getattr(self, f'_{word}')(geared)
+
+    def _geared(self):
+        self._driven(True)
+
+    def _gear(self, word, value, geared):
+        """Return what a line says of its gear, and note the value of the input there would be."""
+        rng, turns = self._rng, word == 'crank'
+        others = [name for name, (kind, _) in self._inputs.items() if (kind == 'crank') == turns]
+        before = sum(kind == word for kind, _ in self._inputs.values())
+        self._inputs[f'{word}{before + 1}' if before else word] = word, value
+        if not geared or not others:
+            return ''
+        other = self._pick(others)
+        ratio = float(rng.choice(RATIOS))
+        offset = value - ratio * self._inputs[other][1]
+        if turns:
+            return f' geared {other} {ratio!r} {math.remainder(offset, math.tau)!r}'
+        return f' geared {other} {ratio!r} {self._number(offset, False)}'
+
+    def _geared_to_any(self, word, geared):
+        """Tell whether a line can be geared, where it is to be."""
+        return not geared or any((kind == 'crank') == (word == 'crank')
+                                 for kind, _ in self._inputs.values())
+
+    def _turn_crank(self, name, centre, length, text, more='', turn=0.0, geared=False):
         angle = self._rng.uniform(-math.pi, math.pi)
-        self._lines.append(f'{name} crank {centre} {text}' + (' up' if up else ''))
-        self._put(name, self._place[centre] + length * cmath.exp(1j * angle), 'crank')
-        self._crank_of[name] = centre
+        gear = self._gear('crank', angle, geared)
+        self._lines.append(f'{name} crank {centre} {text}{more}{gear}')
+        on_ground = not more.startswith(' zero') or more.split()[1] in self._fixed
+        self._put(name, self._place[centre] + length * cmath.exp(1j * (angle + turn)),
+                  'crank' if on_ground else 'crank of a link')
         self._body(centre, name)
 
-    def _crank(self):
-        length = _log_uniform(self._rng, 0.2, 2.0)
+    def _crank(self, geared=False):
+        rng = self._rng
+        if not self._geared_to_any('crank', geared):
+            return
+        length = _log_uniform(rng, 0.2, 2.0)
         text = self._number(length)
-        self._turn_crank(self._name(), self._pick(self._fixed), self._texts[text], text,
-                         self._rng.random() < 0.25)
+        length = self._texts[text]
+        if rng.random() < (0.6 if geared or self._bodies else 0.1):
+            centre, zero = self._guide()
+            if centre:
+                away = self._place[zero] - self._place[centre]
+                self._turn_crank(self._name(), centre, length, text, f' zero {zero}',
+                                 cmath.phase(away), geared)
+                return
+        up = rng.random() < 0.25
+        self._turn_crank(self._name(), self._pick(self._fixed), length, text, ' up' * up,
+                         math.pi / 2 * up, geared)
+
+    def _guide(self):
+        """Return two joints of one link or of the ground that are apart, or none."""
+        bodies = [body for body in (*self._bodies, self._fixed) if len(body) > 1]
+        body = bodies[self._rng.integers(len(bodies))]
+        pair = tuple(map(str, self._rng.choice(body, 2, replace=False)))
+        return pair if self._distance(*pair) > 1e-3 else (None, None)
+
+    def _cylinder(self, geared=False):
+        rng = self._rng
+        if not self._geared_to_any('cylinder', geared):
+            return
+        base, pivot = self._guide() if rng.random() < 0.4 else self._any_two()
+        if not base:
+            return
+        p, o = self._place[base], self._place[pivot]
+        place = self._somewhere((p + o) / 2)
+        if self._degenerate and rng.random() < 0.5:
+            # As far as the base is from the pivot: the cylinder can be as short as nothing.
+            place = o + (p - o) * cmath.exp(1j * rng.uniform(0.3, 2.8))
+            text = self._text_between(base, pivot)
+            bar = self._nudged(text, self._texts[text]) if text else self._number(abs(place - o))
+        else:
+            bar = self._number(abs(place - o) or 1.0)
+        gear = self._gear('cylinder', abs(place - p), geared)
+        side = 'left' if ((o - p).conjugate() * (place - p)).imag > 0 else 'right'
+        name = self._name()
+        self._lines.append(f'{name} cylinder {base} {pivot} {bar} {side}{gear}')
+        self._put(name, place, 'cylinder')
+        self._slide(name, place - p)
+        self._body(pivot, name)
+
+    def _any_two(self):
+        return map(str, self._rng.choice(list(self._place), 2, replace=False))
+
+    def _text_between(self, *joints):
+        """Return the length that a line writes for a bar between two joints, if one does."""
+        for line in self._lines:
+            name, word, first, text, *_ = line.split()
+            if word == 'crank' and {name, first} == set(joints) and text in self._texts:
+                return text
+        return None
+
+    def _carriage(self, geared=False):
+        rng = self._rng
+        if not self._geared_to_any('carriage', geared):
+            return
+        origin, towards = self._guide()
+        if not origin:
+            return
+        along = self._place[towards] - self._place[origin]
+        value = rng.normal() * abs(along)
+        low, high = sorted((value - abs(rng.normal()), value + abs(rng.normal())))
+        if self._degenerate and rng.random() < 0.3 and low < 0.0 < high:
+            low, high = rng.choice(((low, 0.0), (0.0, high)))
+        ends = [self._number(low, False), self._number(high, False)]
+        gear = self._gear('carriage', value, geared)
+        name = self._name()
+        self._lines.append(f'{name} carriage {origin} along {towards} {" ".join(ends)}{gear}')
+        self._put(name, self._place[origin] + along / abs(along) * value, 'carriage')
+        self._slide(name, along)
+
+    def _slide(self, joint, along):
+        """Note the direction in which a joint slides, the first one that it has."""
+        self._along.setdefault(joint, along / (abs(along) or 1.0))
+
+    def _block(self):
+        if not self._along:
+            return
+        rng, joint = self._rng, self._pick(list(self._along))
+        parts = [self._number(rng.normal(), False) for _ in 'xy']
+        if self._degenerate and rng.random() < 0.5:
+            parts[int(rng.integers(2))] = '0'
+        name = self._name()
+        self._lines.append(f'{name} block {joint} {parts[0]} {parts[1]}')
+        self._put(name, self._place[joint] + self._along[joint] * complex(
+            *map(self._worth, parts)), 'block')
+        for body in self._bodies:
+            if body[0] == joint and self._kind[body[1]] == 'block':
+                body.append(name)
+                return
+        self._body(joint, name)
 
     def _special_start(self):
         """Hang on the first crank what has a change point, or an arm of no length at times."""
@@ -251,18 +392,24 @@ class _Writer:
         self._lines.append(f'{foot} ground {at[0]} {at[1]}')
         step = {'right': g, 'left': -g, 'up': 1j * g, 'down': -1j * g}[where]
         self._put(foot, self._place[centre] + step, 'ground')
-        kind = rng.choice(('isosceles', 'parallelogram', 'sum', 'kite', 'difference'))
+        kind = rng.choice(('isosceles', 'parallelogram', 'sum', 'kite', 'difference', 'crossed'))
         if kind in ('isosceles', 'kite'):
             crank, m = self._nudged(ground, g), g
         else:
             crank = self._number(m)
             m = self._texts[crank]
-        self._turn_crank(pin, centre, m, crank, rng.random() < 0.25)
+        up = rng.random() < 0.25
+        self._turn_crank(pin, centre, m, crank, ' up' * up, math.pi / 2 * up)
         pair = (pin, foot) if rng.random() < 0.5 else (foot, pin)
         side = rng.choice(('left', 'right'))
         name = self._name()
         b = rng.uniform(0.15, 0.85) * (g + m)
-        if kind == 'isosceles':
+        if kind == 'crossed':
+            self._lines.append(f'{name} antiparallelogram {centre} {pair[0]} {pair[1]}')
+            self._put(name, self._somewhere(self._place[pin]), 'antiparallelogram')
+            self._body(pair[0], name)
+            self._body(pair[1], name)
+        elif kind == 'isosceles':
             self._arms += [pair, pair]
         elif kind == 'parallelogram':
             to_pin, to_foot = self._nudged(ground, g), self._nudged(crank, m)
@@ -365,6 +512,9 @@ class _Writer:
     def _parallelogram(self):
         self._reflected('parallelogram')
 
+    def _antiparallelogram(self):
+        self._reflected('antiparallelogram')
+
     def _reflected(self, word):
         corners = self._corners()
         if not corners:
@@ -375,7 +525,9 @@ class _Writer:
         o, p, q = (self._place[name] for name in (point, first, second))
         name = self._name()
         self._lines.append(f'{name} {word} {point} {first} {second}')
-        self._put(name, p + q - o if word == 'parallelogram' or abs(q - p) < 1e-9
+        if word != 'mirror':
+            o = p + q - o
+        self._put(name, o if word == 'parallelogram' or abs(q - p) < 1e-9
                   else p + (q - p) * ((o - p) / (q - p)).conjugate(), word)
         self._body(first, name)
         self._body(second, name)
@@ -399,6 +551,8 @@ class _Writer:
     def _slot(self):
         rng = self._rng
         pivot, pin = self._pick(self._fixed), self._pick(self._moving)
+        if rng.random() < 0.4:
+            pivot, pin = self._two()
         away = self._distance(pivot, pin)
         kind = rng.random()
         if kind < (0.5 if self._degenerate else 0.2):
@@ -410,26 +564,35 @@ class _Writer:
         self._lines.append(f'{name} slot {pivot} {pin} {offset} {rng.choice(("out", "in"))} '
                            f'{length}')
         self._put(name, self._somewhere(self._place[pivot]), 'slot')
+        self._slide(pin, self._place[pin] - self._place[pivot])
         self._body(pivot, name)
 
     def _slider(self):
         rng = self._rng
         pin, origin = self._pick(self._moving), self._pick(self._fixed)
-        angle = rng.choice((0.0, 1.5707963267948966, 3.141592653589793, -1.5707963267948966,
-                            rng.uniform(-4.0, 4.0)))
+        angle, towards = rng.choice((0.0, 1.5707963267948966, 3.141592653589793,
+                                     -1.5707963267948966, rng.uniform(-4.0, 4.0))), None
         along = cmath.exp(1j * angle)
+        if rng.random() < 0.4:
+            origin, towards = self._guide()
+            if not origin or pin in (origin, towards):
+                return
+            along = self._place[towards] - self._place[origin]
+            along /= abs(along)
         seen = (self._place[pin] - self._place[origin]) * along.conjugate()
-        if self._degenerate and rng.random() < 0.5 and pin in self._pins:
+        if self._degenerate and rng.random() < 0.5 and self._kind[pin] == 'crank':
             text = self._lines[[line.split()[0] for line in self._lines].index(pin)].split()[3]
             rod = self._nudged(text, self._texts.get(text, 1.0))
         else:
             rod = self._number(abs(seen.imag) + abs(rng.normal()))
         name = self._name()
         turn = '0' if angle == 0.0 else repr(float(angle))
-        if angle and rng.random() < 0.3:
+        if angle and not towards and rng.random() < 0.3:
             turn = f'd{len(self._dimensions)}'
             self._dimensions[turn] = float(angle)
-        self._lines.append(f'{name} slider {pin} {rod} {origin} {turn} '
+        self._lines.append(f'{name} slider {pin} {rod} {origin} '
+                           f'{f"along {towards}" if towards else turn} '
                            f'{rng.choice(("out", "in"))}')
         self._put(name, self._place[origin] + along * seen.real, 'slider')
+        self._slide(name, along)
         self._body(pin, name)
