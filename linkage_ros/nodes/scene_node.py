@@ -335,7 +335,7 @@ def _run(node_class, name, args, executor_class, goodbye):
             node.get_logger().info(f'ready: {node.serves()}')
         # What has been made so far stays: the collector need not look through it again and again.
         gc.freeze()
-        _spin(node, executor_class())
+        _spin(node, executor_class(), goodbye)
     except ExternalShutdownException:
         pass
     except scene.SceneError as error:
@@ -350,13 +350,16 @@ def _run(node_class, name, args, executor_class, goodbye):
     return 0
 
 
-def _spin(node, executor):
-    executor.add_node(node)
+def _spin(node, executor, goodbye):
     try:
-        while rclpy.ok():
+        # `wake` wakes not every executor.
+        goodbye.wake = lambda: executor.create_task(lambda: None)
+        executor.add_node(node)
+        while rclpy.ok() and not goodbye.is_over:
             executor.spin_once(timeout_sec=LONGEST_WAIT)
     finally:
         executor.shutdown()
+        goodbye.left.set()
 
 
 def _refuse_arguments(args):

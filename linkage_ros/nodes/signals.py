@@ -1,14 +1,18 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Signals that end a node while it can still publish: it says goodbye, then its context ends."""
+"""Signals that end a node while it can still publish: it says goodbye, then stops to spin."""
 
 import os
 import signal
 import socket
-from threading import Thread
+from threading import Event, Thread
 
 from rclpy.signals import install_signal_handlers, SignalHandlerOptions
+
+
+# How long what the node is doing may take to end [s].
+PATIENCE = 0.5
 
 
 class Goodbye:
@@ -16,11 +20,21 @@ class Goodbye:
     What happens at the first SIGINT or SIGTERM, in a thread, whatever goes on meanwhile.
 
     The client library must not have handlers of its own. A node that has a method `say_goodbye` is
-    to be put into `node`.
+    to be put into `node`, what ends the executor's waiting into `wake`.
+
+    Attributes
+    ----------
+    is_over : bool
+        Whether the node is to spin no more. Its context goes on for a while: an executor whose
+        context ends while it looks for what there is may end the process.
+    left : Event
+        Set once it spins no more.
+
     """
 
     def __init__(self):
-        self.node = None
+        self.node, self.wake, self.is_over = None, None, False
+        self.left = Event()
 
     def __enter__(self):
         self._heard, told = socket.socketpair()
@@ -39,6 +53,7 @@ class Goodbye:
         for number, handler in self._before.items():
             signal.signal(number, handler)
         self._told.close()
+        self.left.set()
         self._thread.join()
         self._heard.close()
 
@@ -50,6 +65,11 @@ class Goodbye:
             if hasattr(self.node, 'say_goodbye'):
                 self.node.say_goodbye()
         finally:
-            # From here on it is as if nobody had caught the signal.
+            # From here on it is as if nobody caught signals: another one ends the context, and so
+            # does this one where something holds the node up.
             install_signal_handlers(SignalHandlerOptions.ALL)
-            os.kill(os.getpid(), *number)
+            self.is_over = True
+            if self.wake:
+                self.wake()
+            if not self.left.wait(PATIENCE):
+                os.kill(os.getpid(), *number)
