@@ -10,7 +10,6 @@ from threading import Event, Thread
 
 from rclpy.signals import install_signal_handlers, SignalHandlerOptions
 
-
 # How long what the node is doing may take to end [s].
 PATIENCE = 0.5
 
