@@ -27,6 +27,9 @@ SAMPLES, FEWEST, ROUNDS = 720, 33, 4
 INSIDE = 0.49
 # What places may differ by from turn to turn, as a part of their size, and be the same.
 ALIKE = 1e-6
+# More ends than these are rounding, of the direction of an arm without length: between them there
+# is nothing to be looked for.
+MOST = 100
 
 
 def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Callable,
@@ -66,7 +69,10 @@ def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Calla
     if any(x.margin.varies and x not in closed for x in limits):
         ends += [end for arc in input_.between(ends) for end in _limits(margins, failing, *arc)]
     found = reachable_arcs(ends, assembled, input_, lambda: _is_periodic(places))
-    return found if input_.is_whole(found) else [_trimmed(assembled, *arc) for arc in found]
+    if input_.is_whole(found):
+        return found
+    trimmed = [_trimmed(assembled, *arc) for arc in found]
+    return [(lo, hi) for lo, hi in trimmed if lo < hi]
 
 
 def _limits(margins: Callable, failing: Callable, lo: float, hi: float) -> List[float]:
@@ -86,7 +92,7 @@ def _limits(margins: Callable, failing: Callable, lo: float, hi: float) -> List[
         before, after = refined(lambda x, as_before=first[place][:, None]: failing(x) == as_before,
                                 theta[place], theta[place + 1])
         known, ends = len(ends), sorted({lo, hi, *before.tolist(), *after.tolist()})
-        if len(ends) == known:
+        if len(ends) == known or len(ends) > MOST:
             break
     return ends[1:-1]
 
