@@ -334,7 +334,7 @@ def test_a_block_on_a_short_bar_of_a_kite_keeps_the_digits_of_its_slide():
 
 
 def test_the_reach_of_what_hangs_on_rounding_takes_no_longer_than_any_other():
-    # F is where A is, so the mirror line F-A has a direction of rounding, and so has all behind it.
+    # F is where A is: the mirror line F-A has a direction of rounding, and so has all behind it.
     lines = ('A ground -0.552 0', 'B ground 0 -0.4465', 'C ground 0 0',
              'D cylinder B C 0.476 left', 'E parallelogram C D A', 'F parallelogram D E C',
              'G mirror C F A', 'L dyad G B 3.5837 3.196 left')
