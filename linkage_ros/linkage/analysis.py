@@ -271,5 +271,5 @@ class Analysed(Mechanism):
             raise ValueError(f'{self.type} has no output {quoted(output)}; '
                              f'allowed: {listed(allowed)}')
         if not self._structure.moves(output):
-            raise ValueError(f'{output} of {self.type} does not move with '
+            raise ValueError(f'{output} of {self.type} does not move with the '
                              f'{self.inputs[0].name}')
