@@ -74,7 +74,7 @@ class Mechanism(Analysed):
     A linkage whose dimensions are set; make one with `linkage_ros.mechanisms.create`.
 
     A pose depends on the inputs alone: any value, in any order, gives the same numbers. Joint
-    angles in arrays may differ by an ulp from those asked for one by one.
+    angles in arrays may differ by two ulps from those asked for one by one.
 
     Attributes
     ----------
