@@ -243,7 +243,7 @@ class Analysed(Mechanism):
         """
         branches, pose = self._remembered('follow', (output,), lambda: (
             self._inverse(output, ()), self._bound('output', output).at))
-        turns = math.tau * math.floor((near + math.pi) / math.tau) if self.inputs[0].turns else 0.0
+        turns = self.inputs[0].turns_of(near)
         found, rate = branches.follow(pose, self.inputs[0].size, value, near - turns)
         return found + turns, rate
 

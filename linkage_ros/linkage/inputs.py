@@ -75,6 +75,10 @@ class Input(NamedTuple):
         """Return values within [low, high) where they turn, else as they are."""
         return wrapped(value) if self.turns else value
 
+    def turns_of(self, value: float) -> float:
+        """Return the whole turns [rad] by which a value is out of [-pi, pi)."""
+        return math.tau * math.floor((value + math.pi) / math.tau) if self.turns else 0.0
+
     def beside(self, value: Any, near: Any) -> Any:
         """Return values plus the whole turns that take them next to others."""
         if not self.turns:
@@ -120,7 +124,7 @@ class Input(NamedTuple):
     def between(self, ends: Iterable[float]) -> List[Arc]:
         """Return the arcs between values, in order; the last of a turn ends where it began."""
         marks: List[float] = []
-        inside = map(_into_the_turn, ends) if self.turns else (
+        inside = (end - self.turns_of(end) for end in ends) if self.turns else (
             end for end in (self.low, *ends, self.high) if self.low <= end <= self.high)
         for end in sorted(inside):
             if not marks or end - marks[-1] > NARROWEST:
@@ -138,7 +142,3 @@ def wrapped(theta: Any) -> Any:
     turned = theta - math.tau * np.floor((theta + math.pi) / math.tau)
     turned = np.where((turned < -math.pi) | (turned >= math.pi), -math.pi, turned)
     return np.where((theta >= -math.pi) & (theta < math.pi), theta, turned)
-
-
-def _into_the_turn(theta: float) -> float:
-    return theta - math.tau * math.floor((theta + math.pi) / math.tau)

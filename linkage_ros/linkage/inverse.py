@@ -149,7 +149,7 @@ class MonotoneBranches:
 
     def _refined(self, pose: Callable, sign: float, lo: float, hi: float, target: float,
                  size: float) -> Tuple[float, float]:
-        """Return where an output meets a target: Newton's method kept inside a bracket."""
+        """Return what `_solved` does, for one float: arrays would cost more than the search."""
         lo, hi = lo * size, hi * size
         theta, last = 0.5 * (lo + hi), math.inf
         best = theta, math.nan

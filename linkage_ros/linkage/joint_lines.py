@@ -181,8 +181,7 @@ def _mirrored(lines: List[Line], mirror: Line) -> List[Line]:
             found.append(_parsed(f'{line.names[0]}{mirror.names[0]} image {line.names[0]} '
                                  f'{" ".join(mirror.stands_on)}')._replace(text=mirror.text))
             continue
-        suffix = dict.fromkeys(own, '')
-        args = [_image(line.word, arg, suffix.get(arg.text, mirror.names[0]))
+        args = [_image(line.word, arg, '' if arg.text in own else mirror.names[0])
                 for arg in line.arguments if arg.option != 'geared']
         if line.word in INPUTS:
             number = count[line.word] if count[line.word] > 1 else ''

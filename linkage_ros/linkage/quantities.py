@@ -163,6 +163,7 @@ class Structure:
 
     def _rates(self, names: Names, by: int = 0) -> List[Real]:
         known: Dict[Real, Real] = {}
+
         def d(expression: Real) -> Real:
             return derivative(expression, {by: 1.0}, known)
 
