@@ -146,8 +146,12 @@ class Browser:
 
     async def write(self, expression: str, text: str):
         """Write a text in place of what an element says, key by key, and press Enter."""
+        async def reached():
+            await self.click(expression)
+            return await self.value(f'document.activeElement === ({expression})')
+
         await self.value(f'({expression}).scrollIntoView()')
-        await self.click(expression)
+        await until(reached, f'{expression} has the focus')
         await self.value(f'({expression}).select()')
         for key in (*text, '\r'):
             await self._do('Input.dispatchKeyEvent', type='keyDown', text=key,

@@ -1223,6 +1223,25 @@ def test_a_dragged_slider_sets_the_nodes_and_a_refused_one_springs_back(show, lo
 
 @pytest.mark.long
 @needs_browser
+def test_what_was_mistyped_is_said_though_an_earlier_number_is_granted_later(show, looked_at):
+    running = show(LEVER)
+
+    async def doing(seen):
+        await seen.view('lever')
+        field = f'{seen.row("lever", "a")}.querySelector("input[type=text]")'
+        await seen.page.value(f"""for (const text of ['80.5', '8x']) {{
+            ({field}).value = text;
+            ({field}).dispatchEvent(new Event('change'));
+        }}""")
+        await browser.until(lambda: running.value(Kinematics, 'lever.dimensions.a') == 80.5)
+        await browser.until(lambda: seen.page.value(f'({field}).value === "80.5"'))
+        assert await seen.reason('lever', 'a') == 'Refused: 8x is not a number that can be set'
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
 def test_a_number_can_be_written_with_a_point_or_a_comma(show, looked_at):
     running = show(LEVER)
 

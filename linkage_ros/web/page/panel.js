@@ -111,7 +111,7 @@ class Slider {
     this.range.onchange = () => this.release();
     this.number.onfocus = () => { this.held = true; };
     this.number.onblur = () => this.release();
-    this.number.oninput = () => this.explain('');
+    this.number.oninput = () => { this.mistyped = false; this.explain(''); };
     this.number.onchange = () => {
       this.type(this.number.value.trim());
       this.number.blur();
@@ -120,13 +120,15 @@ class Slider {
   }
 
   offer(value) {
+    this.mistyped = false;
     this.asked.offer(value);
   }
 
   type(text) {
     const value = read(text);
-    if (Number.isFinite(value)) this.offer(value);
-    else if (text) this.explain(`Refused: ${text} is not a number that can be set`);
+    this.mistyped = text !== '' && !Number.isFinite(value);
+    if (this.mistyped) this.explain(`Refused: ${text} is not a number that can be set`);
+    else if (text) this.offer(value);
   }
 
   chosen() {
@@ -139,7 +141,7 @@ class Slider {
   settle(wanted, answer) {
     const refused = answer.reason && answer.value === undefined;
     if (!refused) this.accepted = answer.value ?? wanted;
-    this.explain(refused ? `Refused: ${answer.reason}` : answer.reason, refused);
+    if (!this.mistyped) this.explain(refused ? `Refused: ${answer.reason}` : answer.reason, refused);
     this.told?.(answer);
     if (!this.held && !this.asked.waiting) this.render();
   }
