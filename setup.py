@@ -18,7 +18,7 @@ interfaces = Path(__file__).resolve().with_name('linkage_interfaces')
 for_ros = sys.argv[1:2] != ['--help'] and {'install', 'develop'} & set(sys.argv)
 commands = {
     'crank_driver': 'nodes.crank_driver', 'from_robot': 'robot_files.command',
-    'kinematics': 'nodes.kinematics', 'render': 'render',
+    'kinematics': 'nodes.kinematics', 'render': 'render', 'scene': 'nodes.together',
     'servo_inverse': 'nodes.servo_inverse', 'urdf': 'nodes.urdf_command',
     'viewer': 'web.viewer'}
 

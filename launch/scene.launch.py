@@ -24,6 +24,7 @@ import yaml
 
 PACKAGE = 'linkage_ros'
 NODES = ('crank_driver', 'kinematics', 'servo_inverse')
+TOGETHER = ('scene',)
 VIEWER = 'viewer'
 NO_VIEWER = 'The viewer is left out: it needs aiohttp (apt install python3-aiohttp).'
 RVIZ_CONFIG = 'linkage.rviz'
@@ -36,6 +37,7 @@ LARGEST_PORT = 65535
 ARGUMENTS = (
     ('scene', 'all', 'Scene: a name in config/ without its ending, or the path of a file.'),
     ('namespace', '', 'Namespace of all nodes and topics.'),
+    ('apart', 'false', 'Whether each node is a process of its own.'),
     ('viewer', 'true', 'Whether to serve the page with the picture and the sliders.'),
     ('port', '8020', "Port of the viewer's page; 0: any that is free."),
     ('rviz', 'false', 'Whether to start RViz.'),
@@ -57,8 +59,9 @@ def generate_launch_description():
 
 def _started(context):
     chosen = {name: LaunchConfiguration(name).perform(context) for name, *_ in ARGUMENTS}
-    viewer, rviz_wanted, robot_model, use_sim_time = (
-        switched(name, chosen[name]) for name in ('viewer', 'rviz', 'robot_model', 'use_sim_time'))
+    apart, viewer, rviz_wanted, robot_model, use_sim_time = (
+        switched(name, chosen[name])
+        for name in ('apart', 'viewer', 'rviz', 'robot_model', 'use_sim_time'))
     port = numbered('port', chosen['port'])
     share = Path(get_package_share_directory(PACKAGE))
     path = _scene_path(share, chosen['scene'])
@@ -92,7 +95,7 @@ def _started(context):
                           **common))
     return nodes + [Node(package=PACKAGE, executable=name, **common,
                          parameters=[str(path), time, {'frame_prefix': prefix}])
-                    for name in NODES]
+                    for name in (NODES if apart else TOGETHER)]
 
 
 def switched(name, text):

@@ -115,7 +115,7 @@ def test_the_launch_file_starts_executables_that_there_are(constants, monkeypatc
     runpy.run_path('setup.py')
     installed = [line.split(' = ')[0] for line in handed['entry_points']['console_scripts']]
     assert constants['PACKAGE'] == handed['name']
-    assert {*constants['NODES'], constants['VIEWER']} <= set(installed)
+    assert {*constants['NODES'], *constants['TOGETHER'], constants['VIEWER']} <= set(installed)
     files = {name for folder, names in handed['data_files'] for name in names}
     assert {f'config/{constants["RVIZ_CONFIG"]}', 'launch/scene.launch.py'} <= files
     assert {str(path.relative_to(ROOT)) for path in CONFIG.glob('*.yaml')} <= files
@@ -183,6 +183,7 @@ def started(**arguments):
 @pytest.mark.parametrize('arguments, besides', [
     ({}, ['viewer']),
     ({'viewer': 'false', 'scene': 'strandbeest'}, []),
+    ({'apart': 'yes'}, ['viewer']),
     ({'scene': str(CONFIG / 'all.yaml'), 'robot_model': 'true'},
      4 * ['robot_state_publisher'] + ['viewer']),
     ({'scene': 'jansen', 'robot_model': '1', 'viewer': 'no', 'frame_prefix': 'left'},
@@ -191,8 +192,9 @@ def started(**arguments):
 ])
 def test_the_launch_file_starts_the_nodes_of_a_scene(arguments, besides, monkeypatch, tmp_path):
     monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path))
+    nodes = ['crank_driver', 'kinematics', 'servo_inverse'] if 'apart' in arguments else ['scene']
     assert [node.node_executable for node in started(**arguments)] == [
-        *besides, 'crank_driver', 'kinematics', 'servo_inverse']
+        *besides, *nodes]
 
 
 @needs_launch
@@ -202,8 +204,7 @@ def test_without_aiohttp_the_rest_is_started(monkeypatch):
     monkeypatch.setattr('importlib.util.find_spec', lambda name: None)
     said, *nodes = started()
     assert isinstance(said, LogInfo)
-    assert [node.node_executable for node in nodes] == [
-        'crank_driver', 'kinematics', 'servo_inverse']
+    assert [node.node_executable for node in nodes] == ['scene']
 
 
 @needs_launch

@@ -8,6 +8,7 @@ What the nodes cost, next to what any node costs, in the same run.
     python -m benchmark.nodes --quick     a look, within a minute or two
     python -m benchmark.nodes --soak      memory over a million messages
     python -m benchmark.nodes --hold      a minute at 1000 Hz
+    python -m benchmark.nodes --processes a scene in one process, and in three
     python -m benchmark.nodes --trouble   ten minutes of changes, bad bytes and stalled listeners
 
 Results go to benchmark/results/nodes.json, each mode into its own part; the tables are printed,
@@ -58,6 +59,7 @@ def arguments():
     mode.add_argument('--soak', type=int, nargs='?', const=10 ** 6, metavar='MESSAGES')
     mode.add_argument('--hold', type=float, nargs='?', const=60.0, metavar='SECONDS')
     mode.add_argument('--trouble', type=float, nargs='?', const=600.0, metavar='SECONDS')
+    mode.add_argument('--processes', action='store_true', help='one process against three')
     mode.add_argument('--tables', action='store_true', help='run nothing, show the last results')
     parser.add_argument('--document', action='store_true', help='write the tables to docs/')
     parser.add_argument('--rounds', type=int, help='bursts of each subject')
@@ -69,7 +71,7 @@ def run(options):
     """Return the parts of the result that were asked for."""
     from benchmark.machine import machine
 
-    from . import campaign, driving, long, scenes
+    from . import campaign, driving, long, processes, scenes
 
     started = time.time()
     driver = driving.Driver()
@@ -83,6 +85,9 @@ def run(options):
                 return {'hold': long.hold(bench, 1000.0, options.hold)}
             if options.trouble:
                 return {'trouble': long.trouble(bench, options.trouble)}
+            if options.processes:
+                return {'processes': [row for scene in scenes.SCENES for rate in (50.0, 200.0)
+                                      for row in processes.compare(bench, scene, rate)]}
             rates = (1000.0,) if options.quick else campaign.RATES
             rows, bodies = [], []
             for scene in scenes.SCENES:

@@ -30,6 +30,8 @@ def document(result):
             '### Where the time goes', layers(result),
             '### Body of the tick', bodies(result),
             '### Service', services(result['services'])]
+    if 'processes' in result:
+        parts += ['### One process or three', processes(result['processes'])]
     if {'soak', 'hold', 'trouble'} & result.keys():
         parts += ['### At length', long(result)]
     return '\n\n'.join(parts) + '\n'
@@ -183,6 +185,22 @@ def services(rows):
         [names[row['subject']], f'{row["p50"]:.0f}', f'{row["p99"]:.0f}',
          f'{in_turn(row["round_trips"], base):.2f}',
          f'{row["cpu"]:.0f}'] for row in rows])
+
+
+def processes(rows):
+    """Return what a scene costs in one process, and in three."""
+    lines = []
+    for apart, together in zip(rows[::2], rows[1::2]):
+        line = [apart['scene'], f'{apart["rate"]:.0f}']
+        for what, digits in (('cpu', 0), ('memory', 0), ('start', 2)):
+            line += [f'{statistics.median(row[what]):.{digits}f}' for row in (apart, together)]
+            line.append(f'{in_turn(together[what], apart[what]):.2f}')
+        lines.append(line)
+    return ('`scene` beside `crank_driver`, `kinematics` and `servo_inverse`, joint states heard: '
+            'CPU time of all processes [us a tick], their proportional memory [MiB], seconds from '
+            'the start to the first joint states of all.\n\n' + table(
+                ['scene', 'Hz', 'CPU of three', 'of one', 'ratio', 'memory of three', 'of one',
+                 'ratio', 'start of three', 'of one', 'ratio'], lines))
 
 
 def long(result):

@@ -6,10 +6,13 @@
 import sys
 from time import monotonic_ns
 
+import numpy as np
 from rclpy.clock import Clock, ClockType
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from . import scene_node
+from .message_layout import pack, Wire
 from .messages import JointStates
 from .. import scene
 from ..scene.motion import Motion
@@ -23,15 +26,25 @@ LONGEST_PERIOD = 1e18
 
 
 class CrankDriver(scene_node.SceneNode):
-    """Publishes every input as a function of the node's time, on `crank_states`."""
+    """
+    Publishes every input as a function of the node's time, on `crank_states`.
 
-    def __init__(self, **kwargs):
+    Parameters
+    ----------
+    beside : sequence of rclpy.node.Node
+        Nodes of the same process: they are handed the messages if nobody else hears the topic.
+
+    """
+
+    def __init__(self, beside=(), **kwargs):
         super().__init__(scene.DRIVER, **kwargs)
         self._motions = {}
         self._drives, self._machines = {}, {}
         self._now = self._steady = None
-        self._messages = JointStates()
+        self._names, self._wire = [], None
         self._publisher = self.create_publisher(JointState, 'crank_states', 10)
+        if beside:
+            self._publisher = HandedOver(self._publisher, beside)
         self._timer = self.create_timer(1.0, self._tick)
         # On system time a timer sleeps until an old time comes round again, if that is set back.
         self.create_timer(1.0, self._wake, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -49,7 +62,18 @@ class CrankDriver(scene_node.SceneNode):
             elif (old.speed, old.sweep) != (drive.speed, drive.sweep):
                 self._motions[key] = self._motions[key].changed(drive.speed, drive.sweep, now)
         self._drives, self._machines = drives, new.machines
+        self._name(list(dict.fromkeys(drive.source for drive in drives.values())))
         self._pace(new.rate)
+
+    def _name(self, sources):
+        """Tell of these joints from now on."""
+        if sources == self._names:
+            return
+        joint_states, n = JointStates(), len(sources)
+        self._names, self._wire = sources, Wire(
+            self._publisher,
+            lambda stamp, values: joint_states.message(stamp, sources, values[:n], values[n:]),
+            2 * n, self.get_logger())
 
     def _pace(self, rate):
         if not rate:
@@ -84,9 +108,7 @@ class CrankDriver(scene_node.SceneNode):
         if self._publisher.get_subscription_count():
             said = {drive.source: self._said(key, drive, now)
                     for key, drive in self._drives.items()}
-            positions, speeds = zip(*said.values())
-            self._publisher.publish(
-                self._messages.message(time.to_msg(), list(said), positions, speeds))
+            self._wire.send(pack(time.to_msg()), np.ravel([*zip(*said.values())]))
 
     def _said(self, key, drive, now):
         """Return where an input is and how fast, as its source tells it."""
@@ -104,6 +126,34 @@ class CrankDriver(scene_node.SceneNode):
         set_back = self._now is not None and self._time().nanoseconds < self._now
         if set_back and self.scene.rate:
             self._timer.reset()
+
+
+class HandedOver:
+    """
+    A topic whose messages the nodes of this process take at once, and all others over the wire.
+
+    As long as others hear it, these nodes do as the others do: then each message comes once.
+
+    """
+
+    def __init__(self, publisher, nodes):
+        self.topic_name = publisher.topic_name
+        self._publisher = publisher
+        self._ears = [subscription for node in nodes for subscription in node.subscriptions
+                      if subscription.topic_name == self.topic_name]
+
+    def get_subscription_count(self) -> int:
+        """Return how many hear it."""
+        return self._publisher.get_subscription_count() or len(self._ears)
+
+    def publish(self, message):
+        """Hand over or publish a message: bytes, or one that is not serialised yet."""
+        if self._publisher.get_subscription_count() > len(self._ears):
+            self._publisher.publish(message)
+            return
+        text = message if isinstance(message, bytes) else serialize_message(message)
+        for subscription in self._ears:
+            subscription.callback(text)
 
 
 def main(args=None):

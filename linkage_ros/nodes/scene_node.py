@@ -312,11 +312,16 @@ def _typed(parameter):
 
 def run(node_class, name: str, args=None, executor_class=Executor) -> int:
     """Run a node until it is interrupted; return the exit code of the process."""
+    return run_together(lambda: [node_class()], name, args, executor_class)
+
+
+def run_together(make, name: str, args=None, executor_class=Executor) -> int:
+    """Run the nodes that are made, in one executor, until they are interrupted; as `run`."""
     with Goodbye() as goodbye:
-        return _run(node_class, name, args, executor_class, goodbye)
+        return _run(make, name, args, executor_class, goodbye)
 
 
-def _run(node_class, name, args, executor_class, goodbye):
+def _run(make, name, args, executor_class, goodbye):
     sys.setswitchinterval(SWITCH_INTERVAL)
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
@@ -328,14 +333,15 @@ def _run(node_class, name, args, executor_class, goodbye):
         what = 'nothing after --ros-args is called ' if unknown else ''
         hint = '; allowed: -p, -r, --params-file, --log-level, ...' if unknown else ''
         return _failed(name, elided(f'bad arguments: {what}{error}', 240) + hint)
-    node = None
     try:
-        node = goodbye.node = node_class()
-        if isinstance(node, SceneNode):
-            node.get_logger().info(f'ready: {node.serves()}')
+        for node in make():
+            _refuse_namesake(node, goodbye.nodes)
+            goodbye.nodes.append(node)
+            if isinstance(node, SceneNode):
+                node.get_logger().info(f'ready: {node.serves()}')
         # What has been made so far stays: the collector need not look through it again and again.
         gc.freeze()
-        _spin(node, executor_class(), goodbye)
+        _spin(executor_class(), goodbye)
     except ExternalShutdownException:
         pass
     except scene.SceneError as error:
@@ -344,17 +350,26 @@ def _run(node_class, name, args, executor_class, goodbye):
         if rclpy.ok():
             raise
     finally:
-        if node is not None:
+        for node in goodbye.nodes:
             node.destroy_node()
         rclpy.try_shutdown()
     return 0
 
 
-def _spin(node, executor, goodbye):
+def _refuse_namesake(node, others):
+    name = node.get_name()
+    if name in {other.get_name() for other in others}:
+        node.destroy_node()
+        raise scene.SceneError(f'two nodes would be called {name}; to rename one of them: '
+                               '-r kinematics:__node:=NAME')
+
+
+def _spin(executor, goodbye):
     try:
         # `wake` wakes not every executor.
         goodbye.wake = lambda: executor.create_task(lambda: None)
-        executor.add_node(node)
+        for node in goodbye.nodes:
+            executor.add_node(node)
         while rclpy.ok() and not goodbye.is_over:
             executor.spin_once(timeout_sec=LONGEST_WAIT)
     finally:

@@ -18,11 +18,13 @@ class Goodbye:
     """
     What happens at the first SIGINT or SIGTERM, in a thread, whatever goes on meanwhile.
 
-    The client library must not have handlers of its own. A node that has a method `say_goodbye` is
-    to be put into `node`, what ends the executor's waiting into `wake`.
+    The client library must not have handlers of its own. What ends the executor's waiting is to be
+    put into `wake`.
 
     Attributes
     ----------
+    nodes : list of rclpy.node.Node
+        Those that spin; what has a method `say_goodbye` does so.
     is_over : bool
         Whether the node is to spin no more. Its context goes on for a while: an executor whose
         context ends while it looks for what there is may end the process.
@@ -32,7 +34,7 @@ class Goodbye:
     """
 
     def __init__(self):
-        self.node, self.wake, self.is_over = None, None, False
+        self.nodes, self.wake, self.is_over = [], None, False
         self.left = Event()
 
     def __enter__(self):
@@ -61,8 +63,9 @@ class Goodbye:
         if not number:
             return
         try:
-            if hasattr(self.node, 'say_goodbye'):
-                self.node.say_goodbye()
+            for node in self.nodes:
+                if hasattr(node, 'say_goodbye'):
+                    node.say_goodbye()
         finally:
             # From here on it is as if nobody caught signals: another one ends the context, and so
             # does this one where something holds the node up.

@@ -1,0 +1,59 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A whole scene in one process, and in three: CPU time, memory, start."""
+
+from contextlib import contextmanager
+import time
+
+from sensor_msgs.msg import JointState
+
+from . import scenes
+from .driving import Process
+
+APART = ('crank_driver', 'kinematics', 'servo_inverse')
+NODES = {'apart': APART, 'together': ('together',)}
+# How long each runs in a round [s].
+SECONDS = 4.0
+
+
+def compare(bench, scene, rate):
+    """Return rows: CPU [us a tick], memory [MiB] and start [s] of each, a value a round."""
+    rows = {kind: {'scene': scene, 'rate': rate, 'kind': kind, 'cpu': [], 'memory': [],
+                   'start': []} for kind in NODES}
+    for _ in range(bench.rounds):
+        for kind, row in rows.items():
+            begin = time.perf_counter()
+            with _started(bench, kind, scene, rate) as (processes, heard):
+                assert bench.driver.until(lambda heard=heard: all(map(len, heard)))
+                row['start'].append(time.perf_counter() - begin)
+                # Machine code is made beside the first ticks.
+                bench.driver.wait(2.0)
+                before, ticks = sum(p.cpu() for p in processes), len(heard[0])
+                bench.driver.wait(SECONDS)
+                row['cpu'].append(1e6 * (sum(p.cpu() for p in processes) - before)
+                                  / (len(heard[0]) - ticks))
+                row['memory'].append(sum(p.proportional() for p in processes) / 2 ** 20)
+    return list(rows.values())
+
+
+@contextmanager
+def _started(bench, kind, scene, rate):
+    """Start the nodes of a scene; yield the processes and what is heard of each mechanism."""
+    node, parameters = bench.driver.node, scenes.write(scene, bench.folder)
+    heard, ears, processes = [], [], []
+    for topic in scenes.topics(scene):
+        if topic.joints:
+            heard.append([])
+            ears.append(node.create_subscription(
+                JointState, f'/{kind}/{topic.name}', heard[-1].append, 1000, raw=True))
+    try:
+        for name in NODES[kind]:
+            processes.append(Process(kind, '-m', f'linkage_ros.nodes.{name}', '--ros-args', '-p',
+                                     f'rate:={rate}', parameters=parameters))
+        yield processes, heard
+    finally:
+        for process in processes:
+            process.end()
+        for ear in ears:
+            node.destroy_subscription(ear)

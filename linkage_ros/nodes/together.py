@@ -1,0 +1,31 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The three nodes of a scene in one process: the same names, topics, parameters and services."""
+
+import sys
+
+from . import scene_node
+from .crank_driver import CrankDriver
+from .kinematics import Kinematics
+from .servo_inverse import ServoInverse
+
+NAME = 'scene'
+
+
+def nodes():
+    """Make the nodes, the owner of the geometry first, who turns the cranks last."""
+    kinematics = Kinematics()
+    yield kinematics
+    inverse = ServoInverse()
+    yield inverse
+    yield CrankDriver(beside=[kinematics, inverse])
+
+
+def main(args=None):
+    """Run the nodes; return the exit code."""
+    return scene_node.run_together(nodes, NAME, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

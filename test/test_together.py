@@ -1,0 +1,128 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A scene's three nodes in one process: nobody can tell them from three processes."""
+
+import math
+from pathlib import Path
+import re
+import signal
+
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('linkage_interfaces')
+
+from linkage_interfaces.srv import ServoInverse as ServoInverseType  # noqa: E402
+from linkage_ros.nodes import together  # noqa: E402
+from linkage_ros.nodes.crank_driver import CrankDriver, HandedOver  # noqa: E402
+from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
+from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
+from rclpy.serialization import deserialize_message  # noqa: E402
+from ros_harness import Process  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+
+CONFIG = Path(__file__).parents[1] / 'config'
+LEVER = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever', 'lever.crank.speed': 2.0}
+
+
+@pytest.fixture
+def nodes(graph):
+    """Start them as the process does."""
+    kinematics, inverse = graph.start(Kinematics, LEVER), graph.start(ServoInverse, LEVER)
+    return kinematics, inverse, graph.start(CrankDriver, LEVER, beside=[kinematics, inverse])
+
+
+def told(message):
+    """Return what a message says, and when."""
+    stamp = message.header.stamp
+    return (stamp.sec, stamp.nanosec), dict(zip(message.name, message.position))
+
+
+def lever_at(crank):
+    """Return the angle of the lever: a crank of 80 stands 150 from its pivot."""
+    return math.atan2(80.0 * math.sin(crank), 150.0 + 80.0 * math.cos(crank))
+
+
+def is_true(message):
+    """Tell whether the lever is where the crank in the same message puts it."""
+    _, at = told(message)
+    return at['lever_lever'] == pytest.approx(lever_at(at['lever_crank']), abs=1e-14)
+
+
+def test_what_nobody_else_hears_is_handed_over_without_the_wire(graph):
+    taken = []
+    own = graph.start(Kinematics, LEVER)
+    own.create_subscription(JointState, 'turned', taken.append, 10, raw=True)
+    publisher = HandedOver(own.create_publisher(JointState, 'turned', 10), [own])
+    graph.until(publisher.get_subscription_count)
+    publisher.publish(JointState(name=['one']))
+    assert [deserialize_message(text, JointState).name for text in taken] == [['one']]
+    other = graph.listen(JointState, 'turned')
+    graph.until(lambda: publisher.get_subscription_count() == 2)
+    publisher.publish(JointState(name=['two']))
+    assert len(taken) == 1
+    graph.until(lambda: other and len(taken) == 2)
+    assert deserialize_message(taken[1], JointState) == other[0]
+
+
+def test_a_lever_moves_with_cranks_that_nobody_else_hears(graph, nodes):
+    heard = graph.listen(JointState, 'lever/joint_states')
+    graph.until(lambda: len(heard) > 20)
+    assert all(map(is_true, heard))
+    times = [told(message)[0] for message in heard]
+    assert times == sorted(set(times))
+
+
+def test_who_listens_to_the_cranks_hears_what_the_lever_was_moved_by(graph, nodes):
+    moved, cranks = (graph.listen(JointState, topic)
+                     for topic in ('lever/joint_states', 'crank_states'))
+    graph.until(lambda: len(cranks) > 20 and told(moved[-1])[0] >= told(cranks[-1])[0])
+    times = [told(message)[0] for message in moved]
+    assert len(times) == len(set(times))
+    said, then = dict(map(told, cranks)), dict(map(told, moved))
+    both = said.keys() & then.keys()
+    assert len(both) > 15
+    assert all(then[time]['lever_crank'] == said[time]['lever_crank'] for time in both)
+
+
+def test_the_service_knows_where_the_crank_is(graph, nodes):
+    *_, driver = nodes
+    client = graph.node.create_client(ServoInverseType, 'servo_inverse')
+    for start in (0.4, 2.9):
+        graph.set(driver, lever__crank__start=start, lever__crank__speed=0.0)
+        wanted = lever_at(start)
+
+        def nearest(start=start, wanted=wanted):
+            found = graph.call(client, ServoInverseType.Request(lever_angle=[wanted]))
+            return found.success and found.servo_angle[0] == pytest.approx(start, abs=1e-9)
+
+        graph.until(nearest)
+
+
+def test_a_change_of_the_geometry_reaches_all_three(graph, nodes):
+    kinematics, *others = nodes
+    assert graph.set(kinematics, lever__dimensions__a=90.0).successful
+    graph.until(lambda: all(
+        node.get_parameter('lever.dimensions.a').value == 90.0 for node in others))
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_them_quietly(number):
+    process = Process('together', CONFIG / 'all.yaml')
+    said = [process.line() for _ in range(3)]
+    assert [re.search(r'\[(\w+)\]: ready: .*water_drop', line)[1] for line in said] == [
+        'kinematics', 'servo_inverse', 'crank_driver']
+    process.interrupt(number)
+    assert process.end() == (0, '')
+
+
+def test_one_name_for_all_is_refused(capfd):
+    assert together.main(['scene', '--ros-args', '-r', '__node:=robot']) == 1
+    assert re.search(r'\[FATAL\].*two nodes would be called robot', capfd.readouterr().err)
+
+
+def test_a_bad_scene_ends_them_all_in_one_sentence(capfd):
+    assert together.main(['scene', '--ros-args', '-p', 'mechanisms:=[leg]']) == 1
+    printed = capfd.readouterr().err
+    assert printed.count('[FATAL]') == 1 and 'leg.type must be one of' in printed
