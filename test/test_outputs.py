@@ -6,6 +6,7 @@
 import math
 
 from linkage_ros import mechanisms, scene
+import mpmath
 import numpy as np
 import pytest
 from truth import random_linkages
@@ -94,6 +95,27 @@ def test_whole_turns_are_kept_and_what_cannot_be_is_not_a_number():
     for bad in (9.0, math.nan, math.inf, -math.inf):
         outside = linkage.follow('distance(O,B)', bad * 100.0, 0.6)
         assert all(map(math.isnan, outside))
+
+
+@pytest.mark.parametrize('turns', [-2e5, -1, 2, 1e5])
+def test_an_output_that_turns_all_round_takes_the_crank_along(turns):
+    linkage = mechanisms.create('whitworth')
+    for crank in (-3.2, -3.1, 0.0, 3.1, 3.2, 9.4):
+        value = float(linkage.joint_angles(crank)['lever'])
+        for near in (crank - 0.2, crank + 0.2):
+            found, _ = linkage.follow('lever', value, near + math.tau * turns)
+            assert found - math.tau * turns == pytest.approx(crank, abs=1e-15 * abs(turns) + 1e-14)
+
+
+@pytest.mark.parametrize('value', [1e6, -1e9, 1e15, 1e22, -1e300])
+def test_whole_turns_of_a_wanted_angle_cost_no_digits(value):
+    linkage = mechanisms.create('whitworth')
+    with mpmath.workdps(400):
+        value_in_turn = float(mpmath.atan2(mpmath.sin(value), mpmath.cos(value)))
+    wanted, = linkage.input_for('angle(Q,L)', value_in_turn)
+    assert linkage.input_for('angle(Q,L)', value) == pytest.approx(wanted, abs=1e-14)
+    found, _ = linkage.follow('angle(Q,L)', value, wanted)
+    assert found == pytest.approx(wanted, abs=1e-14)
 
 
 def test_a_scene_measures_lengths_scaled_and_beyond_a_branch_the_nearest_answer():

@@ -243,8 +243,12 @@ class Analysed(Mechanism):
         """
         branches, pose = self._remembered('follow', (output,), lambda: (
             self._inverse(output, ()), self._bound('output', output).at))
-        turns = self.inputs[0].turns_of(near)
-        found, rate = branches.follow(pose, self.inputs[0].size, value, near - turns)
+        first = self.inputs[0]
+        turns = first.turns_of(near)
+        found, rate = branches.follow(pose, first.size, value, near - turns)
+        if branches.is_one and first.is_whole(self.reach()):
+            # The output turns all round with the crank: beyond pi they go on together.
+            turns = float(first.beside(found, near)) - found
         return found + turns, rate
 
     def _inverse(self, output: str, others: Tuple[float, ...]) -> MonotoneBranches:

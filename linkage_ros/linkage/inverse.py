@@ -120,6 +120,11 @@ class MonotoneBranches:
                 row[place] = np.where(target >= branch.value[-1] - near, branch.theta[-1], part)
         return found
 
+    @property
+    def is_one(self) -> bool:
+        """Whether the output rises, or falls, wherever the input may be."""
+        return len(self._branches) == 1
+
     def follow(self, pose: Callable, size: float, value: float,
                near: float) -> Tuple[float, float]:
         """
@@ -141,6 +146,8 @@ class MonotoneBranches:
         low, high, slack = float(branch.value[0]), float(branch.value[-1]), self._rounding
         target = branch.sign * value
         if self._angular and math.isfinite(target):
+            if abs(target) > math.tau:
+                target = math.atan2(math.sin(target), math.cos(target))
             target += math.tau * math.ceil((low - slack - target) / math.tau)
         if not low - slack <= target <= high + slack:
             return None
@@ -236,6 +243,10 @@ class MonotoneBranches:
         if not self._angular:
             turn, count = 0.0, 1
         else:
+            with np.errstate(invalid='ignore'):
+                # Sine and cosine take off whole turns without loss, however many there are.
+                within = np.arctan2(np.sin(values), np.cos(values))
+            values = np.where(np.abs(values) > math.tau, within, values)
             values = values + math.tau * np.ceil((lo - slack - values) / math.tau)
         for i in range(count):
             target = values + i * turn

@@ -18,7 +18,7 @@ from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from . import joint_state_reader, messages, scene_node
-from .message_layout import pack, unpack, Unreadable, Wire
+from .message_layout import NEVER, pack, unpack, Unreadable, Wire
 from .whole_scene import LATCHED, WholeScene
 from .. import scene
 from ..linkage.walker import Layout
@@ -34,8 +34,6 @@ PATIENCE = 5.0
 STRANGERS = 1000
 # How long the end may wait for what takes the mechanisms out of the picture [s].
 FAREWELL = 0.1
-# A message without a stamp.
-NEVER = bytes(8)
 
 
 class Kinematics(scene_node.SceneNode):

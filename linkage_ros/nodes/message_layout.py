@@ -24,6 +24,8 @@ LITTLE_ENDIAN = b'\0\1'
 # Of fewer bytes no message is made. A middleware that takes the sender's word for how many of them
 # are padding looks beyond the end, and may end the process.
 SHORTEST = 8
+# The stamp of a message that has none.
+NEVER = bytes(8)
 
 _STAMP, _COUNT = struct.Struct('<iI'), struct.Struct('<I')
 _SIZES = {'boolean': 1, 'octet': 1, 'uint8': 1, 'int8': 1, 'uint16': 2, 'int16': 2, 'uint32': 4,

@@ -3,21 +3,20 @@
 
 """Node that answers which servo angle puts a lever, or any other output, where it is wanted."""
 
-from functools import cached_property
 import math
 from operator import itemgetter
 import sys
-from typing import Optional
 
 import numpy as np
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from . import joint_state_reader, scene_node
+from .command_stream import CommandStream
 from .message_layout import Unreadable
 from .. import scene
-from ..linkage.servo import CLOSE
 from ..robot_model import urdf
+from ..scene.wanted import LEVER, Wanted
 from ..words import elided, listed, MESSAGE, quoted
 
 try:
@@ -28,7 +27,6 @@ except ImportError as error:
         'build in the workspace, which builds linkage_interfaces too, and source '
         'install/setup.bash') from error
 
-LEVER = 'lever'
 # More values than this at once would keep other callers waiting.
 MOST_VALUES = 1_000_000
 # Values named, and letters of names allowed, in a message.
@@ -45,6 +43,8 @@ class ServoInverse(scene_node.SceneNode):
         self._reader = joint_state_reader.Reader(self._inputs_in)
         self.create_subscription(JointState, 'crank_states', self._turn, ANY, raw=True)
         self.create_service(ServoInverseType, 'servo_inverse', self.answer)
+        self._stream = CommandStream(self, self.scene.machines, lambda wanted: wanted.present(
+            self._heard.get(wanted.source)))
         self.begin()
 
     def serves(self):
@@ -60,6 +60,7 @@ class ServoInverse(scene_node.SceneNode):
     def adopt(self, new):
         """Forget what was asked about."""
         self._known = {}
+        self._stream.adopt(new.machines)
         self._inputs = {drive.source for machine in new.machines.values()
                         for drive in machine.inputs.values()}
 
@@ -81,7 +82,7 @@ class ServoInverse(scene_node.SceneNode):
         response.success = False
         try:
             key = request.mechanism, request.output
-            asked = self._known.get(key) or Asked(_machine(self.scene, *key), request.output)
+            asked = self._known.get(key) or Wanted(_machine(self.scene, *key), request.output)
             solve(asked, request, response, asked.present(self._heard.get(asked.source)))
             self._known[key] = asked
         except ValueError as problem:
@@ -127,113 +128,6 @@ def solve(asked, request, response, present=math.inf):
 
 def _listed(found):
     return np.ravel(found).tolist() if isinstance(found, np.ndarray) else [float(found)]
-
-
-class Asked:
-    """
-    An output of a mechanism with one input, and the values of that that may be taken.
-
-    That is a link's joint angle or slide, or a joint's coordinate; empty: the lever.
-
-    Raises
-    ------
-    ValueError
-        If there are several inputs.
-
-    """
-
-    def __init__(self, machine: scene.Machine, output: str):
-        self._machine, self._linkage, self._name = machine, machine.linkage, output or LEVER
-        if len(machine.inputs) > 1:
-            raise ValueError(f'{machine.name} has several inputs; only a linkage with one can be '
-                             'solved for an output')
-        self._drive = machine.first
-        self.source, self.unit = self._drive.source, self._drive.input.unit
-        self.what = 'lever angles' if self._name == LEVER else f'values of {self._name}'
-        self._linkage.check_output(self._name)
-        self._turns = self._linkage.is_angle(self._name)
-        self._scale = machine.scale_of(self._name)
-        self._input_scale = machine.scale_of(self._drive.input.name)
-
-        # Where something else is measured, the answer is the input itself.
-        self._ratio, self._offset = (1.0, 0.0) if self._drive.measures else (
-            self._drive.ratio, self._drive.offset)
-
-    def input_of(self, position):
-        """Return the input [rad or m] of its source's position."""
-        return self._ratio * position + self._offset
-
-    def present(self, heard: Optional[float]) -> float:
-        """Return where the input is, from what was heard last; infinite if that is not known."""
-        if heard is None:
-            return math.inf
-        found, _ = self._machine.understood(self._drive, heard, None, None)
-        return found if math.isfinite(found) else math.inf
-
-    def servo(self, wanted, near):
-        """Return for each value where the source has to be, and d output / d source there."""
-        unit, ends = self._input_scale, self._drive.ends
-        value, rate = self._linkage.servo_for(
-            self._name, wanted / self._scale, near if near is None else near / unit,
-            ends and (ends[0] / unit, ends[1] / unit))
-        return ((value * unit - self._offset) / self._ratio,
-                rate * (self._scale / unit * self._ratio))
-
-    def reason(self, value: float) -> str:
-        """Return in words why a value cannot be had: which end of the sweep or reach forbids."""
-        if not math.isfinite(value):
-            return 'a value must be finite'
-        inputs, _ = self._linkage.servos(self._name, value / self._scale)
-        inputs = inputs[np.isfinite(inputs)] * self._input_scale
-        if inputs.size and self._drive.ends:
-            beyond = min((self._beyond(end, input_, name) for input_ in inputs.tolist()
-                          for end, name in zip(self._drive.ends, ('lower', 'upper'))))
-            return (f'{value:.6g} needs the {self._drive.input.name} at {beyond[1]:.6g} '
-                    f'{self.unit}, outside {self._where}: beyond its {beyond[2]} end')
-        return self._out_of_range(value)
-
-    def _beyond(self, end, input_, name):
-        """Return how far beyond an end an input is, where that is, and the end's name."""
-        sign = 1.0 if name == 'upper' else -1.0
-        gap = sign * (input_ - end)
-        gap = gap % math.tau if self._drive.input.turns else gap if gap > 0.0 else math.inf
-        return gap, end + sign * gap, name
-
-    @property
-    def _where(self):
-        ends = self._drive.ends
-        return f'{self._drive.input.name}.sweep {scene.in_words([ends])}' if ends else 'the reach'
-
-    def _out_of_range(self, value):
-        gaps = [gap for (low, _), (high, _) in self._spans for gap in (low - value, value - high)]
-        nearest = int(np.argmin([gap % math.tau if self._turns else gap if gap > 0.0 else math.inf
-                                 for gap in gaps]))
-        (_, at), arc = self._spans[nearest // 2][nearest % 2], self._arcs[nearest // 2]
-        input_ = self._drive.input
-        end = [end for end, limit in zip(('lower', 'upper'), arc)
-               if abs(limit - at) < CLOSE * input_.size and not input_.is_whole([arc])]
-        end = f', the {end[0]} end of {self._where}' if end else ''
-        spans = scene.in_words((low, high) for (low, _), (high, _) in self._spans)
-        what = 'the lever' if self._name == LEVER else self._name
-        return (f'{what} reaches {spans} {"rad" if self._turns else "m"}, its '
-                f'{("least", "greatest")[nearest % 2]} at the {input_.quantity} {at:.6g} '
-                f'{self.unit}{end}')
-
-    @property
-    def _arcs(self):
-        """Where the input may be, no more than a turn."""
-        if not self._drive.ends:
-            return self._drive.reach
-        low, high = self._drive.ends
-        return [(low, min(high, low + math.tau) if self._drive.input.turns else high)]
-
-    @cached_property
-    def _spans(self):
-        """The least and the greatest value on each arc, with the input there."""
-        unit = self._input_scale
-        found = self._linkage.extremes(self._name, [(low / unit, high / unit)
-                                                    for low, high in self._arcs])
-        return [[(value * self._scale, at * unit) for value, at in span] for span in found]
 
 
 def _machine(scene_, name, output):

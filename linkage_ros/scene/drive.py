@@ -79,6 +79,11 @@ class Drive:
         """Whether its source tells the input as it is."""
         return (self.ratio, self.offset, self.measures) == (1.0, 0.0, '')
 
+    @property
+    def actuator(self) -> Tuple[float, float]:
+        """Ratio and offset of what moves it: the input itself where something else is measured."""
+        return (1.0, 0.0) if self.measures else (self.ratio, self.offset)
+
 
 def in_words(arcs: Iterable[Arc]) -> str:
     """Return arcs as text, for messages."""

@@ -55,7 +55,7 @@ OWN_FRAME_ID = Field('string', "Frame that its pose is in; empty: the scene's.",
                      readers=(KINEMATICS,), rule=FRAME_RULE, pattern=FRAME)
 JOINT_NAMES = Field(
     'string_array', "The robot's own names of joints; a joint that is not listed keeps its name.",
-    readers=(KINEMATICS,),
+    readers=(KINEMATICS, INVERSE),
     rule="such as 'BC=left_shin', or 'EF=-left_ankle+0.35' for 0.35 minus its position")
 ONLY_NAMED = Field('bool', 'Whether only the joints in joint_names are published.',
                    readers=(KINEMATICS,))

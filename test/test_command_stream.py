@@ -1,0 +1,221 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Wanted outputs come in as a stream or a trajectory; what their actuators have to do goes out."""
+
+import itertools
+import math
+import random
+
+from builtin_interfaces.msg import Duration
+from linkage_ros import mechanisms, scene
+from linkage_ros.scene.wanted import Wanted
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('linkage_interfaces')
+
+from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
+from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from std_msgs.msg import Float64MultiArray  # noqa: E402
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
+
+# A hobby servo with a gear of 2 turns a crank of 80, 150 from the pivot of a lever.
+LEVER = {'mechanisms': ['lever', 'bar'], 'lever.type': 'slotted_lever',
+         'lever.crank.source': 'servo', 'lever.crank.ratio': 0.5, 'lever.crank.offset': 0.25,
+         'lever.crank.sweep': [-1.5, 1.5], 'lever.joint_names': ['lever=-flap+0.1'],
+         'bar.type': 'four_bar', 'bar.crank.start': 0.5}
+
+
+class Stream:
+    """What is wanted goes to a node, and its commands are gathered."""
+
+    def __init__(self, graph, parameters):
+        self.node = graph.start(ServoInverse, parameters)
+        self._graph, self._stamps = graph, itertools.count(1)
+        self._wanted = graph.node.create_publisher(JointState, 'wanted_states', 10)
+        self.commands = graph.listen(JointState, 'servo_commands')
+
+    def want(self, names, positions, velocities=()):
+        """Return the command that a message brings; each is sent until it has been answered."""
+        message = JointState(name=names, position=positions, velocity=velocities)
+        message.header.stamp.sec = stamp = next(self._stamps)
+
+        def answered():
+            self._wanted.publish(message)
+            return [c for c in self.commands if c.header.stamp.sec == stamp]
+
+        command = self._graph.until(answered)[0]
+        return {name: (position, *rest) for name, position, *rest in zip(
+            command.name, command.position, *([command.velocity] if command.velocity else []))}
+
+
+@pytest.fixture
+def stream(graph):
+    """Start the node with a lever and a four-bar."""
+    return Stream(graph, LEVER)
+
+
+def flap(servo):
+    """Return where the flap is, from the textbook: the pin of the crank turns the slot."""
+    crank = 0.5 * servo + 0.25
+    return 0.1 - math.atan2(80.0 * math.sin(crank), 150.0 + 80.0 * math.cos(crank))
+
+
+def slope(function, at):
+    """Return a derivative."""
+    return (function(at + 1e-5) - function(at - 1e-5)) / 2e-5
+
+
+def test_a_flap_is_put_where_it_is_wanted_in_the_language_of_its_servo(stream):
+    for servo in (-3.0, -1.0, 0.0, 0.7, 2.4):
+        (name, (position, speed)), = stream.want(['flap'], [flap(servo)], [0.3]).items()
+        assert name == 'servo' and position == pytest.approx(servo, abs=1e-13)
+        assert speed == pytest.approx(0.3 / slope(flap, servo), rel=1e-8)
+
+
+def test_outputs_of_several_mechanisms_in_one_message(stream, graph):
+    arrays = {name: graph.listen(Float64MultiArray, f'{name}/commands')
+              for name in ('lever', 'bar')}
+    four_bar = mechanisms.create('four_bar')
+    for crank in (0.6, 1.1, 1.6, 1.3):
+        at = four_bar.solve(crank, ('B',))['B'].tolist()
+        rocker = float(four_bar.joint_angles(crank)['QB'])
+        for name, value in (('bar_B.x', at[0]), ('bar_QB', rocker)):
+            commands = stream.want(['somebody_else', name, 'flap'], [9.0, value, flap(0.7)])
+            assert commands.keys() == {'bar_crank', 'servo'}
+            assert commands['bar_crank'] == (pytest.approx(crank, abs=1e-12),)
+            assert commands['servo'] == (pytest.approx(0.7, abs=1e-13),)
+    graph.until(lambda: all(arrays.values()))
+    assert arrays['lever'][-1].data[0] == pytest.approx(0.7, abs=1e-13)
+    assert arrays['bar'][-1].data[0] == pytest.approx(1.3, abs=1e-12)
+
+
+def test_what_cannot_be_had_is_held_and_said(stream, capfd):
+    good = stream.want(['flap'], [flap(1.0)], [0.1])['servo']
+    reasons = ((-2.0, 'the lever reaches'), (math.nan, 'a value must be finite'),
+               (flap(2.6), r'outside crank.sweep \[-1.5, 1.5\]'), (math.inf, ''), (-1e300, ''))
+    for value, _ in reasons:
+        assert stream.want(['flap'], [value], [0.1])['servo'] == (good[0], 0.0)
+    assert 'flap cannot be -2: the lever reaches' in capfd.readouterr().err
+    assert stream.want(['flap'], [flap(0.9)])['servo'] == (pytest.approx(0.9, abs=1e-13),)
+
+
+def test_before_the_first_good_command_there_is_none(stream, graph):
+    publisher = graph.node.create_publisher(JointState, 'wanted_states', 10)
+    graph.until(publisher.get_subscription_count)
+    for _ in range(5):
+        publisher.publish(JointState(name=['flap', 'bar_QB'], position=[5.0, 9.0]))
+    assert 'bar_crank' in stream.want(['flap', 'bar_QB'], [5.0, 1.2])
+    assert {name for command in stream.commands for name in command.name} == {'bar_crank'}
+
+
+def test_two_outputs_of_one_input_and_a_name_of_nobody_are_said(stream, capfd):
+    assert stream.want(['flap', 'lever_A.x', 'boom'], [flap(0.2), 100.0, 1.0]).keys() == {'servo'}
+    said = capfd.readouterr().err
+    assert 'flap and lever_A.x are moved by one input: name one of them' in said
+    assert 'nothing is called boom' in said
+
+
+def test_hostile_bytes_end_nothing(stream, graph):
+    publisher = graph.node.create_publisher(JointState, 'wanted_states', 10)
+    graph.until(publisher.get_subscription_count)
+    chance = random.Random(0)
+    for size in range(40):
+        publisher.publish(chance.randbytes(8 + size))
+    publisher.publish(JointState(name=['flap', 'flap', ''], position=[0.1]))
+    publisher.publish(JointState(position=[0.1]))
+    assert stream.want(['flap'], [flap(0.4)])['servo'] == (pytest.approx(0.4, abs=1e-13),)
+
+
+def test_a_change_of_the_geometry_is_minded(stream, graph):
+    for a in (80.0, 90.0):
+        assert graph.set(stream.node, lever__dimensions__a=a).successful
+        servo, = stream.want(['lever_A.y'], [40.0])['servo']
+        assert a * math.cos(0.5 * servo + 0.25) == pytest.approx(40.0, abs=1e-12)
+
+
+def test_commands_move_the_picture(stream, graph):
+    graph.start(Kinematics, LEVER, cli_args=['--ros-args', '-r', 'crank_states:=servo_commands'])
+    shown = graph.listen(JointState, 'lever/joint_states')
+    graph.until(lambda: stream.want(['flap'], [-0.2]) and shown)
+    message = shown[-1]
+    assert dict(zip(message.name, message.position))['flap'] == pytest.approx(-0.2, abs=1e-14)
+
+
+# --- in turn, and all round ---
+
+@pytest.mark.parametrize('type_, output, part', [
+    ('four_bar', 'QB', 1.0), ('jansen', 'G.x', 1.0), ('slider_crank', 'block', 1.0),
+    ('watt', 'P.y', 1.0), ('whitworth', 'lever', 3.0)])
+def test_a_turning_crank_is_found_again_without_a_jump(type_, output, part):
+    machine = scene.read({'mechanisms': ['one'], 'one.type': type_}).machines['one']
+    linkage, wanted = machine.linkage, Wanted(machine, output)
+    (_, start), (_, end) = linkage.extremes(output)[0]
+    near = start + 0.02 * part * (end - start)
+    for k in range(2, 98):
+        crank = start + 0.01 * k * part * (end - start)
+        value = float(linkage.joint_angles(crank, [output])[output])
+        found, actuator, _ = wanted.commanded(value, None, near)
+        assert actuator == found and abs(found - near) < 0.3
+        again = float(linkage.joint_angles(found, [output])[output])
+        assert math.remainder(again - value, math.tau) == pytest.approx(0.0, abs=1e-12 * max(
+            1.0, linkage.longest))
+        near = found
+
+
+# --- trajectories ---
+
+@pytest.fixture
+def plan(graph, stream):
+    """Return a function that sends a trajectory and returns the actuators'."""
+    publisher = graph.node.create_publisher(JointTrajectory, 'wanted_trajectory', 10)
+    planned = graph.listen(JointTrajectory, 'servo_trajectory')
+    graph.until(publisher.get_subscription_count)
+    ids = itertools.count(1)
+
+    def send(names, *points):
+        message = JointTrajectory(joint_names=names, points=[
+            JointTrajectoryPoint(positions=positions, velocities=velocities,
+                                 time_from_start=Duration(sec=second))
+            for second, (positions, velocities) in enumerate(points)])
+        message.header.frame_id = mark = str(next(ids))
+        publisher.publish(message)
+        return lambda: [one for one in planned if one.header.frame_id == mark]
+
+    return send
+
+
+def test_a_trajectory_becomes_that_of_the_actuators(graph, plan):
+    four_bar = mechanisms.create('four_bar')
+    cranks, servos = [0.6, 0.9, 1.3], [0.1, 0.5, -0.4]
+
+    def rocker(crank):
+        return float(four_bar.joint_angles(crank)['QB'])
+
+    found = graph.until(plan(['bar_QB', 'flap'], *(
+        ([rocker(crank), flap(servo)], [0.2, -0.1]) for crank, servo in zip(cranks, servos))))[0]
+    assert found.joint_names == ['bar_crank', 'servo']
+    for second, (point, crank, servo) in enumerate(zip(found.points, cranks, servos)):
+        assert point.time_from_start.sec == second
+        assert point.positions.tolist() == pytest.approx([crank, servo], abs=1e-12)
+        assert point.velocities.tolist() == pytest.approx(
+            [0.2 / slope(rocker, crank), -0.1 / slope(flap, servo)], rel=1e-7)
+
+
+@pytest.mark.parametrize('names, points, reason', [
+    (['flap'], [([0.0], []), ([4.0], [])], 'point 1: flap cannot be 4: the lever reaches'),
+    (['flap'], [([0.0, 1.0], [])], 'point 0 must have 1 positions'),
+    (['flap'], [([0.0], [1.0, 2.0])], 'as many velocities or none, not 1 and 2'),
+    (['flap', 'wing'], [([0.0, 0.0], [])], 'nothing is called wing'),
+    (['flap', 'flap'], [([0.0, 0.0], [])], 'flap and flap are moved by one input'),
+    (['bar_A.x'], [([1e3], [])], 'point 0: bar_A.x cannot be 1000'),
+    (['flap'], [([math.nan], [])], 'point 0: flap cannot be nan: a value must be finite')])
+def test_a_trajectory_that_cannot_be_is_refused_as_a_whole(graph, plan, capfd, names, points,
+                                                           reason):
+    refused = plan(names, *points)
+    graph.until(plan(['flap'], ([flap(0.3)], [])))
+    assert not refused()
+    said = capfd.readouterr().err
+    assert f'wanted_trajectory is refused: {reason}' in said or reason in said
