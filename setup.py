@@ -17,10 +17,10 @@ interfaces = Path(__file__).resolve().with_name('linkage_interfaces')
 # PATH, where names like `render` have no business.
 for_ros = sys.argv[1:2] != ['--help'] and {'install', 'develop'} & set(sys.argv)
 commands = {
-    'crank_driver': 'nodes.crank_driver', 'from_robot': 'robot_files.command',
-    'kinematics': 'nodes.kinematics', 'render': 'render', 'scene': 'nodes.together',
-    'servo_inverse': 'nodes.servo_inverse', 'urdf': 'nodes.urdf_command',
-    'viewer': 'web.viewer'}
+    'c_code': 'c_code.command', 'crank_driver': 'nodes.crank_driver',
+    'from_robot': 'robot_files.command', 'kinematics': 'nodes.kinematics',
+    'render': 'render', 'scene': 'nodes.together', 'servo_inverse': 'nodes.servo_inverse',
+    'urdf': 'nodes.urdf_command', 'viewer': 'web.viewer'}
 
 
 def build_interfaces():

@@ -12,10 +12,10 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / 'linkage_ros'
 # From the ground up: a module imports from its own room and from those below.
 ROOMS = ('words', 'palette', 'formula', 'linkage', 'mechanisms', 'scene', 'command',
-         'robot_files', 'robot_model', 'render', 'nodes', 'web')
+         'c_code', 'robot_files', 'robot_model', 'render', 'nodes', 'web')
 WITH_ROS = ('nodes', 'web')
 ROS = ('rclpy', 'builtin_interfaces', 'geometry_msgs', 'rcl_interfaces', 'sensor_msgs', 'std_msgs',
-       'visualization_msgs', 'linkage_interfaces')
+       'trajectory_msgs', 'visualization_msgs', 'linkage_interfaces')
 MODULES = sorted(PACKAGE.rglob('*.py'))
 PAGE = PACKAGE / 'web' / 'page'
 OUTSIDE = sorted([*(ROOT / 'test').rglob('*.py'), *(ROOT / 'benchmark').rglob('*.py')])

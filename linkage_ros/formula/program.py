@@ -89,7 +89,7 @@ def _fsum(*terms: float) -> float:
         return math.nan
 
 
-_OPERATORS = {
+OPERATORS = {
     'add': '({} + {})', 'subtract': '({} - {})', 'multiply': '({} * {})', 'divide': '({} / {})',
     'negative': '(-{})', 'less': '({} < {})', 'less_equal': '({} <= {})',
     'sin': 'sin({})', 'cos': 'cos({})', 'sqrt': 'sqrt({})', 'atan2': 'atan2({}, {})',
@@ -98,26 +98,27 @@ _OPERATORS = {
 
 
 @dataclass(frozen=True)
-class _Dialect:
+class Dialect:
     """How operations are spelt, which of them repeat their first operand, and their names."""
 
     templates: Mapping[str, str]
     repeating: frozenset
     names: Mapping[str, Any]
-    frees: bool
+    frees: bool = False
+    number: Callable[[float], str] = repr
 
 
-FLOAT = _Dialect(
-    {**_OPERATORS, 'where': '({1} if {0} else {2})',
+FLOAT = Dialect(
+    {**OPERATORS, 'where': '({1} if {0} else {2})',
      'rint': 'round({})',
      'root': '(sqrt({0}) if {0} > 0.0 else grazed({0}, {1}))',
      'gated': '({0} if {1} >= -{2} else nan)'},
     frozenset({'root'}),
     {'sin': math.sin, 'cos': math.cos, 'sqrt': math.sqrt, 'atan2': math.atan2,
-     'grazed': grazed, 'nan': math.nan, 'inf': math.inf}, frees=False)
+     'grazed': grazed, 'nan': math.nan, 'inf': math.inf})
 
-_ARRAY = _Dialect(
-    {**_OPERATORS, 'where': 'where({}, {}, {})', 'root': 'root({}, {})',
+_ARRAY = Dialect(
+    {**OPERATORS, 'where': 'where({}, {}, {})', 'root': 'root({}, {})',
      'gated': 'gated({}, {}, {})', 'rint': 'rint({})'},
     frozenset(),
     {'sin': np.sin, 'cos': np.cos, 'sqrt': np.sqrt, 'atan2': np.arctan2, 'where': np.where,
@@ -219,7 +220,7 @@ class _Listing:
         return [(number, node.op, (float(node.value),) if node.op == 'constant' else args)
                 for number, node, args in needed], self.constants, self.outputs
 
-    def statements(self, dialect: _Dialect) -> tuple:
+    def statements(self, dialect: Dialect) -> tuple:
         """Return the assignments as (name, code, names used) and the code of each output."""
         text, depth, lines = {}, {}, []
         reads: Dict[int, Set[str]] = {}
@@ -230,7 +231,8 @@ class _Listing:
             if number in self.constants:
                 text[number], depth[number], reads[number] = f'k{number}', 0, set()
             elif node.op == 'constant':
-                text[number], depth[number], reads[number] = repr(node.value), 0, set()
+                text[number], depth[number], reads[number] = (
+                    dialect.number(node.value), 0, set())
             elif node.op == 'argument':
                 text[number], depth[number], reads[number] = f'x{args[0]}', 0, set()
             else:
@@ -257,7 +259,7 @@ def _with_releases(lines: Sequence[Tuple[str, str, Set[str]]], kept: Set[str]) -
             yield 'del ' + ', '.join(done)
 
 
-def _python(listing: _Listing, dialect: _Dialect, arguments: int,
+def _python(listing: _Listing, dialect: Dialect, arguments: int,
             names: Tuple[str, ...] = ()) -> Callable:
     """
     Return a function of constants, and of what to do instead, to the function of the arguments.
@@ -409,6 +411,20 @@ class Pose:
     def _by_arrays(self, *arguments: float) -> tuple:
         """Return the outputs at one pose with inf or nan where Python's floats raise."""
         return tuple(self._blocks([np.array([a]) for a in arguments], 1)[:, 0].tolist())
+
+    def rounded(self, argument: np.ndarray) -> np.ndarray:
+        """Return the outputs over one argument, worked out in the precision of that array."""
+        with np.errstate(all='ignore'):
+            rows = self.variant.array(*self.constants)(argument)
+        return np.array([np.broadcast_to(row, argument.shape) for row in rows])
+
+    def statements(self, dialect: Dialect) -> Tuple[Dict[str, float], List[Tuple[str, str]],
+                                                    List[str]]:
+        """Return constants by name, assignments (name, code) and the code of each output."""
+        listing = self.variant.listing
+        lines, outputs, _ = listing.statements(dialect)
+        return (dict(zip((f'k{n}' for n in listing.constants), self.constants)),
+                [(name, code) for name, code, _ in lines], outputs)
 
     def placer(self, names: tuple) -> Callable:
         """Return the function from one argument, a float, to an array (2,) for each name."""

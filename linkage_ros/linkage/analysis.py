@@ -22,6 +22,7 @@ from .inputs import Arc
 from .inverse import distinct, in_order, MonotoneBranches, nearest
 from .mechanism import Inputs, Mechanism
 from .planar import GRAZE
+from ..formula.program import Pose
 from ..words import listed, quoted
 
 # Dead points nearer to an end of the reach than this [rad] are that end.
@@ -250,6 +251,28 @@ class Analysed(Mechanism):
             # The output turns all round with the crank: beyond pi they go on together.
             turns = float(first.beside(found, near)) - found
         return found + turns, rate
+
+    def monotone(self, output: str, most: float) -> Tuple[List[Tuple[float, ...]], Pose]:
+        """
+        Return what an inverse of one's own starts from, of a linkage with one input.
+
+        Parameters
+        ----------
+        output : str
+            What `input_for` takes.
+        most : float
+            By how much the output changes in one piece at most [rad or m].
+
+        Returns
+        -------
+        (list of (float, float, float, float), Pose)
+            Pieces of the reach on which the output rises or falls all along: the input [rad or m]
+            at both ends, and the output there; the code for the output and its rate.
+
+        """
+        size = self.inputs[0].size
+        return [(low * size, high * size, *values) for low, high, *values
+                in self._inverse(output, ()).pieces(most)], self._bound('output', output)
 
     def _inverse(self, output: str, others: Tuple[float, ...]) -> MonotoneBranches:
         """Return the branches of an output."""

@@ -120,6 +120,18 @@ class MonotoneBranches:
                 row[place] = np.where(target >= branch.value[-1] - near, branch.theta[-1], part)
         return found
 
+    def pieces(self, most: float) -> List[Tuple[float, float, float, float]]:
+        """Return the branches, cut where the output has changed by so much: inputs, outputs."""
+        cut = []
+        for theta, value, sign in self._branches:
+            places = [0]
+            for i in range(1, len(theta)):
+                if i + 1 == len(theta) or value[i + 1] - value[places[-1]] > most:
+                    places.append(i)
+            cut += [(float(theta[i]), float(theta[k]), float(sign * value[i]),
+                     float(sign * value[k])) for i, k in zip(places, places[1:])]
+        return cut
+
     @property
     def is_one(self) -> bool:
         """Whether the output rises, or falls, wherever the input may be."""

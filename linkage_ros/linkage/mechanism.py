@@ -299,10 +299,15 @@ class Mechanism:
             If a joint does not exist.
 
         """
+        return self.posed(points, joints, rates).at
+
+    def posed(self, points: Optional[Sequence[str]] = None, joints: Sequence[str] = (),
+              rates: Sequence[str] = ()) -> Pose:
+        """Return the code behind `function`."""
         wanted = tuple(self._names(kind, _hashable(names))
                        for kind, names in (('points', points), ('angles', joints),
                                            ('rates', rates)))
-        return self._bound('parts', wanted).at
+        return self._bound('parts', wanted)
 
     def legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...],
              rows: np.ndarray) -> Batch:

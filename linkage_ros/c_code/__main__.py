@@ -1,0 +1,10 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""`python -m linkage_ros.c_code`."""
+
+import sys
+
+from .command import main
+
+sys.exit(main())

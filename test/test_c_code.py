@@ -1,0 +1,218 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Linkages as C: compiled without a warning, and solved to the same numbers as in Python."""
+
+import ctypes
+from pathlib import Path
+import re
+import shutil
+import subprocess
+
+from linkage_ros import mechanisms, scene
+from linkage_ros.c_code import command, header
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[1]
+COMPILER = shutil.which('cc') or shutil.which('gcc')
+STRICT = ('-std=c99', '-Wall', '-Wextra', '-pedantic', '-Werror', '-O2')
+
+pytestmark = pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
+
+# What there is, each at a size of its own, and what a word drives, carries or ties.
+SCENE = {
+    'mechanisms': [*mechanisms.TYPES, 'boom', 'rack', 'bent'],
+    **{f'{name}.type': name for name in mechanisms.TYPES}, 'jansen.scale': 0.01,
+    'slotted_lever.scale': 1e-3, 'boom.type': 'custom', 'boom.scale': 2.0, 'boom.joints': [
+        'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C rigid O B 2 1.4 left'],
+    'rack.type': 'custom', 'rack.joints': [
+        'O ground 0 0', 'R ground 1 0', 'A carriage O along R 0 2', 'Q ground 0 1',
+        'B dyad A Q 0.9 0.6 left'],
+    'bent.type': 'custom', 'bent.joints': [
+        'O ground 0 0', 'A crank O 0.4', 'B crank A 0.3 zero O', 'C rigid A B 0.2 0.4 left']}
+OUTPUTS = {'slotted_lever': ('lever', 'A.x'), 'four_bar': ('QB', 'distance(O,B)'),
+           'jansen': ('G.x', 'angle(A,G)'), 'whitworth': ('lever',), 'slider_crank': ('block',),
+           'boom': ('B.x', 'angle(O,B)')}
+CALLER = """
+void {name}_over(long count, const {number} *given, {number} *out)
+{{
+    long i;
+    for (i = 0; i < count; i++) {{
+        {name}_pose *p = ({name}_pose *)(out + i * {size});
+        out[i * {size} + {size} - 1] = {name}_solve({given}, p);
+        {name}_rates({given}, {places});
+    }}
+}}
+"""
+INVERTER = """
+int {name}_{input}_for_{field}_(const {number} *given, {number} *found)
+{{
+    return {name}_{input}_for_{field}(given[0], given[1], found);
+}}
+"""
+
+
+def compiled(folder, machines, single=False):
+    """Return a library with a loop over each mechanism, and over its inverses."""
+    text, number = [], 'float' if single else 'double'
+    for machine in machines:
+        linkage, n = machine.linkage, len(machine.linkage.inputs)
+        fields = 2 * len(linkage.points) + len(linkage.joints)
+        given = ', '.join(f'given[i * {n} + {k}]' for k in range(n))
+        text.append(header.written(machine, OUTPUTS.get(machine.name, ()), single))
+        text.append(CALLER.format(
+            name=machine.name, number=number, given=given, size=fields * (n + 1) + 1,
+            places=', '.join(f'p + {k + 1}' for k in range(n))))
+        text += [INVERTER.format(name=machine.name, input=linkage.inputs[0].name, number=number,
+                                 field=re.search(rf'_for_(\w+)\({number} value', part)[1])
+                 for part in text[-2].split('static inline ') if '_for_' in part]
+    source, library = folder / f'{number}.c', folder / f'{number}.so'
+    source.write_text('\n'.join(text))
+    subprocess.run([COMPILER, *STRICT, '-shared', '-fPIC', str(source), '-o', str(library), '-lm'],
+                   check=True)
+    return ctypes.CDLL(str(library))
+
+
+def solved(library, machine, inputs, kind=np.float64):
+    """Return what C makes of inputs, shape (poses, n): pose, rates by each, and whether it is."""
+    linkage, n = machine.linkage, inputs.shape[1]
+    size = (2 * len(linkage.points) + len(linkage.joints)) * (n + 1) + 1
+    given, out = np.ascontiguousarray(inputs, kind), np.zeros((len(inputs), size), kind)
+    library[f'{machine.name}_over'](ctypes.c_long(len(inputs)), ctypes.c_void_p(
+        given.ctypes.data), ctypes.c_void_p(out.ctypes.data))
+    return out
+
+
+def expected(machine, inputs):
+    """Return the same from Python, one pose after the other."""
+    linkage = machine.linkage
+    names = [*(f'{joint}.{axis}' for joint in linkage.points for axis in 'xy'), *linkage.joints]
+    solve = linkage.function(linkage.points, linkage.joints, names)
+    units = [machine.scale_of(input_.name) for input_ in linkage.inputs]
+    sizes = np.array([machine.scale_of(name) for name in names])
+    rows = np.array([solve(*(np.array(row) / units).tolist()) for row in inputs])
+    return rows * np.concatenate([sizes, *(sizes / unit for unit in units)])
+
+
+def values(machine, count):
+    """Return inputs all over and beyond the reach, dead points included."""
+    rng, rows = np.random.default_rng(1), []
+    for drive in machine.inputs.values():
+        low, high = (-9.0, 9.0) if drive.input.turns else (
+            drive.input.low - 0.1, min(drive.input.high, 4.0) + 0.1)
+        own = rng.uniform(low, high, count)
+        ends = [end for arc in drive.reach for end in arc][:count // 2]
+        own[:len(ends)] = ends
+        rows.append(own)
+    return np.column_stack(rows)
+
+
+@pytest.fixture(scope='module')
+def machines():
+    """Return the mechanisms of the scene."""
+    return scene.read(SCENE).machines
+
+
+@pytest.fixture(scope='module')
+def library(machines, tmp_path_factory):
+    """Return them in C."""
+    return compiled(tmp_path_factory.mktemp('c'), machines.values())
+
+
+@pytest.mark.parametrize('name', SCENE['mechanisms'])
+def test_poses_and_rates_are_those_of_python(library, machines, name, count=300):
+    machine = machines[name]
+    inputs = values(machine, count)
+    *found, whole = solved(library, machine, inputs).T
+    poses = expected(machine, inputs).T
+    fields = 2 * len(machine.linkage.points) + len(machine.linkage.joints)
+    assert np.array_equal(whole.astype(bool), np.isfinite(poses[:fields]).all(axis=0))
+    np.testing.assert_allclose(np.array(found), poses, rtol=1e-15, atol=0.0)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('name', ['jansen', 'slotted_lever'])
+def test_so_they_are_at_a_hundred_thousand_poses(library, machines, name):
+    test_poses_and_rates_are_those_of_python(library, machines, name, 100_000)
+
+
+@pytest.mark.parametrize('name', SCENE['mechanisms'])
+def test_the_reach_is_that_of_python(machines, name):
+    machine = machines[name]
+    text = header.written(machine)
+    assert (f'{name}_reaches' in text) == (len(machine.inputs) == 1)
+    assert scene.in_words(machine.first.reach) in text or len(machine.inputs) > 1
+
+
+@pytest.mark.parametrize('name, output', [
+    (name, output) for name, outputs in OUTPUTS.items() for output in outputs])
+def test_the_inverse_finds_the_nearest_input(library, machines, name, output):
+    machine, rng = machines[name], np.random.default_rng(2)
+    linkage, drive = machine.linkage, machine.first
+    unit, size = machine.scale_of(drive.input.name), machine.scale_of(output)
+    plain = re.sub(r'\W+', '_', output).strip('_')
+    field = plain if '.' in output or '(' in output else (
+        'angle_' if linkage.is_angle(output) else 'slide_') + plain
+    invert = library[f'{name}_{drive.input.name}_for_{field}_']
+    low, high = drive.reach[0]
+    for theta in rng.uniform(low, high, 60):
+        value = float(linkage.joint_angles(theta / unit, [output])[output]) * size
+        near = theta + rng.uniform(-0.3, 0.3) * (high - low) + (
+            drive.input.turns and float(rng.integers(-3, 4)) * 2.0 * np.pi)
+        given, found = (ctypes.c_double * 2)(value, near), ctypes.c_double()
+        assert invert(given, ctypes.byref(found)) == 1
+        again = float(linkage.joint_angles(found.value / unit, [output])[output]) * size
+        best = linkage.input_for(output, value / size, near / unit) * unit
+        gap = again - value
+        gap -= linkage.is_angle(output) and 2.0 * np.pi * np.round(gap / (2.0 * np.pi))
+        assert abs(gap) <= 2e-14 * max(1.0, size * linkage.longest)
+        assert abs(abs(found.value - near) - abs(best - near)) < 1e-6
+    for value in (1e3, -1e3, np.nan, np.inf):
+        if linkage.is_angle(output) and np.isfinite(value):
+            continue
+        given, found = (ctypes.c_double * 2)(value, 0.0), ctypes.c_double(7.0)
+        assert invert(given, ctypes.byref(found)) == 0 and found.value == 7.0
+
+
+def test_single_precision_is_as_good_as_it_says(machines, tmp_path):
+    chosen = [machines[name] for name in ('jansen', 'slotted_lever', 'boom', 'bent')]
+    library = compiled(tmp_path, chosen, single=True)
+    for machine in chosen[:3]:
+        said = float(re.search(r'off by up to (\S+) of', header.written(machine, (), True))[1])
+        (low, high), = machine.first.reach
+        edge = 0.01 * (high - low)
+        inputs = np.random.default_rng(3).uniform(low + edge, high - edge, (500, 1)).astype(
+            np.float32)
+        points = 2 * len(machine.linkage.points)
+        found = solved(library, machine, inputs, np.float32)[:, :points]
+        exact = expected(machine, inputs.astype(float))[:, :points]
+        worst = np.abs(found - exact).max() / (machine.scale * machine.linkage.longest)
+        assert 0.1 * said < worst < 3.0 * said < 1e-4
+
+
+def test_the_sketch_has_the_header_that_is_printed(capsys):
+    sketch = ROOT / 'examples' / 'hobby_servo'
+    assert command.main([str(sketch / 'lever.yaml'), '--output', 'lever', '--float']) == 0
+    assert capsys.readouterr().out.splitlines() == (sketch / 'lever.h').read_text().splitlines()
+    called = set(re.findall(r'\blever_\w+(?=\()', (sketch / 'hobby_servo.ino').read_text()))
+    assert called and called <= set(re.findall(r'\blever_\w+', (sketch / 'lever.h').read_text()))
+
+
+def test_a_scene_file_is_printed_as_c(capsys):
+    assert command.main([str(ROOT / 'config' / 'all.yaml'), '--mechanism', 'slotted_lever',
+                         '--output', 'lever']) == 0
+    printed = capsys.readouterr().out
+    assert 'slotted_lever_crank_for_angle_lever' in printed and 'jansen' not in printed
+
+
+@pytest.mark.parametrize('arguments, said', [
+    (['all', '--mechanism', 'arm'], "there is no mechanism 'arm'; allowed: water_drop"),
+    (['all', '--mechanism', 'jansen', '--output', 'arm'], 'jansen has no'),
+    (['excavator', '--output', 'C.x'], 'has several inputs'), (['nowhere'], 'No such file'),
+    ([], 'the following arguments are required: SCENE')])
+def test_what_cannot_be_is_one_sentence(capsys, arguments, said):
+    scenes = [str(ROOT / 'config' / f'{arguments[0]}.yaml')] if arguments else []
+    assert command.main(scenes + arguments[1:]) == 1
+    printed = capsys.readouterr().err
+    assert printed.startswith('c_code: ') and printed.count('\n') == 1 and said in printed
