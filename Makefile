@@ -21,7 +21,7 @@ lint_bin := .venv-lint/bin
 requirements := wheels/$(DISTRO).txt wheels/build.txt wheels/demo.txt
 tools := wheels/dev.txt $(wildcard wheels/dev-$(DISTRO).txt)
 sources := package.xml setup.py setup.cfg resource/linkage_ros wheels/prefix.cmake \
-  $(shell find linkage_ros config launch linkage_interfaces -type f ! -name '*.pyc' 2>/dev/null)
+  $(shell find linkage_ros config examples launch linkage_interfaces -type f ! -name '*.pyc' 2>/dev/null)
 
 # The first Python that is new enough for the wheels and can build against itself; without any, the
 # first that is new enough.
