@@ -62,6 +62,7 @@ bench: build $(venv)/.tools .venv-bench/.installed ## Measure run time against e
 pictures: .venv-docs/.installed ## Draw what pictures/pictures.txt lists, without ROS
 	@mkdir -p pictures/out
 	@grep -v '^#' pictures/pictures.txt | xargs -t -L 1 $(docs_python) -m linkage_ros.render
+	@PYTHONPATH=. $(docs_python) examples/draw_leg.py pictures/out/leg.png
 
 .PHONY: docs
 docs: .venv-docs/.installed ## Build the documentation to docs/_build/html/ and check its links

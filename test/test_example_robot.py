@@ -5,6 +5,8 @@
 
 import ast
 from pathlib import Path
+import subprocess
+import sys
 from xml.etree import ElementTree
 
 import numpy as np
@@ -138,3 +140,12 @@ def test_the_launch_file_starts_what_there_is():
              if isinstance(call, ast.Call) and ast.unparse(call.func) == 'Node']
     assert [node['executable'].value for node in nodes] == [
         'robot_state_publisher', 'kinematics', 'crank_driver']
+
+
+@pytest.mark.long
+def test_the_picture_is_drawn_by_its_command(tmp_path, monkeypatch):
+    pytest.importorskip('matplotlib')
+    monkeypatch.setenv('MPLBACKEND', 'Agg')
+    subprocess.run([sys.executable, EXAMPLES / 'draw_leg.py', tmp_path / 'leg.png'], check=True,
+                   timeout=60)
+    assert (tmp_path / 'leg.png').read_bytes().startswith(b'\x89PNG')
