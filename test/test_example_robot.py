@@ -4,7 +4,9 @@
 """The example robot: what arrives on `joint_states` closes the loops of its own URDF."""
 
 import ast
+from importlib.util import find_spec
 from pathlib import Path
+import runpy
 import subprocess
 import sys
 from xml.etree import ElementTree
@@ -34,7 +36,7 @@ MOTORS = {name for motors in BOARDS for name in motors}
 JOINTS = {joint.get('name'): joint for joint in ElementTree.fromstring(URDF).iter('joint')
           if joint.get('type') != 'fixed'}
 PASSIVE = JOINTS.keys() - MOTORS
-POSES = 60
+POSES = 40
 
 
 class Robot:
@@ -140,6 +142,19 @@ def test_the_launch_file_starts_what_there_is():
              if isinstance(call, ast.Call) and ast.unparse(call.func) == 'Node']
     assert [node['executable'].value for node in nodes] == [
         'robot_state_publisher', 'kinematics', 'crank_driver']
+
+
+@pytest.mark.skipif(not find_spec('launch_ros'), reason='launch_ros is not installed')
+@pytest.mark.parametrize('simulated, left_out', [('true', set()), ('false', {'crank_driver'})])
+def test_the_motors_are_simulated_where_that_is_wanted(simulated, left_out):
+    from launch import LaunchContext
+    from launch_ros.actions import Node
+
+    context = LaunchContext()
+    context.launch_configurations['simulated'] = simulated
+    described = runpy.run_path(str(EXAMPLES / 'leg.launch.py'))['generate_launch_description']()
+    assert {node.node_executable for node in described.entities if isinstance(node, Node)
+            and node.condition and not node.condition.evaluate(context)} == left_out
 
 
 @pytest.mark.long

@@ -118,7 +118,8 @@ def test_the_launch_file_starts_executables_that_there_are(constants, monkeypatc
     assert {*constants['NODES'], *constants['TOGETHER'], constants['VIEWER']} <= set(installed)
     files = {name for folder, names in handed['data_files'] for name in names}
     assert {f'config/{constants["RVIZ_CONFIG"]}', 'launch/scene.launch.py'} <= files
-    assert {str(path.relative_to(ROOT)) for path in CONFIG.glob('*.yaml')} <= files
+    kept = *CONFIG.glob('*.yaml'), *(ROOT / 'examples').glob('*.*')
+    assert {str(path.relative_to(ROOT)) for path in kept} <= files
 
 
 def test_every_argument_of_the_launch_file_is_described(constants):
