@@ -12,21 +12,24 @@ from xml.etree import ElementTree
 import pytest
 
 pytest.importorskip('rclpy')
+pytest.importorskip('linkage_interfaces')
 yaml = pytest.importorskip('yaml')
 
 from linkage_ros import scene  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
+from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
 from linkage_ros.robot_files.command import main as from_robot  # noqa: E402
 from linkage_ros.robot_model.command import main as urdf  # noqa: E402
 from robots import LIBRARIES  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
+from std_msgs.msg import Float64MultiArray  # noqa: E402
 
 ROOT = Path(__file__).parents[1]
 SECTIONS = dict(re.findall(r'^## (.*?)\n(.*?)(?=^## |\Z)', (ROOT / 'docs/how-to.md').read_text(),
                            re.MULTILINE | re.DOTALL))
 BLOCK = re.compile(r'(?:^`([\w.]+)`:\n\n)?^```(\w+)\n(.*?)^```', re.MULTILINE | re.DOTALL)
-NODES = {'kinematics': Kinematics, 'crank_driver': CrankDriver}
+NODES = {'kinematics': Kinematics, 'crank_driver': CrankDriver, 'servo_inverse': ServoInverse}
 COMMANDS = {'from_robot': from_robot, 'linkage_ros.robot_model': urdf}
 
 
@@ -120,13 +123,21 @@ def test_coordinates_of_a_drawing(follow):
     assert places['lid_B'] == pytest.approx([0.1, 0.0, 0.07], abs=1e-12)
 
 
-def test_motors_of_ros2_control_are_the_sources_of_the_scene(follow):
-    node = follow('ros2_control beside it')
-    sources = [drive.source for machine in node.scene.machines.values()
-               for drive in machine.inputs.values()]
+def test_ros2_control_moves_the_motors_of_the_scene(graph, follow):
+    machines = follow('ros2_control beside it').scene.machines
+    sources = {name: [machine.first.source] for name, machine in machines.items()}
+    motors = [motor for listed in sources.values() for motor in listed]
     controllers = yaml.safe_load(Path('controllers.yaml').read_text())
-    control = ElementTree.parse('control.urdf')
-    robot = ElementTree.parse('examples/leg.urdf')
-    assert controllers['motors']['ros__parameters']['joints'] == sources
-    assert [joint.get('name') for joint in control.iter('joint')] == sources
-    assert {*sources} < {joint.get('name') for joint in robot.iter('joint')}
+    control, robot = map(ElementTree.parse, ('control.urdf', 'examples/leg.urdf'))
+    assert {name: controllers[name]['ros__parameters']['joints'] for name in machines} == sources
+    assert [joint.get('name') for joint in control.iter('joint')] == motors
+    assert {*motors} < {joint.get('name') for joint in robot.iter('joint')}
+
+    # What is wanted of the knee becomes a command, which puts the knee there.
+    commands, answers = graph.listen(Float64MultiArray, 'knee/commands'), []
+    graph.node.create_subscription(
+        JointState, 'joint_states', lambda m: 'knee' in m.name and answers.append(m), 10)
+    wanted = graph.node.create_publisher(JointState, 'wanted_states', 10)
+    graph.until(lambda: commands or wanted.publish(JointState(name=['knee'], position=[0.9])))
+    state = graph.crank(['knee_motor'], 'joint_states')(commands[0].data, answers)
+    assert state.position[state.name.index('knee')] == pytest.approx(0.9, abs=1e-12)
