@@ -21,7 +21,7 @@ lint_bin := .venv-lint/bin
 requirements := wheels/$(DISTRO).txt wheels/build.txt wheels/demo.txt
 tools := wheels/dev.txt $(wildcard wheels/dev-$(DISTRO).txt)
 sources := package.xml setup.py setup.cfg resource/linkage_ros wheels/prefix.cmake \
-  $(shell find linkage_ros config launch linkage_interfaces -type f ! -name '*.pyc' 2>/dev/null)
+  $(shell find linkage_ros config examples launch linkage_interfaces -type f ! -name '*.pyc' 2>/dev/null)
 
 # The first Python that is new enough for the wheels and can build against itself; without any, the
 # first that is new enough.
@@ -62,6 +62,7 @@ bench: build $(venv)/.tools .venv-bench/.installed ## Measure run time against e
 pictures: .venv-docs/.installed ## Draw what pictures/pictures.txt lists, without ROS
 	@mkdir -p pictures/out
 	@grep -v '^#' pictures/pictures.txt | xargs -t -L 1 $(docs_python) -m linkage_ros.render
+	@PYTHONPATH=. $(docs_python) examples/draw_leg.py pictures/out/leg.png
 
 .PHONY: docs
 docs: .venv-docs/.installed ## Build the documentation to docs/_build/html/ and check its links

@@ -65,6 +65,7 @@ setup(
         (f'share/{package_name}', ['package.xml']),
         (f'share/{package_name}/config', glob('config/*')),
         (f'share/{package_name}/launch', glob('launch/*.launch.py')),
+        (f'share/{package_name}/examples', glob('examples/*.*')),
     ],
     python_requires='>=3.10',
     install_requires=['setuptools', 'numpy'],

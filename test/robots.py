@@ -6,6 +6,7 @@
 from io import BytesIO
 import math
 
+import numpy as np
 import pytest
 
 
@@ -20,7 +21,11 @@ class Yourdfpy:
     def places(self, positions, names):
         """Return where frames are [m], by name, at joint positions."""
         self.robot.update_cfg({name: float(value) for name, value in positions.items()})
-        return {name: self.robot.get_transform(name)[:3, 3] for name in names}
+        return {name: self.seen_from(None, name) for name in names}
+
+    def seen_from(self, base, name):
+        """Return where a frame is now, in another [m]."""
+        return self.robot.get_transform(name, base)[:3, 3]
 
 
 class Pinocchio:
@@ -42,6 +47,14 @@ class Pinocchio:
         self._library.framesForwardKinematics(self._model, self._data, q)
         return {name: self._data.oMf[self._model.getFrameId(name)].translation.copy()
                 for name in names}
+
+
+def in_frame(pose, point):
+    """Return a marker's point [m] in the marker's frame, turned by the quaternion of its pose."""
+    q, p = pose.orientation, np.array([point.x, point.y, point.z])
+    axis = np.array([q.x, q.y, q.z])
+    turned = p + 2.0 * np.cross(axis, np.cross(axis, p) + q.w * p)
+    return turned + [pose.position.x, pose.position.y, pose.position.z]
 
 
 LIBRARIES = [Yourdfpy, Pinocchio]

@@ -658,6 +658,18 @@ def test_a_sign_and_a_zero_hold_where_some_legs_are_left_out(graph):
     assert by_name((state := bench.joints_at(0.2)).position, state) == {'shaft': 0.8}
 
 
+def test_a_gear_alone_has_its_ratio_sign_zero_and_speed(graph):
+    graph.start(Kinematics, {
+        'mechanisms': ['hip'], 'hip.type': 'custom', 'hip.joints': ['O ground 0 0', 'K crank O 1'],
+        'hip.crank.ratio': 0.125, 'hip.joint_names': ['crank=-thigh+0.5'], 'hip.only_named': True})
+    graph.listen(MarkerArray, 'hip/markers')
+    for topic in ('hip/joint_states', 'joint_states'):
+        states = graph.listen(JointState, topic)
+        state = graph.crank(['hip_crank'])([8.0], states, [16.0])
+        assert (state.name, list(state.position), list(state.velocity)) == (
+            ['thigh'], [-0.5], [-2.0])
+
+
 def test_motors_and_passive_joints_share_a_topic_and_nobody_hears_himself(graph):
     graph.start(Kinematics, KNEE, cli_args=SHARED)
     said, answers, heard = [], [], graph.listen(Log, '/rosout')

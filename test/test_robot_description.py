@@ -21,7 +21,7 @@ from linkage_ros.nodes.urdf_command import main  # noqa: E402
 from linkage_ros.robot_model import urdf  # noqa: E402
 from rcl_interfaces.msg import Log  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
-from robots import Pinocchio, Yourdfpy  # noqa: E402
+from robots import in_frame, Pinocchio, Yourdfpy  # noqa: E402
 from ros_harness import Process  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
@@ -42,14 +42,6 @@ def given(name):
     """Return the parameters of a scene with a mechanism `m` in a pose askew."""
     return {'mechanisms': ['m'], 'm.type': name.split()[0], 'm.pose': POSE, 'm.scale': 0.01,
             **SCENES[name]}
-
-
-def in_frame(pose, point):
-    """Return a marker's point [m] in the marker's frame, turned by the quaternion of its pose."""
-    q, p = pose.orientation, np.array([point.x, point.y, point.z])
-    axis = np.array([q.x, q.y, q.z])
-    turned = p + 2.0 * np.cross(axis, np.cross(axis, p) + q.w * p)
-    return turned + [pose.position.x, pose.position.y, pose.position.z]
 
 
 @pytest.mark.parametrize('name, library', [

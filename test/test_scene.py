@@ -21,7 +21,7 @@ OWN = {'mechanisms': ['own'], 'own.type': 'custom'}
 YEAR = 365 * 86400 * 10 ** 9
 
 
-def solved(assembly, theta, points=(), joints=(), rates=()):
+def solved(assembly, theta, points=(), joints=(), rates=None):
     """Return the rows of all legs at a crank angle, at a crank speed of 1 rad/s."""
     solution = assembly.solution(points, joints, rates)
     solution.solve([theta], [1.0])

@@ -27,7 +27,7 @@ class Layout(NamedTuple):
     How the numbers of a solution follow each other: a row for each leg, then the inputs.
 
     A row holds so many coordinates, joint angles and joint velocities; of the inputs there are
-    the values and, where there are velocities, the speeds.
+    the values and, where velocities are wanted, as many speeds.
     """
 
     legs: int
@@ -35,6 +35,7 @@ class Layout(NamedTuple):
     coordinates: int
     joints: int
     velocities: int
+    speeds: int
 
     @property
     def posed(self) -> int:
@@ -44,14 +45,14 @@ class Layout(NamedTuple):
     @property
     def size(self) -> int:
         """How many numbers there are."""
-        return self._rows_end() + self.inputs * (2 if self.velocities else 1)
+        return self._rows_end() + self.inputs + self.speeds
 
     def rows(self, values: np.ndarray) -> np.ndarray:
         """Return the rows, one for each leg."""
         return values[:self._rows_end()].reshape(self.legs, self.posed + self.velocities)
 
     def driven(self, values: np.ndarray) -> np.ndarray:
-        """Return the inputs' values and, where there are velocities, their speeds."""
+        """Return the inputs' values and, where velocities are wanted, their speeds."""
         return values[self._rows_end():]
 
     def _rows_end(self) -> int:
@@ -86,8 +87,8 @@ class Solution:
         self._batch.finish()
 
     def solve(self, inputs: Sequence[float], speeds: Sequence[float] = ()) -> None:
-        """Solve at inputs [rad or m] and, if there are velocities, their speeds [per second]."""
-        if not self.layout.velocities:
+        """Solve at inputs [rad or m] and, if velocities are wanted, their speeds [per second]."""
+        if not self.layout.speeds:
             speeds = ()
         for row, value in zip(self._inputs, inputs):
             row.fill(value)
@@ -155,13 +156,15 @@ class Assembly:
             return self.linkage
 
     def solution(self, points: Sequence[Union[str, Spot]] = (), joints: Sequence[str] = (),
-                 rates: Sequence[str] = ()) -> Solution:
+                 rates: Optional[Sequence[str]] = None) -> Solution:
         """Return what solves all legs for points, joint angles and rates, and nothing else."""
-        layout = Layout(len(self.legs), len(self.linkage.inputs), 2 * len(points), len(joints),
-                        len(rates))
+        inputs, moving = len(self.linkage.inputs), rates is not None
+        rates = tuple(rates or ())
+        layout = Layout(len(self.legs), inputs, 2 * len(points), len(joints), len(rates),
+                        inputs if moving else 0)
         values = np.empty(layout.size)
         batch = self._fastest.legs(
-            tuple(points), tuple(joints), tuple(rates), layout.rows(values))
+            tuple(points), tuple(joints), rates, layout.rows(values))
         batch.given[2 * layout.inputs:].T[:] = list(self.legs.values())
         return Solution(layout, values, batch)
 

@@ -243,7 +243,7 @@ class Model:
         if wanted not in self._solutions:
             names = self.assembly.joints if joints else ()
             self._solutions[wanted] = self.assembly.solution(
-                self._points if markers else (), names, names if moving else ())
+                self._points if markers else (), names, names if joints and moving else None)
         return self._solutions[wanted]
 
     def solve(self, driven: InputState) -> Pose:
@@ -251,7 +251,7 @@ class Model:
         solution = self.solution(*driven.wanted)
         solution.solve(driven.values, driven.speeds)
         layout, values = solution.layout, solution.values
-        held, moving = None, layout.velocities > 0
+        held, moving = None, layout.speeds > 0
         if self.assembly.is_limited:
             held = self.assembly.within_reach(driven.values[0])
         # One sum, of squares, tells whether all values are finite; it is rarely asked which are.
@@ -264,7 +264,7 @@ class Model:
                                      and np.isfinite(driven.speeds).all())
         if held is not None and held.all():
             held = None
-        if layout.joints and not self._is_plain:
+        if not self._is_plain:
             signs, offsets = self._change(layout)
             values *= signs
             values += offsets
@@ -329,7 +329,7 @@ def _arranged(layout: Layout, rest: float, joints: np.ndarray, rates: np.ndarray
     values, n = np.full(layout.size, rest), layout.inputs
     rows, driven = layout.rows(values), layout.driven(values)
     driven[:n], rows[:, layout.coordinates:layout.posed].flat = np.split(joints, [n])
-    if layout.velocities:
+    if layout.speeds:
         driven[n:], rows[:, layout.posed:].flat = np.split(rates, [n])
     return values
 
@@ -361,7 +361,7 @@ class MechanismPublisher:
         if driven := self._driven:
             model.solution(*driven.wanted).finish()
             pose = model.solve(driven)
-            pose = pose._replace(held=None, moving=pose.layout.velocities > 0)
+            pose = pose._replace(held=None, moving=pose.layout.speeds > 0)
             for publisher, build in self._listening(model, driven):
                 model.wire(publisher, build, pose, self._logger)
         return model

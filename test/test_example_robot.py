@@ -1,0 +1,166 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The example robot: what arrives on `joint_states` closes the loops of its own URDF."""
+
+import ast
+from importlib.util import find_spec
+from pathlib import Path
+import runpy
+import subprocess
+import sys
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
+from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
+from robots import in_frame, LIBRARIES  # noqa: E402
+from ros_harness import Graph  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from visualization_msgs.msg import MarkerArray  # noqa: E402
+
+EXAMPLES = Path(__file__).parents[1] / 'examples'
+URDF = (EXAMPLES / 'leg.urdf').read_text()
+ARGS = ['--ros-args', '--params-file', str(EXAMPLES / 'leg.yaml'),
+        '-r', 'crank_states:=joint_states']
+# What has to coincide, by the URDF alone.
+LOOPS = [('abduction_eye', 'abduction_pin'), ('knee_eye', 'knee_pin')]
+# Motors of two boards, and how far each turns [rad].
+BOARDS = {('abduction_motor', 'hip_motor'): np.array([[-12.0, 12.0], [-4.5, 5.8]]),
+          ('knee_motor',): np.array([[-7.0, 4.5]])}
+MOTORS = {name for motors in BOARDS for name in motors}
+JOINTS = {joint.get('name'): joint for joint in ElementTree.fromstring(URDF).iter('joint')
+          if joint.get('type') != 'fixed'}
+PASSIVE = JOINTS.keys() - MOTORS
+POSES = 40
+
+
+class Robot:
+    """The leg's kinematics and its motors, all on `joint_states`."""
+
+    def __init__(self, graph):
+        self.joints, self._answers, self._boards = {}, [], {}
+        self._graph = graph
+        graph.start(Kinematics, cli_args=ARGS)
+        graph.node.create_subscription(JointState, 'joint_states', self._hear, 100)
+
+    def _hear(self, message):
+        if not PASSIVE.isdisjoint(message.name):
+            self._answers.append(message)
+            self.joints.update(zip(message.name, message.position, strict=True))
+
+    def turn(self, motors, positions):
+        """Move some motors; return the joints that then are known, from motors and node alike."""
+        if motors not in self._boards:
+            self._boards[motors] = self._graph.crank(list(motors), 'joint_states')
+        self._boards[motors](positions, self._answers)
+        self.joints.update(zip(motors, positions, strict=True))
+        return dict(self.joints)
+
+
+@pytest.fixture(scope='module')
+def told():
+    """Return the joints on the topic at poses all over the motors' range, board after board."""
+    with Graph() as graph:
+        robot, rng, found = Robot(graph), np.random.default_rng(13), []
+        for part in [0.0, 1.0, *rng.uniform(size=POSES)]:
+            for motors, ends in BOARDS.items():
+                at = ends @ ([1.0 - part, part] if part in (0.0, 1.0) else rng.dirichlet([1, 1]))
+                found.append(robot.turn(motors, list(at)))
+        # A message of one motor out of two moves that one.
+        found.append(robot.turn(('hip_motor',), [1.0]))
+        return found
+
+
+@pytest.mark.parametrize('library', LIBRARIES)
+def test_the_loops_of_the_urdf_are_closed_at_every_pose(told, library):
+    robot = library(URDF)
+    for state in told:
+        if len(state) == len(robot.joints):
+            places = robot.places(state, [frame for loop in LOOPS for frame in loop])
+            for eye, pin in LOOPS:
+                assert np.abs(places[eye] - places[pin]).max() < 1e-12
+
+
+def test_every_joint_is_told_and_stays_within_the_limits_of_the_urdf(told):
+    assert len(told) == 2 * POSES + 5 and set(told[0]) < set(told[-1]) == set(JOINTS)
+    limits = {name: [float(limit.get(end)) for end in ('lower', 'upper')]
+              for name, joint in JOINTS.items() if (limit := joint.find('limit')) is not None}
+    assert len(limits) == 7
+    for name, (low, high) in limits.items():
+        seen = [state[name] for state in told if name in state]
+        assert low < min(seen) < max(seen) < high
+        assert np.ptp(seen) > 0.4 * (high - low)
+
+
+def test_gears_have_the_ratios_that_the_robot_has(told):
+    for state in told[2:]:
+        turned = {crank: state[f'{name}_motor'] / ratio for name, crank, ratio in (
+            ('abduction', 'abduction_crank', 20.0), ('hip', 'hip_pitch', 8.0),
+            ('knee', 'knee_crank', -10.0))}
+        assert {crank: state[crank] for crank in turned} == pytest.approx(turned, abs=1e-15)
+
+
+def test_a_partial_message_moves_its_motor_alone(told):
+    before, after = told[-2:]
+    assert {name for name in after if after[name] != before[name]} == {'hip_motor', 'hip_pitch'}
+    assert after['hip_pitch'] == pytest.approx(0.125, abs=1e-15)
+
+
+@pytest.mark.parametrize('name, motor, base', [
+    ('abduction', 'abduction_motor', 'torso'), ('knee', 'knee_motor', 'thigh')])
+def test_markers_stay_on_the_link_that_the_loop_stands_on_wherever_it_is(
+        graph, name, motor, base):
+    robot, urdf = Robot(graph), LIBRARIES[0](URDF)
+    drawn = graph.listen(MarkerArray, f'{name}/markers')
+    for at in (-4.0, 4.0):
+        robot.turn(('abduction_motor', 'hip_motor'), [at, at])
+        robot.turn(('knee_motor',), [at])
+        *_, pin = (spheres := graph.crank([motor], 'joint_states')([at], drawn).markers[1]).points
+        urdf.places(robot.joints, [])
+        wanted = urdf.seen_from(base, f'{name}_pin')
+        assert spheres.header.frame_id == base
+        assert in_frame(spheres.pose, pin) == pytest.approx(wanted, abs=1e-12)
+
+
+def test_a_simulated_motor_says_what_the_real_one_would(graph):
+    states = graph.listen(JointState, 'joint_states')
+    graph.start(Kinematics, cli_args=ARGS)
+    graph.start(CrankDriver, cli_args=ARGS)
+    graph.until(lambda: {name for state in states for name in state.name} == set(JOINTS))
+    for state in states:
+        assert set(state.name) in (MOTORS, PASSIVE) and len(state.velocity) == len(state.name)
+
+
+def test_the_launch_file_starts_what_there_is():
+    tree = ast.parse((EXAMPLES / 'leg.launch.py').read_text())
+    nodes = [{word.arg: word.value for word in call.keywords} for call in ast.walk(tree)
+             if isinstance(call, ast.Call) and ast.unparse(call.func) == 'Node']
+    assert [node['executable'].value for node in nodes] == [
+        'robot_state_publisher', 'kinematics', 'crank_driver']
+
+
+@pytest.mark.skipif(not find_spec('launch_ros'), reason='launch_ros is not installed')
+@pytest.mark.parametrize('simulated, left_out', [('true', set()), ('false', {'crank_driver'})])
+def test_the_motors_are_simulated_where_that_is_wanted(simulated, left_out):
+    from launch import LaunchContext
+    from launch_ros.actions import Node
+
+    context = LaunchContext()
+    context.launch_configurations['simulated'] = simulated
+    described = runpy.run_path(str(EXAMPLES / 'leg.launch.py'))['generate_launch_description']()
+    assert {node.node_executable for node in described.entities if isinstance(node, Node)
+            and node.condition and not node.condition.evaluate(context)} == left_out
+
+
+@pytest.mark.long
+def test_the_picture_is_drawn_by_its_command(tmp_path, monkeypatch):
+    pytest.importorskip('matplotlib')
+    monkeypatch.setenv('MPLBACKEND', 'Agg')
+    subprocess.run([sys.executable, EXAMPLES / 'draw_leg.py', tmp_path / 'leg.png'], check=True,
+                   timeout=60)
+    assert (tmp_path / 'leg.png').read_bytes().startswith(b'\x89PNG')
