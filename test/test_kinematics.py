@@ -646,6 +646,17 @@ def test_joints_are_published_under_the_robots_own_names_signs_and_zeros(graph):
             'left_crank': 2.0, 'left_shin': 2.0 * rates['AB'], 'left_ankle': -2.0 * rates['QB']})
 
 
+def test_a_joint_with_a_zero_of_its_own_is_within_half_a_turn_of_it(graph):
+    graph.start(Kinematics, {**KNEE, 'left.joint_names': ['QB=-left_ankle+7', 'crank=motor+9']})
+    states, turn = graph.listen(JointState, 'left/joint_states'), graph.crank(['left_knee_motor'])
+    linkage = mechanisms.create('four_bar')
+    for theta in (0.4, 3.0, 5.0):
+        at = by_name((state := turn([theta], states)).position, state)
+        angle = float(linkage.joint_angles(theta)['QB'])
+        assert at == {'left_ankle': pytest.approx(math.remainder(7.0 - angle, math.tau)),
+                      'motor': theta + 9.0}
+
+
 def test_a_sign_and_a_zero_hold_where_some_legs_are_left_out(graph):
     bench = Bench(graph, 'walker', {**WALKER, 'walker.dimensions.m': 24.0})
     plain = bench.joints_at(0.2)

@@ -147,8 +147,8 @@ print(node.__file__, node.ServoInverseType.__module__)' && echo $AMENT_PREFIX_PA
     assert module.endswith('linkage_interfaces.srv._servo_inverse')
     executables = {file.name for prefix in prefixes.split(':')
                    for file in Path(prefix, 'lib', 'linkage_ros').glob('*')}
-    assert executables == {'crank_driver', 'from_robot', 'kinematics', 'render', 'servo_inverse',
-                           'urdf', 'viewer'}
+    assert executables == {'c_code', 'crank_driver', 'from_robot', 'kinematics', 'render', 'scene',
+                           'servo_inverse', 'urdf', 'viewer'}
 
 
 @pytest.mark.skipif(not shutil.which('colcon'), reason='colcon is not installed')
