@@ -18,9 +18,10 @@ from numpy.typing import ArrayLike
 from .arguments import numbers
 from .curves import extremes
 from .dead_points import NEAR, near_zeros, NearZero
+from .dynamics import Driven
 from .inputs import Arc
 from .inverse import distinct, in_order, MonotoneBranches, nearest
-from .mechanism import Inputs, Mechanism
+from .mechanism import Inputs
 from .planar import GRAZE
 from ..formula.program import Pose
 from ..words import listed, quoted
@@ -29,7 +30,7 @@ from ..words import listed, quoted
 ONE = 1e-9
 
 
-class Analysed(Mechanism):
+class Analysed(Driven):
     """A mechanism that also answers questions about its motion."""
 
     def input_for(self, output: str, value: ArrayLike, near: Optional[ArrayLike] = None,

@@ -377,6 +377,7 @@ class Mechanism:
     def _names(self, kind: str, wanted: Any) -> Tuple[str, ...]:
         what, allowed = {
             'points': ('point', self.points), 'velocities': ('point', self.points),
+            'point accelerations': ('point', self.points),
             'transmissions': ('transmission angle at', tuple(
                 self._structure.built.transmissions)),
         }.get(kind, ('joint', self.joints))

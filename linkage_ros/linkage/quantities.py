@@ -24,6 +24,7 @@ from ..formula.expression import (
     derivative,
     dimension,
     gated,
+    Number,
     Real,
     real,
     spin,
@@ -75,14 +76,17 @@ class Structure:
             'points': self._points, 'velocities': self._velocities, 'angles': self._angles,
             'rates': self._rates, 'parts': self._parts, 'margins': self._margins,
             'transmissions': self._transmissions, 'closures': self._closures,
-            'output': self._output}
+            'output': self._output, 'point accelerations': self._point_accelerations,
+            'joint accelerations': self._joint_accelerations}
 
     def program(self, kind: str, names: Any, *by: int) -> Program:
         """Return the code for outputs of one kind; what they do not depend on is left out."""
         key = (kind, names, *by)
         if key not in self._programs:
             outputs = self._outputs[kind](names, *by)
-            keep(self._programs, key, Program(outputs, len(self.built.inputs)))
+            # An acceleration also depends on the inputs' speeds, and on how these change.
+            given = 3 if kind.endswith('accelerations') else 1
+            keep(self._programs, key, Program(outputs, given * len(self.built.inputs)))
         return self._programs[key]
 
     def legs(self, points: Points, joints: Names, moving: Names) -> Program:
@@ -162,10 +166,34 @@ class Structure:
         return any(x.name == name and x.kind == 'prismatic' for x in self.built.links)
 
     def _rates(self, names: Names, by: int = 0) -> List[Real]:
+        return [self._due(rate, self._value(name))
+                for name, rate in zip(names, self._turning(names, {by: 1.0}))]
+
+    def _point_accelerations(self, names: Names) -> List[Real]:
+        known: Dict[Real, Real] = {}
+        speeds = self._speeds()
+        return self._changing([derivative(part, speeds, known) for part in self._points(names)])
+
+    def _joint_accelerations(self, names: Names) -> List[Real]:
+        return self._changing(self._turning(names, self._speeds()))
+
+    def _speeds(self) -> Dict[int, Number]:
+        n = len(self.built.inputs)
+        return {i: argument(n + i) for i in range(n)}
+
+    def _changing(self, rates: List[Real]) -> List[Real]:
+        """Differentiate rates once more, by time: speeds are arguments, and change too."""
+        n = len(self.built.inputs)
+        known: Dict[Real, Real] = {}
+        moving: Dict[int, Number] = {i: argument(n + i) for i in range(2 * n)}
+        return [derivative(rate, moving, known) for rate in rates]
+
+    def _turning(self, names: Names, speeds: Dict[int, Number]) -> List[Real]:
+        """Return how fast outputs change at speeds of the inputs."""
         known: Dict[Real, Real] = {}
 
         def d(expression: Real) -> Real:
-            return derivative(expression, {by: 1.0}, known)
+            return derivative(expression, speeds, known)
 
         def turning(bar: Optional[Complex]) -> Real:
             if bar is None:
@@ -182,7 +210,7 @@ class Structure:
 
         directions = self.built.directions
         parents = {link.name: link.parent for link in self.built.links}
-        return [self._due(rate(name), self._value(name)) for name in names]
+        return [rate(name) for name in names]
 
     def _margins(self, _: Names) -> List[Real]:
         """Return each limit's margin, so much above its tolerance that a reached one is >= 0."""

@@ -276,7 +276,7 @@ class Model:
         return Pose(layout, values, held, moving)
 
     def _change(self, layout: Layout):
-        """Return by what all values are multiplied, what is added, and where turns are taken off."""
+        """Return what all values are multiplied by, what is added, and where turns come off."""
         if layout not in self._changes:
             self._changes[layout] = (
                 _arranged(layout, 1.0, self._signs, self._signs),
