@@ -136,6 +136,16 @@ def test_a_change_of_the_geometry_is_minded(stream, graph):
         assert a * math.cos(0.5 * servo + 0.25) == pytest.approx(40.0, abs=1e-12)
 
 
+def test_a_command_says_what_its_actuator_has_to_hold(graph):
+    stream = Stream(graph, {**LEVER, 'lever.loads': ['lever=-3.0']})
+    stream.want(['flap'], [flap(0.7)])
+    command = stream.commands[-1]
+    # Power in is power out: the moment of the lever, at the rate at which the servo turns it.
+    assert command.effort.tolist() == pytest.approx([-3.0 * slope(flap, 0.7)], rel=1e-7)
+    stream.want(['flap', 'bar_QB'], [flap(0.7), 1.2])
+    assert stream.commands[-1].effort[1] == 0.0
+
+
 def test_commands_move_the_picture(stream, graph):
     graph.start(Kinematics, LEVER, cli_args=['--ros-args', '-r', 'crank_states:=servo_commands'])
     shown = graph.listen(JointState, 'lever/joint_states')

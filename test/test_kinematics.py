@@ -657,6 +657,30 @@ def test_a_joint_with_a_zero_of_its_own_is_within_half_a_turn_of_it(graph):
                       'motor': theta + 9.0}
 
 
+def test_what_the_inputs_hold_against_loads_is_their_effort(graph):
+    node = graph.start(Kinematics, {
+        **KNEE, 'left.scale': 2.0, 'left.joint_names': ['crank=-motor'], 'left.only_named': False,
+        'left.loads': ['B=3 -9.81', 'QB=0.5']})
+    one, all_ = (graph.listen(JointState, topic)
+                 for topic in ('left/joint_states', 'joint_states'))
+    graph.listen(MarkerArray, 'left/markers')
+    linkage = mechanisms.create('four_bar')
+    turn = graph.crank(['left_knee_motor', 'right_hip_motor'])
+    for theta in (0.4, 1.7):
+        velocity = 2.0 * linkage.velocity(theta)['B'] @ [3.0, -9.81]
+        torque = -(velocity + 0.5 * float(linkage.joint_rates(theta)['QB']))
+        for states in (one, all_):
+            state = turn([theta, 0.3], states)
+            efforts = by_name(state.effort, state)
+            assert efforts.pop('motor') == pytest.approx(-torque)
+            assert set(efforts.values()) == {0.0}
+    assert graph.set(node, left__loads=[]).successful
+    assert not turn([0.5, 0.3], one).effort
+    for wrong in (['B=3'], ['QB=1 2'], ['Z=1 2'], ['B=1 2', 'B=1 2'], ['B=nan 0'], ['B=1 2 3']):
+        result = graph.set(node, left__loads=wrong)
+        assert not result.successful and 'left.loads must be texts such as' in result.reason
+
+
 def test_a_sign_and_a_zero_hold_where_some_legs_are_left_out(graph):
     bench = Bench(graph, 'walker', {**WALKER, 'walker.dimensions.m': 24.0})
     plain = bench.joints_at(0.2)

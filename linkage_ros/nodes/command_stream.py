@@ -14,8 +14,9 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from . import joint_state_reader
-from .message_layout import NEVER, pack, Unreadable, Wire
+from .message_layout import NEVER, pack, unpack, Unreadable, Wire
 from .messages import JointStates
+from .. import scene
 from ..scene.wanted import Wanted
 from ..words import elided
 
@@ -30,9 +31,8 @@ class Route(NamedTuple):
     """From an output, as others call it, to the actuator that moves it."""
 
     called: str
-    mechanism: str
+    machine: scene.Machine
     actuator: str
-    start: float
     wanted: Wanted
     sign: float
     offset: float
@@ -52,10 +52,16 @@ class Command(NamedTuple):
     """What an actuator is to do, and where it takes its input [rad or m]; its speed if known."""
 
     actuator: str
-    mechanism: str
+    machine: scene.Machine
     input: float
     position: float
     speed: Optional[float]
+
+    @property
+    def effort(self) -> float:
+        """What it gives at rest against the loads [N m or N]; 0 where there are none."""
+        loaded, (ratio, _) = self.machine.loads, self.machine.first.actuator
+        return ratio * self.machine.efforts([self.input])[0] if loaded else 0.0
 
 
 class CommandStream:
@@ -101,8 +107,7 @@ class CommandStream:
             if joint != called and machine.linkage.has_output(joint):
                 drive = machine.first
                 actuator = f'{machine.name}_{drive.input.name}' if drive.measures else drive.source
-                return Route(called, machine.name, actuator, drive.start, Wanted(machine, joint),
-                             sign, offset)
+                return Route(called, machine, actuator, Wanted(machine, joint), sign, offset)
         raise ValueError(f'nothing is called {elided(called)}; an output is called '
                          '<mechanism>_<link>, <mechanism>_<joint>.x, or as joint_names has it')
 
@@ -112,13 +117,13 @@ class CommandStream:
         for place, name in enumerate(names):
             try:
                 route = self._route(name)
-                if other := owners.get(route.mechanism):
+                if other := owners.get(route.machine.name):
                     raise ValueError(f'{other.called} and {elided(name)} are moved by one input: '
                                      'name one of them')
             except ValueError as error:
                 leave_out(str(error))
                 continue
-            owners[route.mechanism] = route
+            owners[route.machine.name] = route
             routes.append((route, place))
         return routes
 
@@ -150,21 +155,21 @@ class CommandStream:
 
     def _near(self, route) -> float:
         """Return where an input was last, or is; else where it starts."""
-        if last := self._last.get(route.mechanism):
+        if last := self._last.get(route.machine.name):
             return last.input
         present = self._present(route.wanted)
-        return present if math.isfinite(present) else route.start
+        return present if math.isfinite(present) else route.machine.first.start
 
     def _command(self, route, position, speed) -> Optional[Command]:
         """Return the command for an output, or the last good one, to be held; None without any."""
         found = route.commanded(position, speed, self._near(route))
         if math.isfinite(found[0]):
-            command = Command(route.actuator, route.mechanism, *found)
-            self._last[route.mechanism] = command
+            command = Command(route.actuator, route.machine, *found)
+            self._last[route.machine.name] = command
             return command
         if time.monotonic() > self._said.get(route.called, -math.inf) + SECONDS_BETWEEN_WARNINGS:
             self._warn(route.called, route.reason(position))
-        last = self._last.get(route.mechanism)
+        last = self._last.get(route.machine.name)
         return last and last._replace(speed=0.0)
 
     def _send(self, stamp, commands):
@@ -173,9 +178,15 @@ class CommandStream:
         speeds = [command.speed for command in commands]
         moving = None not in speeds and all(map(math.isfinite, speeds))
         if self._commands.get_subscription_count():
-            self._wire(names, moving).send(stamp, np.array(values + speeds * moving))
+            if any(command.machine.loads for command in commands):
+                efforts = [command.effort for command in commands]
+                self._commands.publish(self._message.message(
+                    unpack(stamp), names, values, speeds if moving else (),
+                    () if any(map(math.isnan, efforts)) else efforts))
+            else:
+                self._wire(names, moving).send(stamp, np.array(values + speeds * moving))
         for command in commands:
-            publisher = self._arrays[command.mechanism]
+            publisher = self._arrays[command.machine.name]
             if publisher.get_subscription_count():
                 publisher.publish(Float64MultiArray(data=[command.position]))
 
@@ -201,9 +212,9 @@ class CommandStream:
         """Return the actuators' trajectory; raise ValueError if one point of it cannot be."""
         n = len(message.joint_names)
         routes = self._routes(message.joint_names, _refuse)
-        near = {route: self._near(route) for route, _ in routes}
+        near = [self._near(route) for route, _ in routes]
         planned = JointTrajectory(header=message.header,
-                                  joint_names=[route.actuator for route in near])
+                                  joint_names=[route.actuator for route, _ in routes])
         for i, point in enumerate(message.points):
             if len(point.positions) != n or len(point.velocities) not in (0, n):
                 raise ValueError(f'point {i} must have {n} positions, and as many velocities or '
@@ -211,8 +222,8 @@ class CommandStream:
             found = []
             for route, place in routes:
                 position, speed = point.positions[place], (*point.velocities, *n * [0.0])[place]
-                near[route], *actuator = route.commanded(position, speed, near[route])
-                if not math.isfinite(near[route]):
+                near[place], *actuator = route.commanded(position, speed, near[place])
+                if not math.isfinite(near[place]):
                     raise ValueError(f'point {i}: {route.reason(position)}')
                 if not math.isfinite(actuator[1]):
                     raise ValueError(f'point {i}: {route.called} turns back at {position:.6g} and '

@@ -293,21 +293,35 @@ class Model:
                 pose.layout.size, logger)
         return self._wires[kind]
 
+    def is_patched(self, build) -> bool:
+        """Return whether a kind of message changes in nothing but what is solved for."""
+        return build != self.joint_message or not self.machine.loads
+
     def joint_message(self, pose: Pose, stamp) -> JointState:
         """Return the joint states of the legs that can be assembled."""
-        names, positions, velocities = self.joints(pose)
-        return self.joint_state.message(stamp, names.tolist(), positions, velocities)
+        names, positions, velocities, efforts = self.joints(pose)
+        known = self.machine.loads and not np.isnan(efforts).any()
+        return self.joint_state.message(stamp, names.tolist(), positions, velocities,
+                                        efforts if known else ())
 
     def joints(self, pose: Pose):
-        """Return names, positions and, where known, velocities of what is published of a pose."""
+        """
+        Return names, positions, velocities and efforts of what is published of a pose.
+
+        There are no velocities where they are not known; what is no input has no effort.
+        """
         layout, n, chosen = pose.layout, pose.layout.inputs, self._published
         if pose.held is not None:
             chosen = chosen & np.append([True] * n, pose.held.repeat(layout.joints))
         rows, driven = layout.rows(pose.values), layout.driven(pose.values)
         positions = np.append(driven[:n], rows[:, layout.coordinates:layout.posed])
         velocities = np.append(driven[n:], rows[:, layout.posed:])
+        efforts = np.zeros(len(positions))
+        if self.machine.loads:
+            inputs = (driven[:n] - self._offsets[:n]) * self._signs[:n]
+            efforts[:n] = self._signs[:n] * self.machine.efforts(inputs)
         return (self._names[chosen], positions[chosen],
-                velocities[chosen] if pose.moving else velocities[:0])
+                velocities[chosen] if pose.moving else velocities[:0], efforts[chosen])
 
     def marker_message(self, pose: Pose, stamp) -> MarkerArray:
         """Return the markers of the legs that can be assembled."""
@@ -369,7 +383,8 @@ class MechanismPublisher:
             pose = model.solve(driven)
             pose = pose._replace(held=None, moving=pose.layout.speeds > 0)
             for publisher, build in self._listening(model, driven):
-                model.wire(publisher, build, pose, self._logger)
+                if model.is_patched(build):
+                    model.wire(publisher, build, pose, self._logger)
         return model
 
     def adopt(self, model: Model):
@@ -499,9 +514,9 @@ class MechanismPublisher:
             throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
 
     def _send(self, publisher, build, stamp):
-        """Publish all legs by patching one message; where some are left out, build another."""
+        """Publish all legs by patching one message; where that is not alike, build another."""
         pose = self._pose
-        if pose.held is not None:
+        if pose.held is not None or not self._model.is_patched(build):
             publisher.publish(build(pose, unpack(stamp)))
         else:
             self._model.wire(publisher, build, pose, self._logger).send(stamp, pose.values)

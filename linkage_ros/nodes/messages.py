@@ -28,12 +28,14 @@ class JointStates:
     def __init__(self):
         self._message = JointState()
 
-    def message(self, stamp, names: Sequence[str], positions, velocities=()) -> JointState:
-        """Return joints [rad or m] and their velocities, where they are known."""
+    def message(self, stamp, names: Sequence[str], positions, velocities=(),
+                efforts=()) -> JointState:
+        """Return joints [rad or m], their velocities and efforts, where they are known."""
         self._message.header.stamp = stamp
         self._message.name = names
         self._message.position = array('d', positions)
         self._message.velocity = array('d', velocities)
+        self._message.effort = array('d', efforts)
         return self._message
 
 

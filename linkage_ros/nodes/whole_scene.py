@@ -71,7 +71,7 @@ class WholeScene:
                  if (known := mechanism.known())] if stamp and self.is_heard else []
         if not shown:
             return
-        if any(pose.held is not None for _, pose in shown):
+        if any(pose.held is not None or model.machine.loads for model, pose in shown):
             self._joint_states.publish(self._message(unpack(stamp), shown))
             return
         values = np.concatenate([pose.values for _, pose in shown])
@@ -84,12 +84,14 @@ class WholeScene:
         self._wire.send(stamp, values)
 
     def _message(self, stamp, shown) -> JointState:
-        names, positions, velocities = map(np.concatenate, zip(
+        names, positions, velocities, efforts = map(np.concatenate, zip(
             *(model.joints(pose) for model, pose in shown)))
         chosen = [name not in self._said for name in names]
         known = all(pose.moving for _, pose in shown)
+        loaded = any(model.machine.loads for model, _ in shown) and not np.isnan(efforts).any()
         return self._joints.message(stamp, names[chosen].tolist(), positions[chosen],
-                                    velocities[chosen] if known else ())
+                                    velocities[chosen] if known else (),
+                                    efforts[chosen] if loaded else ())
 
 
 def _with(shown, values):

@@ -8,10 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field as some, replace
 from functools import lru_cache
 import re
-from typing import Any, Dict, Mapping, Optional, Tuple
+from typing import Any, Dict, Mapping, Optional, Sequence, Tuple
 
 from .drive import Drive, read_drive
 from .joint_names import JointName, read_joint_names
+from .loads import Load, read_loads
 from .parameters import (
     ALL,
     Field,
@@ -59,6 +60,9 @@ JOINT_NAMES = Field(
     rule="such as 'BC=left_shin', or 'EF=-left_ankle+0.35' for 0.35 minus its position")
 ONLY_NAMED = Field('bool', 'Whether only the joints in joint_names are published.',
                    readers=(KINEMATICS,))
+LOADS = Field('string_array', "Loads that the inputs hold, in the linkage's plane.",
+              readers=(KINEMATICS, INVERSE),
+              rule="such as 'C=0 -9.81', a force [N] at a joint, or 'EF=2.5', a moment [N m]")
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,7 @@ class Machine:
     frame_id: str
     joints: Mapping[str, JointName]
     only_named: bool
+    loads: Mapping[str, Load]
     given: Mapping[str, Any] = some(compare=False, repr=False)
     parameters: Tuple[Parameter, ...] = some(compare=False, repr=False)
 
@@ -127,6 +132,17 @@ class Machine:
             speed = rate * speed
         return (value - drive.offset) / drive.ratio, speed / drive.ratio
 
+    def efforts(self, values: Sequence[float]) -> Tuple[float, ...]:
+        """Return what each input, at these values, gives against the loads [N m or N]."""
+        units = [self.scale_of(name) for name in self.inputs]
+        own = [value / unit for value, unit in zip(values, units)]
+        # Where all is so much larger, a force has a longer lever; a moment has none.
+        loads = {name: load if isinstance(load, float) else (self.scale * load[0],
+                                                             self.scale * load[1])
+                 for name, load in self.loads.items()}
+        found = self.linkage.effort(own if len(own) > 1 else own[0], loads)
+        return tuple(float(effort) / unit for effort, unit in zip(found, units))
+
     def assembly(self) -> Assembly:
         """Return its legs on their inputs."""
         return Assembly(self.linkage, self.leg_pairs, self.mirrored, self.scale, self.reach)
@@ -159,9 +175,12 @@ def read_machine(name: str, given: Mapping[str, Any], old: Optional[Machine],
     joints = read_joint_names(
         name, [*inputs, *Assembly(linkage, leg_pairs, mirrored, scale, reach).all_joints],
         values.take(f'{name}.joint_names', JOINT_NAMES, ()), only_named)
+    loads = read_loads(name, linkage, values.take(f'{name}.loads', LOADS, ()))
+    if loads and (leg_pairs > 1 or mirrored):
+        raise SceneError(f'{name}.loads must be empty where there is more than one leg')
     refuse_unknown(values.left(), [parameter.name for parameter in values.parameters])
     return Machine(name, linkage, reach, scale, leg_pairs, mirrored, points, pose, inputs,
-                   frame_id, joints, only_named, given, tuple(values.parameters))
+                   frame_id, joints, only_named, loads, given, tuple(values.parameters))
 
 
 def _linkage(name: str, type_: str, values: Values) -> Tuple[Mechanism, Tuple[Arc, ...]]:

@@ -1,0 +1,35 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What pulls at a mechanism: forces at its joints, moments on its links."""
+
+from __future__ import annotations
+
+import re
+from typing import Dict, Iterable, Tuple, Union
+
+from .parameters import SceneError
+from ..linkage.servo import Mechanism
+from ..words import elided, listed
+
+# A moment [N m], or a force x, y [N].
+Load = Union[float, Tuple[float, float]]
+
+_FIGURE = r'[+-]?(?:\d{1,99}\.?\d{0,99}|\.\d{1,99})(?:[eE][+-]?\d\d?)?'
+_LINE = re.compile(rf'(\w+)=({_FIGURE})(?: +({_FIGURE}))?', re.ASCII)
+
+
+def read_loads(mechanism: str, linkage: Mechanism, lines: Iterable[str]) -> Dict[str, Load]:
+    """Return the loads on joints and links, by name; raise SceneError for what is none."""
+    loads: Dict[str, Load] = {}
+    for line in lines:
+        match = _LINE.fullmatch(line)
+        if not match or match[1] in loads or match[1] not in (
+                linkage.points if match[3] else linkage.joints):
+            raise SceneError(
+                f"{mechanism}.loads must be texts such as 'C=0 -9.81', a force [N] at a joint, or "
+                f"'EF=2.5', a moment [N m] on a link, each about another of "
+                f'{listed((*linkage.points, *linkage.joints), 90)}, not {elided(line)!r}')
+        first = float(match[2])
+        loads[match[1]] = (first, float(match[3])) if match[3] else first
+    return loads
