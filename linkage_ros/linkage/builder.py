@@ -115,6 +115,7 @@ class Builder:
         self.inputs: List[Input] = []
         self.arguments: List[Real] = []
         self.cylinders: List[Tuple[str, str]] = []
+        self.yokes: Dict[str, str] = {}
         # The ground joints of the lines that what is added is mirrored in, one after the other.
         self.mirrors: Tuple[Tuple[str, ...], ...] = ()
         self._vectors: Dict[Tuple[str, str], _Vector] = {}
@@ -177,7 +178,9 @@ class Builder:
         """Slide a block along a line between two joints; a pin runs in a slot across it."""
         _, along, _ = self._direction(origin, towards)
         start, end = self.points[origin], self.points[pin]
-        self._ride(self._numbered('block'), name, origin, towards,
+        block = self._numbered('block')
+        self.yokes[block] = pin
+        self._ride(block, name, origin, towards,
                    dot(along, end.place - start.place), end.span + start.span, pin)
 
     def _ride(self, link: str, name: str, origin: str, towards: str, place: Real, way: Real,
