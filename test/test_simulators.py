@@ -233,7 +233,7 @@ def test_gears_are_gears_in_both():
     assert (mimic.get('joint'), float(mimic.findtext('multiplier'))) == gear[1:]
 
 
-ARM = {'mechanisms': ['arm', 'hand'], 'arm.type': 'four_bar', 'hand.type': 'four_bar'}
+ARM = {'mechanisms': ['hand', 'arm'], 'arm.type': 'four_bar', 'hand.type': 'four_bar'}
 
 
 @pytest.mark.parametrize('link', ['AB_link', 'B', 'B_cut'])

@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 import math
-from typing import Dict, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, Iterable, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from . import shapes
 from .. import palette
@@ -190,15 +190,21 @@ def together(robots: Sequence[Robot]) -> Robot:
     """
     if len(robots) == 1:
         return robots[0]
-    made = Robot('linkages', _root(robots), [part for robot in robots for part in robot.parts])
+    above = {name: robot.root for robot in robots for tag, name in robot.names() if tag == 'link'}
+
+    def depth(frame: str) -> int:
+        return 1 + depth(above[frame]) if frame in above else 0
+
+    root = _root(robots, above)
+    made = Robot('linkages', root, [part for robot in sorted(
+        robots, key=lambda robot: depth(robot.root)) for part in robot.parts])
     made.check_names('mechanisms')
     return made
 
 
-def _root(robots: Sequence[Robot]) -> str:
-    """Return the link that all models hang on."""
+def _root(robots: Sequence[Robot], above: Mapping[str, str]) -> str:
+    """Return the link that all models hang on, by the root of the model that a link is in."""
     frames = [robot.root for robot in robots]
-    above = {name: robot.root for robot in robots for tag, name in robot.names() if tag == 'link'}
     for _ in robots:
         frames = [above.get(frame, frame) for frame in frames]
     tops = dict.fromkeys(frames)
