@@ -123,6 +123,11 @@ class Builder:
         self.driven: Dict[str, Tuple[Input, Real]] = {}
         self._kites: Dict[Tuple[str, str], planar.CrankArm] = {}
 
+    @property
+    def grounded(self) -> Tuple[str, ...]:
+        """The joints on the ground."""
+        return tuple(name for name, point in self.points.items() if point.home == GROUND)
+
     def ground(self, name: str, x: Number, y: Number) -> None:
         """Fix a joint to the ground at (x, y) [m]."""
         place = Complex(x, y)

@@ -326,7 +326,9 @@ class _Tree:
                 drawn, thickness = {shapes.GUIDE: (BOX, GUIDE), shapes.BLOCK: (BOX, BLOCK),
                                     shapes.BARREL: (ROD, BARREL), shapes.ROD: (ROD, BAR)
                                     }[shape.kind]
-                body.pieces.append(Piece(drawn, colour, thickness * self._thickness, start, end))
+                if start != end:
+                    body.pieces.append(Piece(drawn, colour, thickness * self._thickness, start,
+                                             end))
 
     def _add_points(self, prefix, side, link, body, points, ends):
         """Add joints of a link, those that it was cut off as well."""
@@ -339,8 +341,8 @@ class _Tree:
                                      met if name != met else '', JOINT * self._thickness))
 
     def _with_hub(self, body) -> Body:
-        """Return a body that is not nothing."""
-        if not body.pieces and not body.points:
+        """Return a body; one that carries no joint is seen, and weighs, where it hangs."""
+        if not body.points:
             origin = (0.0, 0.0)
             body.pieces.append(Piece(BALL, JOINTS, JOINT * self._thickness, origin, origin))
         return body

@@ -23,7 +23,8 @@ from .. import palette
 
 def write(model: Assembled) -> str:
     """Return a robot model, its loops closed, as SDF."""
-    root = ElementTree.Element('sdf', version='1.11')
+    # Gazebo Classic reads versions up to 1.7, which have no mimic.
+    root = ElementTree.Element('sdf', version='1.11' if model.gears else '1.7')
     robot = ElementTree.SubElement(root, 'model', name=model.name)
     gears = {gear.joint: gear for gear in model.gears}
     motors = {motor.joint: motor for motor in model.motors}
