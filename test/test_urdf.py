@@ -29,6 +29,8 @@ FIVE_BAR = ['O ground 0 0', 'Q ground 0.118 0', 'A crank O 0.09', 'C crank Q 0.0
             'P dyad A C 0.1 0.09 left', 'G ground 0 0.2', 'S slider P 0.3 G 0.2 out']
 BOOM = ['O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C line O B 1.6',
         'E rigid O B 0.6 0.7 left', 'F cylinder E B 0.4 left']
+SWINGING_BLOCK = ['O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'P slot A Q 0 out 4',
+                  'B slider A 3 Q along O out']
 HALF_TURN = ['O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'B dyad A Q 1.4 1.1 left']
 
 
@@ -52,6 +54,7 @@ MACHINES = {
     'engine with zeros elsewhere': lambda: machine('custom', ENGINE, leg_pairs=2, joint_names=[
         'crank=-m_crank+0.3', 'left0_block=-m_left0_block+0.7', 'right1_block=m_right1_block-2',
         'right0_AB=-m_right0_AB', 'left1_AB=m_left1_AB+2.5']),
+    'swinging block on the ground': lambda: machine('custom', SWINGING_BLOCK),
     'boom': lambda: machine('custom', BOOM[:4], scale=2.0),
     'boom and arm': lambda: machine('custom', BOOM, scale=2.0),
 }
@@ -61,7 +64,8 @@ OWN = {name: lambda case=case, pairs=2 if name == 'Cardan gears' else 1: machine
     for name, case in CASES.items()}
 CUTS = {'water_drop': 1, 'jansen': 3, 'peaucellier': 3, 'slotted_lever': 1,
         'walker of 3 pairs': 18, 'gripper': 1, 'engine': 1, 'boxer engine': 4, 'five_bar': 1,
-        'five-bar with a block': 2, 'boom': 1, 'boom and arm': 2}
+        'five-bar with a block': 2, 'swinging block on the ground': 2, 'boom': 1,
+        'boom and arm': 2}
 
 
 def drives(one, count=41):

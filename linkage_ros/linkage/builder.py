@@ -115,12 +115,18 @@ class Builder:
         self.inputs: List[Input] = []
         self.arguments: List[Real] = []
         self.cylinders: List[Tuple[str, str]] = []
+        self.yokes: Dict[str, str] = {}
         # The ground joints of the lines that what is added is mirrored in, one after the other.
         self.mirrors: Tuple[Tuple[str, ...], ...] = ()
         self._vectors: Dict[Tuple[str, str], _Vector] = {}
         self._axes: Dict[str, _Vector] = {}
         self.driven: Dict[str, Tuple[Input, Real]] = {}
         self._kites: Dict[Tuple[str, str], planar.CrankArm] = {}
+
+    @property
+    def grounded(self) -> Tuple[str, ...]:
+        """The joints on the ground."""
+        return tuple(name for name, point in self.points.items() if point.home == GROUND)
 
     def ground(self, name: str, x: Number, y: Number) -> None:
         """Fix a joint to the ground at (x, y) [m]."""
@@ -177,7 +183,9 @@ class Builder:
         """Slide a block along a line between two joints; a pin runs in a slot across it."""
         _, along, _ = self._direction(origin, towards)
         start, end = self.points[origin], self.points[pin]
-        self._ride(self._numbered('block'), name, origin, towards,
+        block = self._numbered('block')
+        self.yokes[block] = pin
+        self._ride(block, name, origin, towards,
                    dot(along, end.place - start.place), end.span + start.span, pin)
 
     def _ride(self, link: str, name: str, origin: str, towards: str, place: Real, way: Real,

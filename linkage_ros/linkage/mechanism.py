@@ -64,9 +64,11 @@ class Mechanism:
         self.tracer = design.tracer
         built = structure.built
         self.points = tuple(built.points)
+        self.grounded = built.grounded
         self.joints = tuple(built.joint_values)
         self.bars = tuple((bar.first, bar.second) for bar in built.bars)
         self.cylinders = tuple(built.cylinders)
+        self.yokes = dict(built.yokes)
         self._design = design
         self._structure = structure
         self._accelerate = accelerate
@@ -78,6 +80,7 @@ class Mechanism:
         self.inputs = tuple(input_._replace(low=self._metres(input_.low),
                                             high=self._metres(input_.high))
                             if not input_.turns else input_ for input_ in built.inputs)
+        self.geared = tuple(built.driven.keys() - {input_.name for input_ in self.inputs})
         self.links = tuple(link._replace(zero=np.asarray(self._value(link.zero)).tolist())
                            for link in built.links)
 

@@ -32,13 +32,10 @@ def common_reach(assembly: Assembly) -> Sequence[Arc]:
 
 
 def ground_frame(linkage: Mechanism) -> Dict[str, Tuple[float, float]]:
-    """Return where the joints lie [m] that no moving link carries."""
-    frames = linkage.frames
-    carried = {name for link in linkage.links for name in frames[link.name] if name != link.joint}
-    names = [name for name in linkage.points if name not in carried]
+    """Return where the joints on the ground lie [m]."""
     anywhere = [0.0] * len(linkage.inputs)
     return {name: tuple(place.ravel().tolist())
-            for name, place in linkage.solve(anywhere, names).items()}
+            for name, place in linkage.solve(anywhere, linkage.grounded).items()}
 
 
 def travels(linkage: Mechanism, reach: Sequence[Arc]) -> Dict[str, Optional[Travel]]:

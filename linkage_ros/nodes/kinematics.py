@@ -22,7 +22,7 @@ from .message_layout import NEVER, pack, unpack, Unreadable, Wire
 from .whole_scene import LATCHED, WholeScene
 from .. import scene
 from ..linkage.walker import Layout
-from ..robot_model import shapes, urdf
+from ..robot_model import bodies, shapes, urdf
 from ..words import listed
 
 # Any source will do; what comes while the node is kept waiting, 50 ms at 1000 Hz, is not lost.
@@ -76,7 +76,7 @@ class Kinematics(scene_node.SceneNode):
         # Where only named joints are published, they are in a robot model of somebody else's.
         robots = [model.robot for model in models.values() if not model.machine.only_named]
         try:
-            return models, urdf.together(robots) if robots else ''
+            return models, urdf.write(bodies.together(robots)) if robots else ''
         except scene.SceneError as error:
             self.get_logger().info(f'no robot_description of the whole scene: {error}', once=True)
             return models, ''
@@ -222,7 +222,8 @@ class Model:
     def __init__(self, machine: scene.Machine, frame_id: str, prefix: str):
         self.machine, self.made_for = machine, (machine, frame_id, prefix)
         self.drives = list(machine.inputs.values())
-        self.robot = urdf.describe([machine], frame_id)
+        self.robot = bodies.robot([machine], frame_id)
+        self.description = urdf.write(self.robot)
         self.assembly = machine.assembly()
         self._names, self._signs, self._offsets, self._published = map(
             np.array, zip(*machine.joints.values()))
@@ -231,7 +232,7 @@ class Model:
         self._shifted = (self._offsets != 0.0) & np.append(
             [False] * len(self.drives), len(self.assembly.legs) * angles).astype(bool)
         drawn = machine.name, prefix + frame_id, machine.pose
-        size = urdf.size(machine)
+        size = bodies.size(machine)
         self._points, shown = _shown(machine)
         self.drawn = *drawn, size, shown
         self.marker_array = messages.Markers(*self.drawn)
@@ -392,8 +393,8 @@ class MechanismPublisher:
         before, self._model = self._model, model
         if model is before:
             return
-        if not before or model.robot != before.robot:
-            self._description.publish(String(data=model.robot))
+        if not before or model.description != before.description:
+            self._description.publish(String(data=model.description))
         self._draw_locus(model)
         self._delete(self._drawn - model.marker_array.ids)
         if self._driven:

@@ -15,7 +15,7 @@ from . import joint_state_reader, scene_node
 from .command_stream import CommandStream
 from .message_layout import Unreadable
 from .. import scene
-from ..robot_model import urdf
+from ..robot_model import bodies
 from ..scene.wanted import LEVER, Wanted
 from ..words import elided, listed, MESSAGE, quoted
 
@@ -54,7 +54,7 @@ class ServoInverse(scene_node.SceneNode):
     def prepare(self, new):
         """Refuse lengths that `kinematics` could not publish; SceneError says which."""
         for machine in new.machines.values():
-            urdf.size(machine)
+            bodies.size(machine)
         return new
 
     def adopt(self, new):

@@ -3,10 +3,12 @@
 
 """Command that prints the robot model of a scene's mechanisms; it needs no ROS."""
 
+import argparse
 import sys
 from typing import List, Optional
 
-from . import urdf
+from . import bodies, mjcf, sdf, urdf
+from .assembled import assembled, DENSITY
 from .. import command, scene
 
 NAME = 'urdf'
@@ -14,7 +16,7 @@ NEEDS = 'pip install pyyaml, or apt install python3-yaml'
 
 
 def main(args: Optional[List[str]] = None) -> int:
-    """Print URDF; return the exit code."""
+    """Print a robot model; return the exit code."""
     return command.run(NAME, show, args, NEEDS)
 
 
@@ -24,20 +26,46 @@ def show(args: Optional[List[str]], told: Optional[scene.Scene] = None) -> None:
     if told and asked.scene:
         raise command.RequestError('the scene comes as SCENE or with --ros-args, not with both')
     found = told or (scene.load(asked.scene) if asked.scene else scene.read({}))
-    print(urdf.describe(command.chosen(found.machines, asked.mechanism), found.frame_id))
+    if asked.format == 'urdf' and asked.density:
+        raise command.RequestError('--density is for sdf and mjcf: a URDF has no masses here')
+    robot = bodies.robot(command.chosen(found.machines, asked.mechanism), found.frame_id,
+                         asked.width)
+    if asked.format == 'urdf':
+        print(urdf.write(robot))
+    else:
+        writer = {'sdf': sdf, 'mjcf': mjcf}[asked.format]
+        print(writer.write(assembled(robot, asked.density or DENSITY)))
 
 
 def parser() -> command.Parser:
     """Return the parser of the command line."""
     made = command.Parser(
-        NAME, description='Print the robot model of a scene as URDF.',
+        NAME, description='Print the robot model of a scene.',
         epilog='As `ros2 run linkage_ros urdf` it takes the scene as a node does, too: '
                '--ros-args --params-file SCENE')
     made.add_argument('scene', metavar='SCENE', nargs='?',
                       help="the scene's parameter file (default: the catalogue's linkages)")
     made.add_argument('--mechanism', nargs='+', default=[], metavar='NAME',
                       help='only these mechanisms of the scene')
+    made.add_argument('--format', choices=('urdf', 'sdf', 'mjcf'), default='urdf',
+                      help='a tree for robot_state_publisher, or closed loops for Gazebo or '
+                           'MuJoCo (default: urdf)')
+    made.add_argument('--width', type=_positive, metavar='M',
+                      help='of a bar, all else in proportion (default: a 40th of the longest)')
+    made.add_argument('--density', type=_positive, metavar='KG/M3',
+                      help=f'of all bodies of sdf and mjcf (default: {DENSITY:g}, aluminium)')
     return made
+
+
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not bodies.SMALLEST <= value <= bodies.LARGEST:
+        raise argparse.ArgumentTypeError(
+            f'must be from {bodies.SMALLEST:g} to {bodies.LARGEST:g}, not {text}')
+    return value
 
 
 if __name__ == '__main__':

@@ -1,0 +1,186 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+What a simulator needs besides the tree of bodies: where it starts, masses, gears and motors.
+
+All inputs are at their start, so that every loop is closed where a simulation begins.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+
+import numpy as np
+
+from .bodies import BALL, Body, BOX, Joint, Piece, Point, Robot, ROD, size
+from ..scene import Machine, SceneError
+from ..scene.motion import Motion
+
+# Of aluminium [kg/m^3].
+DENSITY = 2700.0
+
+
+class Weight(NamedTuple):
+    """Mass [kg], centre x, y [m], and moments of inertia about it xx, yy, zz, xy [kg m^2]."""
+
+    mass: float
+    centre: Tuple[float, float]
+    moments: Sequence[float]
+
+
+class Solid(NamedTuple):
+    """A body in the pose where a simulation starts; without a name, its parent is the world."""
+
+    name: str
+    parent: str
+    pose: Tuple[float, ...]
+    joint: Optional[Joint]
+    position: float
+    pieces: Sequence[Piece]
+    points: Sequence[Point]
+    weight: Weight
+
+
+class Motor(NamedTuple):
+    """What moves an input: its start, its sweep if any, the mass it moves [kg], its arm [m]."""
+
+    joint: str
+    turns: bool
+    start: float
+    sweep: Sequence[float]
+    mass: float
+    arm: float
+
+
+class Gear(NamedTuple):
+    """A joint that moves `ratio` times as far as another."""
+
+    joint: str
+    input: str
+    ratio: float
+
+
+class Assembled(NamedTuple):
+    """A robot model with its loops closed, and what it is made of [kg/m^3]."""
+
+    name: str
+    density: float
+    solids: List[Solid]
+    motors: List[Motor]
+    gears: List[Gear]
+
+
+def assembled(robot: Robot, density: float = DENSITY) -> Assembled:
+    """Return a robot model at the start of its inputs; raise SceneError if there is no pose."""
+    homes = {point.name: (body.name, point.place) for body in robot.bodies
+             for point in body.points}
+    made = Assembled(robot.name, density, [], [], [])
+    for machine, bodies in robot.parts:
+        starts = {name: Motion.of(drive).at(0)[0] for name, drive in machine.inputs.items()}
+        positions, rates = _solved(machine, starts)
+        bodies = [*bodies, *_slots(machine, bodies, positions)]
+        solids = []
+        for body in bodies:
+            position = positions.get(body.joint.name, 0.0) if body.joint else 0.0
+            pieces = [*body.pieces, *(point.ball(point.place) for point in body.points)]
+            home, (x, y) = homes.get(body.parent, (body.parent, (0.0, 0.0)))
+            u, v, *turned = body.posed(position)
+            solids.append(Solid(
+                body.name, '' if home == robot.root else home, (u + x, v + y, *turned),
+                body.joint, position, pieces, body.points, weight(pieces, density)))
+        made.solids.extend(solids)
+        tips = {link.name: link.tip for link in machine.linkage.links}
+        mass = sum(solid.weight.mass for solid in solids[1:])
+        for name, drive in machine.inputs.items():
+            called = machine.joints[name]
+            arm = math.hypot(*machine.linkage.frames[name][tips[name]])
+            ends = sorted(map(called.of, drive.sweep or ()))
+            made.motors.append(Motor(called.name, drive.input.turns, called.of(starts[name]), ends,
+                                     mass, machine.scale * arm if arm else size(machine)))
+        made.gears.extend(Gear(name, *max(rates[name].items(), key=lambda item: abs(item[1])))
+                          for name in rates)
+    return made
+
+
+def _solved(machine: Machine, starts: Dict[str, float]
+            ) -> Tuple[Dict[str, float], Dict[str, Dict[str, float]]]:
+    """Return joints' positions at the start; of those that are geared, the rate by each input."""
+    assembly, called, inputs = machine.assembly(), machine.joints, list(machine.inputs)
+    solution = assembly.solution((), assembly.joints, assembly.joints)
+    values = dict(starts)
+    rates: Dict[str, Dict[str, float]] = {}
+    count = len(assembly.joints)
+    for driving in inputs:
+        solution.solve(list(starts.values()), [float(name == driving) for name in inputs])
+        for prefix, row in zip(assembly.legs, solution.rows.tolist()):
+            values.update(zip([prefix + joint for joint in assembly.joints], row))
+            for joint, rate in zip(assembly.joints, row[count:]):
+                if joint in machine.linkage.geared:
+                    own, other = called[prefix + joint], called[driving]
+                    rates.setdefault(own.name, {})[other.name] = own.sign * rate * other.sign
+    if not np.isfinite(list(values.values())).all():
+        keys = ' and '.join(f'{machine.name}.{name}.start' for name in starts)
+        given = ', '.join(f'{value:g}' for value in starts.values())
+        raise SceneError(f'{keys} must be where {machine.name} can be assembled, not at {given}')
+    return {called[name].name: called[name].of(value) for name, value in values.items()}, rates
+
+
+def _slots(machine: Machine, bodies: Sequence[Body], positions: Dict[str, float]
+           ) -> Iterator[Body]:
+    """Yield what runs in the slot of a yoke, which no joint of the tree stands for."""
+    at: Dict[str, Tuple[complex, float]] = {}
+    for body in bodies:
+        start, turn = at.get(body.parent, (0j, 0.0))
+        if body.joint:
+            x, y, *_, yaw = body.posed(positions[body.joint.name])
+            start, turn = start + cmath.rect(1.0, turn) * complex(x, y), turn + yaw
+        elif at:
+            turn += body.pose[5]
+        at[body.name] = start, turn
+    places = {point.name: (at[body.name][0] + cmath.rect(1.0, at[body.name][1])
+                           * complex(*point.place), point) for body in bodies
+              for point in body.points}
+    for prefix in machine.assembly().legs:
+        for link, pin in machine.linkage.yokes.items():
+            name = f'{machine.name}_{prefix}{link}'
+            start, turn = at[f'{name}_link']
+            place, point = places[f'{machine.name}_{prefix}{pin}']
+            seen = (place - start) * cmath.rect(1.0, -turn)
+            joint = Joint(f'{name}_slot', 'prismatic', 1.0, None)
+            met = Point(f'{name}_pin', (0.0, 0.0), point.name, point.radius)
+            yield Body(f'{name}_slot_link', f'{name}_link',
+                       (seen.real, seen.imag, 0.0, 0.0, 0.0, 0.5 * math.pi), joint, [], [met])
+
+
+def weight(pieces: Sequence[Piece], density: float) -> Weight:
+    """Return what pieces weigh together, of a density [kg/m^3]; of none at all, nothing."""
+    masses = np.array([density * _volume(piece) for piece in pieces])
+    mass = float(masses.sum())
+    if not mass:
+        return Weight(0.0, (0.0, 0.0), (0.0,) * 4)
+    x, y = masses @ [piece.pose[:2] for piece in pieces] / mass
+    moments = np.zeros(4)
+    for own, piece in zip(masses, pieces):
+        along, across = (own * each for each in _gyration(piece))
+        u, v, *_, angle = piece.pose
+        u, v, c, s = u - x, v - y, math.cos(angle), math.sin(angle)
+        moments += (along * c * c + across * s * s + own * v * v,
+                    along * s * s + across * c * c + own * u * u,
+                    across + own * (u * u + v * v), (along - across) * c * s - own * u * v)
+    return Weight(mass, (float(x), float(y)), moments.tolist())
+
+
+def _volume(piece: Piece) -> float:
+    thickness, length = piece.thickness, piece.length
+    return {ROD: math.pi * thickness ** 2 * length, BOX: thickness ** 2 * length,
+            BALL: 4.0 / 3.0 * math.pi * thickness ** 3}[piece.shape]
+
+
+def _gyration(piece: Piece) -> Tuple[float, float]:
+    """Return the squares of the radii of gyration [m^2] about a piece's length and across it."""
+    thick, long = piece.thickness ** 2, piece.length ** 2 / 12.0
+    return {ROD: (0.5 * thick, 0.25 * thick + long), BOX: (thick / 6.0, thick / 12.0 + long),
+            BALL: (0.4 * thick, 0.4 * thick)}[piece.shape]

@@ -1,0 +1,382 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Robot models: the mechanisms of a scene as a tree of bodies, from which each format is written.
+
+A robot model is a tree, so each closed loop is cut open at a joint. A body's own frame is on the
+joint that it hangs on, x along its bar; the joints that it carries are points fixed to it. A body
+that was cut off a joint has a point for it too, which coincides with the joint's as long as the
+loop is closed::
+
+    <frame_id>
+      <mechanism>_ground_link             at the mechanism's pose; its plane is x-y
+        <mechanism>_<link>_link           moved by <mechanism>_<link>, or by its joint_names
+          <mechanism>_<point>             fixed, one for each joint of the linkage
+          <mechanism>_<point>_cut         fixed, on the link that has to meet that joint
+
+Legs of a walker have their prefix before link and point, and one crank for all of them.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+import math
+from typing import Dict, Iterable, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+
+from . import shapes
+from .. import palette
+from ..linkage.builder import GROUND
+from ..linkage.output_range import common_reach, ground_frame, Travel, travels
+from ..scene import Machine, SceneError
+from ..words import listed
+
+COLOURS = {'orange': palette.ORANGE, 'blue': palette.BLUE, 'green': palette.GREEN,
+           'vermilion': palette.VERMILION, 'sky': palette.SKY, 'purple': palette.PURPLE,
+           'grey': palette.DARK}
+*BARS, JOINTS = COLOURS
+
+# As parts of the longest bar: radii of bars, joints and barrels, thickness of guides and blocks.
+BAR, JOINT, BARREL, GUIDE, BLOCK = 1 / 80, 1 / 40, 1 / 32, 1 / 80, 1 / 20
+
+# Sizes [m] between which nothing that is drawn is lost in single precision, as displays have it.
+SMALLEST, LARGEST = 1e-30, 1e30
+
+# As all formats call them.
+ROD, BOX, BALL = 'cylinder', 'box', 'sphere'
+Place = Tuple[float, float]
+
+
+class Piece(NamedTuple):
+    """What is seen of a body from start to end [m], as thick as a radius, or as a box is [m]."""
+
+    shape: str
+    colour: str
+    thickness: float
+    start: Place
+    end: Place
+
+    @property
+    def length(self) -> float:
+        """How long it is [m]."""
+        return math.dist(self.start, self.end)
+
+    @property
+    def pose(self) -> Tuple[float, ...]:
+        """Its middle x, y, z [m], roll, pitch, yaw: a cylinder's z is laid down, then turned."""
+        (x, y), (u, v) = self.start, self.end
+        return (0.5 * (x + u), 0.5 * (y + v), 0.0,
+                0.0, 0.5 * math.pi if self.shape == ROD else 0.0, math.atan2(v - y, u - x))
+
+    @property
+    def sizes(self) -> Dict[str, Tuple[float, ...]]:
+        """Its sizes [m], as URDF and SDF call them."""
+        if self.shape == BOX:
+            return {'size': (self.length, self.thickness, self.thickness)}
+        length = {'length': (self.length,)} if self.shape == ROD else {}
+        return {'radius': (self.thickness,), **length}
+
+
+class Point(NamedTuple):
+    """A joint of the linkage on a body; where a loop was cut, it has to meet another point."""
+
+    name: str
+    place: Place
+    meets: str
+    radius: float
+
+    def ball(self, place: Place = (0.0, 0.0)) -> Piece:
+        """Return what is seen of it, at a place of its own frame or of another."""
+        return Piece(BALL, JOINTS, self.radius, place, place)
+
+
+class Joint(NamedTuple):
+    """What moves a body: its z turns or its x slides, as `sign` says; limits, if there are any."""
+
+    name: str
+    kind: str
+    sign: float
+    travel: Optional[Travel]
+
+    @property
+    def axis(self) -> Tuple[float, float, float]:
+        """The direction in which it turns or slides."""
+        return (self.sign, 0.0, 0.0) if self.kind == 'prismatic' else (0.0, 0.0, self.sign)
+
+
+@dataclass
+class Body:
+    """A body on its parent at x, y, z [m], roll, pitch, yaw [rad] where its joint is at zero."""
+
+    name: str
+    parent: str
+    pose: Sequence[float]
+    joint: Optional[Joint] = None
+    pieces: List[Piece] = field(default_factory=list)
+    points: List[Point] = field(default_factory=list)
+
+    def posed(self, position: float) -> Tuple[float, ...]:
+        """Return its pose on its parent at a position of its joint."""
+        if not self.joint:
+            return tuple(self.pose)
+        x, y, *middle, yaw = self.pose
+        moved = self.joint.sign * position
+        if self.joint.kind == 'prismatic':
+            return x + moved * math.cos(yaw), y + moved * math.sin(yaw), *middle, yaw
+        return x, y, *middle, yaw + moved
+
+
+@dataclass
+class Robot:
+    """Bodies of some mechanisms, parents first, below a root that is no body."""
+
+    name: str
+    root: str
+    parts: List[Tuple[Machine, List[Body]]]
+
+    @property
+    def bodies(self) -> List[Body]:
+        """The bodies of all mechanisms."""
+        return [body for _, bodies in self.parts for body in bodies]
+
+    def names(self) -> Iterator[Tuple[str, str]]:
+        """Yield what each joint and link is called."""
+        for body in self.bodies:
+            yield 'joint', body.joint.name if body.joint else f'{body.name}_fixed'
+            yield 'link', body.name
+            for point in body.points:
+                yield from (('joint', f'{point.name}_fixed'), ('link', point.name))
+
+    def check_names(self, whose: str) -> None:
+        """Raise SceneError where two links or two joints have the same name."""
+        names = list(self.names())
+        if ('link', self.root) in names:
+            raise SceneError(f'frame_id must be no link of the robot model, not {self.root!r}')
+        for (tag, name), count in Counter(names).items():
+            if count > 1:
+                raise SceneError(f'{whose} must be other names: the robot model would have two '
+                                 f'{tag}s {name}')
+
+
+def robot(machines: Iterable[Machine], frame_id: str, width: Optional[float] = None) -> Robot:
+    """
+    Return mechanisms as one robot model.
+
+    Parameters
+    ----------
+    machines : iterable of Machine
+        What is in it; the model of a single one bears its name.
+    frame_id : str
+        The root link: the frame of the poses of those that have none of their own.
+    width : float, optional
+        How thick bars are [m], and all else in proportion; None: a 40th of the longest bar.
+
+    Raises
+    ------
+    SceneError
+        If two links or two joints would have the same name, the whole would be no tree, or
+        something is too large or small.
+
+    """
+    return together([_robot(machine, machine.frame_id or frame_id, width) for machine in machines])
+
+
+def together(robots: Sequence[Robot]) -> Robot:
+    """
+    Return robot models as one; raise SceneError if they make no tree.
+
+    All have the same root link, or that of one is a link of another.
+    """
+    if len(robots) == 1:
+        return robots[0]
+    above = {name: robot.root for robot in robots for tag, name in robot.names() if tag == 'link'}
+
+    def depth(frame: str) -> int:
+        return 1 + depth(above[frame]) if frame in above else 0
+
+    root = _root(robots, above)
+    made = Robot('linkages', root, [part for robot in sorted(
+        robots, key=lambda robot: depth(robot.root)) for part in robot.parts])
+    made.check_names('mechanisms')
+    return made
+
+
+def _root(robots: Sequence[Robot], above: Mapping[str, str]) -> str:
+    """Return the link that all models hang on, by the root of the model that a link is in."""
+    frames = [robot.root for robot in robots]
+    for _ in robots:
+        frames = [above.get(frame, frame) for frame in frames]
+    tops = dict.fromkeys(frames)
+    if len(tops) > 1 or frames[0] in above:
+        raise SceneError('frame_id must be the same for all mechanisms of one robot model, or a '
+                         f'link of another one of them, not {listed(tops, 120)}')
+    return frames[0]
+
+
+def _robot(machine: Machine, frame_id: str, width: Optional[float]) -> Robot:
+    bodies = list(_Tree(machine, width).bodies(frame_id))
+    made = Robot(machine.name, frame_id, [(machine, bodies)])
+    made.check_names(f'{machine.name}.joints')
+    for value in _numbers(made):
+        if not abs(value) <= LARGEST:
+            raise SceneError(f'{machine.name}.pose, {machine.name}.scale and {machine.name}'
+                             f'.dimensions must keep everything within {LARGEST:g} m, not at '
+                             f'{value:g}')
+    return made
+
+
+def _numbers(robot: Robot) -> Iterator[float]:
+    for body in robot.bodies:
+        yield from body.pose
+        yield from body.joint.travel or () if body.joint else ()
+        for piece in body.pieces:
+            yield from (*piece.start, *piece.end, piece.length)
+        for point in body.points:
+            yield from point.place
+
+
+def size(machine: Machine) -> float:
+    """Return the longest bar [m]; raise SceneError where it cannot be drawn."""
+    length = machine.scale * float(machine.linkage.longest)
+    if not SMALLEST <= length <= LARGEST:
+        raise SceneError(
+            f'{machine.name}.scale and {machine.name}.dimensions must make the longest bar from '
+            f'{SMALLEST:g} to {LARGEST:g} m long, not {length:g}')
+    return length
+
+
+class _Tree:
+    """The bodies of a mechanism."""
+
+    def __init__(self, machine: Machine, width: Optional[float]):
+        length = size(machine)
+        self._thickness = length if width is None else 0.5 * width / BAR
+        self._machine, self._assembly = machine, machine.assembly()
+        self._links = machine.linkage.links
+        self._bars = machine.linkage.bars
+        self._shapes = shapes.shapes(machine)
+        self._frames = {GROUND: ground_frame(machine.linkage), **machine.linkage.frames}
+        self._travels = {**travels(machine.linkage, machine.reach),
+                         **_input_travels(machine, self._assembly)}
+        self._shared = len(self._assembly.legs) > 1 and self._links[0]
+
+    def bodies(self, root: str) -> Iterator[Body]:
+        """Yield ground, crank and legs."""
+        ground = Body(self._name('', GROUND), root, self._machine.pose)
+        for side in dict.fromkeys(leg.side for leg in self._assembly.legs.values()):
+            self._add_shapes(side, GROUND, ground, JOINTS)
+        yield ground
+        if self._shared:
+            yield self._with_hub(self._hung('', 1.0, self._shared))
+        for prefix, leg in self._assembly.legs.items():
+            ends: Counter[str] = Counter()
+            self._add_points(prefix, leg.side, GROUND, ground, self._frames[GROUND], ends)
+            for i, link in enumerate(self._links):
+                body = (self._lagging(prefix, leg, link) if link is self._shared
+                        else self._hung(prefix, leg.side, link))
+                self._add_pieces(leg.side, link, body, BARS[i % len(BARS)])
+                carried = [point for point in self._frames[link.name] if point != link.joint]
+                self._add_points(prefix, leg.side, link.name, body, carried, ends)
+                yield self._with_hub(body)
+
+    def _lagging(self, prefix, leg, crank) -> Body:
+        """Return a leg's pins, fixed to the crank of all legs."""
+        return Body(self._name(prefix, crank.name), self._name('', crank.name),
+                    (0.0, 0.0, 0.0, 0.0, 0.0, -leg.lag))
+
+    def _hung(self, prefix, side, link) -> Body:
+        """Return a body that moves on its parent; in a mirrored leg the other way round."""
+        prismatic, mirrored = link.kind == 'prismatic', side < 0.0
+        zero = math.pi - link.zero if mirrored and link.parent == GROUND else link.zero
+        travel = self._travels.get(link.name)
+        if travel and mirrored:
+            travel = -travel[1], -travel[0]
+        if travel and prismatic:
+            travel = self._machine.scale * travel[0], self._machine.scale * travel[1]
+        x, y = self._place(side, link.parent, link.joint)
+        called = self._machine.joints[prefix + link.name]
+        # Where the link is when what is published is zero.
+        back = -called.sign * called.offset
+        if prismatic:
+            x, y = x + side * back * math.cos(zero), y + side * back * math.sin(zero)
+        else:
+            zero += back
+        if travel:
+            travel = min(ends := [*map(called.of, travel)]), max(ends)
+        joint = Joint(called.name, link.kind, called.sign * (side if prismatic else 1.0), travel)
+        return Body(self._name(prefix, link.name), self._name(prefix, link.parent),
+                    (x, y, 0.0, 0.0, 0.0, zero), joint)
+
+    def _add_pieces(self, side, link, body, colour):
+        """Add bars as rods, and what slides on a link or is the slide."""
+        frame = self._frames[link.name]
+        for first, second in self._bars:
+            if first in frame and second in frame:
+                body.pieces.append(Piece(ROD, colour, BAR * self._thickness,
+                                         self._place(side, link.name, first),
+                                         self._place(side, link.name, second)))
+        self._add_shapes(side, link.name, body, colour)
+
+    def _add_shapes(self, side, link, body, colour):
+        """Add guides, blocks, barrels and the rods in them."""
+        for shape in self._shapes:
+            if shape.start.link == link:
+                start, end = (self._seen(side, link, spot[1:]) for spot in shape[2:])
+                drawn, thickness = {shapes.GUIDE: (BOX, GUIDE), shapes.BLOCK: (BOX, BLOCK),
+                                    shapes.BARREL: (ROD, BARREL), shapes.ROD: (ROD, BAR)
+                                    }[shape.kind]
+                if start != end:
+                    body.pieces.append(Piece(drawn, colour, thickness * self._thickness, start,
+                                             end))
+
+    def _add_points(self, prefix, side, link, body, points, ends):
+        """Add joints of a link, those that it was cut off as well."""
+        for point in points:
+            name = met = f'{self._machine.name}_{prefix}{point}'
+            ends[point] += 1
+            if ends[point] > 1:
+                name += f'_cut{ends[point] - 1 if ends[point] > 2 else ""}'
+            body.points.append(Point(name, self._place(side, link, point),
+                                     met if name != met else '', JOINT * self._thickness))
+
+    def _with_hub(self, body) -> Body:
+        """Return a body; one that carries no joint is seen, and weighs, where it hangs."""
+        if not body.points:
+            origin = (0.0, 0.0)
+            body.pieces.append(Piece(BALL, JOINTS, JOINT * self._thickness, origin, origin))
+        return body
+
+    def _name(self, prefix, name):
+        return f'{self._machine.name}_{"" if name == GROUND else prefix}{name}_link'
+
+    def _place(self, side, link, point):
+        """Return x, y [m] of a point of a link; the ground is mirrored in y, a link in its bar."""
+        return self._seen(side, link, self._frames[link][point])
+
+    def _seen(self, side, link, place):
+        """Return x, y [m] of a place on a link."""
+        x, y = (self._machine.scale * value for value in place)
+        return (side * x, y) if link == GROUND else (x, side * y)
+
+
+def _input_travels(machine, assembly) -> Dict[str, Optional[Travel]]:
+    """Return the outermost ends of each input's reach, unscaled; None: it turns all round."""
+    found: Dict[str, Optional[Travel]] = {}
+    for input_ in machine.linkage.inputs:
+        single = len(machine.inputs) == 1
+        arcs = common_reach(assembly) if single else [(input_.low, input_.high)]
+        if not arcs or input_.is_whole(arcs):
+            found[input_.name] = None
+            continue
+        low, high = min(lo for lo, _ in arcs), max(hi for _, hi in arcs)
+        sweep = machine.inputs[input_.name].sweep if input_.turns else None
+        # A crank is in the turn that it is driven in.
+        turns = math.tau * math.floor((sweep[1] - low) / math.tau) if sweep else 0.0
+        found[input_.name] = low + turns, high + turns
+    return found
+
+
+def numbers(*values: float) -> str:
+    """Return numbers with all their digits; adding zero makes -0.0 plain."""
+    return ' '.join(repr(float(value) + 0.0) for value in values)

@@ -1,0 +1,275 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Linkages with masses and closed loops, as MuJoCo has them, and read back from SDF and MJCF."""
+
+import math
+from pathlib import Path
+from xml.etree import ElementTree
+
+from linkage_ros import scene
+from linkage_ros.robot_files import command as from_robot, readers
+from linkage_ros.robot_model import bodies, mjcf, sdf
+from linkage_ros.robot_model.assembled import assembled
+from linkage_ros.robot_model.command import main
+import numpy as np
+import pytest
+from test_urdf import CUTS, drives, in_space, MACHINES, OWN, posed
+
+# One of each kind; the others are long.
+KINDS = ('jansen', 'slotted_lever', 'five_bar', 'walker of 3 pairs', 'engine with zeros elsewhere',
+         'boom and arm', 'Scotch yoke', 'Cardan gears', 'scissor lift', '2F-85 finger')
+SCENES = sorted(Path(__file__).parents[1].glob('config/*.yaml'))
+# On the way to a change point: the side seen at the start is not the one behind it.
+FOLDS = {'water_drop'}
+
+
+def simulated(name):
+    """Return a mechanism of about a metre that starts in the middle of its reach."""
+    one = {**MACHINES, **OWN}[name]()
+    given = {**one.given, 'm.scale': one.scale / bodies.size(one)}
+    one = scene.read({'mechanisms': ['m'], **given}).machines['m']
+    rows = drives(one)
+    given.update((f'm.{key}.start', value) for key, value in zip(
+        one.inputs, rows[len(rows) // 2].tolist()))
+    return scene.read({'mechanisms': ['m'], **given}).machines['m']
+
+
+def some_quick(names, quick):
+    return [pytest.param(name, marks=() if name in quick else pytest.mark.long) for name in names]
+
+
+def some_scenes(*quick):
+    return [pytest.param(path, marks=() if path.stem in quick else pytest.mark.long, id=path.stem)
+            for path in SCENES]
+
+
+def model(machines, frame_id='world', **given):
+    return assembled(bodies.robot(machines, frame_id), **given)
+
+
+class MuJoCo:
+    """A model in MuJoCo, at its start."""
+
+    def __init__(self, text):
+        self.library = pytest.importorskip('mujoco', reason='pip install mujoco')
+        self.model = self.library.MjModel.from_xml_string(text)
+        self.data = self.library.MjData(self.model)
+        self.library.mj_resetDataKeyframe(self.model, self.data, 0)
+        self.library.mj_kinematics(self.model, self.data)
+
+    def put(self, positions):
+        """Put joints there; what runs in a slot goes to its pin, where no joint tells."""
+        for name, value in positions.items():
+            self.data.joint(name).qpos = value
+        self.library.mj_kinematics(self.model, self.data)
+        for first, second in self.closed():
+            slot = self.model.body(self.model.site(second).bodyid[0])
+            if slot.name.endswith('_slot_link'):
+                apart = self.places([first])[first] - self.places([second])[second]
+                joint = slot.jntadr[0]
+                self.data.qpos[joint] += self.data.xaxis[joint] @ apart
+        self.library.mj_kinematics(self.model, self.data)
+
+    def closed(self):
+        """Yield the points that have to meet."""
+        for kind, one, other in zip(self.model.eq_type, self.model.eq_obj1id,
+                                    self.model.eq_obj2id):
+            if kind == self.library.mjtEq.mjEQ_CONNECT:
+                yield self.model.site(one).name, self.model.site(other).name
+
+    def places(self, names):
+        return {name: self.data.site(name).xpos.copy() for name in names}
+
+    def open(self):
+        """Return how far a loop is open [m]."""
+        return max((math.dist(*self.places(ends).values()) for ends in self.closed()),
+                   default=0.0)
+
+    def run(self, seconds, inputs=None):
+        """Yield from time to time, with inputs at what a function of time says."""
+        for step in range(round(seconds / self.model.opt.timestep)):
+            if inputs:
+                self.data.ctrl[:] = inputs(self.data.time)
+            self.library.mj_step(self.model, self.data)
+            if step % 20 == 0:
+                self.library.mj_kinematics(self.model, self.data)
+                yield self.data.time
+        assert not self.data.warning.number.any()
+
+
+@pytest.mark.parametrize('name', some_quick([*MACHINES, *OWN], KINDS))
+def test_mujoco_has_every_joint_where_it_is_and_every_loop_closed(name):
+    one = simulated(name)
+    robot, near = MuJoCo(mjcf.write(model([one]))), 1e-12 * bodies.size(one)
+    free = robot.model.nv - 2 * len([*robot.closed()]) - len(one.linkage.geared) * len(
+        one.assembly().legs)
+    assert free == robot.model.nu == len(one.inputs)
+    assert robot.open() < near
+    for thetas in drives(one, 5):
+        positions, places = posed(one, thetas)
+        robot.put(positions)
+        assert robot.open() < near
+        for point, found in robot.places(places).items():
+            assert found == pytest.approx(in_space(one.pose, places[point]), abs=near)
+
+
+@pytest.mark.parametrize('file', some_scenes('all', 'excavator', 'rack_steering'))
+def test_gravity_tears_no_scene(file):
+    found = scene.load(str(file))
+    robot = MuJoCo(mjcf.write(model(found.machines.values(), found.frame_id)))
+    bar = min(map(bodies.size, found.machines.values()))
+    assert max(robot.open() for _ in robot.run(1.0)) < 1e-5 * bar
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('name', [*MACHINES, *OWN])
+def test_gravity_tears_no_linkage(name):
+    one = simulated(name)
+    robot = MuJoCo(mjcf.write(model([one])))
+    assert max(robot.open() for _ in robot.run(1.0)) < 1e-5 * bodies.size(one)
+
+
+def follow(one, robot, seconds):
+    """Drive inputs through their sweeps, or a turn; return how far points are from `solve`."""
+    solution = one.assembly().solution(one.linkage.points)
+    names = [f'{one.name}_{prefix}{point}' for prefix in one.assembly().legs
+             for point in one.linkage.points]
+    starts = robot.data.ctrl.copy()
+
+    def inputs(time):
+        turned = 0.5 - 0.5 * math.cos(math.pi * time / seconds)
+        for start, drive in zip(starts, one.inputs.values()):
+            low, high = drive.sweep or (start, start + 2.0 * math.tau)
+            phase = math.acos(1.0 - 2.0 * (start - low) / (high - low))
+            yield low + (high - low) * (0.5 - 0.5 * math.cos(phase + math.pi * turned))
+
+    for _ in robot.run(seconds, lambda time: [*inputs(time)]):
+        solution.solve([float(robot.data.joint(one.joints[name].name).qpos[0])
+                        for name in one.inputs])
+        places = [in_space(one.pose, place) for place in solution.rows.reshape(-1, 2)]
+        yield np.abs(np.array(places) - [*robot.places(names).values()]).max()
+
+
+@pytest.mark.parametrize('file', some_scenes('excavator', 'jansen', 'rack_steering'))
+def test_servos_drive_the_linkage_through_the_poses_of_solve(file):
+    for one in scene.load(str(file)).machines.values():
+        robot = MuJoCo(mjcf.write(model([one])))
+        assert max(follow(one, robot, 2.0)) < 2e-3 * bodies.size(one)
+
+
+def published(machines, motors):
+    """Return what scenes publish where a robot's motors are."""
+    found = {}
+    for one in machines:
+        values = [drive.ratio * motors[drive.source] + drive.offset
+                  for drive in one.inputs.values()]
+        angles = one.linkage.joint_angles(values if len(values) > 1 else values[0])
+        found.update((called.name, float(called.of(angles[joint])))
+                     for joint, called in one.joints.items() if called.published)
+    return found
+
+
+@pytest.mark.parametrize('form', [mjcf, sdf], ids=['mjcf', 'sdf'])
+@pytest.mark.parametrize('name', some_quick(
+    sorted({*MACHINES, 'excavator', 'parallelogram arm', 'scissor lift', 'rack steering'} - FOLDS),
+    ('jansen', 'boom and arm', 'boxer engine')))
+def test_a_linkage_comes_back_from_its_simulator_s_file(tmp_path, form, name):
+    if form is mjcf:
+        pytest.importorskip('mujoco', reason='pip install mujoco')
+    one, file = simulated(name), tmp_path / 'robot.xml'
+    built = model([one])
+    file.write_text(form.write(built))
+    given, said = from_robot.described(readers.read(str(file)))
+    assert not any(line.startswith('Left out') for line in said)
+    # An SDF has its zeros where it starts.
+    zeros = {solid.joint.name: solid.position if form is sdf else 0.0
+             for solid in built.solids if solid.joint}
+    turns = {solid.joint.name: solid.joint.kind == 'revolute'
+             for solid in built.solids if solid.joint}
+    machines = scene.read(given).machines.values()
+    for thetas in drives(one, 7):
+        wanted = {name: value - zeros[name] for name, value in posed(one, thetas)[0].items()}
+        for joint, value in published(machines, wanted).items():
+            if joint in wanted:
+                apart = value - wanted[joint]
+                apart = math.remainder(apart, math.tau) if turns[joint] else apart
+                # At a dead point half of the digits of an angle are in its sine.
+                assert apart == pytest.approx(0.0, abs=1e-7), (joint, thetas)
+
+
+def test_bodies_weigh_what_mujoco_finds_their_shapes_to_weigh():
+    built = model([simulated('engine')], density=1000.0)
+    text = mjcf.write(built)
+    given, shapes = (MuJoCo(text.replace('angle="radian"', f'angle="radian" {by}')).model
+                     for by in ('', 'inertiafromgeom="true"'))
+    moving = [given.body(solid.name).id for solid in built.solids if solid.joint]
+    for what in 'body_mass', 'body_ipos', 'body_inertia':
+        assert getattr(given, what)[moving] == pytest.approx(getattr(shapes, what)[moving])
+    wide = model([simulated('engine')], density=2000.0)
+    assert wide.solids[1].weight.mass == pytest.approx(2.0 * built.solids[1].weight.mass)
+
+
+@pytest.mark.parametrize('name', CUTS)
+def test_an_sdf_closes_each_loop_by_a_pin_with_two_parents(name):
+    root = ElementTree.fromstring(sdf.write(model([simulated(name)])))
+    joints = [(joint.get('type'), joint.findtext('child')) for joint in root.iter('joint')]
+    pins = [link.get('name') for link in root.iter('link') if link.get('name').endswith('_pin')]
+    assert len(pins) == CUTS[name]
+    for pin in pins:
+        assert [kind for kind, child in joints if child == pin] == ['revolute', 'fixed']
+    assert [link.text for link in root.iter('child_link')] == pins
+    assert all(float(mass.text) > 0.0 for mass in root.iter('mass'))
+    assert len([*root.iter('mass')]) == len([*root.iter('link')])
+
+
+def test_gears_are_gears_in_both():
+    one = simulated('geared five-bar')
+    built = model([one])
+    gear, = built.gears
+    rates = one.linkage.joint_rates(1.0)
+    assert gear == ('m_crank2', 'm_crank', pytest.approx(rates['crank2']))
+    mimic, = ElementTree.fromstring(sdf.write(built)).iter('mimic')
+    assert (mimic.get('joint'), float(mimic.findtext('multiplier'))) == gear[1:]
+
+
+ARM = {'mechanisms': ['hand', 'arm'], 'arm.type': 'four_bar', 'hand.type': 'four_bar'}
+
+
+@pytest.mark.parametrize('link', ['AB_link', 'B', 'B_cut'])
+def test_a_hand_is_carried_by_its_arm(link):
+    found = scene.read({**ARM, 'hand.frame_id': f'arm_{link}', 'hand.pose': [1.0] + [0.0] * 5})
+    robot = MuJoCo(mjcf.write(model(found.machines.values())))
+    assert robot.open() < 1e-12
+    home = {'AB_link': 'arm_A'}.get(link, 'arm_B')
+    places = robot.places([home, 'hand_O'])
+    assert math.dist(*places.values()) == pytest.approx(1.0)
+    robot.put({f'arm_{name}': angle for name, angle in
+               found.machines['arm'].linkage.joint_angles(1.0).items()})
+    moved = robot.places([home, 'hand_O'])
+    assert math.dist(*moved.values()) == pytest.approx(1.0)
+    assert math.dist(places['hand_O'], moved['hand_O']) > 0.1
+
+
+def test_the_command_prints_each_format(tmp_path, capsys):
+    for form, tag in ('urdf', 'robot'), ('sdf', 'sdf'), ('mjcf', 'mujoco'):
+        assert main(['--mechanism', 'jansen', '--format', form, '--width', '0.5']) == 0
+        assert ElementTree.fromstring(capsys.readouterr().out).tag == tag
+
+
+@pytest.mark.parametrize('arguments, complaint', [
+    (['--density', '2700'], '--density is for sdf and mjcf'),
+    (['--width', '-1'], 'must be from 1e-30 to 1e+30, not -1'),
+    (['--format', 'dae'], "invalid choice: 'dae'"),
+    (['--format', 'mjcf', '--width', '1e-6'], 'link is too light for MuJoCo: give a larger'),
+])
+def test_the_command_says_what_is_wrong(capsys, arguments, complaint):
+    assert main(arguments) == 1
+    printed = capsys.readouterr()
+    assert not printed.out and printed.err.count('\n') == 1
+    assert complaint in printed.err
+
+
+def test_a_start_out_of_reach_is_refused():
+    with pytest.raises(scene.SceneError, match='m.cylinder.start and .* must be where m can be'):
+        model([OWN['excavator']()])
