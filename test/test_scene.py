@@ -191,9 +191,9 @@ def test_joints_bear_a_robots_own_names_signs_and_zeros():
     joints = scene.read({'jansen.leg_pairs': 2, 'jansen.only_named': True,
                          'jansen.joint_names': lines}).machines['jansen'].joints
     named = {joint: called for joint, called in joints.items() if called.published}
-    assert named == {'crank': ('hip', 1.0, 0.0, True),
-                     'left0_BC': ('left-knee', -1.0, 0.0, True),
-                     'right1_EF': ('ankle.2', -1.0, -0.15, True)}
+    assert named == {'crank': ('hip', 1.0, 0.0, True, False),
+                     'left0_BC': ('left-knee', -1.0, 0.0, True, False),
+                     'right1_EF': ('ankle.2', -1.0, -0.15, True, True)}
     assert joints['left1_BC'].name == 'jansen_left1_BC' and len(joints) == 1 + 4 * 6
 
 

@@ -225,12 +225,9 @@ class Model:
         self.robot = bodies.robot([machine], frame_id)
         self.description = urdf.write(self.robot)
         self.assembly = machine.assembly()
-        self._names, self._signs, self._offsets, self._published = map(
+        self._names, self._signs, self._offsets, self._published, self._taken = map(
             np.array, zip(*machine.joints.values()))
         self._is_plain = bool((self._signs > 0.0).all()) and not self._offsets.any()
-        angles = [machine.linkage.is_angle(name) for name in self.assembly.joints]
-        self._shifted = (self._offsets != 0.0) & np.append(
-            [False] * len(self.drives), len(self.assembly.legs) * angles).astype(bool)
         drawn = machine.name, prefix + frame_id, machine.pose
         size = bodies.size(machine)
         self._points, shown = _shown(machine)
@@ -269,11 +266,10 @@ class Model:
         if held is not None and held.all():
             held = None
         if not self._is_plain:
-            signs, offsets, shifted = self._change(layout)
+            signs, offsets, taken = self._change(layout)
             values *= signs
             values += offsets
-            # A joint's own angle is within half a turn of its own zero.
-            values[shifted] -= math.tau * np.round(values[shifted] / math.tau)
+            values[taken] -= math.tau * np.round(values[taken] / math.tau)
         return Pose(layout, values, held, moving)
 
     def _change(self, layout: Layout):
@@ -282,7 +278,7 @@ class Model:
             self._changes[layout] = (
                 _arranged(layout, 1.0, self._signs, self._signs),
                 _arranged(layout, 0.0, self._offsets, 0.0 * self._offsets),
-                np.flatnonzero(_arranged(layout, 0.0, self._shifted, 0.0 * self._offsets)))
+                np.flatnonzero(_arranged(layout, 0.0, self._taken, 0.0 * self._offsets)))
         return self._changes[layout]
 
     def wire(self, publisher, build, pose: Pose, logger) -> Wire:

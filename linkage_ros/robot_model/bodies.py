@@ -303,7 +303,7 @@ class _Tree:
         else:
             zero += back
         if travel:
-            travel = min(ends := [*map(called.of, travel)]), max(ends)
+            travel = called.travel(travel)
         joint = Joint(called.name, link.kind, called.sign * (side if prismatic else 1.0), travel)
         return Body(self._name(prefix, link.name), self._name(prefix, link.parent),
                     (x, y, 0.0, 0.0, 0.0, zero), joint)

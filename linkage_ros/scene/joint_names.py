@@ -5,8 +5,11 @@
 
 from __future__ import annotations
 
+import math
 import re
-from typing import Any, Dict, Iterable, Mapping, NamedTuple, Sequence
+from typing import Any, Dict, Iterable, Mapping, NamedTuple, Optional, Tuple
+
+import numpy as np
 
 from .parameters import SceneError
 from ..words import elided, listed
@@ -17,21 +20,40 @@ _LINE = re.compile(r'(\w+)=(-?)([A-Za-z_][\w./:]*(?:-[A-Za-z_][\w./:]*)*)'
 
 
 class JointName(NamedTuple):
-    """What a joint is called; published is sign * position + offset [rad or m], or nothing."""
+    """
+    What a joint is called; published is sign * position + offset [rad or m], or nothing.
+
+    Of an angle that has a zero of its own whole turns are `taken` off: it is within half a turn.
+    """
 
     name: str
     sign: float = 1.0
     offset: float = 0.0
     published: bool = True
+    taken: bool = False
 
     def of(self, position: Any) -> Any:
-        """Return what is published for a position."""
-        return self.sign * position + self.offset
+        """Return what is published for a position, a number or an array."""
+        value = self.sign * position + self.offset
+        return value - math.tau * np.round(value / math.tau) if self.taken else value
+
+    def travel(self, ends: Tuple[float, float]) -> Optional[Tuple[float, float]]:
+        """Return between which ends it is published; None for an angle that passes half a turn."""
+        low, high = sorted(self._replace(taken=False).of(end) for end in ends)
+        if not self.taken:
+            return low, high
+        turns = math.tau * round(0.5 * (low + high) / math.tau)
+        low, high = low - turns, high - turns
+        return (low, high) if -math.pi < low and high <= math.pi else None
 
 
-def read_joint_names(mechanism: str, joints: Sequence[str], lines: Iterable[str],
+def read_joint_names(mechanism: str, joints: Mapping[str, bool], lines: Iterable[str],
                      only_named: bool) -> Dict[str, JointName]:
-    """Return the names of all joints of a mechanism; raise SceneError if a line fits none."""
+    """
+    Return the names of all joints of a mechanism; raise SceneError if a line fits none.
+
+    `joints` tells of each whether it is an angle that comes without whole turns.
+    """
     usual = {joint: JointName(f'{mechanism}_{joint}', published=not only_named)
              for joint in joints}
     own: Dict[str, JointName] = {}
@@ -42,7 +64,9 @@ def read_joint_names(mechanism: str, joints: Sequence[str], lines: Iterable[str]
                 f"{mechanism}.joint_names must be texts such as 'BC=left_shin' or "
                 f"'EF=-left_ankle+0.35', each about another of {listed(joints, 90)}, not "
                 f'{elided(line)!r}')
-        own[match[1]] = JointName(match[3], -1.0 if match[2] else 1.0, float(match[4] or 0.0))
+        offset = float(match[4] or 0.0)
+        own[match[1]] = JointName(match[3], -1.0 if match[2] else 1.0, offset,
+                                  taken=joints[match[1]] and offset != 0.0)
     return {**usual, **own}
 
 

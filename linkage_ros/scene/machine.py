@@ -172,8 +172,11 @@ def read_machine(name: str, given: Mapping[str, Any], old: Optional[Machine],
               for input_ in linkage.inputs}
     frame_id = values.take(f'{name}.frame_id', OWN_FRAME_ID, '')
     only_named = values.take(f'{name}.only_named', ONLY_NAMED, False)
+    assembly = Assembly(linkage, leg_pairs, mirrored, scale, reach)
+    angles = [linkage.is_angle(joint) for joint in assembly.joints]
     joints = read_joint_names(
-        name, [*inputs, *Assembly(linkage, leg_pairs, mirrored, scale, reach).all_joints],
+        name, {**dict.fromkeys(inputs, False),
+               **dict(zip(assembly.all_joints, len(assembly.legs) * angles))},
         values.take(f'{name}.joint_names', JOINT_NAMES, ()), only_named)
     loads = read_loads(name, linkage, values.take(f'{name}.loads', LOADS, ()))
     if loads and (leg_pairs > 1 or mirrored):
