@@ -124,7 +124,13 @@ export class Slider {
 
   offer(value) {
     this.mistyped = false;
+    this.offered = value;
     this.asked.offer(value);
+  }
+
+  /** The value that it has, or will have when what was asked for is granted. */
+  get expected() {
+    return this.asked.busy ? this.offered : this.accepted;
   }
 
   type(text) {

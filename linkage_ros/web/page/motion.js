@@ -49,8 +49,8 @@ class InputRow {
   }
 
   step(way) {
-    const { low, high, accepted } = this.slider;
-    const wanted = accepted + way * (this.turns ? STEP : (high - low) / STEPS_A_STROKE);
+    const { low, high, expected } = this.slider;
+    const wanted = expected + way * (this.turns ? STEP : (high - low) / STEPS_A_STROKE);
     this.slider.offer(this.turns ? this.beside(wanted) : wanted);
   }
 
