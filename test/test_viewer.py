@@ -10,12 +10,15 @@ import gc
 import itertools
 import json
 import math
+import os
 from pathlib import Path
 import re
 import resource
 import signal
 import socket
 import struct
+import subprocess
+import sys
 import threading
 import time
 
@@ -842,6 +845,31 @@ def test_a_signal_ends_the_viewer_while_somebody_looks(tmp_path, stop):
     code, printed = process.end()
     assert code == 0 and f'Look at {url}' in printed
     assert 'Traceback' not in printed and 'rror' not in printed
+
+
+@pytest.mark.long
+def test_make_view_says_where_to_look_and_ends_all_that_it_started():
+    environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)}
+    environment.pop('ROS_DOMAIN_ID', None)
+    process = subprocess.Popen(
+        [sys.executable, ROOT / 'demo' / 'view.py', ROOT / 'config' / 'jansen.yaml', '0'],
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment)
+    try:
+        address, = re.findall(r'Look at (http:\S+)', next(
+            line for line in process.stdout if 'Look at' in line))
+
+        async def look():
+            async with Page(address) as page:
+                await page.cast('/jansen')
+
+        asyncio.run(look())
+        process.send_signal(signal.SIGINT)
+        # The output ends when the last of those who have it does.
+        printed, _ = process.communicate(timeout=browser.DEADLINE)
+        assert process.returncode == 0 and 'Traceback' not in printed
+    finally:
+        process.terminate()
+        process.wait(browser.DEADLINE)
 
 
 @pytest.mark.long
