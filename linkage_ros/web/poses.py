@@ -14,6 +14,8 @@ from ..words import listed, quoted
 
 # By how much a dimension is changed to see which bars follow, as a part of the longest bar.
 NUDGE = 1e-6
+# How far beyond its end an input is by rounding alone.
+CLOSE = 1e-9
 
 
 class Refused(Exception):
@@ -79,17 +81,18 @@ def reached(machine, present, want):
 
 
 def _input_at(machine, present, name, value):
-    drive = machine.inputs[name]
-    whole = drive.input.is_whole(arcs(drive))
-    beside = [drive.input.beside(value, 0.5 * (low + high)) if drive.input.turns else value
-              for low, high in arcs(drive)]
-    near = min((min(max(near, low), high) for near, (low, high) in zip(beside, arcs(drive))),
-               key=lambda end: drive.input.apart(end, value))
-    taken = float(math.remainder(value, math.tau) if whole else near)
+    drive, ends = machine.inputs[name], arcs(machine.inputs[name])
+    near = min((min(max(float(drive.input.beside(value, (low + high) / 2.0)), low), high)
+                for low, high in ends), key=lambda end: drive.input.apart(end, value))
+    whole = drive.input.is_whole(ends)
+    taken = math.remainder(value, math.tau) if whole else near
     inputs = [taken if key == name else old for key, old in zip(machine.inputs, present)]
-    _check_assembled(machine, inputs)
-    missed = not whole and drive.input.apart(near, value) > 1e-9 * drive.input.size
-    return inputs, f'{name} reaches {in_words(arcs(drive))} {drive.input.unit}' if missed else ''
+    own = [value / machine.scale_of(key) for key, value in zip(machine.inputs, inputs)]
+    places = machine.linkage.solve(_theta(own))
+    if not all(math.isfinite(part) for place in places.values() for part in place):
+        raise Refused(f'{machine.name} cannot be assembled there')
+    missed = not whole and drive.input.apart(near, value) > CLOSE * drive.input.size
+    return inputs, f'{name} reaches {in_words(ends)} {drive.input.unit}' if missed else ''
 
 
 def _output_at(machine, present, name, value):
@@ -127,13 +130,6 @@ def _joint_at(machine, present, joint, place, leg=0):
         [[(low / size, high / size) for low, high in way] for way, size in zip(ways, own)])
     return [float(leg.lag + leg.side * (value - leg.start)) * size
             for value, size in zip(found, own)]
-
-
-def _check_assembled(machine, inputs):
-    own = [value / machine.scale_of(name) for name, value in zip(machine.inputs, inputs)]
-    places = machine.linkage.solve(_theta(own))
-    if not all(math.isfinite(part) for place in places.values() for part in place):
-        raise Refused(f'{machine.name} cannot be assembled there')
 
 
 def arcs(drive):

@@ -118,7 +118,8 @@ export class Picture {
     context.clearRect(0, 0, width, height);
     const shapes = this.shapes();
     if (!shapes.length) return;
-    this.fit(shapes, width, height);
+    // Under a joint that is dragged the paper stays where it is.
+    if (!this.scale || !this.pull()) this.fit(shapes, width, height);
     this.grid(width, height);
     shapes.sort((a, b) => (a.look.kind === 'lines') - (b.look.kind === 'lines'));
     const joints = shapes.filter(({ look }) => look.kind === 'joints');
