@@ -92,7 +92,8 @@ export class Slider {
     this.unitShown = element('span', { className: 'unit' });
     this.row = element('div', { className: 'row', title },
       element('label', { htmlFor: id, textContent: label }), this.range, this.number, this.unitShown, this.reason.line);
-    this.asked = new Newest(async wanted => this.settle(wanted, await request(wanted, this.gesture)));
+    this.asked = new Newest(async ([wanted, gesture]) => this.settle(
+      wanted, await request(wanted, gesture, this.accepted)));
     this.range.oninput = () => this.slid();
     this.range.onchange = () => this.release();
     this.range.onkeydown = event => this.key(event);
@@ -125,7 +126,7 @@ export class Slider {
   offer(value) {
     this.mistyped = false;
     this.offered = value;
-    this.asked.offer(value);
+    this.asked.offer([value, this.gesture]);
   }
 
   /** The value that it has, or will have when what was asked for is granted. */
@@ -208,7 +209,7 @@ export class Switch {
     this.row = element('div', { className: 'row', title },
       element('label', { htmlFor: id, textContent: label }), this.box, this.reason.line);
     this.box.onchange = async () => {
-      const { reason } = await request(this.box.checked, {});
+      const { reason } = await request(this.box.checked, {}, !this.box.checked);
       this.reason.say(reason && `Refused: ${reason}`);
       if (reason) this.box.checked = !this.box.checked;
     };

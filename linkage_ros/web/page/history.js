@@ -28,16 +28,9 @@ export class History {
     this.steps.push({ name, gesture, values: { [name]: value } });
   }
 
-  /** What undoes the last step; nothing if there is none. */
-  undone() {
-    return this.steps.pop()?.values;
-  }
-
-  /** What brings the first values back, which can be undone as well. */
-  reset() {
+  /** What brings the first values back, and what undoes that. */
+  changes() {
     const changed = [...this.first].filter(([name, value]) => this.mechanism.value(name) !== value);
-    if (!changed.length) return null;
-    this.steps.push({ values: Object.fromEntries(changed.map(([name]) => [name, this.mechanism.value(name)])) });
-    return Object.fromEntries(changed);
+    return [changed, changed.map(([name]) => [name, this.mechanism.value(name)])].map(pairs => Object.fromEntries(pairs));
   }
 }

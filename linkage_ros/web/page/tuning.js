@@ -45,8 +45,8 @@ export class Tuning {
       groups[group].push(control.row);
     }
     this.speeds = groups.speeds;
-    this.undoing = this.button('Undo', () => this.put(mechanism.history.undone()));
-    this.resetting = this.button('Reset', () => this.put(mechanism.history.reset()));
+    this.undoing = this.button('Undo', () => this.undo());
+    this.resetting = this.button('Reset', () => this.reset());
     const tools = element('div', { className: 'tools' }, this.undoing, this.resetting,
       this.button('Save as scene file', () => this.save()), this.reason.line);
     this.element = element('div', {}, tools, folding('Dimensions', groups.dimensions, open), folding('More', groups.more, false));
@@ -65,7 +65,7 @@ export class Tuning {
       ...setting, label: labelled(name), title: `${meaning}\nMay be: ${allowed}.`,
       unit: /\[([^\]]+)\]/.exec(meaning)?.[1] ?? '', scale: law(setting),
     };
-    const request = (value, gesture) => this.set(name, value, gesture);
+    const request = (...about) => this.set(name, ...about);
     if (kind === 'bool') return new Switch(described, request);
     const ranged = low !== null && high !== null && low < high;
     if (!ranged || kind !== 'double' && kind !== 'integer') return null;
@@ -80,21 +80,33 @@ export class Tuning {
     row.addEventListener('focusout', () => this.light(''));
   }
 
-  async set(name, value, gesture) {
-    const before = this.mechanism.value(name);
+  async set(name, value, gesture, before) {
     const answer = await this.connection.ask({ op: 'set', mechanism: this.mechanism.key, values: { [name]: value } });
     if (!answer.reason && before !== value) this.mechanism.history.remember(name, before, gesture);
     this.renderTools();
     return answer;
   }
 
-  /** Set several values at once, as undo and reset do. */
+  async undo() {
+    const { steps } = this.mechanism.history;
+    const step = steps.pop();
+    if (step && !await this.put(step.values)) steps.push(step);
+    this.renderTools();
+  }
+
+  async reset() {
+    const { history } = this.mechanism;
+    const [values, before] = history.changes();
+    if (await this.put(values)) history.steps.push({ values: before });
+    this.renderTools();
+  }
+
+  /** Set several values at once; return whether that was granted. */
   async put(values) {
-    if (!values) return;
     const { reason } = await this.connection.ask({ op: 'set', mechanism: this.mechanism.key, values });
     this.reason.say(reason && `Refused: ${reason}`);
     for (const name of Object.keys(values)) this.controls.get(name)?.reason.say('');
-    this.renderTools();
+    return !reason;
   }
 
   async save() {
