@@ -35,6 +35,11 @@ export function element(tag, properties = {}, ...children) {
   return made;
 }
 
+/** Change only what is other than before: what is drawn anew takes time. */
+export function put(node, properties) {
+  for (const [name, value] of Object.entries(properties)) if (node[name] !== value) node[name] = value;
+}
+
 let made = 0;
 const nextId = () => `s${made += 1}`;
 
@@ -185,13 +190,14 @@ export class Slider {
   }
 
   render() {
-    this.unitShown.textContent = units.of(this.unit).name;
+    put(this.unitShown, { textContent: units.of(this.unit).name });
     if (this.accepted === null || this.accepted === undefined) return;
     const place = this.kind === 'integer' ? this.accepted
       : STOPS * clamp(this.scale.place(this.accepted, this.low, this.high), 0, 1);
     this.range.value = place;
-    this.number.value = this.shortened(this.accepted);
-    this.range.ariaValueText = `${this.number.value} ${this.unitShown.textContent}`;
+    const text = this.shortened(this.accepted);
+    put(this.number, { value: text });
+    put(this.range, { ariaValueText: `${text} ${this.unitShown.textContent}` });
     this.row.classList.remove('refused');
   }
 

@@ -3,7 +3,7 @@
 
 // How a mechanism moves: a slider for each input, play and step, and what its outputs are now.
 
-import { element, LINEAR, Newest, Reason, read, Slider } from './control.js';
+import { element, LINEAR, Newest, put, Reason, read, Slider } from './control.js';
 import { units } from './units.js';
 
 const STEP = Math.PI / 180;
@@ -64,6 +64,7 @@ class InputRow {
 /** An output: its value, which can be written where there is one input, and d output / d input. */
 class OutputRow {
   constructor(name, editable, count, want) {
+    this.editable = editable;
     this.value = editable
       ? element('input', { type: 'text', inputMode: 'decimal', autocomplete: 'off', ariaLabel: name })
       : element('span');
@@ -88,15 +89,14 @@ class OutputRow {
 
   render() {
     const { value, unit, rates } = this.output;
-    if (document.activeElement !== this.value) this.value['value' in this.value ? 'value' : 'textContent'] = shown(value, unit);
-    this.unit.textContent = units.of(unit).name;
+    if (document.activeElement !== this.value) put(this.value, { [this.editable ? 'value' : 'textContent']: shown(value, unit) });
+    put(this.unit, { textContent: units.of(unit).name });
     this.inputs.forEach((input, i) => {
       const ratio = `${unit}/${input.unit}`;
       const { name } = units.of(ratio);
       const alone = this.inputs.length === 1;
-      this.rates[i].title = name;
-      this.rates[i].textContent = shown(rates[i], ratio, alone ? FIGURES : FIGURES_OF_MANY)
-        + (alone && unit !== input.unit ? ` ${name}` : '');
+      const textContent = shown(rates[i], ratio, alone ? FIGURES : FIGURES_OF_MANY);
+      put(this.rates[i], { title: name, textContent: textContent + (alone && unit !== input.unit ? ` ${name}` : '') });
     });
   }
 }
