@@ -51,6 +51,14 @@ help: ## Show what can be made
 demo: build ## Run the nodes, measure what they send, draw it to demo/out/
 	@$(in_ros) PYTHONPATH=$$PYTHONPATH:test python demo/demo.py
 
+# What `make view` shows, and where.
+SCENE ?= config/all.yaml
+PORT ?= 8020
+
+.PHONY: view
+view: build ## Show SCENE=config/all.yaml in the browser, at PORT=8020
+	@$(in_ros) PYTHONPATH=$$PYTHONPATH:test exec python demo/view.py '$(SCENE)' '$(PORT)'
+
 .PHONY: bench
 bench: build $(venv)/.tools .venv-bench/.installed ## Measure run time against error, stability, and the nodes
 	@.venv-bench/bin/python -m benchmark.run

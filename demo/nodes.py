@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The three nodes of linkage_ros as processes of their own, as `ros2 run` would start them."""
+"""The nodes of linkage_ros as processes of their own, as `ros2 run` would start them."""
 
 import os
 from pathlib import Path
@@ -19,9 +19,9 @@ class DemoError(Exception):
 
 
 class Nodes:
-    """The running nodes of a scene; a context that leaves none behind."""
+    """The running nodes of a scene, with a viewer if it has a port; leaves none behind."""
 
-    def __init__(self, scene_file: Path, domain: int):
+    def __init__(self, scene_file: Path, domain: int, viewer_port=None):
         try:
             folder = Path(get_package_prefix('linkage_ros'), 'lib', 'linkage_ros')
         except PackageNotFoundError:
@@ -29,6 +29,9 @@ class Nodes:
                             'install/setup.bash') from None
         self._commands = {name: [folder / name, '--ros-args', '--params-file', scene_file]
                           for name in EXECUTABLES}
+        if viewer_port is not None:
+            self._commands['viewer'] = [
+                folder / 'viewer', '--ros-args', '-p', f'port:={viewer_port}']
         self._environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
         self._processes = {}
 

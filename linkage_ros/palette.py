@@ -12,6 +12,9 @@ SKY, PURPLE = '#56b4e9', '#cc79a7'
 DARK, FAINT, GREY, FRAME, TRACK, GRID, SHADE = (
     '#222222', '#606060', '#8a8a8a', '#b0b0b0', '#d0d0d0', '#e6e6e6', '#f4f4f4')
 
+# Of a page in the dark: its paper and its grid.
+NIGHT, DUSK = '#161616', '#303030'
+
 # What they show: in markers a joint and the locus, in pictures a crank, the tracer and guides.
 LINK, JOINT, LOCUS = BLUE, ORANGE, GREEN
 CRANK, TRACE, GUIDE, FLOOR = ORANGE, VERMILION, GREEN, '#b5a27c'

@@ -167,6 +167,26 @@ class Browser:
                     a + part * (b - a) for a, b in zip(start, end)))
         await self._mouse('mouseReleased', *places[-1])
 
+    async def move(self, x, y):
+        """Go to a place with the mouse, no button pressed."""
+        await self._do('Input.dispatchMouseEvent', type='mouseMoved', x=x, y=y)
+
+    async def hover(self, expression: str):
+        """Go to an element with the mouse, from beside it."""
+        await self.value(f'({expression}).scrollIntoView({{block: "nearest"}})')
+        x, y, _ = await self.middle(expression)
+        await self.move(1.0, 1.0)
+        await self.move(x, y)
+
+    async def press(self, key: str):
+        """Press a key that writes nothing."""
+        for kind in ('keyDown', 'keyUp'):
+            await self._do('Input.dispatchKeyEvent', type=kind, key=key, code=key)
+
+    async def downloads(self, folder: Path):
+        """Let what is downloaded go to a folder."""
+        await self._do('Browser.setDownloadBehavior', behavior='allow', downloadPath=str(folder))
+
     async def _mouse(self, kind, x, y):
         await self._do('Input.dispatchMouseEvent', type=kind, x=x, y=y, button='left',
                        buttons=int(kind != 'mouseReleased'), clickCount=1)

@@ -10,7 +10,7 @@ import os
 from linkage_ros import mechanisms, scene
 from linkage_ros.linkage.walker import Assembly
 from linkage_ros.render.cycle import Cycle
-from linkage_ros.scene import slider
+from linkage_ros.scene import slider, writing
 from linkage_ros.scene.motion import Motion
 import numpy as np
 import pytest
@@ -46,6 +46,16 @@ def test_without_parameters_the_scene_is_the_catalogue():
         assert machine.linkage.dimensions == mechanisms.defaults(name)
         assert machine.first.speed == 1.0 and machine.first.start == 0.0
     assert scene.read({}).rate == 50.0
+
+
+@pytest.mark.parametrize('file', sorted(glob(os.path.join(CONFIG, '*.yaml'))))
+def test_a_scene_is_written_as_the_few_values_that_tell_it(file, tmp_path):
+    before = scene.load(file)
+    kept = writing.without_defaults(before)
+    again = tmp_path / 'again.yaml'
+    again.write_text(writing.in_yaml(kept))
+    assert scene.load(str(again)).parameters == before.parameters
+    assert len(kept) < len(before.parameters) / 2
 
 
 def test_scale_multiplies_every_length():

@@ -10,12 +10,15 @@ import gc
 import itertools
 import json
 import math
+import os
 from pathlib import Path
 import re
 import resource
 import signal
 import socket
 import struct
+import subprocess
+import sys
 import threading
 import time
 
@@ -28,7 +31,7 @@ pytest.importorskip('linkage_interfaces')
 
 import browser  # noqa: E402
 from geometry_msgs.msg import Point  # noqa: E402
-from linkage_ros import mechanisms  # noqa: E402
+from linkage_ros import mechanisms, scene  # noqa: E402
 from linkage_ros.nodes import message_layout, messages  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
@@ -255,7 +258,6 @@ def test_every_slider_has_a_value_a_range_and_a_meaning(lever):
             return await page.cast('/lever', '/drop')
 
     cast = asyncio.run(look(lever.viewer.url))
-    assert (cast['/lever']['lever'], cast['/drop']['lever']) == (True, False)
     settings = {one['name']: one for one in cast['/lever']['settings']}
     assert {'crank.speed', 'crank.start', 'dimensions.a', 'dimensions.b', 'dimensions.e'} <= set(
         settings)
@@ -353,7 +355,7 @@ def test_a_dragged_lever_is_where_it_was_dragged_to_and_stays_there(show):
     async def use(url):
         async with Page(url) as page:
             await page.cast('/lever', '/drop')
-            answer = await page.ask('drag', '/lever', angle=0.4)
+            answer = await page.ask('pose', '/lever', want={'output': 'lever', 'value': 0.4})
             assert answer['reason'] == ''
 
             def lever():
@@ -365,11 +367,12 @@ def test_a_dragged_lever_is_where_it_was_dragged_to_and_stays_there(show):
             return answer
 
     answer = asyncio.run(use(running.viewer.url))
-    assert lever_of(answer['servo']) == pytest.approx(0.4, abs=1e-12)
-    slope = (lever_of(answer['servo'] + 1e-6) - lever_of(answer['servo'] - 1e-6)) / 2e-6
-    assert answer['reduction'] == pytest.approx(slope, abs=1e-8)
+    servo, lever = answer['inputs']['crank']['value'], answer['outputs']['lever']
+    assert lever_of(servo) == pytest.approx(0.4, abs=1e-12)
+    slope = (lever_of(servo + 1e-6) - lever_of(servo - 1e-6)) / 2e-6
+    assert lever['rates'] == [pytest.approx(slope, abs=1e-8)]
     assert running.values('lever.crank.speed') == [0.0]
-    assert running.values('lever.crank.start') == [answer['servo']]
+    assert running.values('lever.crank.start') == [servo]
 
 
 @pytest.mark.parametrize('lengths, sign', [
@@ -383,31 +386,94 @@ def test_a_lever_that_is_dragged_beyond_its_reach_goes_to_its_end(show, lengths,
     async def use(url):
         async with Page(url) as page:
             await page.cast('/lever', '/drop')
-            return [await page.ask('drag', '/lever', angle=sign * beyond)
+            return [await page.ask(
+                'pose', '/lever', want={'output': 'lever', 'value': sign * beyond})
                     for beyond in (2.0, 1.0)]
 
     for answer in asyncio.run(use(running.viewer.url)):
-        assert 'cannot be reached; the lever reaches [' in answer['reason']
-        assert answer['value'] == pytest.approx(end, abs=1e-9)
+        assert answer['reason'].startswith('lever reaches [')
+        assert answer['outputs']['lever']['value'] == pytest.approx(end, abs=1e-9)
         servo = running.values('lever.crank.start')[0]
         pin = 1j * a * cmath.exp(1j * servo) + 1j * b
         slot = cmath.phase(pin / 1j) - math.asin(e / abs(pin))
         assert slot == pytest.approx(end, abs=1e-9)
 
 
-@pytest.mark.parametrize('mechanism, angle, reason', [
-    ('/drop', 0.1, 'drop has no lever'),
-    ('/gone', 0.1, "no mechanism '/gone'; there are: /drop, /lever"),
-    ('/lever', 'up', 'not understood'),
+@pytest.mark.parametrize('mechanism, want, reason', [
+    ('/gone', None, "no mechanism '/gone'; there are: /drop, /lever"),
+    ('/drop', {'output': 'lever', 'value': 0.1}, "no output 'lever'"),
+    ('/drop', {'joint': 'X', 'place': [0.0, 0.0]}, "joint must be one of .*, not 'X'"),
+    ('/drop', {'joint': 'P', 'place': [0.0, 0.0], 'leg': 1}, 'leg must be a whole number below 1'),
+    ('/drop', {'joint': 'P', 'place': [0.0]}, 'place must be two finite numbers'),
 ])
-def test_a_lever_that_cannot_be_dragged_says_why(lever, mechanism, angle, reason):
+def test_what_cannot_be_brought_about_says_why(lever, mechanism, want, reason):
     async def use(url):
         async with Page(url) as page:
             await page.cast('/lever', '/drop')
-            return (await page.ask('drag', mechanism, angle=angle))['reason']
+            return (await page.ask('pose', mechanism, want=want))['reason']
 
     assert re.search(reason, asyncio.run(use(lever.viewer.url)))
     assert lever.values('lever.crank.speed') == [1.0]
+
+
+def test_any_joint_of_any_leg_is_brought_where_it_can_be(show):
+    running = show({**RATE, 'mechanisms': ['walker'], 'walker.type': 'jansen',
+                    'walker.leg_pairs': 3, 'walker.scale': 0.01})
+    leg = mechanisms.create('jansen')
+    # The second pair's right leg, and what its foot is asked to do.
+    lag, theta = math.tau / 3, 2.0
+    x, y = leg.solve(math.pi - (theta - lag), ('G',))['G'] * 0.01
+
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/walker')
+            want = {'joint': 'G', 'leg': 3, 'place': [-x, y]}
+            answer = await page.ask('pose', '/walker', want=want)
+
+            def there():
+                joints = page.drawn('/walker', 'joints')
+                return len(joints) and abs(joints[4 * 8 - 1] - (-x, y, 0.0)).max() < 1e-6
+
+            await browser.until(there)
+            return answer
+
+    crank = asyncio.run(use(running.viewer.url))['inputs']['crank']
+    assert math.remainder(crank['value'] - theta, math.tau) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_what_is_saved_starts_the_tuned_scene_again(show, tmp_path):
+    running = show({**LEVER, 'drop.pose': [0.0, 0.0, 0.5, 1.5, 0.0, 0.0]})
+
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/lever', '/drop')
+            assert await page.set('/lever', **{'dimensions.a': 81.25, 'scale': 0.01}) == ''
+            await page.heard('value', mechanism='/lever', name='scale', value=0.01)
+            await page.ask('pose', '/lever', want={'output': 'crank', 'value': 0.75})
+            await page.heard('value', mechanism='/lever', name='crank.start', value=0.75)
+            return await page.ask('save', '/lever', values={'crank.speed': 2.0})
+
+    file = tmp_path / 'tuned.yaml'
+    file.write_text(asyncio.run(use(running.viewer.url))['text'])
+    lever, drop = scene.load(str(file)).machines.values()
+    assert (lever.linkage.dimensions['a'], lever.scale) == (81.25, 0.01)
+    assert (lever.first.start, lever.first.speed) == (0.75, 2.0)
+    assert drop.pose == (0.0, 0.0, 0.5, 1.5, 0.0, 0.0)
+    assert scene.load(str(file)).rate == RATE['rate']
+    assert 'dimensions.b' not in file.read_text()
+
+
+def test_the_page_learns_how_far_dimensions_go_and_which_bars_follow(lever):
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/lever', '/drop')
+            return await page.ask('tune', '/lever'), await page.ask('tune', '/drop')
+
+    lever_, drop = asyncio.run(use(lever.viewer.url))
+    low, high = lever_['travel']['dimensions.a']
+    assert low < 80.0 < high and lever_['fixed'] == ['O', 'Q']
+    assert lever_['bars']['dimensions.a'] == [['O', 'A']]
+    assert all(bar in drop['bars']['dimensions.a'] for bar in (['O', 'A'], ['C', 'B']))
 
 
 def test_nobody_is_listened_to_while_nobody_looks(show, monkeypatch):
@@ -505,10 +571,16 @@ REQUESTS = [
     ('set', {'values': {'\\ud800': '1'}}, 'lever has no parameter'),
     ('set', {'values': '3'}, 'not understood'), ('set', {'values': '[[[], 1]]'}, 'not understood'),
     ('set', {'values': '{}', 'mechanism': '{}'}, 'not understood'),
-    ('set', {}, "not understood: it lacks 'values'"), ('drag', {}, "it lacks 'angle'"),
-    *(('drag', {'angle': angle}, 'angle must be a finite number')
-      for angle in ('1e400', '-1e400', 'NaN', 400 * '9', 'true', '[1]', '"1"')),
-    ('drag', {'angle': '1e308'}, 'cannot be reached'),
+    ('set', {}, "not understood: it lacks 'values'"),
+    *(('pose', {'want': {'output': '"crank"', 'value': value}}, 'value must be a finite number')
+      for value in ('1e400', '-1e400', 'NaN', 400 * '9', 'true', '[1]', '"1"')),
+    ('pose', {'want': '{}'}, "it lacks 'output'"), ('pose', {'want': '3'}, 'not understood'),
+    ('pose', {'want': {'output': '[]', 'value': '1'}}, 'not understood'),
+    ('pose', {'want': {'joint': '[]', 'place': '[1, 2]'}}, 'joint must be'),
+    ('pose', {'want': {'joint': '"A"', 'up': '2'}}, 'not understood'),
+    ('pose', {'mechanism': '[]'}, 'not understood'), ('tune', {'mechanism': '""'}, 'there is no'),
+    ('save', {'values': '{"crank.start": "up"}'}, 'crank.start must be'),
+    ('save', {'values': '7'}, 'not understood'),
     (50000 * 'x', {}, "unknown request 'x*[.]{3}x*'$"),
 ]
 
@@ -517,7 +589,7 @@ REQUESTS = [
 def test_a_request_is_answered_whatever_it_holds(lever, op, fields, reason):
     def text(value):
         return value if isinstance(value, str) else '{%s}' % ', '.join(
-            f'"{name}": {inner}' for name, inner in value.items())
+            f'"{name}": {text(inner)}' for name, inner in value.items())
 
     members = {'op': f'"{op}"', 'id': '7', 'mechanism': '"/lever"', **fields}
 
@@ -773,6 +845,31 @@ def test_a_signal_ends_the_viewer_while_somebody_looks(tmp_path, stop):
     code, printed = process.end()
     assert code == 0 and f'Look at {url}' in printed
     assert 'Traceback' not in printed and 'rror' not in printed
+
+
+@pytest.mark.long
+def test_make_view_says_where_to_look_and_ends_all_that_it_started():
+    environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)}
+    environment.pop('ROS_DOMAIN_ID', None)
+    process = subprocess.Popen(
+        [sys.executable, ROOT / 'demo' / 'view.py', ROOT / 'config' / 'jansen.yaml', '0'],
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment)
+    try:
+        address, = re.findall(r'Look at (http:\S+)', next(
+            line for line in process.stdout if 'Look at' in line))
+
+        async def look():
+            async with Page(address) as page:
+                await page.cast('/jansen')
+
+        asyncio.run(look())
+        process.send_signal(signal.SIGINT)
+        # The output ends when the last of those who have it does.
+        printed, _ = process.communicate(timeout=browser.DEADLINE)
+        assert process.returncode == 0 and 'Traceback' not in printed
+    finally:
+        process.terminate()
+        process.wait(browser.DEADLINE)
 
 
 @pytest.mark.long
@@ -1110,6 +1207,11 @@ class Seen:
         return float(await self.page.value(
             f'{self.row(name, label)}.querySelector("input[type=text]").value'))
 
+    async def output(self, name, label):
+        """Return the value that is shown of an output, when it is shown."""
+        return float(await browser.until(lambda: self.page.value(
+            f'{self.section(name)}.querySelector(`td input[aria-label="{label}"]`)?.value')))
+
     async def write(self, name, label, text):
         """Write a number beside a slider."""
         await self.page.write(
@@ -1121,8 +1223,16 @@ class Seen:
 
     async def view(self, name):
         """Show one mechanism."""
-        await self.page.click('[...document.querySelectorAll("#views button")].find('
-                              f'button => button.textContent === "{name}")')
+        button = ('[...document.querySelectorAll("#views button")].find('
+                  f'button => button.textContent === "{name}")')
+
+        async def shown():
+            await self.page.click(button)
+            return await self.page.value(
+                'document.querySelectorAll("section").length === 1 && '
+                f'!!{self.section(name)}?.querySelector("tbody tr")')
+
+        await browser.until(shown)
 
     async def canvas(self):
         """Return what is seen of the picture."""
@@ -1131,8 +1241,8 @@ class Seen:
         return (await self.page.picture())[int(top):, :int(width)]
 
 
-# Of joints.
-ORANGE = 230, 159, 0
+# Of joints, and of the bars that are pointed at.
+ORANGE, PURPLE = (230, 159, 0), (204, 121, 167)
 
 
 def coloured(picture, red, green, blue):
@@ -1338,7 +1448,7 @@ def test_a_picture_of_what_is_far_off_is_drawn_and_left(show, looked_at):
 
 @pytest.mark.long
 @needs_browser
-def test_the_lever_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
+def test_a_joint_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
     running = show({**LEVER, 'lever.crank.speed': 0.0})
 
     async def doing(seen):
@@ -1349,7 +1459,7 @@ def test_the_lever_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
             return len(coloured(before, 89, 193, 163)) > 100 and (
                 await seen.canvas() == before).all()
 
-        await browser.until(lambda: seen.page.value(f'!!({seen.row("lever", "lever")})'))
+        await seen.output('lever', 'lever')
         await browser.until(settled)
         rows, columns = coloured(await seen.canvas(), *ORANGE).T
         top = await seen.page.value('document.getElementById("picture").getBoundingClientRect().y')
@@ -1360,29 +1470,110 @@ def test_the_lever_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
         def at(phi):
             return pivot[0] - length * math.sin(phi), pivot[1] - length * math.cos(phi)
 
+        def lever():
+            return lever_of(running.values('lever.crank.start')[0])
+
         async def dragged(predicate, *places):
             """Drag as a person would: again if the page, laid out anew, missed the press."""
             for _ in range(3):
                 await seen.page.drag(*places)
                 with contextlib.suppress(asyncio.TimeoutError):
-                    return await asyncio.wait_for(browser.until(predicate), 5.0)
+                    return await asyncio.wait_for(browser.until(predicate), 10.0)
             raise AssertionError('the lever cannot be dragged')
 
-        await dragged(lambda: abs(lever_of(running.values('lever.crank.start')[0]) - 0.4) < 0.02,
-                      tip, at(0.2), at(0.4))
-
         async def shown():
-            servo, = running.values('lever.crank.start')
-            return abs(await seen.number('lever', 'lever') - lever_of(servo)) < 0.01
+            return abs(await seen.output('lever', 'lever') - lever()) < 0.001
 
+        await dragged(lambda: abs(lever() - 0.4) < 0.02, tip, at(0.2), at(0.4))
         await browser.until(shown)
-        assert await seen.reason('lever', 'lever') == ''
-        await dragged(lambda: seen.reason('lever', 'lever'), at(0.4), at(0.5), at(1.2))
-        assert 'the lever reaches' in await seen.reason('lever', 'lever')
+        end = math.asin(80.0 / 150.0)
+        await dragged(lambda: abs(lever() - end) < 1e-4, at(0.4), at(0.5), at(1.2))
         await browser.until(shown)
-        await browser.until(lambda: lever_of(running.values('lever.crank.start')[0]) == (
-            pytest.approx(math.asin(80.0 / 150.0), abs=1e-9)))
-        assert not await seen.red('lever', 'lever')
+        assert running.values('lever.crank.speed') == [0.0]
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
+def test_an_input_is_moved_with_the_keys_by_steps_and_in_degrees(show, looked_at):
+    running = show({**LEVER, 'lever.crank.speed': 1.5})
+
+    async def doing(seen):
+        await seen.view('lever')
+        await seen.output('lever', 'lever')
+
+        def servo():
+            return running.values('lever.crank.start')[0]
+
+        async def follows():
+            return abs(await seen.number('lever', 'crank') - math.degrees(servo())) < 0.001
+
+        await seen.page.click('document.getElementById("workshop")')
+        await seen.write('lever', 'crank', '30')
+        await browser.until(lambda: servo() == pytest.approx(math.radians(30.0), abs=1e-12))
+        assert running.values('lever.crank.speed') == [0.0]
+        await browser.until(follows)
+        await seen.page.click(f'{seen.row("lever", "crank")}.querySelectorAll("button")[1]')
+        await browser.until(lambda: servo() == pytest.approx(math.radians(31.0), abs=1e-4))
+        await browser.until(follows)
+        await seen.page.value(f'{seen.row("lever", "crank")}.querySelector("input").focus()')
+        before = servo()
+        await seen.page.press('ArrowLeft')
+        await browser.until(lambda: before - 0.02 < servo() < before)
+        await seen.page.click(f'{seen.section("lever")}.querySelector("button")')
+        await browser.until(lambda: running.values('lever.crank.speed') == [1.5])
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
+def test_a_bar_and_its_slider_light_up_and_changes_are_undone_and_saved(show, looked_at, tmp_path):
+    running = show({**LEG, 'leg.crank.speed': 0.0})
+
+    def value(name):
+        return running.value(Kinematics, f'leg.dimensions.{name}')
+
+    async def doing(seen):
+        def lit(label):
+            return seen.page.value(f'{seen.row("leg", label)}.classList.contains("lit")')
+
+        def button(text):
+            return (f'[...{seen.section("leg")}.querySelectorAll("button")].find('
+                    f'button => button.textContent === "{text}")')
+
+        async def where_lit():
+            """Point at the slider of h until its bar is lit; return the middle of that."""
+            await seen.page.hover(f'{seen.row("leg", "h")}.querySelector("label")')
+            places = coloured(await seen.canvas(), *PURPLE)
+            return tuple(places.mean(axis=0)) if len(places) > 300 else None
+
+        await seen.output('leg', 'BC')
+        row, column = await browser.until(where_lit)
+        assert await lit('h') and not await lit('g')
+        top = await seen.page.value('document.getElementById("picture").getBoundingClientRect().y')
+        await seen.page.move(5.0, top + 5.0)
+        await browser.until(lambda: seen.page.value('!document.querySelector(".lit")'))
+        await seen.page.move(column, top + row)
+        await browser.until(lambda: lit('h'))
+
+        await seen.write('leg', 'h', '60.5')
+        await browser.until(lambda: value('h') == 60.5)
+        await seen.write('leg', 'g', '37.25')
+        await browser.until(lambda: value('g') == 37.25)
+        await seen.page.downloads(tmp_path)
+        await seen.page.click(button('Save as scene file'))
+        saved = tmp_path / 'leg.yaml'
+        await browser.until(saved.exists)
+        dimensions = scene.load(str(saved)).machines['leg'].linkage.dimensions
+        assert (dimensions['g'], dimensions['h'], dimensions['i']) == (37.25, 60.5, 49.0)
+        await seen.page.click(button('Undo'))
+        await browser.until(lambda: value('g') == 36.7)
+        assert value('h') == 60.5
+        await seen.page.click(button('Reset'))
+        await browser.until(lambda: value('h') == 65.7)
+        await browser.until(lambda: seen.page.value(f'{button("Reset")}.disabled'))
 
     looked_at(running, doing)
 

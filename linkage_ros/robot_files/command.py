@@ -9,7 +9,6 @@ from itertools import combinations
 import math
 import re
 import sys
-from textwrap import indent
 from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from . import loops, readers
 from .dyads import Drawing, short
 from .. import command, mechanisms, scene
 from ..linkage.mechanism import Mechanism
+from ..scene.writing import in_yaml
 
 NAME = 'from_robot'
 NEEDS = 'pip install pyyaml, and mujoco for MJCF'
@@ -33,8 +33,6 @@ def main(args: Optional[List[str]] = None) -> int:
 
 def show(args: Optional[List[str]]) -> None:
     """Print what a command line asks for."""
-    import yaml
-
     parser = command.Parser(NAME, description='Print the scene of the planar closed loops in a '
                             'robot: MJCF, SDF or URDF.')
     parser.add_argument('file', metavar='FILE', help='the robot')
@@ -45,12 +43,8 @@ def show(args: Optional[List[str]]) -> None:
     robot = readers.read(asked.file, asked.loops)
     robot.driven = asked.driven or robot.driven
     given, said = described(robot)
-    print(f'# From {asked.file}.', *(f'# {line}' for line in said), '/**:',
-          '  ros__parameters:', sep='\n')
-    for key, value in given.items():
-        flow = None if key.endswith('.pose') else False
-        text = yaml.safe_dump({key: value}, default_flow_style=flow, width=1000)
-        print(indent(text, '    '), end='')
+    print(f'# From {asked.file}.', *(f'# {line}' for line in said), in_yaml(given),
+          sep='\n', end='')
     print(*(f'{NAME}: {line}' for line in said), sep='\n', file=sys.stderr)
 
 

@@ -5,59 +5,73 @@
 
 import asyncio
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 import math
 
-from linkage_interfaces.srv import ServoInverse
-import numpy as np
 from rcl_interfaces.msg import ParameterEvent
+from rclpy.node import NodeNameNonExistentError
 from rclpy.qos import (
     DurabilityPolicy,
     qos_profile_parameter_events,
     QoSProfile,
     ReliabilityPolicy,
 )
+from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
+from . import poses
 from .bridge import NoAnswer
 from .feed import Feed
-from .settings import is_number, RemoteNode, Setting
+from .poses import Refused
+from .settings import RemoteNode, Setting
+from .. import scene
+from ..scene import writing
 from ..words import quoted
 
 MARKERS, LOCUS, LIST = '/markers', '/locus', '/list_parameters'
 MARKERS_TYPE, LOCUS_TYPE = 'visualization_msgs/msg/MarkerArray', 'visualization_msgs/msg/Marker'
 LIST_TYPE = 'rcl_interfaces/srv/ListParameters'
-LEVER_TYPE = 'linkage_interfaces/srv/ServoInverse'
+INPUTS_TYPE = 'sensor_msgs/msg/JointState'
 SECONDS_BETWEEN_LOOKS = 1.0
 SECONDS_TO_LINGER = 1.0
-# How finely, and how often, it is looked for the end of a lever's reach.
-SAMPLES, CLOSER_LOOKS = 2001, 4
+SECONDS_TO_ARRIVE, ARRIVED = 1.0, 1e-6
+# What a scene has beside its mechanisms.
+GENERAL = 'mechanisms', 'frame_id', 'frame_prefix', 'rate'
 SCENE = 'scene'
 
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-class Refused(Exception):
-    """What cannot be done, with the reason."""
-
-
 @dataclass
 class ShownMechanism:
-    """A mechanism on the page: the start of its topics, its settings, its lever's service."""
+    """
+    A mechanism on the page: the start of its topics, its settings, who tells its inputs.
+
+    What was sent somewhere is `held` there until a time, or until it is told to be there: what is
+    heard before may be from where it was.
+    """
 
     key: str
     settings: dict
-    lever: object = None
+    sources: tuple = ()
+    machine: object = None
+    held: dict = field(default_factory=dict)
+    until: float = 0.0
 
     @property
     def name(self):
         """Its name in its scene."""
         return self.key.rsplit('/', 1)[1]
 
+    def values(self) -> dict:
+        """Return its parameters by full name."""
+        return {f'{self.name}.{name}': setting.value for name, setting in self.settings.items()}
+
     def described(self) -> dict:
         """Return what the page needs to draw it."""
-        return {'key': self.key, 'name': self.name, 'lever': self.lever is not None,
+        return {'key': self.key, 'name': self.name,
                 'settings': [setting.described() for setting in self.settings.values()]}
 
 
@@ -85,11 +99,13 @@ class SceneView:
         self._setting = asyncio.Lock()
         self._seen = None
         self._mechanisms = {}
+        self._general = {}
         self._watching = None
         self._stopping = None
         # What follows is changed in the executor's thread alone.
         self._nodes = {}
-        self._levers = {}
+        self._sources = {}
+        self._told = {}
         self._feeds = {}
         self._numbers = {}
         self._events = None
@@ -156,57 +172,86 @@ class SceneView:
         if reason:
             raise Refused(reason)
 
-    async def drag(self, key: str, angle: float) -> dict:
+    async def pose(self, key: str, want=None) -> dict:
         """
-        Put a lever at an angle [rad], or as near as it gets, by its crank, and hold it there.
+        Return where a mechanism is; if something is wanted, bring it there first and hold it.
 
-        Returns
-        -------
-        dict
-            The service's answer, and why the lever is not at the angle, if it is not.
-
+        Takes what `poses.reached` does, returns what `poses.described` does, and the reason if
+        that is not all that was wanted.
         """
         mechanism = self._find(key)
-        if mechanism.lever is None:
-            raise Refused(f'{mechanism.name} has no lever that a servo_inverse node knows')
-        if not is_number(angle):
-            raise ValueError(f'angle must be a finite number, not {quoted(angle)}')
-        answer = await self._asked(mechanism, [angle])
-        reason = answer.message
-        if not answer.success:
-            angle = await self._nearest(mechanism, angle)
-            answer = await self._asked(mechanism, [angle])
-        if not answer.success:
-            raise Refused(reason)
-        servo, reduction = answer.servo_angle[0], answer.reduction[0]
-        await self.set(key, {'crank.speed': 0.0, 'crank.start': servo})
-        return {'value': angle, 'servo': servo, 'reason': reason,
-                'reduction': reduction if math.isfinite(reduction) else None}
+        machine = self._machine_of(mechanism)
+        inputs, reason = self._present(mechanism, machine), ''
+        if want is not None:
+            inputs, reason = poses.reached(machine, inputs, dict(want))
+            await self._hold(mechanism, machine, inputs)
+        return {**poses.described(machine, inputs), 'reason': reason}
+
+    async def _hold(self, mechanism, machine, inputs):
+        """Stop the inputs where they are wanted."""
+        values = {}
+        for (name, drive), value in zip(machine.inputs.items(), inputs):
+            start = mechanism.settings.get(f'{name}.start')
+            if start is None:
+                raise Refused(f'nothing that is known here moves the {name}: no crank_driver runs')
+            if value == start.value:
+                # An input goes to a start that is new to it.
+                value = math.nextafter(value, sum(poses.arcs(drive)[0]) / 2.0)
+            values.update({f'{name}.start': value, f'{name}.speed': 0.0})
+        await self.set(mechanism.key, values)
+        mechanism.held = dict(zip(machine.inputs, inputs))
+        mechanism.until = self._bridge.loop.time() + SECONDS_TO_ARRIVE
+
+    async def tune(self, key: str) -> dict:
+        """Return what `poses.tunable` does."""
+        mechanism = self._find(key)
+        given = {'mechanisms': [mechanism.name], **mechanism.values()}
+        return await self._aside(lambda: poses.tunable(_read(given), mechanism.name))
+
+    async def save(self, key: str, values=()) -> dict:
+        """Return the parameter file of a mechanism's scene, some values replaced."""
+        mechanism, space = self._find(key), _space(key)
+        given = dict(self._general.get(space, {}))
+        for other in self._mechanisms.values():
+            if _space(other.key) == space:
+                given.update(other.values())
+        given.update((f'{mechanism.name}.{name}', value) for name, value in dict(values).items())
+        return {'text': await self._aside(
+            lambda: writing.in_yaml(writing.without_defaults(_read(given))))}
+
+    async def _aside(self, work):
+        """Return what takes longer than others should wait."""
+        try:
+            return await self._bridge.loop.run_in_executor(None, work)
+        except scene.SceneError as error:
+            raise Refused(str(error)) from None
+
+    def _machine_of(self, mechanism):
+        if mechanism.machine is None:
+            given = {'mechanisms': [mechanism.name], **mechanism.values()}
+            mechanism.machine = _read(given).machines[mechanism.name]
+        return mechanism.machine
+
+    def _present(self, mechanism, machine):
+        """Return its inputs [rad or m] as they were told last, or where they start."""
+        inputs = []
+        if self._bridge.loop.time() > mechanism.until:
+            mechanism.held = {}
+        for name, drive in machine.inputs.items():
+            told = next((self._told[topic][drive.source] for topic in mechanism.sources
+                         if drive.source in self._told.get(topic, ())), None)
+            now = drive.start if told is None else machine.understood(drive, told, None, None)[0]
+            held = mechanism.held.get(name, now)
+            if drive.input.apart(held, now) < ARRIVED * drive.input.size:
+                mechanism.held.pop(name, None)
+            inputs.append(mechanism.held.get(name, now))
+        return inputs
 
     def _find(self, key):
         if key not in self._mechanisms:
             raise Refused(f'there is no mechanism {quoted(key)}; '
                           f'there are: {", ".join(self._mechanisms)}')
         return self._mechanisms[key]
-
-    async def _asked(self, mechanism, angles):
-        try:
-            return await self._bridge.call(mechanism.lever, ServoInverse.Request(
-                mechanism=mechanism.name, lever_angle=angles))
-        except NoAnswer as error:
-            raise Refused(str(error)) from None
-
-    async def _nearest(self, mechanism, angle):
-        """Return the nearest angle that a lever reaches, seen ever closer on a finer scale."""
-        low, high, nearest = -math.pi, math.pi, 0.0
-        for _ in range(CLOSER_LOOKS):
-            away = np.linspace(low, high, SAMPLES)
-            reached = away[(await self._asked(mechanism, (angle + away).tolist())).reachable]
-            if not len(reached):
-                break
-            nearest = float(min(reached, key=abs))
-            low, high = nearest, nearest - math.copysign((high - low) / (SAMPLES - 1), nearest)
-        return angle + nearest
 
     def _show(self, client):
         client.tell(SCENE, {'op': 'scene', 'mechanisms': [
@@ -242,22 +287,38 @@ class SceneView:
         marked = tuple((key, tuple(sorted(
             (_joined(info.node_namespace, info.node_name), bytes(info.endpoint_gid))
             for info in node.get_publishers_info_by_topic(f'{key}{MARKERS}')))) for key in keys)
+        heard = {owner: self._heard_by(owner) for _, owners in marked for owner, _ in owners}
         nodes = tuple(sorted(name[:-len(LIST)] for name, types in services
                              if name.endswith(LIST) and LIST_TYPE in types))
-        levers = tuple(sorted(name for name, types in services if LEVER_TYPE in types))
-        return tuple(shown for shown in marked if shown[1]), nodes, levers
+        return tuple(shown for shown in marked if shown[1]), nodes, heard
 
-    async def _change(self, marked, nodes, levers):
+    def _heard_by(self, name):
+        """Return the topics from which a node hears where its inputs are."""
+        space, own = name.rsplit('/', 1)
+        with suppress(NodeNameNonExistentError):
+            return [topic for topic, types in
+                    self._bridge.node.get_subscriber_names_and_types_by_node(own, space or '/')
+                    if INPUTS_TYPE in types]
+        return []
+
+    async def _change(self, marked, nodes, heard):
         owners = {key: [name for name, _ in publishers] for key, publishers in marked}
         spaces = {_space(node) for names in owners.values() for node in names}
         nodes = [node for node in nodes if _space(node) in spaces]
-        levers = [name for name in levers if _space(name) in spaces]
-        await self._bridge.ask(self._open, list(owners), nodes, levers)
-        names = sorted({key.rsplit('/', 1)[1] for key in owners})
+        sources = {topic for topics in heard.values() for topic in topics}
+        await self._bridge.ask(self._open, list(owners), nodes, sources)
+        names = sorted({*GENERAL, *(key.rsplit('/', 1)[1] for key in owners)})
         found = dict(zip(nodes, await asyncio.gather(
             *(self._parameters(node, names) for node in nodes))))
-        self._mechanisms = {key: self._mechanism(key, own_nodes, found)
+        self._mechanisms = {key: self._mechanism(key, own_nodes, found, heard)
                             for key, own_nodes in owners.items()}
+        self._general = {}
+        for node in sorted(found, key=lambda node: node not in heard):
+            for name in found[node].keys() & set(GENERAL):
+                descriptor, value = found[node][name]
+                with suppress(ValueError):
+                    self._general.setdefault(_space(node), {}).setdefault(
+                        name, Setting(name, node, descriptor, value).value)
         for client in self.clients:
             self._show(client)
 
@@ -269,9 +330,10 @@ class SceneView:
             self._seen = None
             return {}
 
-    def _mechanism(self, key, own_nodes, found) -> ShownMechanism:
+    def _mechanism(self, key, own_nodes, found, heard) -> ShownMechanism:
         """Return a mechanism with what the nodes of its namespace say of it, its own first."""
-        mechanism = ShownMechanism(key, {})
+        mechanism = ShownMechanism(key, {}, tuple(
+            topic for node in own_nodes for topic in heard.get(node, ())))
         spaces = {_space(node) for node in own_nodes}
         prefix = f'{mechanism.name}.'
         near = [node for node in found if _space(node) in spaces]
@@ -281,10 +343,6 @@ class SceneView:
                 if full.startswith(prefix) and name not in mechanism.settings:
                     with suppress(ValueError):
                         mechanism.settings[name] = Setting(name, node, descriptor, value)
-        type_ = mechanism.settings.get('type')
-        if type_ and type_.value == 'slotted_lever':
-            mechanism.lever = next((client for name, client in self._levers.items()
-                                    if _space(name) in spaces), None)
         return mechanism
 
     def _listen(self):
@@ -293,15 +351,17 @@ class SceneView:
             lambda event: self._bridge.hand_over(self._notice, event),
             qos_profile_parameter_events)
 
-    def _open(self, keys, nodes, levers):
+    def _open(self, keys, nodes, sources):
         """Make what these need that is not there yet, and destroy what nobody needs."""
         topics = {f'{key}{ending}': (key, type_, qos) for key in keys for ending, type_, qos in (
             (MARKERS, MarkerArray, NEWEST), (LOCUS, Marker, LATCHED))}
-        self._drop_others(nodes, levers, topics)
+        self._drop_others(nodes, sources, topics)
         for name in set(nodes) - set(self._nodes):
             self._nodes[name] = RemoteNode(self._bridge, name)
-        for name in set(levers) - set(self._levers):
-            self._levers[name] = self._bridge.node.create_client(ServoInverse, name)
+        for topic in sources - set(self._sources):
+            self._told[topic] = {}
+            self._sources[topic] = self._bridge.node.create_subscription(
+                JointState, topic, partial(_hear, self._told[topic]), NEWEST)
         for name in set(topics) - set(self._feeds):
             self._feeds[name] = self._feed(name, *topics[name])
 
@@ -315,13 +375,14 @@ class SceneView:
         return feed, self._bridge.node.create_subscription(
             type_, name, lambda raw: self._receive(feed, raw), qos, raw=True)
 
-    def _drop_others(self, nodes, levers, topics):
+    def _drop_others(self, nodes, sources, topics):
         """Destroy all but these."""
         node = self._bridge.node
         for name in set(self._nodes) - set(nodes):
             self._nodes.pop(name).close()
-        for name in set(self._levers) - set(levers):
-            node.destroy_client(self._levers.pop(name))
+        for topic in set(self._sources) - set(sources):
+            node.destroy_subscription(self._sources.pop(topic))
+            del self._told[topic]
         for name in set(self._feeds) - set(topics):
             node.destroy_subscription(self._feeds.pop(name)[1])
 
@@ -358,9 +419,23 @@ class SceneView:
         if node != setting.node:
             return
         setting.message = parameter.value
+        mechanism.machine = None
         for client in self.clients:
             client.tell((mechanism.key, name), {'op': 'value', 'mechanism': mechanism.key,
                                             'name': name, 'value': setting.value})
+
+
+def _read(given):
+    """Return the scene that others' parameters tell; raise Refused if they tell none."""
+    try:
+        return scene.read(given, strict=False)
+    except scene.SceneError as error:
+        raise Refused(str(error)) from None
+
+
+def _hear(told, message):
+    told.update((name, position) for name, position in zip(message.name, message.position)
+                if math.isfinite(position))
 
 
 def _joined(space, name):

@@ -17,7 +17,8 @@ from urllib.parse import urlsplit
 
 from aiohttp import web, WSCloseCode
 
-from .scene_view import Refused, SCENE
+from .poses import Refused
+from .scene_view import SCENE
 from .. import palette
 from ..words import quoted
 
@@ -273,8 +274,12 @@ class Client:
             if op == 'set':
                 await self._view.set(said['mechanism'], dict(said['values']))
                 return {}
-            if op == 'drag':
-                return await self._view.drag(said['mechanism'], said['angle'])
+            if op == 'pose':
+                return await self._view.pose(said['mechanism'], said.get('want'))
+            if op == 'tune':
+                return await self._view.tune(said['mechanism'])
+            if op == 'save':
+                return await self._view.save(said['mechanism'], said.get('values', {}))
             return {'reason': f'unknown request {quoted(op)}'}
         except Refused as reason:
             return {'reason': str(reason)}

@@ -82,7 +82,7 @@ class Setting:
     def value(self):
         """Its value, as JSON has it."""
         value = parameter_value_to_python(self.message)
-        return list(map(_shown, value)) if isinstance(value, list) else _shown(value)
+        return list(map(shown, value)) if isinstance(value, list) else shown(value)
 
     def described(self) -> dict:
         """Return what the page needs to draw it."""
@@ -92,8 +92,8 @@ class Setting:
                            ranges[0].step) if ranges else (None, None, None)
         return {'name': self.name, 'value': self.value, 'kind': self._type.name.lower(),
                 'meaning': about.description, 'allowed': about.additional_constraints,
-                'fixed': about.read_only, 'low': _shown(low), 'high': _shown(high),
-                'step': _shown(step)}
+                'fixed': about.read_only, 'low': shown(low), 'high': shown(high),
+                'step': shown(step)}
 
     def asked(self, full_name: str, value):
         """Return a parameter message with a value from JSON; ValueError if it cannot hold it."""
@@ -117,7 +117,7 @@ HOLDS = {
 }
 
 
-def _shown(value):
+def shown(value):
     """Return a value as JSON can say it: None for a number that is not finite."""
     if isinstance(value, bytes):
         return value[0]

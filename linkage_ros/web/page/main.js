@@ -3,90 +3,12 @@
 
 // The page: what the viewer sends goes into the picture and the panel, what is dragged goes back.
 
+import { Connection } from './connection.js';
+import { Hand } from './hand.js';
+import { Mechanism } from './mechanism.js';
 import { Panel } from './panel.js';
 import { Picture } from './picture.js';
-
-const RETRY = 1000;
-
-/** The WebSocket to the viewer; open only while the page can be seen. */
-class Connection {
-  constructor(handlers) {
-    this.handlers = handlers;
-    this.asked = new Map();
-    this.next = 1;
-    document.addEventListener('visibilitychange', () => document.hidden ? this.close() : this.open());
-    this.open();
-  }
-
-  open() {
-    if (document.hidden || this.socket) return;
-    const socket = this.socket = new WebSocket(`ws${location.protocol.slice(4)}//${location.host}/socket`);
-    socket.binaryType = 'arraybuffer';
-    socket.onmessage = ({ data }) => {
-      if (data instanceof ArrayBuffer) return this.handlers.frame(data);
-      const message = JSON.parse(data);
-      if (message.op !== 'answer') return this.handlers[message.op](message);
-      this.asked.get(message.id)?.(message);
-      this.asked.delete(message.id);
-    };
-    socket.onopen = () => this.handlers.opened();
-    socket.onclose = () => {
-      if (this.socket !== socket) return;
-      this.close();
-      this.handlers.closed();
-      setTimeout(() => this.open(), RETRY);
-    };
-  }
-
-  close() {
-    const socket = this.socket;
-    this.socket = null;
-    socket?.close();
-    for (const answer of this.asked.values()) answer({ reason: 'the viewer is gone' });
-    this.asked.clear();
-  }
-
-  tell(message) {
-    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
-  }
-
-  /** Ask for something; the answer's reason is empty where it was granted. */
-  ask(message) {
-    if (this.socket?.readyState !== WebSocket.OPEN) return Promise.resolve({ reason: 'the viewer is gone' });
-    const id = this.next++;
-    return new Promise(resolve => {
-      this.asked.set(id, resolve);
-      this.tell({ ...message, id });
-    });
-  }
-}
-
-/** A mechanism as it is drawn: its markers by number, its settings by name. */
-class Mechanism {
-  constructor(described) {
-    this.markers = new Map();
-    this.heard = performance.now();
-    this.describe(described);
-  }
-
-  describe(described) {
-    Object.assign(this, described);
-    this.settings = new Map(described.settings.map(setting => [setting.name, setting]));
-  }
-
-  value(name) {
-    return this.settings.get(name)?.value;
-  }
-
-  /** How many pairs of legs there are, and how many legs. */
-  get pairs() {
-    return this.value('leg_pairs') ?? 1;
-  }
-
-  get legs() {
-    return this.pairs * (this.value('mirrored') ? 2 : 1);
-  }
-}
+import { units } from './units.js';
 
 const mechanisms = new Map();
 const views = document.getElementById('views');
@@ -97,9 +19,24 @@ let shown = '';
 let scheduled = false;
 let frames = 0;
 
-const picture = new Picture(document.getElementById('picture'), {
-  drag: (mechanism, angle) => panel.drag(mechanism.key, angle),
+const picture = new Picture(document.getElementById('picture'));
+const hand = new Hand(picture, {
+  drag(mechanism, want) {
+    panel.drag(mechanism.key, want);
+    draw();
+  },
+  light,
+  choose: (mechanism, dimension) => panel.goTo(mechanism.key, dimension),
 });
+picture.pull = () => hand.pull;
+
+/** Light up the bars of a dimension, and its slider. */
+function light(mechanism, dimension) {
+  if (picture.lit.mechanism === mechanism && picture.lit.dimension === dimension) return;
+  picture.lit = { mechanism, dimension };
+  panel.lit(mechanism?.key, dimension);
+  draw();
+}
 
 const connection = new Connection({
   opened() {
@@ -158,7 +95,7 @@ const connection = new Connection({
   },
 });
 
-const panel = new Panel(document.getElementById('panel'), connection);
+const panel = new Panel(document.getElementById('panel'), connection, light);
 
 /** Draw once before the next refresh of the screen, then do what is to be done after it. */
 function draw(after) {
@@ -167,7 +104,6 @@ function draw(after) {
   requestAnimationFrame(() => {
     scheduled = false;
     picture.draw();
-    panel.follow(picture.levers());
     after?.();
   });
 }
@@ -196,10 +132,15 @@ names.onchange = () => {
   draw();
 };
 
+document.getElementById('workshop').onchange = ({ target }) => {
+  units.choose(target.checked);
+  draw();
+};
+
 new ResizeObserver(() => draw()).observe(picture.canvas);
 
 setInterval(() => {
-  if (connection.socket?.readyState === WebSocket.OPEN) status.textContent = `${frames} pictures/s`;
+  if (connection.opened) status.textContent = `${frames} pictures/s`;
   frames = 0;
   panel.check(performance.now());
 }, 1000);

@@ -3,10 +3,11 @@
 
 // The picture: markers seen at a right angle to the plane of the linkage, to scale.
 
+import { units } from './units.js';
+
 const MARGIN = 44;
 const SLACK = 0.06;
 const SHRUNK = 10;
-const GRAB = 18;
 const LINE = 18;
 const MOST_LINES = 100;
 const FONT = "13px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
@@ -38,9 +39,14 @@ function multiples(step, low, high) {
   return Array.from({ length: Math.min(count, MOST_LINES) }, (_, i) => (first + i) * step);
 }
 
-/** A colour made lighter; lightness alone tells the pairs of legs apart. */
-function colour([r, g, b, a], lighter) {
-  const mixed = [r, g, b].map(part => Math.round(255 * (part + (1 - part) * lighter)));
+const dark = matchMedia('(prefers-color-scheme: dark)');
+
+/** A colour that can be seen, made paler; paleness alone tells the pairs of legs apart. */
+function colour([r, g, b, a], paler) {
+  const unseen = dark.matches && Math.max(r, g, b) < 0.3;
+  const paper = dark.matches ? 0.1 : 1;
+  const mixed = [r, g, b].map(part => unseen ? 1 - part : part)
+    .map(part => Math.round(255 * (part + (paper - part) * paler)));
   return `rgba(${mixed.join(',')},${a})`;
 }
 
@@ -79,19 +85,15 @@ class Box {
 }
 
 export class Picture {
-  constructor(canvas, { drag }) {
+  constructor(canvas) {
     this.canvas = canvas;
     this.context = canvas.getContext('2d');
-    this.drag = drag;
     this.named = true;
     this.mechanisms = [];
     this.boxes = new Map();
-    this.grabbed = null;
-    canvas.addEventListener('pointerdown', event => this.grab(event));
-    canvas.addEventListener('pointermove', event => this.move(event));
-    for (const end of ['pointerup', 'pointercancel']) {
-      canvas.addEventListener(end, () => { this.grabbed = null; });
-    }
+    /** The mechanism and the dimension whose bars are lit, and the line of a joint that is pulled. */
+    this.lit = { mechanism: null, dimension: '' };
+    this.pull = () => null;
   }
 
   show(mechanisms) {
@@ -116,12 +118,15 @@ export class Picture {
     context.clearRect(0, 0, width, height);
     const shapes = this.shapes();
     if (!shapes.length) return;
-    this.fit(shapes, width, height);
+    // Under a joint that is dragged the paper stays where it is.
+    if (!this.scale || !this.pull()) this.fit(shapes, width, height);
     this.grid(width, height);
-    const order = ['strip', 'lines', 'joints'];
-    shapes.sort((a, b) => order.indexOf(a.look.kind) - order.indexOf(b.look.kind));
-    for (const shape of shapes) this[shape.look.kind](shape);
-    if (this.grabbed) this.ghost();
+    shapes.sort((a, b) => (a.look.kind === 'lines') - (b.look.kind === 'lines'));
+    const joints = shapes.filter(({ look }) => look.kind === 'joints');
+    for (const shape of shapes) if (!joints.includes(shape)) this[shape.look.kind](shape);
+    this.light();
+    for (const shape of joints) this.joints(shape);
+    this.ghost();
     if (this.named && this.mechanisms.length === 1) this.names(shapes);
     if (this.mechanisms.length > 1) this.titles();
   }
@@ -181,8 +186,9 @@ export class Picture {
 
   grid(width, height) {
     const { context } = this;
-    const step = round(90 / this.scale);
-    const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+    const { name, factor } = units.of('m');
+    const step = round(90 / this.scale * factor) / factor;
+    const digits = Math.max(0, -Math.floor(Math.log10(step * factor) + 1e-9));
     const [left, bottom] = this.from(0, height);
     const [right, top] = this.from(width, 0);
     context.font = FONT;
@@ -194,17 +200,17 @@ export class Picture {
     for (const value of multiples(step, left, right)) {
       const [x] = this.at(value, 0);
       this.line(x, 0, x, height);
-      if (x > 70 && x < width - 30) context.fillText(value.toFixed(digits), x, height - 5);
+      if (x > 70 && x < width - 30) context.fillText((value * factor).toFixed(digits), x, height - 5);
     }
     context.textAlign = 'left';
     context.textBaseline = 'middle';
     for (const value of multiples(step, bottom, top)) {
       const [, y] = this.at(0, value);
       this.line(0, y, width, y);
-      if (y < height - 30 && y > 12) context.fillText(value.toFixed(digits), 6, y);
+      if (y < height - 30 && y > 12) context.fillText((value * factor).toFixed(digits), 6, y);
     }
     context.textBaseline = 'bottom';
-    context.fillText('m', 6, height - 5);
+    context.fillText(name, 6, height - 5);
   }
 
   line(...ends) {
@@ -267,7 +273,7 @@ export class Picture {
     const { context } = this;
     context.lineJoin = 'round';
     context.lineWidth = 4;
-    context.strokeStyle = 'white';
+    context.strokeStyle = paint('--paper');
     context.fillStyle = paint('--ink');
     context.strokeText(words, x, y);
     context.fillText(words, x, y);
@@ -313,54 +319,18 @@ export class Picture {
     }
   }
 
-  /** Return the angle [rad], pivot and tip of each lever that can be dragged, by mechanism. */
-  *found() {
-    for (const shape of this.shapes()) {
-      const { mechanism, look, points } = shape;
+  /** Return of each leg the joints as they are seen, by name, in pixels. */
+  legsSeen() {
+    return this.shapes().filter(({ look }) => look.kind === 'joints').flatMap(({ mechanism, places, map }) => {
       const names = mechanism.value('points') ?? [];
-      const [pivot, tip] = ['Q', 'L'].map(name => names.indexOf(name));
-      if (!mechanism.lever || look.kind !== 'joints' || pivot < 0 || tip < 0) continue;
-      if (points.length !== 3 * names.length) continue;
-      yield { ...shape, pivot, tip };
-    }
-  }
-
-  levers() {
-    return [...this.found()].map(({ mechanism, points, pivot, tip }) => [
-      mechanism.key, Math.atan2(points[3 * pivot] - points[3 * tip], points[3 * tip + 1] - points[3 * pivot + 1])]);
-  }
-
-  /** Return the mechanism whose lever is under the pointer. */
-  under([x, y]) {
-    for (const { mechanism, places, pivot, tip } of this.found()) {
-      const [q, l] = [pivot, tip].map(i => this.at(places[2 * i], places[2 * i + 1]));
-      const along = [l[0] - q[0], l[1] - q[1]];
-      const part = ((x - q[0]) * along[0] + (y - q[1]) * along[1]) / (along[0] ** 2 + along[1] ** 2);
-      const near = Math.min(Math.max(part, 0.2), 1);
-      if (Math.hypot(x - q[0] - near * along[0], y - q[1] - near * along[1]) < GRAB) return mechanism;
-    }
-    return null;
-  }
-
-  grab(event) {
-    const pointer = [event.offsetX, event.offsetY];
-    const mechanism = this.under(pointer);
-    if (!mechanism) return;
-    this.grabbed = { key: mechanism.key, pointer };
-    this.canvas.setPointerCapture(event.pointerId);
-  }
-
-  move(event) {
-    if (!this.grabbed) {
-      this.canvas.classList.toggle('lever', this.under([event.offsetX, event.offsetY]) !== null);
-      return;
-    }
-    this.grabbed.pointer = [event.offsetX, event.offsetY];
-    const lever = [...this.found()].find(({ mechanism }) => mechanism.key === this.grabbed.key);
-    if (!lever) return;
-    const [x, y] = this.inPlane(lever.map, ...this.from(...this.grabbed.pointer));
-    const angle = Math.atan2(lever.points[3 * lever.pivot] - x, y - lever.points[3 * lever.pivot + 1]);
-    this.grabbed.refused = Number.isFinite(angle) && this.drag(lever.mechanism, angle);
+      if (!this.scale || places.length !== 2 * names.length * mechanism.legs) return [];
+      return Array.from({ length: mechanism.legs }, (_, leg) => ({
+        mechanism, leg, map, seen: new Map(names.map((name, i) => {
+          const at = 2 * (leg * names.length + i);
+          return [name, this.at(places[at], places[at + 1])];
+        })),
+      }));
+    });
   }
 
   /** Return the point of a linkage's plane that is seen at a place. */
@@ -369,15 +339,32 @@ export class Picture {
     return [(d * (x - right) - b * (y - up)) / area, (a * (y - up) - c * (x - right)) / area];
   }
 
-  /** Draw where the lever is wanted. */
+  /** Draw the bars that follow the dimension that is pointed at. */
+  light() {
+    const { mechanism, dimension } = this.lit;
+    const pairs = mechanism?.tunable.bars[dimension] ?? [];
+    if (!pairs.length) return;
+    const { context } = this;
+    context.lineCap = 'round';
+    context.lineWidth = 7;
+    context.strokeStyle = paint('--lit');
+    for (const { mechanism: own, seen } of this.legsSeen()) {
+      if (own !== mechanism) continue;
+      for (const [a, b] of pairs) {
+        if (seen.has(a) && seen.has(b)) this.line(...seen.get(a), ...seen.get(b));
+      }
+    }
+  }
+
+  /** Draw from the joint that is dragged to where it is wanted. */
   ghost() {
-    const lever = [...this.found()].find(({ mechanism }) => mechanism.key === this.grabbed.key);
-    if (!lever) return;
+    const pull = this.pull();
+    if (!pull) return;
     const { context } = this;
     context.setLineDash([6, 6]);
     context.lineWidth = 2;
-    context.strokeStyle = this.grabbed.refused ? paint('--refused') : paint('--faint');
-    this.line(...this.at(lever.places[2 * lever.pivot], lever.places[2 * lever.pivot + 1]), ...this.grabbed.pointer);
+    context.strokeStyle = paint('--faint');
+    this.line(...pull.flat());
     context.setLineDash([]);
   }
 }

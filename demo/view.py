@@ -1,0 +1,49 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Run a scene's nodes and the viewer until they are interrupted.
+
+    python demo/view.py config/strandbeest.yaml [PORT]
+"""
+
+import os
+from pathlib import Path
+import signal
+import sys
+import time
+
+try:
+    from domains import Domain
+    from linkage_ros import scene
+    from nodes import DemoError, Nodes
+except ImportError as error:
+    sys.exit(f'view: {error}; `make view` installs and builds what is needed')
+
+SECONDS_BETWEEN_LOOKS = 0.5
+PORT = 8020
+
+
+def main(scene_file, port=PORT) -> int:
+    """Run the nodes; return the exit code of the process."""
+    # However it ends, no node is left behind.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        scene.load(scene_file)
+        with Domain() as domain:
+            # Nodes that listen elsewhere are heard where the user says.
+            id_ = os.environ.get('ROS_DOMAIN_ID') or domain.id
+            print(f'Running {scene_file}, ROS_DOMAIN_ID {id_}; Ctrl-C ends it.', flush=True)
+            with Nodes(Path(scene_file).resolve(), id_, viewer_port=port) as nodes:
+                while True:
+                    nodes.check()
+                    time.sleep(SECONDS_BETWEEN_LOOKS)
+    except (DemoError, RuntimeError, OSError, scene.SceneError) as error:
+        print(f'view: {error}', file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main(*sys.argv[1:]))

@@ -1,0 +1,48 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Scenes as parameter files: what `load` reads. Needs PyYAML, no ROS."""
+
+from __future__ import annotations
+
+from textwrap import indent
+from typing import Any, Dict, Mapping
+
+from . import read, Scene, SceneError
+
+
+def in_yaml(given: Mapping[str, Any]) -> str:
+    """Return a parameter file with these values, by full parameter name."""
+    import yaml
+
+    texts = ['/**:', '  ros__parameters:']
+    for name, value in given.items():
+        plain = list(value) if isinstance(value, tuple) else value
+        numbers = isinstance(plain, list) and not any(isinstance(one, str) for one in plain)
+        text = yaml.safe_dump({name: plain}, width=1000, default_flow_style=numbers and None)
+        texts.append(indent(text.rstrip(), '    '))
+    return '\n'.join(texts) + '\n'
+
+
+def without_defaults(scene: Scene) -> Dict[str, Any]:
+    """
+    Return the values that tell a scene from what it is without them.
+
+    Raises
+    ------
+    SceneError
+        If the nodes would not start with them: a start that is not where its input moves.
+
+    """
+    kept = {parameter.name: parameter.value for parameter in scene.parameters}
+    whole = dict(kept)
+    for name in whole:
+        fewer = {key: value for key, value in kept.items() if key != name}
+        try:
+            same = read(fewer, scene, strict=False).parameters
+        except SceneError:
+            continue
+        if {parameter.name: parameter.value for parameter in same} == whole:
+            kept = fewer
+    read(kept)
+    return kept

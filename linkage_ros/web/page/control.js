@@ -1,0 +1,230 @@
+// Copyright 2026 linkage_ros contributors
+// SPDX-License-Identifier: Apache-2.0
+
+// A slider with a number beside it, and a switch; what is refused springs back, with the reason.
+
+import { units } from './units.js';
+
+const STOPS = 1000;
+const FINE = 0.1;
+const SETTLED = 500;
+const NUMBER = /^[+-]?(\d+[.,]?\d*|[.,]\d+)(e[+-]?\d+)?$/i;
+
+/** How a slider's place in [0, 1] becomes a value, and back. */
+export const LINEAR = {
+  value: (place, low, high) => low + (high - low) * place,
+  place: (value, low, high) => (value - low) / (high - low),
+};
+export const BY_FACTOR = {
+  value: (place, low, high) => low * (high / low) ** place,
+  place: (value, low, high) => Math.log(value / low) / Math.log(high / low),
+};
+export const FINE_ABOUT_ZERO = {
+  value: (place, low, high) => high * (2 * place - 1) ** 3,
+  place: (value, low, high) => (Math.cbrt(value / high) + 1) / 2,
+};
+
+const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+
+/** The number that a text says, a decimal comma taken as a point; NaN if it says none. */
+export const read = text => NUMBER.test(text) ? Number(text.replace(',', '.')) : NaN;
+
+export function element(tag, properties = {}, ...children) {
+  const made = Object.assign(document.createElement(tag), properties);
+  made.append(...children);
+  return made;
+}
+
+/** Change only what is other than before: what is drawn anew takes time. */
+export function put(node, properties) {
+  for (const [name, value] of Object.entries(properties)) if (node[name] !== value) node[name] = value;
+}
+
+let made = 0;
+const nextId = () => `s${made += 1}`;
+
+/** Passes on values one after the other; of those that wait only the newest. */
+export class Newest {
+  constructor(pass) {
+    this.pass = pass;
+    this.busy = false;
+  }
+
+  async offer(value) {
+    this.waiting = { value };
+    if (this.busy) return;
+    this.busy = true;
+    while (this.waiting) {
+      const { value: next } = this.waiting;
+      this.waiting = null;
+      await this.pass(next);
+    }
+    this.busy = false;
+  }
+}
+
+/** The line below a control that says why not all was done that was asked for. */
+export class Reason {
+  constructor(id = nextId()) {
+    this.line = element('p', { className: 'reason', id, hidden: true });
+    this.line.setAttribute('role', 'alert');
+  }
+
+  say(words) {
+    this.line.textContent = words;
+    this.line.hidden = !words;
+    this.since = performance.now();
+  }
+
+  /** Forget it, for what somebody else does; what one did oneself may be heard of late. */
+  fade() {
+    if (performance.now() - this.since > SETTLED) this.say('');
+  }
+}
+
+/** A number with a slider. Each time it is taken hold of is a gesture. */
+export class Slider {
+  constructor({ label, title, unit, low, high, kind, value, scale, step, digits = 6 }, request) {
+    Object.assign(this, { unit, low, high, kind, scale, digits, accepted: value, held: false, gesture: {} });
+    const id = nextId();
+    this.range = element('input', { type: 'range', id });
+    this.range.min = kind === 'integer' ? low : 0;
+    this.range.max = kind === 'integer' ? high : STOPS;
+    this.range.step = kind === 'integer' ? step || 1 : FINE;
+    this.number = element('input', { type: 'text', inputMode: 'decimal', autocomplete: 'off', ariaLabel: label });
+    this.reason = new Reason(`${id}r`);
+    for (const input of [this.range, this.number]) input.setAttribute('aria-describedby', `${id}r`);
+    this.unitShown = element('span', { className: 'unit' });
+    this.row = element('div', { className: 'row', title },
+      element('label', { htmlFor: id, textContent: label }), this.range, this.number, this.unitShown, this.reason.line);
+    this.asked = new Newest(async ([wanted, gesture]) => this.settle(
+      wanted, await request(wanted, gesture, this.accepted)));
+    this.range.oninput = () => this.slid();
+    this.range.onchange = () => this.release();
+    this.range.onkeydown = event => this.key(event);
+    this.number.onfocus = () => { this.held = true; };
+    this.number.onblur = () => this.release();
+    this.number.oninput = () => { this.mistyped = false; this.explain(''); };
+    this.number.onchange = () => {
+      this.type(this.number.value.trim());
+      this.number.blur();
+    };
+    this.render();
+  }
+
+  slid() {
+    this.held = true;
+    this.number.value = this.shortened(this.chosen());
+    this.offer(this.chosen());
+  }
+
+  /** An arrow key goes one stop; with Shift a tenth of it. */
+  key(event) {
+    const way = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
+    if (!way || this.kind === 'integer') return;
+    event.preventDefault();
+    this.range.value = Number(this.range.value) + way * (event.shiftKey ? FINE : 1);
+    this.slid();
+    this.release();
+  }
+
+  offer(value) {
+    this.mistyped = false;
+    this.offered = value;
+    this.asked.offer([value, this.gesture]);
+  }
+
+  /** The value that it has, or will have when what was asked for is granted. */
+  get expected() {
+    return this.asked.busy ? this.offered : this.accepted;
+  }
+
+  type(text) {
+    const value = read(text) / units.of(this.unit).factor;
+    this.mistyped = text !== '' && !Number.isFinite(value);
+    if (this.mistyped) this.explain(`Refused: ${text} is not a number that can be set`);
+    else if (text) this.offer(value);
+  }
+
+  chosen() {
+    if (this.kind === 'integer') return Number(this.range.value);
+    const value = this.scale.value(this.range.value / STOPS, this.low, this.high);
+    return clamp(Number(value.toPrecision(5)), this.low, this.high);
+  }
+
+  /** Show what came of it: all that was wanted, another value, or a refusal. */
+  settle(wanted, answer) {
+    const refused = answer.reason && answer.value === undefined;
+    if (!refused) this.accepted = answer.value ?? wanted;
+    if (!this.mistyped) this.explain(refused ? `Refused: ${answer.reason}` : answer.reason, refused);
+    if (!this.held && !this.asked.waiting) this.render();
+  }
+
+  explain(words, refused) {
+    this.reason.say(words);
+    this.row.classList.toggle('refused', !!refused);
+  }
+
+  release() {
+    this.held = false;
+    this.gesture = {};
+    if (!this.asked.busy) this.render();
+  }
+
+  /** Move between other ends. */
+  bound(low, high) {
+    [this.low, this.high] = [low, high];
+    if (!this.held) this.render();
+  }
+
+  /** Show a value that somebody else has set. */
+  update(value) {
+    if (value !== this.accepted) this.reason.fade();
+    this.follow(value);
+  }
+
+  /** Show a value that changes by itself. */
+  follow(value) {
+    this.accepted = value;
+    if (!this.held && !this.asked.busy) this.render();
+  }
+
+  render() {
+    put(this.unitShown, { textContent: units.of(this.unit).name });
+    if (this.accepted === null || this.accepted === undefined) return;
+    const place = this.kind === 'integer' ? this.accepted
+      : STOPS * clamp(this.scale.place(this.accepted, this.low, this.high), 0, 1);
+    this.range.value = place;
+    const text = this.shortened(this.accepted);
+    put(this.number, { value: text });
+    put(this.range, { ariaValueText: `${text} ${this.unitShown.textContent}` });
+    this.row.classList.remove('refused');
+  }
+
+  shortened(value) {
+    return String(Number((value * units.of(this.unit).factor).toPrecision(this.digits)));
+  }
+}
+
+/** A switch. */
+export class Switch {
+  constructor({ label, title, value }, request) {
+    const id = nextId();
+    this.box = element('input', { type: 'checkbox', id, checked: value });
+    this.reason = new Reason(`${id}r`);
+    this.row = element('div', { className: 'row', title },
+      element('label', { htmlFor: id, textContent: label }), this.box, this.reason.line);
+    this.box.onchange = async () => {
+      const { reason } = await request(this.box.checked, {}, !this.box.checked);
+      this.reason.say(reason && `Refused: ${reason}`);
+      if (reason) this.box.checked = !this.box.checked;
+    };
+  }
+
+  update(value) {
+    if (value !== this.box.checked) this.reason.fade();
+    this.box.checked = value;
+  }
+
+  render() {}
+}

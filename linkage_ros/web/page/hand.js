@@ -1,0 +1,98 @@
+// Copyright 2026 linkage_ros contributors
+// SPDX-License-Identifier: Apache-2.0
+
+// The hand over the picture: drags joints, and finds the bar that is pointed at.
+
+const GRAB = { mouse: 16, touch: 28 };
+const BAR = 9;
+
+/** How far a point is from a line between two others. */
+function distance([x, y], [ax, ay], [bx, by]) {
+  const along = [bx - ax, by - ay];
+  const part = ((x - ax) * along[0] + (y - ay) * along[1]) / (along[0] ** 2 + along[1] ** 2 || 1);
+  const near = Math.min(Math.max(part, 0), 1);
+  return Math.hypot(x - ax - near * along[0], y - ay - near * along[1]);
+}
+
+export class Hand {
+  /** Calls `drag(mechanism, want)`, `light(mechanism, dimension)` and `choose(mechanism, dimension)`. */
+  constructor(picture, calls) {
+    Object.assign(this, calls, { picture, canvas: picture.canvas, grabbed: null });
+    this.canvas.addEventListener('pointerdown', event => this.grab(event));
+    this.canvas.addEventListener('pointermove', event => this.move(event));
+    this.canvas.addEventListener('pointerleave', () => this.light(null, ''));
+    for (const end of ['pointerup', 'pointercancel']) {
+      this.canvas.addEventListener(end, () => { this.grabbed = null; });
+    }
+  }
+
+  /** The joint that is nearest to a pointer, of those that can be moved. */
+  joint([x, y], reach) {
+    let best = null;
+    for (const leg of this.picture.legsSeen()) {
+      for (const [name, at] of leg.seen) {
+        const away = Math.hypot(at[0] - x, at[1] - y);
+        if (leg.mechanism.tunable.fixed.includes(name) || away > reach || best?.away < away) continue;
+        best = { ...leg, joint: name, away };
+      }
+    }
+    return best;
+  }
+
+  /** The bar that is nearest to a pointer, with the dimension that it follows. */
+  bar(pointer) {
+    let best = null;
+    for (const { mechanism, seen } of this.picture.legsSeen()) {
+      for (const [dimension, pairs] of Object.entries(mechanism.tunable.bars)) {
+        for (const [a, b] of pairs) {
+          if (!seen.has(a) || !seen.has(b)) continue;
+          const away = distance(pointer, seen.get(a), seen.get(b)) + pairs.length / 100;
+          if (away <= BAR && !(best?.away <= away)) best = { mechanism, dimension, away };
+        }
+      }
+    }
+    return best;
+  }
+
+  grab(event) {
+    const pointer = [event.offsetX, event.offsetY];
+    const found = this.joint(pointer, GRAB[event.pointerType] ?? GRAB.mouse);
+    if (!found) {
+      const bar = this.bar(pointer);
+      if (bar) this.choose(bar.mechanism, bar.dimension);
+      return;
+    }
+    this.grabbed = { key: found.mechanism.key, leg: found.leg, joint: found.joint, pointer };
+    this.canvas.setPointerCapture(event.pointerId);
+  }
+
+  move(event) {
+    const pointer = [event.offsetX, event.offsetY];
+    if (!this.grabbed) {
+      const joint = this.joint(pointer, GRAB.mouse);
+      const bar = joint ? null : this.bar(pointer);
+      this.canvas.classList.toggle('joint', joint !== null);
+      this.canvas.classList.toggle('bar', bar !== null);
+      this.light(bar?.mechanism ?? null, bar?.dimension ?? '');
+      return;
+    }
+    this.grabbed.pointer = pointer;
+    const held = this.held();
+    if (!held) return;
+    const place = this.picture.inPlane(held.map, ...this.picture.from(...pointer));
+    const { joint, leg } = this.grabbed;
+    if (place.every(Number.isFinite)) this.drag(held.mechanism, { joint, leg, place });
+  }
+
+  /** The leg whose joint is dragged. */
+  held() {
+    return this.grabbed && this.picture.legsSeen().find(
+      ({ mechanism, leg }) => mechanism.key === this.grabbed.key && leg === this.grabbed.leg);
+  }
+
+  /** The ends of the line from the joint to where it is wanted. */
+  get pull() {
+    const from = this.held()?.seen.get(this.grabbed.joint);
+    return from ? [from, this.grabbed.pointer] : null;
+  }
+}

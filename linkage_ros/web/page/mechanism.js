@@ -1,0 +1,36 @@
+// Copyright 2026 linkage_ros contributors
+// SPDX-License-Identifier: Apache-2.0
+
+// A mechanism as the page knows it: its markers by number, its settings by name, what was changed.
+
+import { History } from './history.js';
+
+export class Mechanism {
+  constructor(described) {
+    this.markers = new Map();
+    this.heard = performance.now();
+    /** What may be tuned: travel, bars and fixed joints; empty until the viewer has said. */
+    this.tunable = { travel: {}, bars: {}, fixed: [] };
+    this.describe(described);
+    this.history = new History(this);
+  }
+
+  describe(described) {
+    Object.assign(this, described);
+    this.settings = new Map(described.settings.map(setting => [setting.name, setting]));
+    this.history?.begin();
+  }
+
+  value(name) {
+    return this.settings.get(name)?.value;
+  }
+
+  /** How many pairs of legs there are, and how many legs. */
+  get pairs() {
+    return this.value('leg_pairs') ?? 1;
+  }
+
+  get legs() {
+    return this.pairs * (this.value('mirrored') ? 2 : 1);
+  }
+}

@@ -1,0 +1,163 @@
+// Copyright 2026 linkage_ros contributors
+// SPDX-License-Identifier: Apache-2.0
+
+// What a mechanism is: a control for each parameter, undo and reset, and its scene as a file.
+
+import { BY_FACTOR, element, FINE_ABOUT_ZERO, LINEAR, Reason, Slider, Switch } from './control.js';
+
+const DIMENSION = 'dimensions.';
+const MOVES = /\.(speed|start)$/;
+const RESTED = 300;
+
+/** A parameter's name without what its place in the panel says. */
+function labelled(name) {
+  return name.replace(/^dimensions\./, '').replace(/^branches\./, 'branch ')
+    .replace(/^[a-z]+(\d*)\.(speed|start)$/, '$2 $1').trim();
+}
+
+function law({ name, kind, low, high }) {
+  if (kind === 'integer' || name.endsWith('.start')) return LINEAR;
+  if (low > 0) return BY_FACTOR;
+  return low === -high ? FINE_ABOUT_ZERO : LINEAR;
+}
+
+function folding(title, children, open) {
+  return element('details', { open, hidden: !children.length }, element('summary', { textContent: title }), ...children);
+}
+
+/** Let the browser save a text. */
+function download(name, text) {
+  element('a', { download: name, href: `data:application/yaml;charset=utf-8,${encodeURIComponent(text)}` }).click();
+}
+
+export class Tuning {
+  /** Calls `light` with the name of the dimension whose bars are to light up, or nothing. */
+  constructor(mechanism, connection, open, light) {
+    Object.assign(this, { mechanism, connection, light });
+    this.controls = new Map();
+    this.reason = new Reason();
+    const groups = { speeds: [], dimensions: [], more: [] };
+    for (const setting of mechanism.settings.values()) {
+      const control = this.control(setting);
+      if (!control) continue;
+      this.controls.set(setting.name, control);
+      const group = setting.name.startsWith(DIMENSION) ? 'dimensions' : setting.name.endsWith('.speed') ? 'speeds' : 'more';
+      groups[group].push(control.row);
+    }
+    this.speeds = groups.speeds;
+    this.undoing = this.button('Undo', () => this.undo());
+    this.resetting = this.button('Reset', () => this.reset());
+    const tools = element('div', { className: 'tools' }, this.undoing, this.resetting,
+      this.button('Save as scene file', () => this.save()), this.reason.line);
+    this.element = element('div', {}, tools, folding('Dimensions', groups.dimensions, open), folding('More', groups.more, false));
+    this.renderTools();
+    this.refresh();
+  }
+
+  button(textContent, onclick) {
+    return element('button', { type: 'button', textContent, onclick });
+  }
+
+  control(setting) {
+    const { name, kind, meaning, allowed, fixed, low, high } = setting;
+    if (fixed) return null;
+    const described = {
+      ...setting, label: labelled(name), title: `${meaning}\nMay be: ${allowed}.`,
+      unit: /\[([^\]]+)\]/.exec(meaning)?.[1] ?? '', scale: law(setting),
+    };
+    const request = (...about) => this.set(name, ...about);
+    if (kind === 'bool') return new Switch(described, request);
+    const ranged = low !== null && high !== null && low < high;
+    if (!ranged || kind !== 'double' && kind !== 'integer') return null;
+    const slider = new Slider(described, request);
+    if (name.startsWith(DIMENSION)) this.lights(name, slider);
+    return slider;
+  }
+
+  lights(name, { row }) {
+    for (const event of ['pointerenter', 'focusin']) row.addEventListener(event, () => this.light(name));
+    row.addEventListener('pointerleave', () => { if (!row.contains(document.activeElement)) this.light(''); });
+    row.addEventListener('focusout', () => this.light(''));
+  }
+
+  async set(name, value, gesture, before) {
+    const answer = await this.connection.ask({ op: 'set', mechanism: this.mechanism.key, values: { [name]: value } });
+    if (!answer.reason && before !== value) this.mechanism.history.remember(name, before, gesture);
+    this.renderTools();
+    return answer;
+  }
+
+  async undo() {
+    const { steps } = this.mechanism.history;
+    const step = steps.pop();
+    if (step && !await this.put(step.values)) steps.push(step);
+    this.renderTools();
+  }
+
+  async reset() {
+    const { history } = this.mechanism;
+    const [values, before] = history.changes();
+    if (await this.put(values)) history.steps.push({ values: before });
+    this.renderTools();
+  }
+
+  /** Set several values at once; return whether that was granted. */
+  async put(values) {
+    const { reason } = await this.connection.ask({ op: 'set', mechanism: this.mechanism.key, values });
+    this.reason.say(reason && `Refused: ${reason}`);
+    for (const name of Object.keys(values)) this.controls.get(name)?.reason.say('');
+    return !reason;
+  }
+
+  async save() {
+    const { name, key, playing } = this.mechanism;
+    const { reason, text } = await this.connection.ask({ op: 'save', mechanism: key, values: playing });
+    this.reason.say(reason && `Not saved: ${reason}`);
+    if (text) download(`${name}.yaml`, text);
+  }
+
+  /** Learn anew between what the dimensions may be moved, when nobody moves one. */
+  refresh() {
+    clearTimeout(this.resting);
+    this.resting = setTimeout(async () => {
+      const tunable = await this.connection.ask({ op: 'tune', mechanism: this.mechanism.key });
+      if ([...this.controls.values()].some(({ held }) => held)) return this.refresh();
+      if (tunable.reason) return;
+      this.mechanism.tunable = tunable;
+      for (const [name, ends] of Object.entries(tunable.travel)) {
+        if (ends && ends[0] < ends[1]) this.controls.get(name)?.bound(...ends);
+      }
+    }, RESTED);
+  }
+
+  update(name, value) {
+    this.controls.get(name)?.update(value);
+    if (this.mechanism.history.first.has(name)) this.refresh();
+    if (MOVES.test(name)) return;
+    this.renderTools();
+  }
+
+  renderTools() {
+    const { steps, first } = this.mechanism.history;
+    this.undoing.disabled = !steps.length;
+    this.resetting.disabled = [...first].every(([name, value]) => this.mechanism.value(name) === value);
+  }
+
+  /** Light up the slider of a dimension. */
+  lit(name) {
+    for (const [own, { row }] of this.controls) row.classList.toggle('lit', own === name);
+  }
+
+  /** Go to the slider of a dimension. */
+  goTo(name) {
+    const control = this.controls.get(name);
+    if (!control) return;
+    control.row.closest('details').open = true;
+    control.range.focus({ preventScroll: true });
+    control.row.scrollIntoView({ block: 'nearest' });
+  }
+
+  render() {
+    for (const control of this.controls.values()) control.render();
+  }
+}

@@ -1,0 +1,176 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the page asks of the library: poses that are wanted, and how dimensions may be moved."""
+
+from itertools import combinations
+import math
+
+from .settings import is_number, shown
+from ..linkage.nearest_pose import nearest_inputs
+from ..linkage.output_range import ground_frame
+from ..scene import in_words, slider
+from ..words import listed, quoted
+
+# By how much a dimension is changed to see which bars follow, as a part of the longest bar.
+NUDGE = 1e-6
+# How far beyond its end an input is by rounding alone.
+CLOSE = 1e-9
+
+
+class Refused(Exception):
+    """What cannot be done, with the reason."""
+
+
+def described(machine, present) -> dict:
+    """
+    Return where a mechanism is, in its scene's size, with its inputs at `present` [rad or m].
+
+    Of each input the value, the arcs it may be on and the unit; of each output of the first leg
+    the value, the unit, and d output / d input for each input.
+    """
+    linkage, names = machine.linkage, [
+        *(name for name in machine.linkage.joints if name not in machine.inputs),
+        *(f'{machine.tracer}.{axis}' for axis in 'xy')]
+    own = [machine.scale_of(name) for name in machine.inputs]
+    theta = _theta([value / size for value, size in zip(present, own)])
+    values = linkage.joint_angles(theta, names)
+    rates = [linkage.joint_rates(theta, names, i) for i in range(len(own))]
+    return {
+        'inputs': {name: {'value': value, 'unit': drive.input.unit, 'arcs': arcs(drive)}
+                   for (name, drive), value in zip(machine.inputs.items(), present)},
+        'outputs': {name: {
+            'value': shown(float(values[name]) * machine.scale_of(name)),
+            'unit': 'rad' if linkage.is_angle(name) else 'm',
+            'rates': [shown(float(by[name]) * machine.scale_of(name) / size)
+                      for by, size in zip(rates, own)]} for name in names}}
+
+
+def reached(machine, present, want):
+    """
+    Return the inputs [rad or m] that do what is wanted as nearly as can be, and what is short.
+
+    Parameters
+    ----------
+    machine : Machine
+        The mechanism.
+    present : sequence of float
+        Its inputs.
+    want : dict
+        `output` (an input's name too) and `value`; or `joint`, of which `leg`, and `place`, x and
+        y in the linkage's plane [m].
+
+    Raises
+    ------
+    Refused
+        If there is no such thing.
+    KeyError, TypeError, ValueError
+        If it is not understood.
+
+    """
+    if 'joint' in want:
+        return _joint_at(machine, present, **want), ''
+    name, value = want['output'], want['value']
+    if not is_number(value):
+        raise ValueError(f'value must be a finite number, not {quoted(value)}')
+    if name in machine.inputs:
+        return _input_at(machine, present, name, value)
+    if len(machine.inputs) > 1:
+        raise Refused(f'only a linkage with one input can be solved for {quoted(name)}')
+    return _output_at(machine, present[0], name, value)
+
+
+def _input_at(machine, present, name, value):
+    drive, ends = machine.inputs[name], arcs(machine.inputs[name])
+    near = min((min(max(float(drive.input.beside(value, (low + high) / 2.0)), low), high)
+                for low, high in ends), key=lambda end: drive.input.apart(end, value))
+    whole = drive.input.is_whole(ends)
+    taken = math.remainder(value, math.tau) if whole else near
+    inputs = [taken if key == name else old for key, old in zip(machine.inputs, present)]
+    own = [value / machine.scale_of(key) for key, value in zip(machine.inputs, inputs)]
+    places = machine.linkage.solve(_theta(own))
+    if not all(math.isfinite(part) for place in places.values() for part in place):
+        raise Refused(f'{machine.name} cannot be assembled there')
+    missed = not whole and drive.input.apart(near, value) > CLOSE * drive.input.size
+    return inputs, f'{name} reaches {in_words(ends)} {drive.input.unit}' if missed else ''
+
+
+def _output_at(machine, present, name, value):
+    linkage, drive = machine.linkage, machine.first
+    own, unit = machine.scale_of(drive.input.name), machine.scale_of(name)
+    ends = drive.ends and tuple(end / own for end in drive.ends)
+    found = float(linkage.servo_for(name, value / unit, present / own, ends)[0])
+    if math.isfinite(found):
+        return [found * own], ''
+    spans = linkage.extremes(name, [(low / own, high / own) for low, high in arcs(drive)])
+    turn = math.tau if linkage.is_angle(name) else math.inf
+    _, nearest = min((abs(math.remainder(reached - value / unit, turn)), at)
+                     for span in spans for reached, at in span)
+    reach = in_words((low * unit, high * unit) for (low, _), (high, _) in spans)
+    return [nearest * own], (f'{name} reaches {reach} '
+                             f'{"rad" if linkage.is_angle(name) else "m"}')
+
+
+def _joint_at(machine, present, joint, place, leg=0):
+    if not (isinstance(place, list) and len(place) == 2 and all(map(is_number, place))):
+        raise ValueError(f'place must be two finite numbers, not {quoted(place)}')
+    legs = list(machine.assembly().legs.values())
+    if type(leg) is not int or not 0 <= leg < len(legs):
+        raise ValueError(f'leg must be a whole number below {len(legs)}, not {quoted(leg)}')
+    if joint not in machine.linkage.points:
+        raise ValueError(f'joint must be one of {listed(machine.linkage.points)}, '
+                         f'not {quoted(joint)}')
+    leg, own = legs[leg], [machine.scale_of(name) for name in machine.inputs]
+    # A leg's own input, and back: of a lone leg they are the same.
+    ways = [[sorted(leg.start + leg.side * (end - leg.lag) for end in arc) for arc in arcs(drive)]
+            for drive in machine.inputs.values()]
+    found = nearest_inputs(
+        machine.linkage, joint, [leg.side * place[0] / machine.scale, place[1] / machine.scale],
+        [leg.start + leg.side * (value - leg.lag) / size for value, size in zip(present, own)],
+        [[(low / size, high / size) for low, high in way] for way, size in zip(ways, own)])
+    return [float(leg.lag + leg.side * (value - leg.start)) * size
+            for value, size in zip(found, own)]
+
+
+def arcs(drive):
+    """Return where an input may be put [rad or m]."""
+    return [drive.ends] if drive.ends else list(drive.reach)
+
+
+def _theta(values):
+    return values if len(values) > 1 else values[0]
+
+
+def tunable(scene_, name) -> dict:
+    """
+    Return between what each dimension of a mechanism may be moved, and which bars follow.
+
+    `travel` holds [low, high] by parameter, `bars` pairs of joints, `fixed` the joints that do not
+    move.
+    """
+    machine = scene_.machines[name]
+    start = f'{name}.dimensions.'
+    travel = {parameter.name[len(name) + 1:]: slider.ends(scene_, parameter)
+              for parameter in machine.parameters if parameter.name.startswith(start)}
+    return {'travel': travel, 'fixed': list(ground_frame(machine.linkage)),
+            'bars': {key: _bars(machine.linkage, key.partition('.')[2]) for key in travel}}
+
+
+def _bars(linkage, key):
+    """Return the pairs of joints whose distance follows a dimension."""
+    size = NUDGE * float(linkage.longest)
+    for step in (size, -size):
+        try:
+            other = linkage.with_dimensions(**{key: linkage.dimensions[key] + step})
+        except ValueError:
+            continue
+        after = _distances(other)
+        return [pair for pair, distance in _distances(linkage).items()
+                if abs(after[pair] - distance) > 1e-3 * size]
+    return []
+
+
+def _distances(linkage):
+    frames = [ground_frame(linkage), *linkage.frames.values()]
+    return {(a, b): math.dist(frame[a], frame[b])
+            for frame in frames for a, b in combinations(frame, 2)}
