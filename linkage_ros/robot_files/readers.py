@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Dict, List, Mapping, Optional, Tuple
+from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
@@ -14,12 +14,18 @@ import numpy as np
 from ..command import RequestError
 
 HINGE, SLIDE, BALL, FIXED = 'hinge', 'slide', 'ball', 'fixed'
+# No robot has parts that are farther off [m], nor limits [m or rad].
+FARTHEST = 1e9
 KINDS = {'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE, 'spherical': BALL}
 
 
 @dataclass(eq=False)
 class Joint:
-    """What joins two bodies: its place on each, and its axis; a position where it can be named."""
+    """
+    What joins two bodies: its place on each, and its axis.
+
+    One that can be named has a position, and maybe limits.
+    """
 
     name: str
     kind: str
@@ -27,6 +33,7 @@ class Joint:
     places: Any
     axis: Any
     position: Optional[float] = None
+    limits: Optional[Tuple[float, float]] = None
 
 
 @dataclass
@@ -41,17 +48,36 @@ class Robot:
 
     def join(self, name: str, kind: str, bodies: Tuple[str, str], frame: np.ndarray,
              axis: Any = (0.0, 0.0, 1.0), other: Optional[np.ndarray] = None,
-             position: Optional[float] = None) -> None:
+             position: Optional[float] = None,
+             limits: Optional[Sequence[Any]] = None) -> None:
         """Add a joint by its frame on the parent, and on the child where that is another."""
         for body in bodies:
             if body not in self.frames:
                 raise RequestError(f'joint {name} is on {body!r}, which is no link')
+        if position is not None and name in self.positions:
+            raise RequestError(f'two joints are called {name!r}')
         kind, size = KINDS.get(kind, kind), np.linalg.norm(axis)
         if kind in (HINGE, SLIDE) and not size > 0.0:
             raise RequestError(f'the axis of joint {name} has no length')
         places = frame[:3, 3], (frame if other is None else other)[:3, 3]
         self.joints.append(Joint(name, kind, bodies, places, frame[:3, :3] @ axis / (size or 1.0),
-                                 position))
+                                 position, limits and _limits(*limits)))
+
+    @property
+    def positions(self) -> Dict[str, float]:
+        """The positions of all joints that have a name."""
+        return {joint.name: joint.position for joint in self.joints if joint.position is not None}
+
+    def source(self, name: str) -> Tuple[str, float, float]:
+        """Return the joint that another follows, if not itself, its ratio and its offset."""
+        ratio, offset, passed = 1.0, 0.0, [*self.driven]
+        while name in self.follows and name not in passed:
+            passed.append(name)
+            name, factor, start = self.follows[name]
+            ratio, offset = ratio * factor, offset + ratio * start
+        if name not in self.positions:
+            raise ValueError(f'{passed[-1]} follows {name!r}, which is no joint')
+        return name, ratio, offset
 
 
 def read(path: str, loops: Optional[str] = None) -> Robot:
@@ -67,8 +93,12 @@ def read(path: str, loops: Optional[str] = None) -> Robot:
         return _mjcf(path) if root.tag == 'mujoco' else _sdf(root)
     except ElementTree.ParseError as error:
         raise RequestError(f'{path} is no XML: {error}') from None
-    except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
-        raise RequestError(f'{path} cannot be read: {type(error).__name__}: {error}') from None
+    except RecursionError:
+        raise RequestError(f'{path} has links or frames that hang on themselves') from None
+    except LookupError as error:
+        raise RequestError(f'{path} names {error}, which is not there') from None
+    except (ValueError, TypeError, AttributeError) as error:
+        raise RequestError(f'{path} cannot be read: {error}') from None
 
 
 def _loops(path: str) -> Mapping[str, Any]:
@@ -108,14 +138,19 @@ def _mjcf(path: str) -> Robot:
             one = kind in (HINGE, SLIDE)
             robot.join(names[j], kind, (above, below), _frame(data.xanchor[j]),
                        data.xaxis[j] if one else (0.0, 0.0, 1.0),
-                       position=float(data.qpos[model.jnt_qposadr[j]]) if one else None)
+                       position=float(data.qpos[model.jnt_qposadr[j]]) if one else None,
+                       limits=model.jnt_range[j].tolist() if model.jnt_limited[j] else None)
             above = below
     for i in range(model.neq):
         kind, given = mj.mjtEq(model.eq_type[i]).name[5:].lower(), model.eq_data[i]
         ends, places = [model.eq_obj1id[i], model.eq_obj2id[i]], [given[:3], given[3:6]]
-        if kind == 'joint' and ends[1] >= 0 and not given[2:5].any():
-            robot.follows[names[ends[0]]] = names[ends[1]], float(given[1]), float(given[0])
-        if kind not in ('connect', 'weld') or not model.eq_active0[i]:
+        if not model.eq_active0[i]:
+            continue
+        if kind == 'joint' and ends[1] >= 0 and given[1] and not given[2:5].any():
+            one, other = model.qpos0[model.jnt_qposadr[ends]]
+            robot.follows[names[ends[0]]] = (names[ends[1]], float(given[1]),
+                                             float(given[0] + one - given[1] * other))
+        if kind not in ('connect', 'weld'):
             continue
         if mj.mjtObj(model.eq_objtype[i]) == mj.mjtObj.mjOBJ_SITE:
             ends, places = model.site_bodyid[ends], model.site_pos[ends]
@@ -139,8 +174,8 @@ def _sdf(root: ElementTree.Element) -> Robot:
         raise RequestError('the SDF has no model with joints')
     if model.find('model') is not None or model.find('include') is not None:
         raise RequestError(f'model {model.get("name")} has models in it, which are not read')
-    parts = {str(part.get('name')): part for part in model if part.tag in ('link', 'joint',
-                                                                           'frame')}
+    parts = _once([(part.get('name', ''), part) for part in model
+                   if part.tag in ('link', 'joint', 'frame')])
 
     def frame(name: Optional[str]) -> np.ndarray:
         if name in (None, '', 'world', '__model__'):
@@ -168,14 +203,15 @@ def _sdf(root: ElementTree.Element) -> Robot:
         axis = _numbers(_text(parts[name], 'axis/xyz', '0 0 1'))
         if seen is not None and seen.get('expressed_in'):
             axis = turned[:3, :3].T @ frame(seen.get('expressed_in'))[:3, :3] @ axis
-        robot.join(name, str(parts[name].get('type')), ends, turned, axis, position=0.0)
+        robot.join(name, str(parts[name].get('type')), ends, turned, axis, None, 0.0, [
+            _text(parts[name], f'axis/limit/{end}') for end in ('lower', 'upper')])
     robot.driven = [str(name.text).strip() for name in model.findall('plugin/joint_name')]
     return robot
 
 
 def _urdf(root: ElementTree.Element, loops: Mapping[str, Any]) -> Robot:
-    links = [str(link.get('name')) for link in root.findall('link')]
-    joints = {_attribute(joint, 'child', 'link'): joint for joint in root.findall('joint')}
+    links = _once([(link.get('name', ''), link) for link in root.findall('link')])
+    joints = _once([(_attribute(joint, 'child', 'link'), joint) for joint in root.findall('joint')])
 
     def frame(link: str) -> np.ndarray:
         joint = joints.get(link)
@@ -190,10 +226,12 @@ def _urdf(root: ElementTree.Element, loops: Mapping[str, Any]) -> Robot:
         name = str(joint.get('name'))
         ends = _attribute(joint, 'parent', 'link'), child
         robot.join(name, str(joint.get('type')), ends, frame(child),
-                   _numbers(_attribute(joint, 'axis', 'xyz', '1 0 0')), position=0.0)
-        if master := _attribute(joint, 'mimic', 'joint'):
-            robot.follows[name] = (master, float(_attribute(joint, 'mimic', 'multiplier', '1')),
-                                   float(_attribute(joint, 'mimic', 'offset', '0')))
+                   _numbers(_attribute(joint, 'axis', 'xyz', '1 0 0')), None, 0.0, [
+                       _attribute(joint, 'limit', end) for end in ('lower', 'upper')])
+        ratio, start = _numbers(_attribute(joint, 'mimic', 'multiplier', '1') + ' ' + _attribute(
+            joint, 'mimic', 'offset', '0'), 2)
+        if ratio and joint.find('mimic') is not None:
+            robot.follows[name] = _attribute(joint, 'mimic', 'joint'), float(ratio), float(start)
     for cut in (*root.findall('constraint'), *root.findall('loop_joint')):
         ends = _attribute(cut, 'parent', 'link'), _attribute(cut, 'child', 'link')
         first, second = (robot.frames[end] @ _origin(cut, f'{tag}_origin')
@@ -201,8 +239,8 @@ def _urdf(root: ElementTree.Element, loops: Mapping[str, Any]) -> Robot:
         axis = _attribute(cut, 'parent_axis', 'xyz', _attribute(cut, 'axis', 'xyz', '0 0 1'))
         robot.join(str(cut.get('name')), str(cut.get('type')), ends, first, _numbers(axis), second)
     for i, cut in enumerate(loops.get('closures', ())):
-        robot.join(f'closures[{i}]', HINGE, (cut['link_a'], cut['link_b']), _frame(cut['point']),
-                   cut['axis'])
+        point, axis = (_numbers(' '.join(map(str, cut[key]))) for key in ('point', 'axis'))
+        robot.join(f'closures[{i}]', HINGE, (cut['link_a'], cut['link_b']), _frame(point), axis)
     for (first, second), kind in zip(loops.get('closed_loop', ()), loops.get('type', ())):
         robot.join(f'{first}={second}', FIXED if str(kind).lower() == '6d' else BALL,
                    (first, second), robot.frames.get(first, np.eye(4)),
@@ -223,8 +261,26 @@ def _text(part: ElementTree.Element, tag: str, otherwise: str = '') -> str:
     return (part.findtext(tag) or otherwise).strip()
 
 
-def _numbers(text: str) -> np.ndarray:
-    return np.array(text.split(), float)
+def _once(parts: Iterable[Tuple[str, Any]]) -> Dict[str, Any]:
+    """Return parts by name; raise RequestError if two have one name."""
+    found: Dict[str, Any] = {}
+    for name, part in parts:
+        if found.setdefault(name, part) is not part:
+            raise RequestError(f'{part.tag} {part.get("name")!r} is not the only one of {name!r}')
+    return found
+
+
+def _numbers(text: str, count: int = 3) -> np.ndarray:
+    found = np.array(text.split(), float)
+    if len(found) != count or not np.all(np.abs(found) < FARTHEST):
+        raise ValueError(f'{text!r} must be {count} numbers within {FARTHEST:g}')
+    return found
+
+
+def _limits(low: Any, high: Any) -> Optional[Tuple[float, float]]:
+    """Return the limits of a joint, if it has any."""
+    ends = float(str(low) or 'nan'), float(str(high) or 'nan')
+    return ends if -FARTHEST < ends[0] < ends[1] < FARTHEST else None
 
 
 def _origin(part: ElementTree.Element, tag: str) -> np.ndarray:
@@ -232,7 +288,7 @@ def _origin(part: ElementTree.Element, tag: str) -> np.ndarray:
 
 
 def _pose(text: str) -> np.ndarray:
-    x, y, z, roll, pitch, yaw = _numbers(text)
+    x, y, z, roll, pitch, yaw = _numbers(text, 6)
     (cr, cp, cy), (sr, sp, sy) = np.cos((roll, pitch, yaw)), np.sin((roll, pitch, yaw))
     about_z, about_y, about_x = np.array([
         [[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]], [[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]],
