@@ -40,9 +40,10 @@ def show(args: Optional[List[str]]) -> None:
     parser.add_argument('--driven', metavar='JOINT', nargs='+', help='joints that motors move '
                         '(default: those of which the file says so, or else of any)')
     asked = parser.parse_args(args)
-    robot = readers.read(asked.file, asked.loops)
-    robot.driven = asked.driven or robot.driven
-    given, said = described(robot)
+    with np.errstate(all='ignore'):
+        robot = readers.read(asked.file, asked.loops)
+        robot.driven = asked.driven or robot.driven
+        given, said = described(robot)
     print(f'# From {asked.file}.', *(f'# {line}' for line in said), '/**:',
           '  ros__parameters:', sep='\n')
     for key, value in given.items():
@@ -60,7 +61,7 @@ def described(robot: readers.Robot) -> Tuple[Dict[str, Any], List[str]]:
         try:
             drawing = _drawn(robot, ground, frame_id, joints)
             name, parameters, checked = _checked(robot, drawing, given['mechanisms'])
-        except ValueError as error:
+        except (ArithmeticError, ValueError) as error:
             bodies = dict.fromkeys(body for joint in joints for body in joint.bodies)
             said.append(f'Left out: {", ".join(bodies)}: {error}.')
             continue
@@ -111,7 +112,7 @@ def _checked(robot: readers.Robot, drawing: Drawing, taken: Sequence[str]
              ) -> Tuple[str, Dict[str, Any], List[str]]:
     """Return a mechanism's name and parameters, and what is to be said, once it has its pose."""
     name = re.sub('[^A-Za-z0-9]+', '_', drawing.drives[0].source).strip('_')[:60]
-    name = name if name[:1].isalpha() else f'joint_{name}'
+    name = name if name[:1].isalpha() else f'joint_{name}'.rstrip('_')
     name = f'{name}_{len(taken)}' if name in taken else name
     given = {f'{name}.{key}': value for key, value in _parameters(drawing)}
     machine = scene.read({'mechanisms': [name], **given}).machines[name]

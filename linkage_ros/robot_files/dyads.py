@@ -283,12 +283,14 @@ class Drawing:
                 or any({first, second} == {*joint.bodies} for joint in self.driven):
             return False
         one, two = self._end(first), self._end(second)
-        line = self._alike(pin[first], one, two) or \
+        if abs(one[1] - two[1]) < self.loop.near:
+            raise ValueError(f'{first} and {second} are folded on each other')
+        line = self._alike(pin[first], pin[second], one, two) or \
             f'dyad {self._bars(one, two, pin[first], pin[second])}'
         name = self._name(pin[first], first, line)
         return self._hang(first, one[0], name) and self._hang(second, two[0], name)
 
-    def _alike(self, place: complex, one: Pin, two: Pin) -> Optional[str]:
+    def _alike(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
         """Return what a line says of bars like those from a corner: they pass their flat poses."""
         (first, start), (second, end) = one, two
         for corner, at in self.places:
@@ -301,7 +303,7 @@ class Drawing:
                              for each in (at, opposite))
             for word, seen in (('parallelogram', opposite), ('mirror', kite),
                                ('antiparallelogram', crossed)):
-                if abs(seen - place) < self.loop.near < abs(at - place):
+                if max(abs(seen - place), abs(seen - other)) < self.loop.near < abs(at - place):
                     return f'{word} {corner} {first} {second}'
         return None
 
