@@ -84,7 +84,8 @@ def _drawn(robot: readers.Robot, ground: str, frame_id: str, joints: Sequence[re
         tries += (pair for count in (1, 2) for pair in combinations(names, count))
     drawings: List[Drawing] = []
     for drives in tries:
-        drawings.append(Drawing(robot, loops.flat(robot, ground, frame_id, joints, drives), drives))
+        loop = loops.flat(robot, ground, frame_id, joints, drives)
+        drawings.append(Drawing(robot, loop, drives))
         if not drawings[-1].left:
             break
     best = min(drawings, key=lambda drawing: len(drawing.left))
@@ -102,8 +103,8 @@ def _why(drawing: Drawing) -> str:
     """Return why bodies are left."""
     held = [joint for joint in drawing.loop.joints if {*joint.bodies} & {*drawing.left}]
     free = 3 * len(drawing.left) - 2 * len(held) - sum(joint in drawing.driven for joint in held)
-    names = ', '.join(joint.name for joint in held)
-    return f'not driven: {free} more of {names} must be, see --driven' if free > 0 else (
+    names = ', '.join(joint.name for joint in held if joint.position is not None)
+    return f'not driven: {free} more of {names} must be, named by --driven' if free > 0 else (
         'not of dyads: all of them hold each other, as on a platform on three bars'
         if free == 0 else f'held more than once by {names}')
 
@@ -114,24 +115,26 @@ def _checked(robot: readers.Robot, drawing: Drawing, taken: Sequence[str]
     name = re.sub('[^A-Za-z0-9]+', '_', drawing.drives[0].source).strip('_')[:60]
     name = name if name[:1].isalpha() else f'joint_{name}'.rstrip('_')
     name = f'{name}_{len(taken)}' if name in taken else name
-    given = {f'{name}.{key}': value for key, value in _parameters(drawing)}
+    loop, given = drawing.loop, {
+        f'{name}.{key}': value for key, value in _parameters(drawing)}
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     for drive in drawing.drives:
         if sweep := _sweep(drive, machine.inputs[drive.name]):
             given[f'{name}.{drive.name}.sweep'] = [*sweep]
             given[f'{name}.{drive.name}.start'] = min(max(drive.value, sweep[0]), sweep[1])
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
-    off, gap, size = _apart(machine.linkage, drawing), drawing.loop.gap, drawing.loop.size
+    off = _apart(machine.linkage, drawing)
     if not off <= drawing.allowed:
-        raise ValueError(f'{off:.2g} of its size away from the pose of the file, where it is nearly '
-                         'stretched or folded')
+        raise ValueError(f'{off:.2g} of its size away from the pose of the file, where it is '
+                         'nearly stretched or folded')
     said = [f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.'] if drawing.left else []
-    said.append(f'Checked: {name} has the pose of the file to {off:.0e} of its size' + (
-        f', not to {loops.ROUNDING:g}, as the file itself leaves its loops open by {gap:.0e} m, '
-        f'{gap / size:.0e} of its size.' if off > loops.ROUNDING else '.'))
+    why = f', not to {loops.ROUNDING:g}, as the file itself leaves its loops open by ' \
+        f'{loop.gap:.0e} m, {loop.gap / loop.size:.0e} of its size' if off > loops.ROUNDING else ''
+    said.append(f'Checked: {name} has the pose of the file to {off:.0e} of its size{why}.')
     told = {called.name for called in machine.joints.values() if called.published}
     told |= {joint.name for joint in drawing.driven}
-    own = [part for joint in drawing.loop.joints for part in joint.name.split('+')]
+    own = [part for joint in loop.joints for part in joint.name.split('+')
+           if drawing.parts.keys() >= {*joint.bodies}]
     if lost := [joint for joint in robot.positions if joint in own and joint not in told]:
         said.append(f'Not published: {", ".join(lost)}, which no angle in the plane tells.')
     return name, given, said
@@ -142,14 +145,12 @@ def _sweep(drive: Drive, read: scene.Drive) -> Optional[Tuple[float, float]]:
     if drive.ends is None:
         return None
     low, high = (float(short(end, 1e-15)) for end in drive.ends)
-    if not read.input.is_whole(read.reach):
-        for start, end in read.reach:
-            turns = math.tau * math.floor((drive.value - start) / math.tau) \
-                if read.input.turns else 0.0
-            if start + turns <= drive.value <= end + turns:
-                # An end that is a dead point is not quite reached.
-                edge = loops.ROUNDING * (end - start)
-                low, high = max(low, start + turns + edge), min(high, end + turns - edge)
+    for start, end in () if read.input.is_whole(read.reach) else read.reach:
+        turns = math.tau * math.floor((drive.value - start) / math.tau) * read.input.turns
+        if start + turns <= drive.value <= end + turns:
+            # An end that is a dead point is not quite reached.
+            edge = loops.ROUNDING * (end - start)
+            low, high = max(low, start + turns + edge), min(high, end + turns - edge)
     return (low, high) if low + 1e-6 * read.input.size < high else None
 
 
@@ -182,10 +183,10 @@ def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
         yield f'{drive.name}.ratio', drive.ratio
         yield f'{drive.name}.offset', float(short(drive.offset))
         yield f'{drive.name}.start', float(short(drive.value, 1e-15))
-    links, names = {link.name: link for link in _linkage(drawing).links}, []
+    names, links = [], {link.name: link for link in _linkage(drawing).links}
     for joint, (link, sign, angle) in seen:
         if links[link].kind != 'prismatic':
-            angle = math.remainder(angle - links[link].zero, math.tau)
+            angle = math.remainder(angle - float(np.asarray(links[link].zero)), math.tau)
         zero = float(short((joint.position or 0.0) - sign * angle))
         names.append(f'{link}={"-" * (sign < 0.0)}{joint.name}' + (f'{zero:+}' if zero else ''))
     yield 'joint_names', names

@@ -31,8 +31,8 @@ class Part(NamedTuple):
     """
     A body that is placed: its link, and the joint that this hangs on.
 
-    Angles on it are counted from `along`, as it is in the file's pose; a block is on a slide, which
-    is counted from `start`.
+    Angles on it are counted from `along`, as it is in the file's pose; a block is on a slide,
+    which is counted from `start`.
     """
 
     link: str
@@ -100,7 +100,7 @@ class Drawing:
 
     @property
     def allowed(self) -> float:
-        """How far a pose may be from the file's, of the size: rounding, or what that leaves open."""
+        """How far a pose may be from the file's, of the size: rounding, or some of its gap."""
         return max(ROUNDING, 30.0 * self.loop.gap / self.loop.size)
 
     @property
@@ -312,8 +312,8 @@ class Drawing:
         for slide, base in self._slides(block):
             if pin is not None and base in self.parts:
                 (joint, at), sign = self._end(rod), 1.0 if slide.bodies[1] == block else -1.0
-                (origin, start), towards, along = self._line(base, pin[block] - slide.axis * sign * (
-                    slide.position or 0.0), slide.axis)
+                (origin, start), towards, along = self._line(
+                    base, pin[block] - slide.axis * sign * (slide.position or 0.0), slide.axis)
                 half = 'out' if ((pin[rod] - at) / along).real > 0.0 else 'in'
                 number, length = self._number('slider'), self._say(abs(pin[rod] - at))
                 name = self._name(pin[rod], rod,
@@ -348,7 +348,8 @@ class Drawing:
                 number, geared = self._input('cylinder', slide, sign, abs(seen))
                 _, _, _, length, side = self._bars((base, start), (pivot, end), pin[rod],
                                                    pin[bar]).split()
-                name = self._name(pin[bar], bar, f'cylinder {base} {pivot} {length} {side}{geared}')
+                name = self._name(pin[bar], bar,
+                                  f'cylinder {base} {pivot} {length} {side}{geared}')
                 return self._place(barrel, Part(f'barrel{number}', base, along)) and self._place(
                     rod, Part(f'cylinder{number}', name, along, slide, start)) and self._hang(
                     bar, pivot, name)

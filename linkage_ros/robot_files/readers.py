@@ -22,7 +22,7 @@ Element = ElementTree.Element
 
 @dataclass(eq=False)
 class Joint:
-    """What joins two bodies: its place on each, its axis; if it has a name, position and limits."""
+    """What joins two bodies: its place on each, its axis; with a name, position and limits."""
 
     name: str
     kind: str
@@ -148,12 +148,12 @@ def _mjcf(path: str) -> Robot:
                        float(data.qpos[model.jnt_qposadr[j]]) if one else None,
                        model.jnt_range[j].tolist() if model.jnt_limited[j] else ('', ''))
             above = below
-    for i in np.flatnonzero(model.eq_active0):
+    for i in np.flatnonzero(model.eq_active0).tolist():
         kind, given = mj.mjtEq(model.eq_type[i]).name[5:].lower(), model.eq_data[i]
         ends, places = [model.eq_obj1id[i], model.eq_obj2id[i]], [given[:3], given[3:6]]
         if kind == 'joint' and ends[1] >= 0 and not given[2:5].any():
             one, other = model.qpos0[model.jnt_qposadr[ends]]
-            robot.follow(*(names[end] for end in ends), given[1],
+            robot.follow(names[ends[0]], names[ends[1]], given[1],
                          given[0] + one - given[1] * other)
         if kind in ('connect', 'weld'):
             if mj.mjtObj(model.eq_objtype[i]) == mj.mjtObj.mjOBJ_SITE:
@@ -236,8 +236,9 @@ def _urdf(root: Element, loops: Mapping[str, Any]) -> Robot:
         ends = _attribute(cut, 'parent', 'link'), _attribute(cut, 'child', 'link')
         first, second = (robot.frames[end] @ _origin(cut, f'{tag}_origin')
                          for end, tag in zip(ends, ('parent', 'child')))
-        axis = _attribute(cut, 'parent_axis', 'xyz', _attribute(cut, 'axis', 'xyz', '0 0 1'))
-        robot.join(cut.get('name', ''), cut.get('type', ''), ends, first, _numbers(axis), second)
+        axis = _numbers(_attribute(cut, 'parent_axis', 'xyz',
+                                   _attribute(cut, 'axis', 'xyz', '0 0 1')))
+        robot.join(cut.get('name', ''), cut.get('type', ''), ends, first, axis, second)
     for i, cut in enumerate(loops.get('closures', ())):
         point, axis = (_numbers(' '.join(map(str, cut[key]))) for key in ('point', 'axis'))
         robot.join(f'closures[{i}]', HINGE, (cut['link_a'], cut['link_b']), _frame(point), axis)
