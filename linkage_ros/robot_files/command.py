@@ -119,9 +119,10 @@ def _checked(robot: readers.Robot, drawing: Drawing, taken: Sequence[str]
         f'{name}.{key}': value for key, value in _parameters(drawing)}
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     for drive in drawing.drives:
+        start = f'{name}.{drive.name}.start'
         if sweep := _sweep(drive, machine.inputs[drive.name]):
             given[f'{name}.{drive.name}.sweep'] = [*sweep]
-            given[f'{name}.{drive.name}.start'] = min(max(drive.value, sweep[0]), sweep[1])
+            given[start] = min(max(given[start], sweep[0]), sweep[1])
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     off = _apart(machine.linkage, drawing)
     if not off <= drawing.allowed:

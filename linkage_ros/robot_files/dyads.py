@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from cmath import phase
-from itertools import combinations, permutations
+from itertools import combinations
 import math
 from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
@@ -87,11 +87,15 @@ class Drawing:
                 self._pins.append({body: place for each in (*same, pin)
                                    for body, place in each.items()})
         self._place(loop.ground, Part('', '', 1.0 + 0.0j))
-        while any(self._drive(joint, *way) for joint in self.driven for way in (
-                (*joint.bodies, 1.0), (*joint.bodies[::-1], -1.0))) or any(
-                rule(*pair) for pair in permutations(self.left, 2)
-                for rule in (self._dyad, self._slider, self._slot, self._cylinder)):
+        while self._step():
             pass
+
+    def _step(self) -> bool:
+        """Place what a motor, a dyad or a slide places next; return whether there is any."""
+        ways = [(joint, *way) for joint in self.loop.joints for way in (
+            (*joint.bodies, 1.0), (*joint.bodies[::-1], -1.0))]
+        return any(self._drive(*way) for way in ways) or any(map(self._dyad, self.left)) or any(
+            rule(*way) for way in ways for rule in (self._slider, self._slot, self._cylinder))
 
     @property
     def left(self) -> List[str]:
@@ -238,7 +242,7 @@ class Drawing:
     def _drive(self, joint: Joint, base: str, body: str, sign: float) -> bool:
         """Place the body that a motor moves on one that is placed."""
         places = [pin[body] for pin in self._pins if body in pin]
-        if base not in self.parts or body in self.parts or not places:
+        if joint not in self.driven or base not in self.parts or body in self.parts or not places:
             return False
         size, position = self.loop.size, joint.position or 0.0
         if joint.kind == SLIDE:
@@ -266,29 +270,24 @@ class Drawing:
                           f'{geared}')
         return self._hang(body, centre, name, f'crank{number}')
 
-    def _shared(self, first: str, second: str) -> Optional[Dict[str, complex]]:
-        """Return the pin that two bodies share and that is not placed, while the first has one."""
-        return next((pin for pin in self._pins if {first, second} <= pin.keys()
-                     and self.on[first] and not self._known(first, pin[first])), None)
+    def _rods(self, body: str) -> Iterator[Tuple[str, Dict[str, complex]]]:
+        """Yield what hangs on a joint and has a pin with a body that is not placed, and the pin."""
+        return ((rod, pin) for pin in self._pins if body in pin for rod in pin
+                if rod != body and rod not in self.parts and self.on[rod]
+                and not self._known(rod, pin[rod]))
 
-    def _slides(self, body: str, driven: bool = False) -> Iterator[Tuple[Joint, str]]:
-        """Yield the slides of a body, each with the body at its other end."""
-        return ((joint, joint.bodies[joint.bodies[0] == body]) for joint in self.loop.joints
-                if joint.kind == SLIDE and body in joint.bodies
-                and (joint in self.driven) is driven)
-
-    def _dyad(self, first: str, second: str) -> bool:
-        pin = self._shared(first, second)
-        if pin is None or not self.on[second] or self._end(first)[0] == self._end(second)[0] \
-                or any({first, second} == {*joint.bodies} for joint in self.driven):
-            return False
-        one, two = self._end(first), self._end(second)
-        if abs(one[1] - two[1]) < self.loop.near:
-            raise ValueError(f'{first} and {second} are folded on each other')
-        line = self._alike(pin[first], pin[second], one, two) or \
-            f'dyad {self._bars(one, two, pin[first], pin[second])}'
-        name = self._name(pin[first], first, line)
-        return self._hang(first, one[0], name) and self._hang(second, two[0], name)
+    def _dyad(self, first: str) -> bool:
+        for second, pin in self._rods(first) if self.on[first] else ():
+            one, two = self._end(first), self._end(second)
+            if one[0] == two[0] or any({first, second} == {*each.bodies} for each in self.driven):
+                continue
+            if abs(one[1] - two[1]) < self.loop.near:
+                raise ValueError(f'{first} and {second} are folded on each other')
+            line = self._alike(pin[first], pin[second], one, two) or \
+                f'dyad {self._bars(one, two, pin[first], pin[second])}'
+            name = self._name(pin[first], first, line)
+            return self._hang(first, one[0], name) and self._hang(second, two[0], name)
+        return False
 
     def _alike(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
         """Return what a line says of bars like those from a corner: they pass their flat poses."""
@@ -307,52 +306,50 @@ class Drawing:
                     return f'{word} {corner} {first} {second}'
         return None
 
-    def _slider(self, rod: str, block: str) -> bool:
-        pin = self._shared(rod, block)
-        for slide, base in self._slides(block):
-            if pin is not None and base in self.parts:
-                (joint, at), sign = self._end(rod), 1.0 if slide.bodies[1] == block else -1.0
-                (origin, start), towards, along = self._line(
-                    base, pin[block] - slide.axis * sign * (slide.position or 0.0), slide.axis)
-                half = 'out' if ((pin[rod] - at) / along).real > 0.0 else 'in'
-                number, length = self._number('slider'), self._say(abs(pin[rod] - at))
-                name = self._name(pin[rod], rod,
-                                  f'slider {joint} {length} {origin} along {towards} {half}')
-                return self._hang(rod, joint, name) and self._place(
-                    block, Part(f'block{number}', name, along, slide, start))
+    def _slider(self, slide: Joint, base: str, block: str, sign: float) -> bool:
+        passive = slide.kind == SLIDE and slide not in self.driven
+        if not passive or base not in self.parts or block in self.parts:
+            return False
+        for rod, pin in self._rods(block):
+            (joint, at), length = self._end(rod), abs(pin[rod] - self._end(rod)[1])
+            (origin, start), towards, along = self._line(
+                base, pin[block] - slide.axis * sign * (slide.position or 0.0), slide.axis)
+            half = 'out' if ((pin[rod] - at) / along).real > 0.0 else 'in'
+            number = self._number('slider')
+            name = self._name(pin[rod], rod, f'slider {joint} {self._say(length)} {origin} '
+                              f'along {towards} {half}')
+            return self._hang(rod, joint, name) and self._place(
+                block, Part(f'block{number}', name, along, slide, start))
         return False
 
-    def _slot(self, lever: str, block: str) -> bool:
-        for slide, other in self._slides(lever):
-            if other == block and self.on[lever] and self.on[block]:
-                (pivot, start), (pin, end) = self._end(lever), self._end(block)
-                seen = (end - start) / slide.axis
-                along, number = math.copysign(1.0, seen.real) * slide.axis, self._number('slot')
-                name = self._name(start + abs(seen) * along, lever, f'slot {pivot} {pin} '
-                                  f'{self._say(((end - start) / along).imag)} out '
-                                  f'{self._say(abs(seen))}')
-                return self._hang(lever, pivot, name, f'lever{number}') and self._place(
-                    block, Part(f'slide{number}', pin, along, slide, start))
-        return False
+    def _slot(self, slide: Joint, lever: str, block: str, _: float) -> bool:
+        if slide.kind != SLIDE or slide in self.driven or {lever, block} & self.parts.keys() \
+                or not self.on[lever] or not self.on[block]:
+            return False
+        (pivot, start), (pin, end) = self._end(lever), self._end(block)
+        ahead, number = ((end - start) / slide.axis).real, self._number('slot')
+        along = math.copysign(1.0, ahead) * slide.axis
+        name = self._name(start + abs(ahead) * along, lever, f'slot {pivot} {pin} '
+                          f'{self._say(((end - start) / along).imag)} out {self._say(abs(ahead))}')
+        return self._hang(lever, pivot, name, f'lever{number}') and self._place(
+            block, Part(f'slide{number}', pin, along, slide, start))
 
-    def _cylinder(self, barrel: str, bar: str) -> bool:
-        for slide, rod in self._slides(barrel, driven=True):
-            pin = self._shared(bar, rod)
-            if pin is None or not self.on[barrel] or rod in self.parts:
-                continue
-            (base, start), (pivot, end) = self._end(barrel), self._end(bar)
-            seen = (pin[rod] - start) / slide.axis
-            if base != pivot and abs(seen.imag) < self.loop.near:
-                along = slide.axis * math.copysign(1.0, seen.real)
-                sign = 1.0 if (slide.bodies[1] == rod) == (seen.real > 0.0) else -1.0
-                number, geared = self._input('cylinder', slide, sign, abs(seen))
-                _, _, _, length, side = self._bars((base, start), (pivot, end), pin[rod],
-                                                   pin[bar]).split()
-                name = self._name(pin[bar], bar,
-                                  f'cylinder {base} {pivot} {length} {side}{geared}')
-                return self._place(barrel, Part(f'barrel{number}', base, along)) and self._place(
-                    rod, Part(f'cylinder{number}', name, along, slide, start)) and self._hang(
-                    bar, pivot, name)
+    def _cylinder(self, slide: Joint, barrel: str, rod: str, sign: float) -> bool:
+        if slide not in self.driven or slide.kind != SLIDE or not self.on[barrel] \
+                or {barrel, rod} & self.parts.keys():
+            return False
+        for bar, pin in self._rods(rod):
+            one, two = self._end(barrel), self._end(bar)
+            seen = (pin[rod] - one[1]) / slide.axis
+            if bar != barrel and one[0] != two[0] and abs(seen.imag) < self.loop.near:
+                way = math.copysign(1.0, seen.real)
+                number, geared = self._input('cylinder', slide, sign * way, abs(seen))
+                base, pivot, _, more = self._bars(one, two, pin[rod], pin[bar]).split(' ', 3)
+                name = self._name(pin[bar], bar, f'cylinder {base} {pivot} {more}{geared}')
+                return self._place(barrel, Part(f'barrel{number}', base, way * slide.axis)) \
+                    and self._place(rod, Part(
+                        f'cylinder{number}', name, way * slide.axis, slide, one[1])) \
+                    and self._hang(bar, pivot, name)
         return False
 
 
