@@ -271,7 +271,7 @@ class Drawing:
         return self._hang(body, centre, name, f'crank{number}')
 
     def _rods(self, body: str) -> Iterator[Tuple[str, Dict[str, complex]]]:
-        """Yield what hangs on a joint and has a pin with a body that is not placed, and the pin."""
+        """Yield what hangs on a joint and shares a pin with a body, and the pin, not placed."""
         return ((rod, pin) for pin in self._pins if body in pin for rod in pin
                 if rod != body and rod not in self.parts and self.on[rod]
                 and not self._known(rod, pin[rod]))

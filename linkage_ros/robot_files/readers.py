@@ -258,7 +258,7 @@ def _once(parts: Iterable[Tuple[str, Element]]) -> Dict[str, Element]:
     found: Dict[str, Element] = {}
     for name, part in parts:
         if found.setdefault(name, part) is not part:
-            raise RequestError(f'two elements {part.tag} are for {name!r}')
+            raise RequestError(f'there are two of <{part.tag}> for {name!r}, which may have one')
     return found
 
 
