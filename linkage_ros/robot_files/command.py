@@ -124,13 +124,14 @@ def _checked(robot: readers.Robot, drawing: Drawing, taken: Sequence[str]
             given[f'{name}.{drive.name}.sweep'] = [*sweep]
             given[start] = min(max(given[start], sweep[0]), sweep[1])
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
-    off = _apart(machine.linkage, drawing)
-    if not off <= drawing.allowed:
+    off, bent = _apart(machine.linkage, drawing), _bent(machine.linkage, drawing)
+    if not off <= drawing.allowed or not bent <= loop.near / loop.size:
         raise ValueError(f'{off:.2g} of its size away from the pose of the file, where it is '
                          'nearly stretched or folded')
     said = [f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.'] if drawing.left else []
     why = f', not to {loops.ROUNDING:g}, as the file itself leaves its loops open by ' \
-        f'{loop.gap:.0e} m, {loop.gap / loop.size:.0e} of its size' if off > loops.ROUNDING else ''
+        f'{loop.gap:.0e} m, {loop.gap / loop.size:.0e} of its size; closed, each body has its ' \
+        f'own lengths to {bent:.0e}' if off > loops.ROUNDING else ''
     said.append(f'Checked: {name} has the pose of the file to {off:.0e} of its size{why}.')
     told = {called.name for called in machine.joints.values() if called.published}
     told |= {joint.name for joint in drawing.driven}
@@ -169,6 +170,14 @@ def _apart(linkage: Mechanism, drawing: Drawing, *names: str) -> float:
     places = linkage.solve(_values(drawing))
     return float(np.max([abs(complex(*places[name]) - place) for name, place in drawing.places
                          if name in (names or places)])) / drawing.loop.size
+
+
+def _bent(linkage: Mechanism, drawing: Drawing) -> float:
+    """Return how far distances on one body are from those in the file, as a part of the size."""
+    places = linkage.solve(_values(drawing))
+    return max(abs(abs(complex(*(places[first] - places[second]))) - abs(start - end))
+               for on in drawing.on.values() for (first, start), (second, end) in combinations(
+                   on.items(), 2)) / drawing.loop.size
 
 
 def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
