@@ -198,12 +198,14 @@ class Drawing:
         return next((pin for pin in self.on[body].items() if pin[0] != name), None) or self._fixed(
             body, self.on[body][name] + self.loop.size * self.parts[body].along)
 
-    def _line(self, body: str, place: complex, axis: complex) -> Tuple[Pin, str, complex]:
+    def _line(self, body: str, place: complex, axis: complex, but: str = ''
+              ) -> Tuple[Pin, str, complex]:
         """Return a joint at a place on a body, another on a line through it, and which way."""
         origin, at = self._fixed(body, place)
-        name, end = next((pin for pin in self.on[body].items() if pin[0] != origin and abs(
-            ((pin[1] - at) / axis).imag) < ROUNDING * self.loop.size), None) or self._fixed(
-            body, at + self.loop.size * axis)
+        name, end = next(((name, end) for name, end in self.on[body].items()
+                          if name not in (origin, but)
+                          and abs(((end - at) / axis).imag) < ROUNDING * self.loop.size), None) \
+            or self._fixed(body, at + self.loop.size * axis)
         return (origin, at), name, (end - at) / abs(end - at)
 
     def _end(self, body: str) -> Pin:
@@ -313,7 +315,7 @@ class Drawing:
         for rod, pin in self._rods(block):
             (joint, at), length = self._end(rod), abs(pin[rod] - self._end(rod)[1])
             (origin, start), towards, along = self._line(
-                base, pin[block] - slide.axis * sign * (slide.position or 0.0), slide.axis)
+                base, pin[block] - slide.axis * sign * (slide.position or 0.0), slide.axis, joint)
             half = 'out' if ((pin[rod] - at) / along).real > 0.0 else 'in'
             number = self._number('slider')
             name = self._name(pin[rod], rod, f'slider {joint} {self._say(length)} {origin} '
