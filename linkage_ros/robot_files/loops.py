@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from cmath import phase
 from dataclasses import replace
 from typing import Dict, Iterator, List, NamedTuple, Sequence, Set, Tuple
 
@@ -17,6 +16,8 @@ from .readers import BALL, FIXED, HINGE, Joint, Robot, SLIDE
 ASKEW = 1e-4
 # Hinges nearer to each other [m] cross in a point; the ends of a loop [m] are in one plane.
 TOGETHER = 1e-6
+# Of the size of a linkage, what is rounding.
+ROUNDING = 1e-12
 
 
 class Loop(NamedTuple):
@@ -24,6 +25,7 @@ class Loop(NamedTuple):
     Joints of a linkage on a ground; its plane is `frame`, seen from the link `frame_id`.
 
     In the plane places are complex, and so are the axes of slides; that of a hinge is 1 or -1.
+    The file leaves a gap [m] in the loops; what is nearer than `near` [m] is at one place.
     """
 
     ground: str
@@ -31,7 +33,11 @@ class Loop(NamedTuple):
     frame: np.ndarray
     joints: List[Joint]
     size: float
-    gap: float = 0.0
+    gap: float
+
+    @property
+    def near(self) -> float:
+        return self.size * min(max(ROUNDING, 10.0 * self.gap / self.size), 1e-6)
 
 
 def groups(robot: Robot) -> Iterator[Tuple[str, str, List[Joint]]]:
@@ -118,9 +124,24 @@ def flat(robot: Robot, ground: str, frame_id: str, joints: Sequence[Joint],
         axis = seen[:3, :3] @ joint.axis
         found.append(replace(
             joint, places=(complex(*first[:2]), complex(*second[:2])),
-            axis=complex(*axis[:2]) if joint.kind == SLIDE else float(np.sign(axis[2]))))
+            axis=complex(*axis[:2]) / abs(complex(*axis[:2])) if joint.kind == SLIDE
+            else float(np.sign(axis[2]))))
     places = [place for joint in found for place in joint.places]
-    return Loop(ground, frame_id, frame, found, max(abs(a - b) for a in places for b in places))
+    size = max(abs(place - other) for place in places for other in places)
+    if not size:
+        raise ValueError('all its joints are at one place')
+    return Loop(ground, frame_id, frame, found, size, max(
+        _gap(robot, joint, size, joint.name in drives) for joint in found))
+
+
+def _gap(robot: Robot, joint: Joint, size: float, drives: bool) -> float:
+    """Return by how much [m] a joint is open, or not where the joint that it follows has it."""
+    slides, apart = joint.kind == SLIDE, joint.places[1] - joint.places[0]
+    if not drives:
+        return abs((apart / joint.axis).imag if slides else apart)
+    source, ratio, offset = robot.source(joint.name)
+    late = ratio * robot.positions[source] + offset - robot.positions[joint.name]
+    return max(abs(late) * (1.0 if slides else size), _gap(robot, joint, size, False))
 
 
 def _check_rods(ground: str, joints: Sequence[Joint]) -> None:
@@ -133,51 +154,3 @@ def _check_rods(ground: str, joints: Sequence[Joint]) -> None:
         own = [joint.bodies for joint in joints if body in joint.bodies]
         if body not in held and (len(own) != 2 or not all(held & {*ends} for ends in own)):
             raise ValueError(f'not planar: {body} hangs on balls alone, and is no rod')
-
-
-def closed(loop: Loop, held: Sequence[str]) -> Loop:
-    """Return the loops closed, by Newton's method, while the joints that drive them are held."""
-    where = {body: 3 * i for i, body in enumerate(dict.fromkeys(
-        body for joint in loop.joints for body in joint.bodies))}
-
-    def seen(at: np.ndarray, joint: Joint) -> Tuple[List[complex], List[complex], complex]:
-        """Return how the bodies of a joint have turned, its places, and how far it has moved."""
-        moved = [at[where[body]:][:3] for body in joint.bodies]
-        turns = [complex(np.exp(1j * turn)) for _, _, turn in moved]
-        places = [loop.size * complex(x, y) + turn * place
-                  for (x, y, _), turn, place in zip(moved, turns, joint.places)]
-        apart = places[1] - places[0]
-        if joint.kind == SLIDE:
-            apart = (apart / turns[0] - joint.places[1] + joint.places[0]) / joint.axis
-        return turns, places, apart
-
-    def misses(at: np.ndarray) -> np.ndarray:
-        found = list(at[where[loop.ground]:][:3])
-        for joint in loop.joints:
-            (first, second), _, apart = seen(at, joint)
-            free, angle = joint.name not in held, (second / first).imag
-            along, turn = (free, False) if joint.kind == SLIDE else (False, free)
-            found += [0.0 if along else apart.real / loop.size, apart.imag / loop.size,
-                      0.0 if turn else angle]
-        return np.array(found)
-
-    at = np.zeros(3 * len(where))
-    gap = loop.size * float(np.max(np.abs(misses(at))))
-    for _ in range(60):
-        slope = np.array([misses(at + step) - misses(at - step)
-                          for step in 1e-6 * np.eye(len(at))]).T / 2e-6
-        change = np.linalg.lstsq(slope, -misses(at), rcond=1e-9)[0]
-        at = at + change * min(1.0, 0.3 / max(np.max(np.abs(change)), 1e-300))
-        if np.max(np.abs(change)) < 1e-15:
-            break
-    if np.max(np.abs(misses(at))) > 1e-13:
-        raise ValueError(f'open by {gap:.3g} m in the pose of the file, and cannot be closed')
-    joints = []
-    for joint in loop.joints:
-        (first, second), places, apart = seen(at, joint)
-        moved, axis = joint.axis * phase(second / first), joint.axis
-        if joint.kind == SLIDE:
-            moved, axis = apart.real, axis * first
-        position = None if joint.position is None else joint.position + moved
-        joints.append(replace(joint, places=places, axis=axis, position=position))
-    return loop._replace(gap=gap, joints=joints)

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Dict, List, Mapping, Optional, Tuple
+from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
@@ -15,11 +15,14 @@ from ..command import RequestError
 
 HINGE, SLIDE, BALL, FIXED = 'hinge', 'slide', 'ball', 'fixed'
 KINDS = {'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE, 'spherical': BALL}
+# No robot has parts farther off [m], or limits [m or rad].
+FARTHEST = 1e9
+Element = ElementTree.Element
 
 
 @dataclass(eq=False)
 class Joint:
-    """What joins two bodies: its place on each, and its axis; a position where it can be named."""
+    """What joins two bodies: its place on each, its axis; with a name, position and limits."""
 
     name: str
     kind: str
@@ -27,6 +30,7 @@ class Joint:
     places: Any
     axis: Any
     position: Optional[float] = None
+    limits: Optional[Tuple[float, float]] = None
 
 
 @dataclass
@@ -41,17 +45,44 @@ class Robot:
 
     def join(self, name: str, kind: str, bodies: Tuple[str, str], frame: np.ndarray,
              axis: Any = (0.0, 0.0, 1.0), other: Optional[np.ndarray] = None,
-             position: Optional[float] = None) -> None:
+             position: Optional[float] = None, limits: Sequence[Any] = ('', '')) -> None:
         """Add a joint by its frame on the parent, and on the child where that is another."""
         for body in bodies:
             if body not in self.frames:
                 raise RequestError(f'joint {name} is on {body!r}, which is no link')
+        if position is not None and name in self.positions:
+            raise RequestError(f'two joints are called {name!r}')
         kind, size = KINDS.get(kind, kind), np.linalg.norm(axis)
+        places = frame[:3, 3], (frame if other is None else other)[:3, 3]
+        if not np.all(np.abs((*places, axis)) < FARTHEST):
+            raise RequestError(f'joint {name} must be within {FARTHEST:g} m')
         if kind in (HINGE, SLIDE) and not size > 0.0:
             raise RequestError(f'the axis of joint {name} has no length')
-        places = frame[:3, 3], (frame if other is None else other)[:3, 3]
-        self.joints.append(Joint(name, kind, bodies, places, frame[:3, :3] @ axis / (size or 1.0),
-                                 position))
+        low, high = (float(str(limit) or 'nan') for limit in limits)
+        self.joints.append(Joint(
+            name, kind, bodies, places, frame[:3, :3] @ axis / (size or 1.0), position,
+            (low, high) if -FARTHEST < low < high < FARTHEST else None))
+
+    def follow(self, name: str, other: str, ratio: float, offset: float) -> None:
+        """Have a joint be a multiple of another, plus an offset."""
+        if ratio:
+            self.follows[name] = other, float(ratio), float(offset)
+
+    @property
+    def positions(self) -> Dict[str, float]:
+        """The positions of all joints that have a name."""
+        return {joint.name: joint.position for joint in self.joints if joint.position is not None}
+
+    def source(self, name: str) -> Tuple[str, float, float]:
+        """Return the joint that another follows, if not itself, its ratio and its offset."""
+        ratio, offset, passed = 1.0, 0.0, [*self.driven]
+        while name in self.follows and name not in passed:
+            passed.append(name)
+            name, factor, start = self.follows[name]
+            ratio, offset = ratio * factor, offset + ratio * start
+        if name not in self.positions:
+            raise ValueError(f'{passed[-1]} follows {name!r}, which is no joint')
+        return name, ratio, offset
 
 
 def read(path: str, loops: Optional[str] = None) -> Robot:
@@ -67,15 +98,19 @@ def read(path: str, loops: Optional[str] = None) -> Robot:
         return _mjcf(path) if root.tag == 'mujoco' else _sdf(root)
     except ElementTree.ParseError as error:
         raise RequestError(f'{path} is no XML: {error}') from None
-    except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
-        raise RequestError(f'{path} cannot be read: {type(error).__name__}: {error}') from None
+    except RecursionError:
+        raise RequestError(f'{path} has links or frames that hang on themselves') from None
+    except LookupError as error:
+        raise RequestError(f'{path} names {error}, which is not there') from None
+    except (ValueError, TypeError, AttributeError) as error:
+        raise RequestError(f'{path} cannot be read: {error}') from None
 
 
 def _loops(path: str) -> Mapping[str, Any]:
     import yaml
 
     try:
-        with open(path) as file:
+        with open(path, encoding='utf-8') as file:
             found = yaml.safe_load(file)
     except yaml.YAMLError as error:
         raise RequestError(f'{path} is no YAML: {error}') from None
@@ -87,6 +122,8 @@ def _loops(path: str) -> Mapping[str, Any]:
 def _mjcf(path: str) -> Robot:
     import mujoco as mj
 
+    # What it warns of, and writes to a file, is dynamics.
+    mj.set_mju_user_warning(lambda text: None)
     model = mj.MjModel.from_xml_path(path)
     data = mj.MjData(model)
     data.qpos[:] = model.key_qpos[0] if model.nkey else model.qpos0
@@ -107,22 +144,25 @@ def _mjcf(path: str) -> Robot:
             kind = mj.mjtJoint(model.jnt_type[j]).name[6:].lower()
             one = kind in (HINGE, SLIDE)
             robot.join(names[j], kind, (above, below), _frame(data.xanchor[j]),
-                       data.xaxis[j] if one else (0.0, 0.0, 1.0),
-                       position=float(data.qpos[model.jnt_qposadr[j]]) if one else None)
+                       data.xaxis[j] if one else (0.0, 0.0, 1.0), None,
+                       float(data.qpos[model.jnt_qposadr[j]]) if one else None,
+                       model.jnt_range[j].tolist() if model.jnt_limited[j] else ('', ''))
             above = below
-    for i in range(model.neq):
+    for i in np.flatnonzero(model.eq_active0).tolist():
         kind, given = mj.mjtEq(model.eq_type[i]).name[5:].lower(), model.eq_data[i]
         ends, places = [model.eq_obj1id[i], model.eq_obj2id[i]], [given[:3], given[3:6]]
         if kind == 'joint' and ends[1] >= 0 and not given[2:5].any():
-            robot.follows[names[ends[0]]] = names[ends[1]], float(given[1]), float(given[0])
-        if kind not in ('connect', 'weld') or not model.eq_active0[i]:
-            continue
-        if mj.mjtObj(model.eq_objtype[i]) == mj.mjtObj.mjOBJ_SITE:
-            ends, places = model.site_bodyid[ends], model.site_pos[ends]
-        first, second = (bodies[end] for end in ends)
-        robot.join(model.equality(i).name or f'equality{i}', BALL if kind == 'connect' else FIXED,
-                   (first, second), robot.frames[first] @ _frame(places[0]),
-                   other=robot.frames[second] @ _frame(places[1]))
+            one, other = model.qpos0[model.jnt_qposadr[ends]]
+            robot.follow(names[ends[0]], names[ends[1]], given[1],
+                         given[0] + one - given[1] * other)
+        if kind in ('connect', 'weld'):
+            if mj.mjtObj(model.eq_objtype[i]) == mj.mjtObj.mjOBJ_SITE:
+                ends, places = model.site_bodyid[ends], model.site_pos[ends]
+            first, second = (bodies[end] for end in ends)
+            robot.join(model.equality(i).name or f'equality{i}',
+                       BALL if kind == 'connect' else FIXED, (first, second),
+                       robot.frames[first] @ _frame(places[0]),
+                       other=robot.frames[second] @ _frame(places[1]))
     for way, target in zip(model.actuator_trntype, model.actuator_trnid[:, 0]):
         kind = mj.mjtTrn(way).name[6:].lower()
         wraps = model.tendon_adr[target] + np.arange(model.tendon_num[target]) \
@@ -133,29 +173,26 @@ def _mjcf(path: str) -> Robot:
     return robot
 
 
-def _sdf(root: ElementTree.Element) -> Robot:
+def _sdf(root: Element) -> Robot:
     model = next((model for model in root.iter('model') if model.find('joint') is not None), None)
     if model is None:
         raise RequestError('the SDF has no model with joints')
     if model.find('model') is not None or model.find('include') is not None:
         raise RequestError(f'model {model.get("name")} has models in it, which are not read')
-    parts = {str(part.get('name')): part for part in model if part.tag in ('link', 'joint',
-                                                                           'frame')}
+    parts = _once((part.get('name', ''), part) for part in model
+                  if part.tag in ('link', 'joint', 'frame'))
 
-    def frame(name: Optional[str]) -> np.ndarray:
-        if name in (None, '', 'world', '__model__'):
+    def above(name: str) -> str:
+        return parts[name].get('attached_to') or _text(parts[name], 'child')
+
+    def frame(name: str) -> np.ndarray:
+        if name in ('', 'world', '__model__'):
             return np.eye(4)
-        part = parts[str(name)]
-        pose = part.find('pose')
-        base = pose.get('relative_to') if pose is not None else None
-        return frame(base or part.get('attached_to') or _text(part, 'child')) @ _pose(
-            _text(part, 'pose', '0 0 0 0 0 0'))
+        base = _attribute(parts[name], 'pose', 'relative_to') or above(name)
+        return frame(base) @ _pose(_text(parts[name], 'pose', '0 0 0 0 0 0'))
 
     def body(name: str) -> str:
-        part = parts.get(name)
-        if part is None or part.tag == 'link':
-            return name
-        return body(part.get('attached_to') or _text(part, 'child'))
+        return name if name not in parts or parts[name].tag == 'link' else body(above(name))
 
     joints = {name: (body(_text(part, 'parent')), body(_text(part, 'child')))
               for name, part in parts.items() if part.tag == 'joint'}
@@ -164,75 +201,89 @@ def _sdf(root: ElementTree.Element) -> Robot:
     bodies = ['world'] * ('world' in parents) + sorted(links, key=children.__contains__)
     robot = Robot(bodies[0], {name: frame(name) for name in bodies})
     for name, ends in joints.items():
-        seen, turned = parts[name].find('axis/xyz'), frame(name)
-        axis = _numbers(_text(parts[name], 'axis/xyz', '0 0 1'))
-        if seen is not None and seen.get('expressed_in'):
-            axis = turned[:3, :3].T @ frame(seen.get('expressed_in'))[:3, :3] @ axis
-        robot.join(name, str(parts[name].get('type')), ends, turned, axis, position=0.0)
+        turned, part = frame(name), parts[name]
+        axis = _numbers(_text(part, 'axis/xyz', '0 0 1'))
+        if seen := _attribute(part, 'axis/xyz', 'expressed_in'):
+            axis = turned[:3, :3].T @ frame(seen)[:3, :3] @ axis
+        robot.join(name, part.get('type', ''), ends, turned, axis, None, 0.0,
+                   [_text(part, f'axis/limit/{end}') for end in ('lower', 'upper')])
     robot.driven = [str(name.text).strip() for name in model.findall('plugin/joint_name')]
     return robot
 
 
-def _urdf(root: ElementTree.Element, loops: Mapping[str, Any]) -> Robot:
-    links = [str(link.get('name')) for link in root.findall('link')]
-    joints = {_attribute(joint, 'child', 'link'): joint for joint in root.findall('joint')}
+def _urdf(root: Element, loops: Mapping[str, Any]) -> Robot:
+    links = _once((link.get('name', ''), link) for link in root.findall('link'))
+    joints = _once((_attribute(joint, 'child', 'link'), joint) for joint in root.findall('joint'))
 
     def frame(link: str) -> np.ndarray:
         joint = joints.get(link)
         return np.eye(4) if joint is None else (
             frame(_attribute(joint, 'parent', 'link')) @ _origin(joint, 'origin'))
 
-    top, *others = [link for link in links if link not in joints] or ['']
-    if others or not top:
-        raise RequestError(f'a URDF has one root link, not {len(others) + bool(top)}')
-    robot = Robot(top, {link: frame(link) for link in links})
+    tops = [link for link in links if link not in joints]
+    if len(tops) != 1:
+        raise RequestError(f'a URDF has one root link, not {len(tops)}')
+    robot = Robot(tops[0], {link: frame(link) for link in links})
     for child, joint in joints.items():
-        name = str(joint.get('name'))
-        ends = _attribute(joint, 'parent', 'link'), child
-        robot.join(name, str(joint.get('type')), ends, frame(child),
-                   _numbers(_attribute(joint, 'axis', 'xyz', '1 0 0')), position=0.0)
-        if master := _attribute(joint, 'mimic', 'joint'):
-            robot.follows[name] = (master, float(_attribute(joint, 'mimic', 'multiplier', '1')),
-                                   float(_attribute(joint, 'mimic', 'offset', '0')))
+        name, mimic = joint.get('name', ''), joint.find('mimic')
+        robot.join(name, joint.get('type', ''), (_attribute(joint, 'parent', 'link'), child),
+                   frame(child), _numbers(_attribute(joint, 'axis', 'xyz', '1 0 0')), None, 0.0,
+                   [_attribute(joint, 'limit', end) for end in ('lower', 'upper')])
+        if mimic is not None:
+            ratio, start = _numbers(f'{mimic.get("multiplier", 1)} {mimic.get("offset", 0)}', 2)
+            robot.follow(name, mimic.get('joint', ''), ratio, start)
     for cut in (*root.findall('constraint'), *root.findall('loop_joint')):
         ends = _attribute(cut, 'parent', 'link'), _attribute(cut, 'child', 'link')
         first, second = (robot.frames[end] @ _origin(cut, f'{tag}_origin')
                          for end, tag in zip(ends, ('parent', 'child')))
-        axis = _attribute(cut, 'parent_axis', 'xyz', _attribute(cut, 'axis', 'xyz', '0 0 1'))
-        robot.join(str(cut.get('name')), str(cut.get('type')), ends, first, _numbers(axis), second)
+        axis = _numbers(_attribute(cut, 'parent_axis', 'xyz',
+                                   _attribute(cut, 'axis', 'xyz', '0 0 1')))
+        robot.join(cut.get('name', ''), cut.get('type', ''), ends, first, axis, second)
     for i, cut in enumerate(loops.get('closures', ())):
-        robot.join(f'closures[{i}]', HINGE, (cut['link_a'], cut['link_b']), _frame(cut['point']),
-                   cut['axis'])
+        point, axis = (_numbers(' '.join(map(str, cut[key]))) for key in ('point', 'axis'))
+        robot.join(f'closures[{i}]', HINGE, (cut['link_a'], cut['link_b']), _frame(point), axis)
     for (first, second), kind in zip(loops.get('closed_loop', ()), loops.get('type', ())):
         robot.join(f'{first}={second}', FIXED if str(kind).lower() == '6d' else BALL,
                    (first, second), robot.frames.get(first, np.eye(4)),
                    other=robot.frames.get(second))
     robot.driven = [*loops.get('independent', ()), *loops.get('name_mot', ()), *(
-        str(joint.get('name')) for joint in (
+        joint.get('name', '') for joint in (
             *root.findall('transmission/joint'),
             *root.findall('ros2_control/joint[command_interface]')))]
     return robot
 
 
-def _attribute(part: ElementTree.Element, tag: str, key: str, otherwise: str = '') -> str:
+def _once(parts: Iterable[Tuple[str, Element]]) -> Dict[str, Element]:
+    """Return parts by name; raise RequestError if two have one name, or one child."""
+    found: Dict[str, Element] = {}
+    for name, part in parts:
+        if found.setdefault(name, part) is not part:
+            raise RequestError(f'there are two of <{part.tag}> for {name!r}, which may have one')
+    return found
+
+
+def _attribute(part: Element, tag: str, key: str, otherwise: str = '') -> str:
     found = part.find(tag)
     return otherwise if found is None else found.get(key, otherwise)
 
 
-def _text(part: ElementTree.Element, tag: str, otherwise: str = '') -> str:
+def _text(part: Element, tag: str, otherwise: str = '') -> str:
     return (part.findtext(tag) or otherwise).strip()
 
 
-def _numbers(text: str) -> np.ndarray:
-    return np.array(text.split(), float)
+def _numbers(text: str, count: int = 3) -> np.ndarray:
+    found = np.array(text.split(), float)
+    if len(found) != count or not np.all(np.abs(found) < FARTHEST):
+        raise ValueError(f'{text!r} must be {count} numbers within {FARTHEST:g}')
+    return found
 
 
-def _origin(part: ElementTree.Element, tag: str) -> np.ndarray:
+def _origin(part: Element, tag: str) -> np.ndarray:
     return _pose(' '.join(_attribute(part, tag, key, '0 0 0') for key in ('xyz', 'rpy')))
 
 
 def _pose(text: str) -> np.ndarray:
-    x, y, z, roll, pitch, yaw = _numbers(text)
+    x, y, z, roll, pitch, yaw = _numbers(text, 6)
     (cr, cp, cy), (sr, sp, sy) = np.cos((roll, pitch, yaw)), np.sin((roll, pitch, yaw))
     about_z, about_y, about_x = np.array([
         [[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]], [[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]],
