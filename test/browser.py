@@ -125,6 +125,13 @@ class Browser:
         await self._do('Page.navigate', url=url)
         await until(lambda: self.value('document.readyState === "complete"'), url)
 
+    async def resize(self, width: int, height: int, scheme: str):
+        """Look as a screen of this size [pixels] does that prefers light or dark."""
+        await self._do('Emulation.setDeviceMetricsOverride', width=width, height=height,
+                       deviceScaleFactor=1, mobile=width < 600)
+        await self._do('Emulation.setEmulatedMedia', features=[
+            {'name': 'prefers-color-scheme', 'value': scheme}])
+
     async def value(self, expression: str):
         """Return the value of an expression in the page; wait for it if it is a promise."""
         said = await self._do('Runtime.evaluate', expression=expression, awaitPromise=True,

@@ -36,6 +36,7 @@ from linkage_ros.nodes import message_layout, messages  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
+from linkage_ros.scene.writing import without_defaults  # noqa: E402
 from linkage_ros.web import feed, scene_view, server  # noqa: E402
 from linkage_ros.web.feed import Feed  # noqa: E402
 from linkage_ros.web.scene_view import LATCHED  # noqa: E402
@@ -1574,6 +1575,29 @@ def test_a_bar_and_its_slider_light_up_and_changes_are_undone_and_saved(show, lo
         await seen.page.click(button('Reset'))
         await browser.until(lambda: value('h') == 65.7)
         await browser.until(lambda: seen.page.value(f'{button("Reset")}.disabled'))
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
+@pytest.mark.parametrize('path', sorted((ROOT / 'config').glob('*.yaml')), ids=lambda p: p.stem)
+def test_the_page_is_for_everybody(show, looked_at, path):
+    checker = pytest.importorskip('axe_core_python')
+    axe = (Path(checker.__file__).parent / 'axe.min.js').read_text('utf-8')
+    # A picture now and then leaves the browser time to look through the page.
+    running = show({**without_defaults(scene.load(str(path))), 'rate': 5.0})
+
+    async def doing(seen):
+        for width, height, scheme in ((1200, 900, 'light'), (390, 844, 'dark')):
+            await seen.page.resize(width, height, scheme)
+            await browser.until(lambda: seen.page.value(
+                '!!document.querySelector("section tbody tr")'))
+            assert await seen.page.value('document.documentElement.scrollWidth') <= width
+            found = json.loads(await seen.page.value(
+                f'(() => {{ {axe} }})(), axe.run().then(found => JSON.stringify('
+                'found.violations.map(v => [v.id, ...v.nodes.map(node => node.html)])))'))
+            assert found == []
 
     looked_at(running, doing)
 
