@@ -62,6 +62,7 @@ def test_the_catalogue_is_right_to_the_last_digits(kind, dimensions, branches, n
     check(measure(mechanism, awkward(mechanism, np.random.default_rng(1), 3, near)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('kind', KINDS)
 def test_random_and_degenerate_dimensions_are_right_too(kind):
     rows = []
@@ -70,6 +71,7 @@ def test_random_and_degenerate_dimensions_are_right_too(kind):
     check(rows)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('kind', KINDS)
 def test_velocities_and_joint_rates_are_right(kind):
     rows = []
@@ -114,6 +116,7 @@ def test_any_inversor_at_any_angle_is_right(theta, r, a, b):
     check(measure(mechanisms.create('peaucellier', r=r, a=a, b=b), [theta]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize('size', [1e-150, 1e150])
 def test_lengths_of_any_size_are_right(kind, size):

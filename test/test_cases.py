@@ -42,6 +42,7 @@ def in_digits(place):
     return mpc(*map(float, place))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('name', CASES)
 def test_a_case_keeps_every_length_to_the_last_digits(name):
     case, linkage, path = CASES[name], made(name), poses(name).tolist()
@@ -323,6 +324,7 @@ GEARED = ('O ground 0 0', 'Q ground g 0', 'A crank O a', 'B crank Q b geared cra
           'P dyad A B e f left')
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('ratio', ['1/2', '1/3', '-1.7', '2', '-2', '3', '0'])
 def test_the_reach_of_geared_cranks_is_that_of_one_turn_of_the_first(ratio):
     rng = np.random.default_rng(len(ratio))

@@ -53,6 +53,7 @@ def test_the_catalogue_is_what_is_in_its_folder_the_first_four_in_front():
     assert list(mechanisms.TYPES) == [*mechanisms.CATALOGUE, *others]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('text, said', [
     ('', "module 'linkage_ros.mechanisms.broken' has no attribute 'DESIGN'"),
     ('DESIGN = Design()', "name 'Design' is not defined"),

@@ -195,6 +195,7 @@ def followed(seeds):
     return count
 
 
+@pytest.mark.long
 def test_outputs_of_random_linkages_are_followed_all_through_the_reach():
     assert followed(range(8)) > 1000
 

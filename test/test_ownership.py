@@ -192,6 +192,7 @@ def test_announcements_that_make_no_sense_are_passed_over(graph, warned):
     assert all(len(text) < 2000 for text in warned)
 
 
+@pytest.mark.long
 def test_a_second_node_of_the_same_name_is_noticed_once(graph, warned):
     graph.start(CrankDriver, LEVER)
     graph.start(CrankDriver, LEVER, namespace='other')

@@ -141,6 +141,7 @@ UNPUBLISHABLE = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('given, bad, named', UNPUBLISHABLE.values(), ids=UNPUBLISHABLE)
 def test_what_cannot_be_published_is_refused_and_what_was_there_goes_on(graph, given, bad, named):
     node = graph.start(Kinematics, {'mechanisms': ['jansen'], **given})

@@ -489,6 +489,7 @@ def check_random_robots(seeds):
 
 
 # Slots and cylinders on one pair of joints; gears of gears; crossed bars on a block.
+@pytest.mark.long
 def test_random_linkages_come_back_from_robots():
     check_random_robots([79, 84, 129, 179, 191, 301, 361, 531, 616, 643, 681, *range(20)])
 

@@ -61,6 +61,7 @@ def node(request, graph):
     return graph.start(kind, SCENES[scene])
 
 
+@pytest.mark.long
 def test_every_number_has_a_meaning_a_unit_and_a_range_with_whole_stops(node):
     found = list(numbers(node))
     assert len(found) > 20

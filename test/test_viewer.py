@@ -733,6 +733,7 @@ def test_a_client_that_does_not_read_is_sent_home(show, monkeypatch, last):
         assert not deaf.flood(FLOODS['answers'] + last, 10.0)
 
 
+@pytest.mark.long
 def test_a_client_that_does_not_read_does_not_keep_the_viewer_from_ending(show):
     running = show(LEG)
     with Deaf(running.viewer.url) as deaf:
