@@ -9,6 +9,7 @@ What the nodes cost, next to what any node costs, in the same run.
     python -m benchmark.nodes --soak      memory over a million messages
     python -m benchmark.nodes --hold      a minute at 1000 Hz
     python -m benchmark.nodes --processes a scene in one process, and in three
+    python -m benchmark.nodes --stream    commands for actuators
     python -m benchmark.nodes --trouble   ten minutes of changes, bad bytes and stalled listeners
 
 Results go to benchmark/results/nodes.json, each mode into its own part; the tables are printed,
@@ -60,6 +61,7 @@ def arguments():
     mode.add_argument('--hold', type=float, nargs='?', const=60.0, metavar='SECONDS')
     mode.add_argument('--trouble', type=float, nargs='?', const=600.0, metavar='SECONDS')
     mode.add_argument('--processes', action='store_true', help='one process against three')
+    mode.add_argument('--stream', action='store_true', help='commands for actuators')
     mode.add_argument('--tables', action='store_true', help='run nothing, show the last results')
     parser.add_argument('--document', action='store_true', help='write the tables to docs/')
     parser.add_argument('--rounds', type=int, help='bursts of each subject')
@@ -71,7 +73,7 @@ def run(options):
     """Return the parts of the result that were asked for."""
     from benchmark.machine import machine
 
-    from . import campaign, driving, long, processes, scenes
+    from . import campaign, driving, long, processes, scenes, stream
 
     started = time.time()
     driver = driving.Driver()
@@ -85,6 +87,8 @@ def run(options):
                 return {'hold': long.hold(bench, 1000.0, options.hold)}
             if options.trouble:
                 return {'trouble': long.trouble(bench, options.trouble)}
+            if options.stream:
+                return {'stream': stream.compare(bench, campaign.RATES)}
             if options.processes:
                 return {'processes': [row for scene in scenes.SCENES for rate in (50.0, 200.0)
                                       for row in processes.compare(bench, scene, rate)]}

@@ -32,6 +32,8 @@ def document(result):
             '### Service', services(result['services'])]
     if 'processes' in result:
         parts += ['### One process or three', processes(result['processes'])]
+    if 'stream' in result:
+        parts += ['### Commands', stream(result['stream'])]
     if {'soak', 'hold', 'trouble'} & result.keys():
         parts += ['### At length', long(result)]
     return '\n\n'.join(parts) + '\n'
@@ -201,6 +203,16 @@ def processes(rows):
             'the start to the first joint states of all.\n\n' + table(
                 ['scene', 'Hz', 'CPU of three', 'of one', 'ratio', 'memory of three', 'of one',
                  'ratio', 'start of three', 'of one', 'ratio'], lines))
+
+
+def stream(rows):
+    """Return what commands cost."""
+    lines = [[own['wanted'], f'{own["rate"]:.0f}', f'{statistics.median(own["cpus"]):.0f}',
+              f'{in_turn(own["cpus"], floor["cpus"]):.2f}']
+             for own, floor in zip(rows[::2], rows[1::2])]
+    return ('`servo_inverse` turns `wanted_states` into `servo_commands`: CPU time of the process '
+            '[us a command], and as a ratio to a bare node that sends as many ready bytes.\n\n'
+            + table(['wanted', 'Hz', 'CPU', 'x floor'], lines))
 
 
 def long(result):
