@@ -384,6 +384,24 @@ def test_a_year_of_swinging_loses_nothing():
             assert velocity == (speed if phase < width else -speed)
 
 
+@pytest.mark.parametrize('ratio, period', [
+    ('1.5', 2), ('-2', 1), ('1/3', 3), ('7/12', 12), ('sqrt(2)', 985)])
+def test_a_crank_that_is_geared_by_a_fraction_turns_on_until_all_comes_round(ratio, period):
+    machine = scene.read({'mechanisms': ['gears'], 'gears.type': 'custom', 'gears.joints': [
+        'O ground 0 0', 'Q ground 3 0', 'A crank O 1',
+        f'B crank Q 1 geared crank {ratio} 0']}).machines['gears']
+    drive = machine.first
+    assert drive.period == period
+    motion, exact = Motion.of(drive), eval(ratio, {'sqrt': math.sqrt})
+    for turns in (0.5, 1.5, period - 0.25, period + 0.25):
+        angle, _ = motion.at(round(turns * math.tau * 1e9))
+        assert 0.0 <= angle < period * math.tau
+        tip = machine.linkage.solve(angle)['B'] - (3.0, 0.0)
+        wanted = exact * turns * math.tau
+        slack = 1e-7 if period < 900 or turns < period else 1e-2
+        assert tip == pytest.approx([math.cos(wanted), math.sin(wanted)], abs=slack)
+
+
 def test_an_angle_is_in_a_turn_or_in_the_sweep():
     generator = np.random.default_rng(0)
     turning = [Motion(1e-9, None, start) for start in (0.0, math.tau, -1e-17, 7.0)]

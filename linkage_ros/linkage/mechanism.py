@@ -5,8 +5,10 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from functools import cached_property
 from importlib.util import find_spec
+import math
 from types import MappingProxyType
 from typing import Any, Callable, List, Mapping, Optional, Sequence, Tuple, Union
 
@@ -27,6 +29,7 @@ from ..words import listed, quoted
 # Lengths beyond these are counted in a power of two of their own, which changes no bit of a
 # result and keeps squares and products of lengths inside the range of float64.
 SMALL, LARGE = 1e-30, 1e30
+MOST_TURNS = 1000
 
 # One input, or a sequence of several; each a number or an array [rad or m].
 Inputs = Union[ArrayLike, Sequence[ArrayLike]]
@@ -241,6 +244,20 @@ class Mechanism:
                     by: int = 0) -> dict:
         """Differentiate the joint angles by one of the inputs; see `joint_angles`."""
         return self._scalars('rates', theta, joints, by)
+
+    def period(self, by: int = 0) -> int:
+        """
+        Return after how many turns of an input the pose is the same.
+
+        That is more than one where the input drives others by gears of fractions; a ratio that is
+        none with a denominator up to MOST_TURNS is taken for the nearest that is.
+        """
+        if not self.geared or not self.inputs[by].turns:
+            return 1
+        rates = self.joint_rates([0.0] * len(self.inputs) if len(self.inputs) > 1 else 0.0,
+                                 self.geared, by)
+        return math.lcm(*(Fraction(float(rate)).limit_denominator(MOST_TURNS).denominator
+                          for rate in rates.values() if rate == rate))
 
     def reach(self, *others: float) -> list:
         """

@@ -10,7 +10,6 @@ nanoseconds, so nothing is lost however long an input moves: the only rounding i
 
 from __future__ import annotations
 
-import math
 from typing import Optional, Tuple
 
 from . import Drive
@@ -43,38 +42,40 @@ class Motion:
         Time [ns].
     turns : bool
         Whether it is the same a turn later.
+    period : int
+        After how many turns it begins again, where it turns all round.
 
     """
 
     def __init__(self, speed: float, sweep: Optional[Arc] = None, start: float = 0.0,
-                 since: int = 0, turns: bool = True):
+                 since: int = 0, turns: bool = True, period: int = 1):
         self._speed = speed
         self._rate = _steps(speed, per=10 ** 9)
         self._sweep = sweep
-        self._turns = turns
-        self._low, high = (0, TURN) if sweep is None else map(_steps, sweep)
+        self._turns, self._round = turns, period * TURN
+        self._low, high = (0, self._round) if sweep is None else map(_steps, sweep)
         self._width = high - self._low
-        self._period = TURN if sweep is None else 2 * self._width
+        self._period = self._round if sweep is None else 2 * self._width
         self._phase = self._place(_steps(start))
         self._since = since
 
     def at(self, now: int) -> Tuple[float, float]:
-        """Return the value, an angle in [0, 2 pi) or what is in the sweep, and its speed."""
+        """Return the value, an angle from 0 to its period or in the sweep, and its speed."""
         travelled, ahead = self._fold(self._phase_at(now))
         angle = (self._low + travelled) / STEPS
-        if self._sweep is None and angle >= math.tau:
-            # What is just below a turn may round up to it.
+        if self._sweep is None and angle >= self._round / STEPS:
+            # What is just below the period may round up to it.
             angle = 0.0
         return angle, self._speed if ahead else -self._speed or 0.0
 
     @classmethod
     def of(cls, drive: Drive, since: int = 0) -> Motion:
         """Return how an input moves from its start."""
-        return cls(drive.speed, drive.sweep, drive.start, since, drive.input.turns)
+        return cls(drive.speed, drive.sweep, drive.start, since, drive.input.turns, drive.period)
 
     def changed(self, speed: float, sweep: Optional[Arc], now: int) -> Motion:
         """Return the motion that takes over from this one at a time [ns], without a jump."""
-        taken = Motion(speed, sweep, since=now, turns=self._turns)
+        taken = Motion(speed, sweep, since=now, turns=self._turns, period=self._round // TURN)
         phase = self._phase_at(now)
         if sweep == self._sweep:
             taken._phase = phase
@@ -101,7 +102,7 @@ class Motion:
     def _place(self, angle: int) -> int:
         """Return the phase of an angle, on the way up."""
         if self._sweep is None:
-            return angle % TURN
+            return angle % self._round
         half = self._width // 2
         if self._turns and not 0 <= angle - self._low <= self._width:
             angle = (angle - self._low - half + TURN // 2) % TURN - TURN // 2 + self._low + half
