@@ -115,7 +115,7 @@ def typeset(text: str) -> str:
 
 def use(type_: str) -> str:
     """Return what a mechanism is for and who built it, where that is written down."""
-    return '**For:** {} **Built by:** {}\n'.format(*USES[type_]) if type_ in USES else ''
+    return '**For:** {}<br>\n**Built by:** {}\n'.format(*USES[type_]) if type_ in USES else ''
 
 
 def index() -> str:

@@ -31,7 +31,7 @@ html_theme = 'furo'
 html_title = 'linkage_ros'
 html_show_sphinx = False
 html_static_path = ['_static']
-html_css_files = ['pictures.css']
+html_css_files = ['page.css']
 
 
 def setup(app):

@@ -6,9 +6,8 @@
 import doctest
 import math
 from pathlib import Path
-import re
 
-from linkage_ros import mechanisms, scene
+from linkage_ros import mechanisms
 import numpy as np
 import pytest
 from truth import hard_cases

@@ -56,12 +56,12 @@ def test_every_link_inside_the_repository_leads_somewhere(page):
 
 
 COMMAND = re.compile(
-    r'^ *(?:\$ )?((?:timeout \d+ )?(?:ros2|python3?|make|pip|colcon|rosdep|apt|sudo|source|rviz2|git|cd'
-    r'|cc|sed|\./\w+)\b [^=\n].*)', re.MULTILINE)
+    r'^ *(?:\$ )?((?:timeout \d+ )?(?:ros2|python3?|make|pip|colcon|rosdep|apt|sudo|source|rviz2'
+    r'|git|cd|cc|sed|\./\w+)\b [^=\n].*)', re.MULTILINE)
 # Programs of others: what is asked of them cannot be looked up here.
 FOREIGN = {'pip', 'colcon', 'rosdep', 'sudo', 'source', 'rviz2', 'git', 'cd', 'cc', 'sed', 'apt',
            './jaw'}
-OTHERS = {'robot_state_publisher', 'rqt_reconfigure'}
+OTHERS = {'robot_state_publisher', 'rqt_reconfigure', 'ros_gz_sim'}
 
 
 def typed():
@@ -69,7 +69,7 @@ def typed():
     for page in PAGES:
         fenced = '\n'.join(blocks(page, 'console'))
         indented = '\n'.join(re.findall(r'^    .*', FENCE.sub('', page.read_text()), re.MULTILINE))
-        for line in COMMAND.findall(f'{fenced}\n{indented}'):
+        for line in COMMAND.findall(re.sub(r'\\\n *', ' ', f'{fenced}\n{indented}')):
             words = shlex.split(line.partition(' #')[0].partition(' > ')[0])
             yield page, words[2:] if words[0] == 'timeout' else words
 
@@ -83,8 +83,7 @@ def test_what_a_page_says_to_type_is_there():
             case ['make', *rest]:
                 assert {word for word in rest if '=' not in word} <= targets, (page, words)
             case ['ros2', 'run', package, executable, *_]:
-                mine = executables if package == 'linkage_ros' else OTHERS
-                assert executable in mine, (page, words)
+                assert package in OTHERS or executable in executables, (page, words)
             case ['ros2', 'launch', 'linkage_ros', file, *rest]:
                 assert file in launched, (page, words)
                 sources = ''.join(f.read_text() for f in ROOT.glob('*/*.launch.py'))
@@ -204,6 +203,18 @@ def test_the_page_of_a_mechanism_has_all_of_it(catalogue, type_):
     for line in mechanisms.design(type_).joints:
         assert line.split(maxsplit=1)[1].split()[-1] in page
     exec(compile(re.findall(r'```python\n(.*?)```', page, re.DOTALL)[0], type_, 'exec'), {})
+
+
+def test_what_a_scene_costs_is_what_was_measured():
+    head, _, tables = (ROOT / 'docs' / 'performance.md').read_text().partition('<!-- measured -->')
+    cpu = {(scene_, node, int(rate)): int(us) * int(rate) / 1e4 for scene_, rate, node, us
+           in re.findall(r'^\| ([\w ]+) \| (\d+) \| (kin[^|]*) \| (\d+) \|', tables, re.MULTILINE)}
+    rows = re.findall(r'^\| ([\w ]+)(, nobody listens)? \| (.*) % \| (.*) % \| (.*) % \|$', head,
+                      re.MULTILINE)
+    assert len(rows) == 4
+    for scene_, alone, *shares in rows:
+        node = 'kinematics, no subscriber (d)' if alone else 'kinematics'
+        assert shares == [f'{cpu[scene_, node, rate]:.2g}' for rate in (50, 200, 1000)]
 
 
 def test_the_table_of_engines_is_that_of_the_last_run(monkeypatch):

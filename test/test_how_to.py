@@ -35,7 +35,7 @@ from std_msgs.msg import Float64MultiArray  # noqa: E402
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / 'docs'
 # Pages that are followed step by step.
-FOLLOWED = ['first-ten-minutes', 'tutorial', *sorted(
+FOLLOWED = ['first-ten-minutes', 'tutorial', 'commands', *(
     f'how-to/{page.stem}' for page in (DOCS / 'how-to').glob('*.md') if page.stem != 'index')]
 BLOCK = re.compile(r'(?:^`([\w.]+)`:\n\n)?^```(\w+)\n(.*?)^```', re.MULTILINE | re.DOTALL)
 NODES = {'kinematics': Kinematics, 'crank_driver': CrankDriver, 'servo_inverse': ServoInverse}
@@ -58,6 +58,7 @@ class Reader:
             if file:
                 Path(file).write_text(text)
             if language == 'console':
+                text = re.sub(r'\\\n *', '', text)
                 for line, printed in re.findall(r'^\$ (.*)\n((?:[^$].*\n)*)', text, re.MULTILINE):
                     gave = self._type(line, printed)
             elif language == 'python' and '>>>' in text:
@@ -76,7 +77,8 @@ class Reader:
                 return None  # whether there is such a thing is known to test_docs.py
             case ['ros2', 'topic', 'echo', '--once', topic]:
                 return self._echo(topic, wait=not line.endswith('&'))
-            case ['ros2', 'topic', 'pub', '--once', topic, type_, text]:
+            case ['ros2', 'topic', 'pub', '--once', topic, type_, text] | \
+                    ['ros2', 'topic', 'pub', '-r', _, topic, type_, text]:
                 publisher = self._graph.node.create_publisher(found(type_), topic, 10)
                 message = found(type_)(**yaml.safe_load(text))
                 return self._graph.until(lambda: self.heard or publisher.publish(message))[0]
@@ -115,11 +117,17 @@ def found(type_):
 
 
 @pytest.fixture
-def follow(graph, capsys, monkeypatch, tmp_path):
-    """Return a function that follows a page, in a folder with `examples/` in it."""
+def reader(graph, capsys, monkeypatch, tmp_path):
+    """Return a reader in a folder with `examples/` in it."""
     (tmp_path / 'examples').symlink_to(ROOT / 'examples')
     monkeypatch.chdir(tmp_path)
-    return Reader(graph, capsys).follow
+    return Reader(graph, capsys)
+
+
+@pytest.fixture
+def follow(reader):
+    """Return a function that follows a page."""
+    return reader.follow
 
 
 def test_every_page_of_this_kind_is_tried():
@@ -159,6 +167,19 @@ def test_an_encoder_behind_a_belt(graph, follow):
         assert 0.6 <= joints['press_crank'] <= 2.6
         if told := by_stamp('belt_encoder').get(stamp):
             assert joints['press_QB'] == pytest.approx(told.position[0] / 3.0 + 1.8, abs=1e-12)
+
+
+def test_a_flap_is_put_where_a_planner_wants_it(reader, follow):
+    controlled = follow('commands')
+    command = reader.heard[0]
+    assert command.name == ['servo']
+    crank = 0.5 * command.position[0]
+    lever = math.atan2(80.0 * math.sin(crank), 150.0 + 80.0 * math.cos(crank))
+    assert 0.1 - lever == pytest.approx(0.2, abs=1e-12)
+    # What was remapped for ros2_control has these names.
+    assert controlled.count_publishers('/forward_position_controller/commands') == 1
+    assert controlled.count_publishers('/joint_trajectory_controller/joint_trajectory') == 1
+    assert controlled.count_subscribers('/planner/joint_trajectory') == 1
 
 
 def test_a_boom_on_a_cylinder(graph, follow):
