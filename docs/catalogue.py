@@ -5,7 +5,7 @@
 The pages of the catalogue: one a mechanism, from its docstring, its lines and what it does.
 
 What is on a page is kept nowhere else: text and sources are the docstring of the mechanism's
-module, tables and figures follow from the mechanism itself.
+module, what it is for is below, tables and figures follow from the mechanism itself.
 """
 
 import math
@@ -29,11 +29,43 @@ SIZE = 360, 360
 SHOWN_AT = 0.13  # turns: a pose in which few joints are in line
 CHANGE, CHANGE_OF_LEVER = 0.05, 0.2  # of a dimension, in the figure that shows what it does
 ROOM = 0.25  # around the unchanged curve, in that figure
-COLUMNS = 4
+COLUMNS = 4  # of figures
+SHOWN = 3  # mechanisms in a row
 
 # How several cranks move in the pictures; one crank turns, or swings through its reach.
 MOTIONS = {'five_bar': {'crank.sweep': [1.2, 1.9], 'crank2.sweep': [1.25, 1.95],
                         'crank2.speed': 1.5}}
+
+# What a mechanism is for, and who built it.
+USES = {
+    'water_drop': ('Drawing and showing: two bars, their mirror image and a pen.',
+                   'Keishiro Ueki, who showed it on Twitter.'),
+    'jansen': ('Legs that walk on level ground with an even body, many on one crankshaft.',
+               'Theo Jansen, from 1990 on, for his strandbeesten, which walk on beaches by wind.'),
+    'peaucellier': ('An exact straight line without a guide.',
+                    'Charles-Nicolas Peaucellier, 1864; Lipman Lipkin found it by himself, 1871.'),
+    'slotted_lever': ('A lever moved by a pin: steering, flaps, grippers on a hobby servo; '
+                      'shaping machines.', 'No inventor is known.'),
+    'chebyshev_lambda': ('Legs, and a nearly straight line over half a turn.',
+                         'Pafnuty Chebyshev, whose walking machine was shown in Paris in 1878.'),
+    'five_bar': ('Pick and place, drawing, legs: light arms, since both motors stand still.',
+                 'No inventor is known; as a robot it is called a double SCARA.'),
+    'four_bar': ('Wipers, doors, suspensions, grippers: most loops of most machines.',
+                 'Older than its theory; Franz Grashof said in 1883 which bar can turn.'),
+    'hoeken': ('Pushing along a line at an even speed: feeders, walking toys.',
+               'Karl Hoecken, 1926.'),
+    'klann': ('Legs that lift their feet high and step over things.',
+              'Joe Klann, 1994; patented 2001.'),
+    'pantograph': ('Copying a motion larger or smaller: drawing, engraving, robot legs.',
+                   'Christoph Scheiner, 1603; published 1631.'),
+    'slider_crank': ('Engines, pumps, compressors, presses.',
+                     'Saw mills had it in the 3rd century: one is cut on a sarcophagus in '
+                     'Hierapolis.'),
+    'watt': ('Guiding a rod nearly straight; today rear axles of cars.',
+             'James Watt, 1784, for the piston rod of his steam engine.'),
+    'whitworth': ('Shaping and slotting machines: slow while it cuts, quick on the way back.',
+                  'Joseph Whitworth, in the 19th century, for his machine tools.'),
+}
 
 # What is written in letters in a docstring.
 SIGNS = {r'\btheta\b': 'θ', r'\bphi\b': 'φ', r'\bpi\b': 'π', r'\bsqrt ?(?=[\d(])': '√',
@@ -81,16 +113,22 @@ def typeset(text: str) -> str:
     return text
 
 
+def use(type_: str) -> str:
+    """Return what a mechanism is for and who built it, where that is written down."""
+    return '**For:** {}<br>\n**Built by:** {}\n'.format(*USES[type_]) if type_ in USES else ''
+
+
 def index() -> str:
     """Return the page that shows all mechanisms."""
-    cells = [f'[![{title(t)}]({t}.gif)]({t}.md)<br>[{title(t)}]({t}.md)' for t in mechanisms.TYPES]
-    cells += [''] * (-len(cells) % COLUMNS)
-    rows = [cells[k:k + COLUMNS] for k in range(0, len(cells), COLUMNS)]
+    cells = [f'[![{title(t)}]({t}.gif)]({t}.md)<br>[{title(t)}]({t}.md)'
+             f'<br>{USES.get(t, [""])[0]}' for t in mechanisms.TYPES]
+    cells += [''] * (-len(cells) % SHOWN)
+    rows = [cells[k:k + SHOWN] for k in range(0, len(cells), SHOWN)]
     pages = '\n'.join(mechanisms.TYPES)
     return f"""\
 # Mechanisms
 
-{table([''] * COLUMNS, rows)}
+{table([''] * SHOWN, rows)}
 
 They are put together from a few [constructions](constructions.md). In the same words any other
 planar linkage can be written down, in a scene or in Python: type `custom`.
@@ -98,7 +136,6 @@ planar linkage can be written down, in a scene or in Python: type `custom`.
 ```{{toctree}}
 :hidden:
 
-constructions
 {pages}
 ```
 """
@@ -116,6 +153,7 @@ def page(type_: str) -> str:
 
 ![{title(type_)}, its joints named]({type_}.svg) ![{title(type_)}, moving]({type_}.gif)
 
+{use(type_)}
 {chr(10).join(part + chr(10) for part in rest)}
 ## Dimensions
 

@@ -30,6 +30,8 @@ smartquotes = False
 html_theme = 'furo'
 html_title = 'linkage_ros'
 html_show_sphinx = False
+html_static_path = ['_static']
+html_css_files = ['page.css']
 
 
 def setup(app):

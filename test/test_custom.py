@@ -6,9 +6,8 @@
 import doctest
 import math
 from pathlib import Path
-import re
 
-from linkage_ros import mechanisms, scene
+from linkage_ros import mechanisms
 import numpy as np
 import pytest
 from truth import hard_cases
@@ -16,7 +15,7 @@ from truth.accuracy_rule import broken, case_of, judge, summary
 from truth.exact_poses import MOVING
 
 TURN = [(-math.pi, math.pi)]
-PAGE = Path(__file__).parents[1] / 'docs' / 'write-your-own.md'
+PAGE = Path(__file__).parents[1] / 'docs' / 'which-word.md'
 LENGTHS = {'a': 1.0, 'b': 3.0, 'c': 2.5, 'd': 3.2, 'e': 1.5, 'f': 2.0, 'g': 3.5, 'h': 4.0}
 FOUR_BAR = ('O ground 0 0', 'Q ground g 0', 'A crank O m', 'B dyad A Q b c left')
 
@@ -279,16 +278,6 @@ def test_arrays_of_dimensions_are_checked_too():
                           b=np.array([3.0, 2.5]))
 
 
-def test_the_page_on_writing_a_linkage_says_what_happens():
+def test_the_page_of_words_says_what_is_refused():
     failed, tried = doctest.testfile(str(PAGE), module_relative=False)
-    assert tried > 10 and not failed
-
-
-def test_the_scene_on_that_page_is_the_linkage_on_that_page(tmp_path):
-    text = PAGE.read_text()
-    path = tmp_path / 'gripper.yaml'
-    path.write_text(re.search('```yaml\n(.*?)```', text, re.DOTALL).group(1))
-    gripper = scene.load(str(path)).machines['gripper'].linkage
-    assert gripper.tracer == 'T'
-    assert gripper.solve(0.8)['T'].round(4).tolist() == [0.0985, 0.0684]
-    assert '[0.0985, 0.0684]' in text
+    assert tried == 3 and not failed

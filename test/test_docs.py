@@ -10,13 +10,18 @@ import shlex
 import shutil
 import subprocess
 import sys
+import textwrap
 
 from linkage_ros import mechanisms, scene
 from linkage_ros.linkage import joint_lines
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PAGES = sorted([*ROOT.glob('*.md'), *(ROOT / 'docs').glob('*.md')])
+PAGES = sorted([*ROOT.glob('*.md'), *(ROOT / 'docs').glob('*.md'),
+                *(ROOT / 'docs' / 'how-to').glob('*.md')])
+# Pages of the catalogue, which are made when the others are built.
+MADE = {ROOT / 'docs' / 'mechanisms' / f'{name}.md'
+        for name in ('index', 'constructions', *mechanisms.TYPES)}
 LINK = re.compile(r'!?\[[^]]*\]\(([^)\s]+)\)')
 RENDER = re.compile(r'\$ (?:python -m linkage_ros\.render|ros2 run linkage_ros render) (.*)')
 FENCE = re.compile(r'^```(\w*)\n(.*?)^```', re.MULTILINE | re.DOTALL)
@@ -46,8 +51,57 @@ def test_every_link_inside_the_repository_leads_somewhere(page):
         if not re.match(r'\w+:', link):
             path, _, place = link.partition('#')
             target = (page.parent / path).resolve() if path else page
-            assert target.exists(), link
+            assert target.exists() or target in MADE, link
             assert not place or target.suffix != '.md' or place in anchors(target), link
+
+
+COMMAND = re.compile(
+    r'^ *(?:\$ )?((?:timeout \d+ )?(?:ros2|python3?|make|pip|colcon|rosdep|apt|sudo|source|rviz2'
+    r'|git|cd|cc|sed|\./\w+)\b [^=\n].*)', re.MULTILINE)
+# Programs of others: what is asked of them cannot be looked up here.
+FOREIGN = {'pip', 'colcon', 'rosdep', 'sudo', 'source', 'rviz2', 'git', 'cd', 'cc', 'sed', 'apt',
+           './jaw'}
+OTHERS = {'robot_state_publisher', 'rqt_reconfigure', 'ros_gz_sim'}
+
+
+def typed():
+    """Yield a page and the words of each command that it says to type."""
+    for page in PAGES:
+        fenced = '\n'.join(blocks(page, 'console'))
+        indented = '\n'.join(re.findall(r'^    .*', FENCE.sub('', page.read_text()), re.MULTILINE))
+        for line in COMMAND.findall(re.sub(r'\\\n *', ' ', f'{fenced}\n{indented}')):
+            words = shlex.split(line.partition(' #')[0].partition(' > ')[0])
+            yield page, words[2:] if words[0] == 'timeout' else words
+
+
+def test_what_a_page_says_to_type_is_there():
+    targets = set(re.findall(r'^([a-z]+):', (ROOT / 'Makefile').read_text(), re.MULTILINE))
+    executables = set(re.findall(r"'(\w+)': '[\w.]+'", (ROOT / 'setup.py').read_text()))
+    launched = {file.name for file in (*ROOT.glob('launch/*'), *ROOT.glob('examples/*'))}
+    for page, words in typed():
+        match words:
+            case ['make', *rest]:
+                assert {word for word in rest if '=' not in word} <= targets, (page, words)
+            case ['ros2', 'run', package, executable, *_]:
+                assert package in OTHERS or executable in executables, (page, words)
+            case ['ros2', 'launch', 'linkage_ros', file, *rest]:
+                assert file in launched, (page, words)
+                sources = ''.join(f.read_text() for f in ROOT.glob('*/*.launch.py'))
+                for argument in rest:
+                    assert f"'{argument.partition(':=')[0]}'" in sources, (page, words)
+            case ['ros2', 'topic' | 'param' | 'service', *_]:
+                pass
+            case ['python' | 'python3', '-m', module, *_]:
+                path = ROOT / module.replace('.', '/')
+                assert (path.with_suffix('.py').exists() or (path / '__main__.py').exists()
+                        or module == 'pytest'), (page, words)
+            case ['python', file, *_]:
+                assert (ROOT / file).exists(), (page, words)
+            case [program, *_]:
+                assert program in FOREIGN, (page, words)
+        for word, file in zip(words, words[1:]):
+            if word == '--params-file' and file.startswith(('config/', 'examples/')):
+                assert (ROOT / file).exists(), (page, words)
 
 
 def test_nobody_is_told_to_install_a_release_that_there_is_not():
@@ -85,10 +139,9 @@ def test_every_word_has_its_drawing_with_the_very_lines_that_it_shows():
     assert set(joint_lines.FORMS) <= drawn
 
 
-def test_the_tables_of_words_name_all_of_them():
-    for page in ('which-word.md', 'write-your-own.md'):
-        named = re.findall(r'`(\w+)`', (ROOT / 'docs' / page).read_text())
-        assert set(joint_lines.FORMS) <= set(named)
+def test_the_table_of_words_names_all_of_them():
+    named = re.findall(r'`(\w+)`', (ROOT / 'docs' / 'which-word.md').read_text())
+    assert set(joint_lines.FORMS) <= set(named)
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
@@ -101,17 +154,42 @@ def test_the_pictures_that_a_page_says_to_render_can_be_asked_for(page):
         command = RENDER.match(line)
         if command:
             asked = parsed(shlex.split(command[1]))
-            scene.load(ROOT / asked.scene)
+            if '/' in asked.scene:  # else the page has it
+                scene.load(ROOT / asked.scene)
 
 
-def test_the_tour_works_as_written():
-    page = ROOT / 'docs' / 'index.md'
-    for code in blocks(page, 'python'):
-        exec(compile(code, page.name, 'exec'), {})
+def test_the_library_in_the_readme_works_as_written():
+    code = re.search(r'^    from linkage_ros .*?\n\n', (ROOT / 'README.md').read_text(),
+                     re.MULTILINE | re.DOTALL)[0]
+    exec(compile(textwrap.dedent(code), 'README.md', 'exec'), {})
+
+
+def test_the_page_of_forces_works_as_written():
+    code = '\n'.join(blocks(ROOT / 'docs' / 'forces.md', 'python'))
+    exec(compile(code, 'forces.md', 'exec'), {})
+
+
+@pytest.mark.parametrize('page', ['commands', 'forces', 'scene-files'])
+def test_the_example_of_a_scene_file_is_a_scene(page):
     yaml = pytest.importorskip('yaml')
-    for text in blocks(page, 'yaml'):
-        given = yaml.safe_load(text)['/**']['ros__parameters']
-        assert list(scene.read(given).machines) == given['mechanisms']
+    text, = blocks(ROOT / 'docs' / f'{page}.md', 'yaml')
+    given = yaml.safe_load(text)['/**']['ros__parameters']
+    assert list(scene.read(given).machines) == given['mechanisms']
+
+
+def test_every_page_is_in_the_navigation():
+    listed = set()
+    for index in (ROOT / 'docs' / 'index.md', ROOT / 'docs' / 'how-to' / 'index.md'):
+        for tree in re.findall(r'^```{toctree}\n(.*?)^```', index.read_text(),
+                               re.MULTILINE | re.DOTALL):
+            names = [line for line in tree.splitlines() if line and line[0] != ':']
+            listed |= {(index.parent / name).resolve() for name in names}
+    pages = {page.with_suffix('') for page in PAGES if page.parent != ROOT}
+    assert pages - {ROOT / 'docs' / 'index'} <= listed
+
+
+def test_the_catalogue_says_of_all_what_they_are_for(catalogue):
+    assert set(catalogue.USES) == set(mechanisms.TYPES)
 
 
 @pytest.mark.parametrize('type_', list(mechanisms.TYPES))
@@ -125,6 +203,18 @@ def test_the_page_of_a_mechanism_has_all_of_it(catalogue, type_):
     for line in mechanisms.design(type_).joints:
         assert line.split(maxsplit=1)[1].split()[-1] in page
     exec(compile(re.findall(r'```python\n(.*?)```', page, re.DOTALL)[0], type_, 'exec'), {})
+
+
+def test_what_a_scene_costs_is_what_was_measured():
+    head, _, tables = (ROOT / 'docs' / 'performance.md').read_text().partition('<!-- measured -->')
+    cpu = {(scene_, node, int(rate)): int(us) * int(rate) / 1e4 for scene_, rate, node, us
+           in re.findall(r'^\| ([\w ]+) \| (\d+) \| (kin[^|]*) \| (\d+) \|', tables, re.MULTILINE)}
+    rows = re.findall(r'^\| ([\w ]+)(, nobody listens)? \| (.*) % \| (.*) % \| (.*) % \|$', head,
+                      re.MULTILINE)
+    assert len(rows) == 4
+    for scene_, alone, *shares in rows:
+        node = 'kinematics, no subscriber (d)' if alone else 'kinematics'
+        assert shares == [f'{cpu[scene_, node, rate]:.2g}' for rate in (50, 200, 1000)]
 
 
 def test_the_table_of_engines_is_that_of_the_last_run(monkeypatch):

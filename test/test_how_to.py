@@ -1,12 +1,17 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The how-to page: its files are saved, its commands are run, and what they say is so."""
+"""The pages to follow: their files are saved, their commands run, and what they say is so."""
 
 import cmath
+import doctest
+from importlib import import_module
+import math
 from pathlib import Path
 import re
 import shlex
+import shutil
+import subprocess
 from xml.etree import ElementTree
 
 import pytest
@@ -16,9 +21,11 @@ pytest.importorskip('linkage_interfaces')
 yaml = pytest.importorskip('yaml')
 
 from linkage_ros import scene  # noqa: E402
+from linkage_ros.c_code.command import main as c_code  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
+from linkage_ros.render.command import main as render  # noqa: E402
 from linkage_ros.robot_files.command import main as from_robot  # noqa: E402
 from linkage_ros.robot_model.command import main as urdf  # noqa: E402
 from robots import LIBRARIES  # noqa: E402
@@ -26,49 +33,129 @@ from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import Float64MultiArray  # noqa: E402
 
 ROOT = Path(__file__).parents[1]
-SECTIONS = dict(re.findall(r'^## (.*?)\n(.*?)(?=^## |\Z)', (ROOT / 'docs/how-to.md').read_text(),
-                           re.MULTILINE | re.DOTALL))
+DOCS = ROOT / 'docs'
+# Pages that are followed step by step.
+FOLLOWED = ['first-ten-minutes', 'tutorial', 'commands', *(
+    f'how-to/{page.stem}' for page in (DOCS / 'how-to').glob('*.md') if page.stem != 'index')]
 BLOCK = re.compile(r'(?:^`([\w.]+)`:\n\n)?^```(\w+)\n(.*?)^```', re.MULTILINE | re.DOTALL)
 NODES = {'kinematics': Kinematics, 'crank_driver': CrankDriver, 'servo_inverse': ServoInverse}
-COMMANDS = {'from_robot': from_robot, 'linkage_ros.robot_model': urdf}
+COMMANDS = {'from_robot': from_robot, 'linkage_ros.robot_model': urdf,
+            'linkage_ros.c_code': c_code, 'linkage_ros.render': render}
 
 
-@pytest.fixture
-def follow(graph, capsys, monkeypatch, tmp_path):
-    """Return a function that does what a section says; it returns what was printed last."""
-    (tmp_path / 'examples').symlink_to(ROOT / 'examples')
-    monkeypatch.chdir(tmp_path)
+class Reader:
+    """Somebody who types what a page says."""
 
-    def run(line):
-        line, _, file = line.partition(' > ')
-        name, *args = shlex.split(re.sub(r'^(ros2 run linkage_ros|python -m) ', '', line))
-        if name in NODES:
-            return graph.start(NODES[name], cli_args=args)
-        assert COMMANDS[name](args) == 0
-        printed = capsys.readouterr().out
-        if file:
-            Path(file).write_text(printed)
-        return printed
+    def __init__(self, graph, capsys):
+        self._graph, self._capsys = graph, capsys
+        self._nodes, self._python = {}, {}
+        self.heard = []
 
-    def followed(section):
-        for file, language, text in BLOCK.findall(SECTIONS[section]):
+    def follow(self, page):
+        """Save the files of a page, run its commands; return what the last one gave back."""
+        gave = None
+        for file, language, text in BLOCK.findall((DOCS / f'{page}.md').read_text()):
             if file:
                 Path(file).write_text(text)
             if language == 'console':
-                *_, said = [run(line) for line in re.findall(r'^\$ (.*)', text, re.MULTILINE)]
-        return said
+                text = re.sub(r'\\\n *', '', text)
+                for line, printed in re.findall(r'^\$ (.*)\n((?:[^$].*\n)*)', text, re.MULTILINE):
+                    gave = self._type(line, printed)
+            elif language == 'python' and '>>>' in text:
+                test = doctest.DocTestParser().get_doctest(text, self._python, page, page, 0)
+                assert not doctest.DocTestRunner().run(test, clear_globs=False).failed
+                self._python = test.globs
+            elif language == 'python':
+                exec(compile(text, page, 'exec'), {})
+        return gave
 
-    return followed
+    def _type(self, line, printed):
+        line, _, file = line.replace('$PWD', str(Path.cwd())).partition(' > ')
+        words = shlex.split(line.removeprefix('timeout 5 ').removesuffix(' &'))
+        match words:
+            case ['make' | 'rviz2', *_] | ['ros2', 'launch', *_]:
+                return None  # whether there is such a thing is known to test_docs.py
+            case ['ros2', 'topic', 'echo', '--once', topic]:
+                return self._echo(topic, wait=not line.endswith('&'))
+            case ['ros2', 'topic', 'pub', '--once', topic, type_, text] | \
+                    ['ros2', 'topic', 'pub', '-r', _, topic, type_, text]:
+                publisher = self._graph.node.create_publisher(found(type_), topic, 10)
+                message = found(type_)(**yaml.safe_load(text))
+                return self._graph.until(lambda: self.heard or publisher.publish(message))[0]
+            case ['ros2', 'param', 'set', node, name, value]:
+                result = self._graph.set(self._nodes[node], **{name: yaml.safe_load(value)})
+                assert result.successful, result.reason
+                return result
+            case ['ros2', 'service', 'call', name, type_, text]:
+                client = self._graph.node.create_client(found(type_), name)
+                return self._graph.call(client, found(type_).Request(**yaml.safe_load(text)))
+            case ['ros2', 'run', 'linkage_ros', name, *args] if name in NODES:
+                node = self._graph.start(NODES[name], cli_args=args)
+                self._nodes[node.get_fully_qualified_name()] = node
+                return node
+            case ['ros2', 'run', 'linkage_ros', name, *args] | ['python', '-m', name, *args]:
+                assert COMMANDS[name](args) == 0
+                said = self._capsys.readouterr().out
+                if file:
+                    Path(file).write_text(said)
+                return said
+        said = subprocess.run(words, check=True, timeout=60, text=True, stdout=subprocess.PIPE)
+        assert said.stdout == printed
+        return said.stdout
+
+    def _echo(self, topic, wait):
+        types = self._graph.until(
+            lambda: dict(self._graph.node.get_topic_names_and_types()).get(topic))
+        self.heard = self._graph.listen(found(types[0]), topic)
+        return self._graph.until(lambda: self.heard)[0] if wait else None
 
 
-def test_every_section_is_tried():
-    tried = set(re.findall(r"follow\('(.*?)'\)", Path(__file__).read_text()))
-    assert tried == {*SECTIONS}
+def found(type_):
+    """Return a type of messages or services by its name."""
+    package, kind, name = type_.split('/')
+    return getattr(import_module(f'{package}.{kind}'), name)
+
+
+@pytest.fixture
+def reader(graph, capsys, monkeypatch, tmp_path):
+    """Return a reader in a folder with `examples/` in it."""
+    (tmp_path / 'examples').symlink_to(ROOT / 'examples')
+    monkeypatch.chdir(tmp_path)
+    return Reader(graph, capsys)
+
+
+@pytest.fixture
+def follow(reader):
+    """Return a function that follows a page."""
+    return reader.follow
+
+
+def test_every_page_of_this_kind_is_tried():
+    tried = re.findall(r"follow\('(.*?)'\)", Path(__file__).read_text())
+    assert sorted(tried) == sorted(FOLLOWED)
+
+
+def test_the_first_ten_minutes(follow):
+    pytest.importorskip('matplotlib')
+    answer = follow('first-ten-minutes')
+    assert answer.success and len(answer.servo_angle) == 1
+    assert Path('walker.png').stat().st_size > 10_000
+
+
+@pytest.mark.skipif(not shutil.which('cc'), reason='there is no C compiler')
+def test_the_gripper_of_the_tutorial(follow):
+    pytest.importorskip('matplotlib')
+    assert follow('tutorial').endswith('out of reach\n')
+    assert Path('gripper.png').stat().st_size > 10_000
+    # The picture at its head is of what it ends with.
+    written, drawn = (yaml.safe_load(file.read_text())
+                      for file in (Path('gripper.yaml'), ROOT / 'pictures/gripper.yaml'))
+    assert written == drawn
 
 
 def test_an_encoder_behind_a_belt(graph, follow):
     states = graph.listen(JointState, 'joint_states', 100)
-    follow('An encoder with a gear')
+    follow('how-to/encoder')
 
     def by_stamp(name):
         return {(state.header.stamp.sec, state.header.stamp.nanosec): state
@@ -82,9 +169,53 @@ def test_an_encoder_behind_a_belt(graph, follow):
             assert joints['press_QB'] == pytest.approx(told.position[0] / 3.0 + 1.8, abs=1e-12)
 
 
+def test_a_flap_is_put_where_a_planner_wants_it(reader, follow):
+    controlled = follow('commands')
+    command = reader.heard[0]
+    assert command.name == ['servo']
+    crank = 0.5 * command.position[0]
+    lever = math.atan2(80.0 * math.sin(crank), 150.0 + 80.0 * math.cos(crank))
+    assert 0.1 - lever == pytest.approx(0.2, abs=1e-12)
+    # What was remapped for ros2_control has these names.
+    assert controlled.count_publishers('/forward_position_controller/commands') == 1
+    assert controlled.count_publishers('/joint_trajectory_controller/joint_trajectory') == 1
+    assert controlled.count_subscribers('/planner/joint_trajectory') == 1
+
+
+def test_a_boom_on_a_cylinder(graph, follow):
+    states = graph.listen(JointState, 'joint_states', 100)
+    command = follow('how-to/cylinder')
+    assert command.name == ['boom_stroke'] and 0.0 <= command.position[0] <= 0.6
+
+    # The driver speaks for the sensor: the law of cosines has the boom's angle to O -> P.
+    def told():
+        told = {}
+        for state in states:
+            told.setdefault(state.header.stamp.nanosec, {}).update(zip(state.name, state.position))
+        return [joints for joints in told.values() if {'boom_stroke', 'boom_OB'} <= {*joints}]
+
+    graph.until(lambda: len(told()) > 9)
+    base = math.hypot(0.5, 0.2)
+    for joints in told():
+        length = joints['boom_stroke'] + 0.9
+        corner = math.acos((base ** 2 + 1.1 ** 2 - length ** 2) / (2.0 * base * 1.1))
+        assert joints['boom_OB'] == pytest.approx(math.atan2(-0.2, 0.5) + corner, abs=1e-12)
+
+
+def test_two_robots_of_one_kind(graph, follow):
+    from visualization_msgs.msg import MarkerArray
+
+    sides = 'left', 'right'
+    marked = {side: graph.listen(MarkerArray, f'/{side}/arm/markers') for side in sides}
+    follow('how-to/several-robots')
+    graph.until(lambda: all(marked.values()))
+    for side in sides:
+        assert marked[side][0].markers[0].header.frame_id == f'{side}/base'
+
+
 @pytest.mark.parametrize('library', LIBRARIES)
 def test_a_urdf_with_pairs_of_frames(graph, follow, library):
-    follow('An existing URDF')
+    follow('how-to/existing-urdf')
     answers, robot = [], library((ROOT / 'examples/leg.urdf').read_text())
     graph.node.create_subscription(
         JointState, 'joint_states', lambda m: 'knee' in m.name and answers.append(m), 10)
@@ -100,7 +231,7 @@ def test_a_urdf_with_pairs_of_frames(graph, follow, library):
 
 def test_a_model_for_mujoco(graph, follow):
     pytest.importorskip('mujoco')
-    follow('A MuJoCo model')
+    follow('how-to/mujoco')
     answers = []
     graph.node.create_subscription(
         JointState, 'joint_states', lambda m: 'rod_joint' in m.name and answers.append(m), 10)
@@ -114,7 +245,7 @@ def test_a_model_for_mujoco(graph, follow):
 
 
 def test_coordinates_of_a_drawing(follow):
-    robot = LIBRARIES[0](follow('A CAD export'))
+    robot = LIBRARIES[0](follow('how-to/cad-export'))
     machine = scene.load('export.yaml').machines['lid']
     angles = machine.linkage.joint_angles(machine.first.start)
     places = robot.places({f'lid_{name}': angle for name, angle in angles.items()},
@@ -124,7 +255,7 @@ def test_coordinates_of_a_drawing(follow):
 
 
 def test_ros2_control_moves_the_motors_of_the_scene(graph, follow):
-    machines = follow('ros2_control beside it').scene.machines
+    machines = follow('how-to/ros2-control').scene.machines
     sources = {name: [machine.first.source] for name, machine in machines.items()}
     motors = [motor for listed in sources.values() for motor in listed]
     controllers = yaml.safe_load(Path('controllers.yaml').read_text())
