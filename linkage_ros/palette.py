@@ -18,7 +18,7 @@ NIGHT, DUSK = '#161616', '#303030'
 # What pictures show: links, cranks, the tracer, guides and the floor.
 LINK, CRANK, TRACE, GUIDE, FLOOR = BLUE, ORANGE, VERMILION, GREEN, '#b5a27c'
 # What markers show, each seen on white, NIGHT and DUSK.
-BAR, DRIVEN, JOINT, LOCUS, STILL = '#0081c9', '#c87800', GREY, GREEN, GREY
+BAR, DRIVEN, JOINT, LOCUS, SLOT, EARTH = '#0081c9', '#c87800', GREY, GREEN, GREY, '#998763'
 # Vermilion that can be read as text.
 REFUSED = '#a84300'
 

@@ -945,7 +945,7 @@ def test_from_its_second_message_on_a_topic_is_not_unpacked_whatever_else_is_in_
     for step in range(5):
         message = deserialize_message(walker(step), MarkerArray)
         message.markers.insert(1, Marker(
-            ns='odd', type=Marker.TRIANGLE_LIST, text='abc', points=[Point(x=float(step))] * 3,
+            ns='odd', type=Marker.CUBE_LIST, text='abc', points=[Point(x=float(step))] * 3,
             colors=[ColorRGBA(r=0.5)] * 3, uv_coordinates=[UVCoordinate(u=0.5)]))
         message.markers[1].mesh_file.data = b'abcde'
         topic.newest = serialize_message(message)

@@ -23,12 +23,12 @@ LOOKS = (
     (Marker.LINE_LIST, palette.BAR, 1 / 40, 0),
     (Marker.SPHERE_LIST, palette.JOINT, 1 / 20, 0),
     (Marker.LINE_STRIP, palette.LOCUS, 1 / 100, -3),
-    (Marker.LINE_LIST, palette.STILL, 1 / 14, 1),
+    (Marker.LINE_LIST, palette.SLOT, 1 / 14, 1),
     (Marker.LINE_LIST, palette.BAR, 1 / 22, 3),
     (Marker.LINE_LIST, palette.DRIVEN, 1 / 40, 2),
     (Marker.LINE_LIST, palette.DRIVEN, 1 / 22, 4),
     (Marker.TRIANGLE_LIST, palette.BAR, None, -1),
-    (Marker.TRIANGLE_LIST, palette.STILL, None, -2))
+    (Marker.TRIANGLE_LIST, palette.EARTH, None, -2))
 # From a layer to the next, as a part of the longest bar.
 STEP = 1 / 250
 

@@ -10,6 +10,8 @@ const SLACK = 0.06;
 const SHRUNK = 10;
 const LINE = 18;
 const MOST_LINES = 100;
+/** How many numbers make a line, a triangle, a joint. */
+const PIECE = { lines: 4, triangles: 6, joints: 2 };
 const FONT = "13px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
 
 /** A colour of the style sheet, which the server fills in. */
@@ -41,14 +43,14 @@ function multiples(step, low, high) {
 
 const dark = matchMedia('(prefers-color-scheme: dark)');
 
-/** A colour that can be seen, made paler; paleness alone tells the pairs of legs apart. */
-function colour([r, g, b, a], paler) {
-  const unseen = dark.matches && Math.max(r, g, b) < 0.3;
-  const paper = dark.matches ? 0.1 : 1;
-  const mixed = [r, g, b].map(part => unseen ? 1 - part : part)
-    .map(part => Math.round(255 * (part + (paper - part) * paler)));
-  return `rgba(${mixed.join(',')},${a})`;
+/** A colour mixed with that of the paper, or of the ink. */
+function mixed([r, g, b, a], part, towards) {
+  const other = dark.matches === (towards === 'ink') ? 0.92 : 0.1;
+  return `rgba(${[r, g, b].map(one => Math.round(255 * (one + (other - one) * part))).join(',')},${a})`;
 }
+
+/** A colour as it is, stronger for the legs in front; each is seen well against the paper. */
+const colour = (rgba, front = 0) => mixed(rgba, 0.55 * front, 'ink');
 
 class Box {
   constructor() {
@@ -121,7 +123,7 @@ export class Picture {
     // Under a joint that is dragged the paper stays where it is.
     if (!this.scale || !this.pull()) this.fit(shapes, width, height);
     this.grid(width, height);
-    shapes.sort((a, b) => (a.look.kind === 'lines') - (b.look.kind === 'lines'));
+    shapes.sort((a, b) => a.depth - b.depth);
     const joints = shapes.filter(({ look }) => look.kind === 'joints');
     for (const shape of shapes) if (!joints.includes(shape)) this[shape.look.kind](shape);
     this.light();
@@ -138,7 +140,8 @@ export class Picture {
     for (const mechanism of this.mechanisms) {
       for (const { look, points } of mechanism.markers.values()) {
         const [x, y, z] = axes(look.pose);
-        this.seen ??= { right: x, up: y };
+        this.seen ??= { right: x, up: y, out: z };
+        const depth = dot(this.seen.out, look.pose.slice(0, 3));
         const map = [this.seen.right, this.seen.up].map(way => [
           dot(way, x), dot(way, y), dot(way, z), dot(way, look.pose.slice(0, 3))]);
         const places = new Float64Array(points.length / 3 * 2);
@@ -147,7 +150,7 @@ export class Picture {
             places[to++] = a * points[from] + b * points[from + 1] + c * points[from + 2] + d;
           }
         }
-        shapes.push({ mechanism, look, points, places, map });
+        shapes.push({ mechanism, look, points, places, map, depth });
       }
     }
     return shapes;
@@ -223,21 +226,21 @@ export class Picture {
   strip({ look, places }) {
     const { context } = this;
     context.lineWidth = Math.max(1.5, look.width * this.scale);
-    context.strokeStyle = colour(look.colour, 0.35);
+    context.strokeStyle = colour(look.colour);
     context.lineJoin = context.lineCap = 'round';
     context.beginPath();
     for (let i = 0; i < places.length; i += 2) context.lineTo(...this.at(places[i], places[i + 1]));
     context.stroke();
   }
 
-  /** Call back with each leg's part of what is drawn, the palest pair first. */
-  legs({ mechanism, places }, draw) {
+  /** Call back with each leg's part of what is drawn, the last pair first, and how far in front. */
+  legs({ mechanism, look, places }, draw) {
     const { pairs, legs } = mechanism;
     const size = places.length / legs;
-    if (!Number.isInteger(size)) return draw(places, 0);
+    if (size % PIECE[look.kind]) return draw(places, 0);
     for (let leg = legs - 1; leg >= 0; leg--) {
       const pair = Math.floor(leg * pairs / legs);
-      draw(places.subarray(leg * size, (leg + 1) * size), 0.65 * pair / Math.max(pairs - 1, 1));
+      draw(places.subarray(leg * size, (leg + 1) * size), pairs > 1 ? 1 - pair / (pairs - 1) : 0);
     }
   }
 
@@ -245,8 +248,8 @@ export class Picture {
     const { context } = this;
     context.lineWidth = Math.max(2, shape.look.width * this.scale);
     context.lineCap = 'round';
-    this.legs(shape, (places, lighter) => {
-      context.strokeStyle = colour(shape.look.colour, lighter);
+    this.legs(shape, (places, front) => {
+      context.strokeStyle = colour(shape.look.colour, front);
       context.beginPath();
       for (let i = 0; i < places.length; i += 4) {
         context.moveTo(...this.at(places[i], places[i + 1]));
@@ -256,15 +259,42 @@ export class Picture {
     });
   }
 
+  /** Draw plates as pale as paper between their bars; what has no bars of its colour is filled. */
+  triangles(shape) {
+    const { context } = this;
+    const same = [...shape.mechanism.markers.values()].map(({ look }) => look)
+      .filter(({ kind, colour: other }) => kind === 'lines' && `${other}` === `${shape.look.colour}`);
+    const width = Math.min(...same.map(look => look.width));
+    context.lineWidth = Math.max(2, width * this.scale);
+    context.lineJoin = 'round';
+    this.legs(shape, (places, front) => {
+      context.beginPath();
+      for (let i = 0; i < places.length; i += 6) {
+        for (let k = 0; k < 6; k += 2) {
+          context[k ? 'lineTo' : 'moveTo'](...this.at(places[i + k], places[i + k + 1]));
+        }
+        context.closePath();
+      }
+      context.fillStyle = same.length ? mixed(shape.look.colour, 0.8, 'paper') : colour(shape.look.colour);
+      context.fill();
+      if (!same.length) return;
+      context.strokeStyle = colour(shape.look.colour, front);
+      context.stroke();
+    });
+  }
+
   joints(shape) {
     const { context } = this;
     const radius = Math.max(3, shape.look.width * this.scale / 2);
-    this.legs(shape, (places, lighter) => {
-      context.fillStyle = colour(shape.look.colour, lighter);
+    context.lineWidth = Math.max(1.5, radius / 2.5);
+    context.fillStyle = paint('--paper');
+    this.legs(shape, (places, front) => {
+      context.strokeStyle = colour(shape.look.colour, front);
       for (let i = 0; i < places.length; i += 2) {
         context.beginPath();
-        context.arc(...this.at(places[i], places[i + 1]), radius, 0, 2 * Math.PI);
+        context.arc(...this.at(places[i], places[i + 1]), radius - context.lineWidth / 2, 0, 2 * Math.PI);
         context.fill();
+        context.stroke();
       }
     });
   }
