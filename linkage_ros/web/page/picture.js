@@ -91,6 +91,8 @@ export class Picture {
     this.canvas = canvas;
     this.context = canvas.getContext('2d');
     this.named = true;
+    /** From where it is seen; see view.js. */
+    this.view = null;
     this.mechanisms = [];
     this.boxes = new Map();
     /** The mechanism and the dimension whose bars are lit, and the line of a joint that is pulled. */
@@ -122,7 +124,8 @@ export class Picture {
     if (!shapes.length) return;
     // Under a joint that is dragged the paper stays where it is.
     if (!this.scale || !this.pull()) this.fit(shapes, width, height);
-    this.grid(width, height);
+    if (!this.view.turned) this.grid(width, height);
+    this.planes();
     shapes.sort((a, b) => a.depth - b.depth);
     const joints = shapes.filter(({ look }) => look.kind === 'joints');
     for (const shape of shapes) if (!joints.includes(shape)) this[shape.look.kind](shape);
@@ -140,7 +143,7 @@ export class Picture {
     for (const mechanism of this.mechanisms) {
       for (const { look, points } of mechanism.markers.values()) {
         const [x, y, z] = axes(look.pose);
-        this.seen ??= { right: x, up: y, out: z };
+        this.seen ??= this.view.axes({ right: x, up: y, out: z });
         const depth = dot(this.seen.out, look.pose.slice(0, 3));
         const map = [this.seen.right, this.seen.up].map(way => [
           dot(way, x), dot(way, y), dot(way, z), dot(way, look.pose.slice(0, 3))]);
@@ -159,9 +162,11 @@ export class Picture {
   /** Choose scale and place so that everything is seen, and stays where it is while it moves. */
   fit(shapes, width, height) {
     const now = new Map();
-    for (const { mechanism: { key }, places } of shapes) {
+    this.maps = new Map();
+    for (const { mechanism: { key }, points, map } of shapes) {
       if (!now.has(key)) now.set(key, new Box());
-      for (let i = 0; i < places.length; i += 2) now.get(key).add(places[i], places[i + 1]);
+      for (let i = 0; i < points.length; i += 3) now.get(key).add(points[i], points[i + 1]);
+      this.maps.set(key, map);
     }
     const all = new Box();
     for (const [key, box] of now) {
@@ -169,14 +174,38 @@ export class Picture {
       // It was never so large: something far off was drawn that is gone.
       if (box.size > 0 && known.size > SHRUNK * box.size) known = new Box();
       if (!known.holds(box)) this.boxes.set(key, known.grown(box));
-      const { low, high } = this.boxes.get(key) ?? box;
-      all.add(...low);
-      all.add(...high);
+      for (const corner of this.corners(key, this.boxes.get(key) ?? box)) all.add(...corner);
     }
     const span = [0, 1].map(i => Math.max(all.high[i] - all.low[i], 1e-9));
     this.scale = Math.min((width - 2 * MARGIN) / span[0], (height - 2 * MARGIN) / span[1]);
     this.middle = [0, 1].map(i => (all.high[i] + all.low[i]) / 2);
-    this.centre = [width / 2, height / 2];
+    this.scale *= this.view.zoom;
+    this.centre = [width / 2 + this.view.shift[0], height / 2 + this.view.shift[1]];
+  }
+
+  /** Return the corners of a box in a mechanism's plane, one after the other, as they are seen. */
+  corners(key, { low: [left, bottom], high: [right, top] }) {
+    return [[left, bottom], [right, bottom], [right, top], [left, top]].map(
+      ([x, y]) => this.maps.get(key).map(([a, b, , d]) => a * x + b * y + d));
+  }
+
+  /** Draw the planes of the mechanisms that are not seen at a right angle. */
+  planes() {
+    const { context } = this;
+    context.lineWidth = 1;
+    context.strokeStyle = paint('--faint');
+    context.fillStyle = paint('--shade');
+    for (const [key, box] of this.boxes) {
+      const [[a, b], [c, d]] = this.maps.get(key) ?? [[1, 0], [0, 1]];
+      if (Math.abs(a * d - b * c) > 0.9999) continue;
+      context.beginPath();
+      for (const corner of this.corners(key, box)) context.lineTo(...this.at(...corner));
+      context.closePath();
+      context.globalAlpha = 0.6;
+      context.fill();
+      context.globalAlpha = 1;
+      context.stroke();
+    }
   }
 
   at(x, y) {
@@ -246,7 +275,10 @@ export class Picture {
 
   lines(shape) {
     const { context } = this;
-    context.lineWidth = Math.max(2, shape.look.width * this.scale);
+    const wide = context.lineWidth = Math.max(2, shape.look.width * this.scale);
+    const joints = [...shape.mechanism.markers.values()].find(({ look }) => look.kind === 'joints');
+    // What is wider than a joint is a slot.
+    const slot = wide > 4 && shape.look.width > joints?.look.width;
     context.lineCap = 'round';
     this.legs(shape, (places, front) => {
       context.strokeStyle = colour(shape.look.colour, front);
@@ -256,6 +288,11 @@ export class Picture {
         context.lineTo(...this.at(places[i + 2], places[i + 3]));
       }
       context.stroke();
+      if (!slot) return;
+      context.strokeStyle = paint('--paper');
+      context.lineWidth = wide - 4;
+      context.stroke();
+      context.lineWidth = wide;
     });
   }
 
@@ -340,7 +377,9 @@ export class Picture {
       const box = this.boxes.get(key);
       if (!box) continue;
       const half = context.measureText(name).width / 2 + 4;
-      let [x, y] = this.at((box.low[0] + box.high[0]) / 2, box.low[1]);
+      const corners = this.corners(key, box).map(corner => this.at(...corner));
+      const x = corners.reduce((sum, [one]) => sum + one / corners.length, 0);
+      let y = Math.max(...corners.map(([, one]) => one));
       const over = () => written.find(other =>
         Math.abs(other.x - x) < other.half + half && Math.abs(other.y - y) < LINE);
       for (let other = over(); other; other = over()) y = other.y + LINE;
