@@ -43,7 +43,8 @@ class Bench:
     """A kinematics node, a hand on one of its cranks, and ears on its topics."""
 
     def __init__(self, graph, name, parameters=None, joints=True, markers=True):
-        self.node = graph.start(Kinematics, parameters)
+        # Of a scene that names no mechanisms too, in the catalogue's own size.
+        self.node = graph.start(Kinematics, {f'{name}.scale': 1.0, **(parameters or {})})
         self._graph = graph
         self._name = name
         self._turn = graph.crank([f'{name}_crank'])
@@ -357,7 +358,7 @@ def test_a_message_without_positions_is_passed_over(graph):
 
 
 def test_a_late_subscriber_gets_the_curve(graph):
-    node = graph.start(Kinematics)
+    node = graph.start(Kinematics, {f'{name}.scale': 1.0 for name in LENGTHS})
     curves = {}
     for name in LENGTHS:
         heard = graph.listen(Marker, f'{name}/locus', LATCHED)
