@@ -19,6 +19,7 @@ NIGHT, DUSK = '#161616', '#303030'
 LINK, CRANK, TRACE, GUIDE, FLOOR = BLUE, ORANGE, VERMILION, GREEN, '#b5a27c'
 # What markers show, each seen on white, NIGHT and DUSK.
 BAR, DRIVEN, JOINT, LOCUS, SLOT, EARTH = '#0081c9', '#c87800', GREY, GREEN, GREY, '#998763'
+PLATE = '#5b8fae'
 # Vermilion that can be read as text.
 REFUSED = '#a84300'
 

@@ -33,6 +33,14 @@ LOOKS = (
 STEP = 1 / 250
 
 
+def _rgba(colour):
+    return ColorRGBA(**dict(zip('rgb', palette.rgb(colour))), a=1.0)
+
+
+# Of a plate; its marker's own colour is that of the bars around it.
+FACE = _rgba(palette.PLATE)
+
+
 class JointStates:
     """The joint states of one mechanism, or of several cranks."""
 
@@ -93,8 +101,9 @@ class Markers:
             legs = places[:self._sides] if marker.id == GROUND_ID else places
             marker.points = self._filled(marker.id, legs[:, points].reshape(-1, 2).tolist())
             if marker.type == Marker.TRIANGLE_LIST:
-                # With a colour for each RViz shows both faces so, lit or not.
-                marker.colors = [marker.color] * (len(marker.points) // 3)
+                # With colours of their own RViz shows both sides of faces so, lit or not.
+                face = FACE if marker.id == PLATES_ID else marker.color
+                marker.colors = [face] * (len(marker.points) // 3)
         return self._message
 
     def _filled(self, id_, pairs):
@@ -140,5 +149,5 @@ def _marker(name, id_, frame_id, pose, size) -> Marker:
     marker.scale.x = width * size if width else 1.0
     if type_ in (Marker.SPHERE_LIST, Marker.TRIANGLE_LIST):
         marker.scale.y = marker.scale.z = marker.scale.x
-    marker.color = ColorRGBA(**dict(zip('rgb', palette.rgb(colour))), a=1.0)
+    marker.color = _rgba(colour)
     return marker
