@@ -9,6 +9,9 @@ from linkage_ros.render.cycle import Configuration, Wheel
 from nodes import DemoError
 import numpy as np
 
+# The markers of joints, guides and bodies, by their ids.
+COURSE = 1, 3, 4
+
 
 class Motion:
     """
@@ -24,8 +27,6 @@ class Motion:
         Number of joint state messages.
     times : float array (n,)
         Stamps of the markers that have joint states too [s].
-    bars : float array (n, legs * bars, 2, 2)
-        Ends of each bar [m].
     course : float array (n, legs, points, 2)
         The joints [m], and behind them the ends of what slides.
     period : float
@@ -42,20 +43,17 @@ class Motion:
                 if seconds(message.markers[0].header.stamp) in states]
         if not both:
             raise DemoError(f'{machine.name} sent no messages while it was listened to')
-        links, *others = zip(*both)
         self.machine = machine
         self.joint_states = len(joint_states)
-        self.times = np.array([seconds(marker.header.stamp) for marker in links])
+        self.times = np.array([seconds(markers[0].header.stamp) for markers in both])
         self.start = self.times[0]
-        self.bars = np.array([places(marker) for marker in links])
-        self.bars = self.bars.reshape(len(links), -1, 2, 2)
         self.inputs = [tuple(states[time][f'{machine.name}_{name}'] for name in machine.inputs)
                        for time in self.times]
         # Joints, guides and bodies in turn, each leg after leg.
         legs = len(machine.assembly().legs)
         self.course = np.concatenate([
-            np.array([places(marker) for marker in markers]).reshape(len(links), legs, -1, 2)
-            for markers in others], axis=2)
+            np.array([places(marker) for marker in markers]).reshape(len(both), legs, -1, 2)
+            for markers in zip(*both) if markers[0].id in COURSE], axis=2)
         self.period = Wheel(next(iter(machine.inputs.values()))).period
         self.prefixes = ('',) * self.course.shape[1]
         self._locus = places(locus)
@@ -74,8 +72,9 @@ class Motion:
         """Return the largest error of a bar's length, as a part of the longest bar."""
         linkage, scale = self.machine.linkage, self.machine.scale
         true = scale * np.array([linkage.bar_lengths[bar] for bar in linkage.bars])
-        ends = self.bars.reshape(len(self.times), -1, len(true), 2, 2)
-        lengths = np.hypot(*np.moveaxis(ends[..., 1, :] - ends[..., 0, :], -1, 0))
+        first, last = (self.course[:, :, [self.machine.points.index(name) for name in names]]
+                       for names in zip(*linkage.bars))
+        lengths = np.hypot(*np.moveaxis(last - first, -1, 0))
         return float(np.max(np.abs(lengths - true)) / (scale * linkage.longest))
 
     def turns_to(self, theta: float) -> float:

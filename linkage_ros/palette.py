@@ -12,12 +12,14 @@ SKY, PURPLE = '#56b4e9', '#cc79a7'
 DARK, FAINT, GREY, FRAME, TRACK, GRID, SHADE = (
     '#222222', '#606060', '#8a8a8a', '#b0b0b0', '#d0d0d0', '#e6e6e6', '#f4f4f4')
 
-# Of a page in the dark: its paper and its grid.
+# Behind what is drawn in the dark: a page's paper, and its grid; RViz's background is DUSK too.
 NIGHT, DUSK = '#161616', '#303030'
 
-# What they show: in markers a joint and the locus, in pictures a crank, the tracer and guides.
-LINK, JOINT, LOCUS = BLUE, ORANGE, GREEN
-CRANK, TRACE, GUIDE, FLOOR = ORANGE, VERMILION, GREEN, '#b5a27c'
+# What pictures show: links, cranks, the tracer, guides and the floor.
+LINK, CRANK, TRACE, GUIDE, FLOOR = BLUE, ORANGE, VERMILION, GREEN, '#b5a27c'
+# What markers show, each seen on white, NIGHT and DUSK.
+BAR, DRIVEN, JOINT, LOCUS, SLOT, EARTH = '#0081c9', '#c87800', GREY, GREEN, GREY, '#998763'
+PLATE = '#5b8fae'
 # Vermilion that can be read as text.
 REFUSED = '#a84300'
 

@@ -185,10 +185,11 @@ class Browser:
         await self.move(1.0, 1.0)
         await self.move(x, y)
 
-    async def press(self, key: str):
-        """Press a key that writes nothing."""
+    async def press(self, key: str, shift: bool = False):
+        """Press a key that writes nothing, with Shift or without."""
         for kind in ('keyDown', 'keyUp'):
-            await self._do('Input.dispatchKeyEvent', type=kind, key=key, code=key)
+            await self._do('Input.dispatchKeyEvent', type=kind, key=key, code=key,
+                           modifiers=8 * shift)
 
     async def downloads(self, folder: Path):
         """Let what is downloaded go to a folder."""

@@ -43,7 +43,8 @@ class Bench:
     """A kinematics node, a hand on one of its cranks, and ears on its topics."""
 
     def __init__(self, graph, name, parameters=None, joints=True, markers=True):
-        self.node = graph.start(Kinematics, parameters)
+        # Of a scene that names no mechanisms too, in the catalogue's own size.
+        self.node = graph.start(Kinematics, {f'{name}.scale': 1.0, **(parameters or {})})
         self._graph = graph
         self._name = name
         self._turn = graph.crank([f'{name}_crank'])
@@ -107,6 +108,27 @@ def test_markers_are_one_list_of_links_and_one_of_joints(graph, name):
     lengths = sorted(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
     assert all(any(length == pytest.approx(known) for known in LENGTHS[name].values())
                for length in lengths)
+
+
+def test_cranks_plates_and_the_ground_are_markers_of_their_own(graph):
+    bench = Bench(graph, 'walker', {**WALKER, 'walker.scale': 1.0})
+    links, joints, cranks, plates, ground = bench.markers_at(0.3)
+    assert [m.id for m in (links, joints, cranks, plates, ground)] == [0, 1, 5, 7, 8]
+    pins = places(cranks).reshape(-1, 2, 2)
+    assert not pins[:, 0].any()
+    assert np.linalg.norm(pins[:, 1], axis=1) == pytest.approx([HOLY['m']] * 6)
+    # What is no crank is drawn once, as a bar or as an edge of a plate of the same colour.
+    ends, corners = places(links).reshape(-1, 2, 2), places(plates).reshape(-1, 3, 2)
+    edges = np.concatenate([ends[:, 0] - ends[:, 1], *(corners - np.roll(corners, 1, axis=1))])
+    assert np.sort(np.linalg.norm(edges, axis=1)) == pytest.approx(
+        sorted(6 * [length for name, length in HOLY.items() if name not in 'alm']))
+    assert plates.color == links.color != cranks.color and len(plates.colors) == 12
+    assert len(ground.colors) == 4
+    # Each side stands on its own ground, upright.
+    standing = places(ground).reshape(-1, 3, 2)
+    x, y = HOLY['a'], -HOLY['l']
+    assert {tuple(top) for top in standing[:, 0]} == {(0.0, 0.0), (-x, y), (x, y)}
+    assert (standing[:, 1:, 1] < standing[:, :1, 1]).all()
 
 
 @pytest.mark.parametrize('theta', [0.0, math.pi, -math.pi / 2, 2.5 * math.pi, 400.0, -7.0])
@@ -337,7 +359,7 @@ def test_a_message_without_positions_is_passed_over(graph):
 
 
 def test_a_late_subscriber_gets_the_curve(graph):
-    node = graph.start(Kinematics)
+    node = graph.start(Kinematics, {f'{name}.scale': 1.0 for name in LENGTHS})
     curves = {}
     for name in LENGTHS:
         heard = graph.listen(Marker, f'{name}/locus', LATCHED)
@@ -447,7 +469,7 @@ def test_a_linkage_with_two_cranks_follows_both(graph):
         turning = speeds['five_bar_crank'], speeds['five_bar_crank2']
         assert turning == (0.4, -0.3)
         placed = linkage.solve(thetas)
-        assert places(message.markers[-1]) == pytest.approx(np.array([*placed.values()]))
+        assert places(message.markers[1]) == pytest.approx(np.array([*placed.values()]))
         step = 1e-6
         before, after = (linkage.joint_angles([t + sign * step * w for t, w in zip(
             thetas, turning)]) for sign in (-1.0, 1.0))
@@ -518,7 +540,7 @@ def test_a_linkage_with_two_cylinders_follows_both_lengths(graph):
         assert abs(speeds['boom_OB']) == pytest.approx(0.3 * lengths['boom_cylinder'] / area)
         lines = places(message.markers[0]).reshape(-1, 2, 2)
         assert any((line == [place['P'], place['B']]).all() for line in lines)
-        assert [marker.id for marker in message.markers] == [0, 1, 4]
+        assert [marker.id for marker in message.markers] == [0, 1, 6, 7, 8]
         for barrel, (base, rod) in zip(places(message.markers[2]).reshape(-1, 2, 2), ('PB', 'DE')):
             length, cylinder = math.dist(*barrel), math.dist(place[base], place[rod])
             assert barrel[0] == pytest.approx(place[base]) and 0.0 < length < cylinder
@@ -529,8 +551,8 @@ def test_a_linkage_with_two_cylinders_follows_both_lengths(graph):
 def test_a_pin_in_a_slot_is_a_block_on_a_guide_that_turns_with_the_lever(graph):
     bench = Bench(graph, 'slotted_lever')
     for theta in (0.3, -2.0):
-        _, joints, guides, blocks = bench.markers_at(theta)
-        assert (guides.id, blocks.id) == (3, 4) and guides.scale.x < blocks.scale.x
+        _, joints, guides, blocks, *_ = bench.markers_at(theta)
+        assert (guides.id, blocks.id) == (3, 4) and guides.scale.x > blocks.scale.x
         place = dict(zip('OQAL', places(joints)))
         along = (place['L'] - place['Q']) / math.dist(place['L'], place['Q'])
         (start, end), (back, front) = places(guides), places(blocks)

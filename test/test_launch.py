@@ -1,10 +1,11 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""RViz's configuration and the launch file: they name what there is."""
+"""The layouts for RViz and Foxglove and the launch file: they name what there is."""
 
 import ast
 from importlib.util import find_spec
+import json
 from pathlib import Path
 import re
 import runpy
@@ -51,7 +52,7 @@ def topics(config):
             for topic in (display.get('Topic'), display.get('Description Topic')) if topic}
 
 
-def test_rviz_shows_what_the_nodes_of_the_scene_publish(graph, shown):
+def test_rviz_and_foxglove_show_what_the_nodes_of_the_scene_publish(graph, shown):
     from linkage_ros.nodes.kinematics import Kinematics
 
     given = scene.load(str(CONFIG / 'all.yaml'))
@@ -65,6 +66,17 @@ def test_rviz_shows_what_the_nodes_of_the_scene_publish(graph, shown):
                 published.add((name, class_, DURABLE[info.qos_profile.durability.name]))
     assert len(published) == 3 * len(given.machines)
     assert topics(shown) == published
+    layout = json.loads((CONFIG / 'linkage.foxglove.json').read_text())
+    panels, room = layout['configById'], layout['layout']
+    assert set(panels) == {room['first'], room['second']['first'], room['second']['second']}
+    drawn = panels['3D!linkages']
+    assert drawn['followTf'] == given.frame_id and set(drawn['topics']) == {
+        name for name, *_ in published if not name.endswith('/robot_description')}
+    for path in panels['Plot!joints']['paths']:
+        found = re.fullmatch(r'/(\w+)/joint_states\.position\[(\d)\]', path['value'])
+        name, place = found.groups()
+        called = [joint.name for joint in given.machines[name].joints.values()]
+        assert path['label'] == called[int(place)]
 
 
 def test_rviz_looks_from_where_the_linkages_are_seen(shown):
@@ -118,7 +130,7 @@ def test_the_launch_file_starts_executables_that_there_are(constants, monkeypatc
     assert {*constants['NODES'], *constants['TOGETHER'], constants['VIEWER']} <= set(installed)
     files = {name for folder, names in handed['data_files'] for name in names}
     assert {f'config/{constants["RVIZ_CONFIG"]}', 'launch/scene.launch.py'} <= files
-    kept = *CONFIG.glob('*.yaml'), *(ROOT / 'examples').glob('*.*')
+    kept = *CONFIG.glob('*.*'), *(ROOT / 'examples').glob('*.*')
     assert {str(path.relative_to(ROOT)) for path in kept} <= files
 
 

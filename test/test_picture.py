@@ -12,8 +12,9 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from linkage_ros import scene  # noqa: E402
+from linkage_ros import palette, scene  # noqa: E402
 from linkage_ros.linkage.walker import Assembly  # noqa: E402
+from linkage_ros.nodes import messages  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics, LATCHED  # noqa: E402
 from linkage_ros.robot_model import urdf  # noqa: E402
 from ros_harness import Graph, Process  # noqa: E402
@@ -22,6 +23,9 @@ from std_msgs.msg import String  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
 CELL = {'mechanisms': ['cell'], 'cell.type': 'peaucellier'}
+# The markers of a leg, by id, and of a cell, which has no plates; each with its locus.
+LEG_IDS = set(range(9)) - {3, 4, 6}
+CELL_IDS = LEG_IDS - {7}
 
 
 class Picture:
@@ -48,12 +52,12 @@ def test_links_go_when_the_points_that_they_join_are_no_longer_wanted(graph):
     node = graph.start(Kinematics)
     picture = Picture(graph, 'jansen')
     graph.crank(['jansen_crank'])([0.3], graph.listen(MarkerArray, 'jansen/markers'))
-    graph.until(lambda: picture().keys() == {0, 1, 2})
+    graph.until(lambda: picture().keys() == LEG_IDS)
     # No crank message comes: the pose that there was is drawn anew.
     assert graph.set(node, jansen__points=['G', 'C']).successful
     graph.until(lambda: (picture().keys(), picture().get(1)) == ({1, 2}, 2))
     assert graph.set(node, jansen__points=['O', 'A']).successful
-    graph.until(lambda: picture().keys() == {0, 1, 2})
+    graph.until(lambda: picture().keys() == {1, 2, 5, 8})
 
 
 def test_a_leg_that_cannot_be_assembled_goes_once_and_comes_back(graph):
@@ -63,13 +67,13 @@ def test_a_leg_that_cannot_be_assembled_goes_once_and_comes_back(graph):
         (JointState, 'joint_states'), (MarkerArray, 'markers')))
     turn = graph.crank(['cell_crank'])
     turn([0.3], states)
-    graph.until(lambda: picture().keys() == {0, 1, 2})
+    graph.until(lambda: picture().keys() == CELL_IDS)
     with pytest.raises(AssertionError, match='in time'):
         turn([2.0], states, seconds=0.5)
     assert picture().keys() == {2}
     assert sum(array.markers[0].action == Marker.DELETE for array in arrays) == 1
     turn([0.4], states)
-    graph.until(lambda: picture().keys() == {0, 1, 2})
+    graph.until(lambda: picture().keys() == CELL_IDS)
 
 
 def test_a_locus_that_is_no_curve_any_more_goes_for_whoever_comes_late_too(graph):
@@ -103,7 +107,7 @@ def test_nothing_is_left_of_a_node_that_is_destroyed(graph):
     node = graph.start(Kinematics)
     picture = Picture(graph, 'jansen')
     graph.crank(['jansen_crank'])([0.3], graph.listen(MarkerArray, 'jansen/markers'))
-    graph.until(lambda: picture().keys() == {0, 1, 2})
+    graph.until(lambda: picture().keys() == LEG_IDS)
     node.destroy_node()
     graph.until(lambda: not picture())
 
@@ -117,7 +121,7 @@ def test_nothing_is_left_of_a_process_that_is_told_to_end(tmp_path, stop):
     with Graph(process.domain) as graph:
         picture = Picture(graph, 'jansen')
         graph.crank(['jansen_crank'])([0.3], graph.listen(MarkerArray, 'jansen/markers'))
-        graph.until(lambda: picture().keys() == {0, 1, 2})
+        graph.until(lambda: picture().keys() == LEG_IDS)
         process.interrupt(stop)
         graph.until(lambda: not picture())
         code, printed = process.end()
@@ -126,6 +130,22 @@ def test_nothing_is_left_of_a_process_that_is_told_to_end(tmp_path, stop):
 
 def custom(*lines):
     return {'mechanisms': ['jansen'], 'jansen.type': 'custom', 'jansen.joints': list(lines)}
+
+
+def luminance(colour):
+    """Return the relative luminance of a colour, as WCAG 2 defines it."""
+    parts = [int(colour[i:i + 2], 16) / 255 for i in (1, 3, 5)]
+    return np.dot((0.2126, 0.7152, 0.0722), [
+        part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts])
+
+
+@pytest.mark.parametrize('background', [
+    'white', palette.SHADE, palette.NIGHT, palette.DARK, '#303030'])
+def test_every_marker_is_seen_on_the_page_and_on_the_grey_of_rviz(background):
+    behind = luminance('#ffffff' if background == 'white' else background)
+    for colour in {palette.PLATE, *(look[1] for look in messages.LOOKS)}:
+        darker, lighter = sorted((behind, luminance(colour)))
+        assert (lighter + 0.05) / (darker + 0.05) >= 3.0, colour
 
 
 UNPUBLISHABLE = {

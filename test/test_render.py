@@ -127,8 +127,8 @@ def test_the_data_are_the_joints_as_solved_to_the_last_digit(tmp_path):
         solved = leg.solve(theta if side > 0 else math.pi - theta)
         name = f'strandbeest_{"left" if side > 0 else "right"}{pair}'
         for joint, (x, y) in solved.items():
-            assert row[f'{name}_{joint}_x'] == side * 0.01 * x
-            assert row[f'{name}_{joint}_y'] == 0.01 * y
+            assert row[f'{name}_{joint}_x'] == side * 0.005 * x
+            assert row[f'{name}_{joint}_y'] == 0.005 * y
 
 
 def test_the_bars_in_the_data_are_as_long_as_in_the_original_document(tmp_path):

@@ -258,7 +258,7 @@ def test_the_answer_nearest_to_the_present_crank_is_taken_where_it_is_known(grap
     ({'output': '.x', 'mechanism': 'jansen'}, "jansen has no output '.x'"),
     ({'output': 'G.x.x', 'mechanism': 'jansen'}, "jansen has no output 'G.x.x'"),
     ({'lever_angle': [1e308]}, 'the lever reaches [-0.562536, 0.562536] rad'),
-    ({'lever_angle': [1e308], 'output': 'G.x', 'mechanism': 'jansen'}, 'G.x reaches [-71.52'),
+    ({'lever_angle': [1e308], 'output': 'G.x', 'mechanism': 'jansen'}, 'G.x reaches [-0.357'),
     ({'lever_angle': [-math.inf], 'output': 'BC', 'mechanism': 'jansen'}, 'must be finite'),
     ({'output': 'C.x', 'mechanism': 'peaucellier'}, 'C.x'),
 ])

@@ -224,10 +224,10 @@ class Page:
         self.looks, self.points, self.said = {}, {}, []
 
     def drawn(self, mechanism, kind):
-        """Return the points of a mechanism's marker."""
-        return next((self.points[number] for number, look in self.looks.items()
-                     if (look['mechanism'], look['kind']) == (mechanism, kind)
-                     and number in self.points), np.empty((0, 3)))
+        """Return the points of a mechanism's markers of a kind."""
+        return np.concatenate([np.empty((0, 3)), *(
+            self.points[number] for number, look in self.looks.items()
+            if (look['mechanism'], look['kind']) == (mechanism, kind) and number in self.points)])
 
 
 def test_what_is_drawn_is_where_the_catalogue_says(show):
@@ -244,9 +244,12 @@ def test_what_is_drawn_is_where_the_catalogue_says(show):
     np.testing.assert_allclose(
         joints[:, :2], [solved[point] for point in leg.points], rtol=1e-6, atol=1e-5)
     assert not joints[:, 2].any()
+    # Bars, the crank among them, and two plates instead of the bars around them.
     ends = page.drawn('/leg', 'lines').reshape(-1, 2, 3)
-    np.testing.assert_allclose(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1),
-                               [leg.bar_lengths[bar] for bar in leg.bars], rtol=1e-6)
+    plates = page.drawn('/leg', 'triangles')[:6].reshape(-1, 3, 3)
+    lengths = np.concatenate([ends[:, 0] - ends[:, 1], *(plates - np.roll(plates, 1, axis=1))])
+    np.testing.assert_allclose(np.sort(np.linalg.norm(lengths, axis=1)),
+                               sorted(leg.bar_lengths[bar] for bar in leg.bars), rtol=1e-6)
     feet = leg.solve(np.linspace(0.0, math.tau, 721), ('G',))['G']
     curve = page.drawn('/leg', 'strip')[:, :2]
     away = np.linalg.norm(curve[:, None] - feet, axis=2).min(axis=1)
@@ -945,7 +948,7 @@ def test_from_its_second_message_on_a_topic_is_not_unpacked_whatever_else_is_in_
     for step in range(5):
         message = deserialize_message(walker(step), MarkerArray)
         message.markers.insert(1, Marker(
-            ns='odd', type=Marker.TRIANGLE_LIST, text='abc', points=[Point(x=float(step))] * 3,
+            ns='odd', type=Marker.CUBE_LIST, text='abc', points=[Point(x=float(step))] * 3,
             colors=[ColorRGBA(r=0.5)] * 3, uv_coordinates=[UVCoordinate(u=0.5)]))
         message.markers[1].mesh_file.data = b'abcde'
         topic.newest = serialize_message(message)
@@ -1243,8 +1246,8 @@ class Seen:
         return (await self.page.picture())[int(top):, :int(width)]
 
 
-# Of joints, and of the bars that are pointed at.
-ORANGE, PURPLE = (230, 159, 0), (204, 121, 167)
+# Of joints, of bars, of the locus, and of the bars that are pointed at.
+GREY, BLUE, GREEN, PURPLE = (138, 138, 138), (0, 129, 201), (0, 158, 115), (204, 121, 167)
 
 
 def coloured(picture, red, green, blue):
@@ -1281,7 +1284,7 @@ def test_the_picture_moves_and_a_click_stops_it(show, looked_at):
         await seen.view('lever')
 
         async def drawn():
-            return len(coloured(await seen.canvas(), 0, 114, 178)) > 1000
+            return len(coloured(await seen.canvas(), *BLUE)) > 1000
 
         await browser.until(drawn)
         first = await seen.canvas()
@@ -1434,7 +1437,7 @@ def test_a_picture_of_what_is_far_off_is_drawn_and_left(show, looked_at):
         def published(text):
             async def drawn():
                 markers.publish(text)
-                return len(coloured(await seen.canvas(), *ORANGE)) > 100
+                return len(coloured(await seen.canvas(), *BLUE)) > 100
             return drawn
 
         await browser.until(published(walker(1)))
@@ -1450,6 +1453,45 @@ def test_a_picture_of_what_is_far_off_is_drawn_and_left(show, looked_at):
 
 @pytest.mark.long
 @needs_browser
+def test_the_picture_is_zoomed_shifted_and_turned_by_keys_and_mouse(show, looked_at):
+    running = show({**LEVER, 'lever.crank.speed': 0.0, 'lever.crank.start': 1.0})
+
+    async def doing(seen):
+        await seen.view('lever')
+
+        async def locus(middle=None, size=None):
+            """Return the middle and the size of the locus, at rest and as it is wanted."""
+            first, second = [coloured(await seen.canvas(), *GREEN) for _ in range(2)]
+            if len(first) < 100 or not np.array_equal(first, second):
+                return None
+            found = first.mean(axis=0), np.ptp(first, axis=0)
+            far = [abs(one - wanted).max() for one, wanted in zip(found, (middle, size))
+                   if wanted is not None]
+            return found if max(far, default=0.0) < 6.0 else None
+
+        middle, size = await browser.until(locus)
+        await seen.page.value('document.getElementById("picture").focus()')
+        await seen.page.press('-')
+        await browser.until(lambda: locus(size=size / 1.2), 'zoomed')
+        await seen.page.press('0')
+        await browser.until(lambda: locus(middle, size), 'whole')
+        top = await seen.page.value('document.getElementById("picture").getBoundingClientRect().y')
+        await seen.page.drag((100.0, top + 100.0), (160.0, top + 70.0))
+        await browser.until(lambda: locus(middle + (-30.0, 60.0), size), 'shifted')
+        # Seen nearly from its edge, the plane is narrow and as high as before.
+        await seen.page.press('0')
+        for _ in range(7):
+            await seen.page.press('ArrowRight', shift=True)
+        await browser.until(lambda: locus(size=size * (1.0, math.cos(1.4))), 'turned')
+        await seen.page.click('document.getElementById("whole")')
+        await browser.until(lambda: locus(middle, size), 'whole again')
+        assert await seen.page.value('document.getElementById("whole").hidden')
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
 def test_a_joint_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
     running = show({**LEVER, 'lever.crank.speed': 0.0})
 
@@ -1458,12 +1500,14 @@ def test_a_joint_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
 
         async def settled():
             before = await seen.canvas()
-            return len(coloured(before, 89, 193, 163)) > 100 and (
+            return len(coloured(before, *GREEN)) > 100 and (
                 await seen.canvas() == before).all()
 
         await seen.output('lever', 'lever')
         await browser.until(settled)
-        rows, columns = coloured(await seen.canvas(), *ORANGE).T
+        await seen.page.click('document.getElementById("names")')
+        # The numbers of the grid are left out: they are grey too.
+        rows, columns = coloured((await seen.canvas())[:-40, 80:], *GREY).T + [[0], [80]]
         top = await seen.page.value('document.getElementById("picture").getBoundingClientRect().y')
         tip = float(columns[rows < rows.min() + 10].mean()), top + int(rows.min()) + 8
         pivot = float(columns[rows > rows.max() - 10].mean()), top + int(rows.max()) - 8

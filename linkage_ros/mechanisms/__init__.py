@@ -29,8 +29,8 @@ from ..linkage.quantities import Structure
 from ..linkage.servo import Mechanism
 from ..words import quoted
 
-# What a scene shows when it names no mechanism.
-CATALOGUE = 'water_drop', 'jansen', 'peaucellier', 'slotted_lever'
+# What a scene shows when it names no mechanism, and its scale: from 0.5 m to 1.5 m in size.
+CATALOGUE = {'water_drop': 0.1, 'jansen': 0.005, 'peaucellier': 0.1, 'slotted_lever': 0.002}
 
 CUSTOM = 'custom'
 

@@ -3,6 +3,7 @@
 
 """Node that publishes joint angles, markers, loci and robot models of a scene's mechanisms."""
 
+from itertools import combinations
 import math
 import sys
 from threading import Lock
@@ -21,6 +22,7 @@ from . import joint_state_reader, messages, scene_node
 from .message_layout import NEVER, pack, unpack, Unreadable, Wire
 from .whole_scene import LATCHED, WholeScene
 from .. import scene
+from ..linkage.quantities import Spot
 from ..linkage.walker import Layout
 from ..robot_model import bodies, shapes, urdf
 from ..words import listed
@@ -231,7 +233,7 @@ class Model:
         drawn = machine.name, prefix + frame_id, machine.pose
         size = bodies.size(machine)
         self._points, shown = _shown(machine)
-        self.drawn = *drawn, size, shown
+        self.drawn = *drawn, size, shown, 1 + machine.mirrored
         self.marker_array = messages.Markers(*self.drawn)
         self.joint_state = messages.JointStates()
         curve = self.assembly.locus(machine.tracer)
@@ -328,17 +330,26 @@ class Model:
 
 def _shown(machine: scene.Machine):
     """Return the points of the markers, joints and others, and which of them each marker shows."""
-    place = {point: i for i, point in enumerate(machine.points)}
-    linkage, points = machine.linkage, list(machine.points)
-    shown = {
-        messages.LINKS_ID: [(place[p], place[q]) for p, q in (*linkage.bars, *linkage.cylinders)
-                            if p in place and q in place],
-        messages.JOINTS_ID: range(len(place)), messages.GUIDES_ID: [], messages.BODIES_ID: []}
-    for shape in shapes.drawn(machine, place):
-        id_ = messages.GUIDES_ID if shape.kind == shapes.GUIDE else messages.BODIES_ID
-        shown[id_].append((len(points), len(points) + 1))
-        points += [shape.start, shape.end]
-    return tuple(points), shown
+    linkage, wanted = machine.linkage, machine.points
+    cranks, plates = shapes.cranks(linkage), shapes.plates(linkage, wanted)
+    # A plate is drawn instead of its bars: the message is the smaller for it.
+    edges = {frozenset(edge) for plate in plates for edge in combinations(plate, 2)}
+    bars = [bar for bar in linkage.bars if bar not in cranks and frozenset(bar) not in edges]
+    pieces = {messages.LINKS_ID: [*bars, *linkage.cylinders],
+              messages.JOINTS_ID: [(name,) for name in wanted],
+              messages.GUIDES_ID: [], messages.BODIES_ID: [], messages.CRANKS_ID: cranks,
+              messages.DRIVEN_ID: [], messages.PLATES_ID: plates,
+              messages.GROUND_ID: shapes.marks(linkage, wanted)}
+    for shape in shapes.drawn(machine, wanted):
+        id_ = (messages.GUIDES_ID if shape.kind == shapes.GUIDE else messages.DRIVEN_ID
+               if shape.slide.name in machine.inputs else messages.BODIES_ID)
+        pieces[id_].append((shape.start, shape.end))
+    spots = [point for several in pieces.values() for piece in several for point in piece
+             if isinstance(point, Spot)]
+    place = {point: i for i, point in enumerate((*wanted, *spots))}
+    return (*wanted, *spots), {
+        id_: [[place[point] for point in piece] for piece in several if place.keys() >= set(piece)]
+        for id_, several in pieces.items()}
 
 
 def _arranged(layout: Layout, rest: float, joints: np.ndarray, rates: np.ndarray) -> np.ndarray:

@@ -15,11 +15,30 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from .. import palette
 
-# How each marker is drawn, by its id: type, colour and width as a part of the longest bar.
-LINKS_ID, JOINTS_ID, LOCUS_ID, GUIDES_ID, BODIES_ID = range(5)
-LOOKS = ((Marker.LINE_LIST, palette.LINK, 1 / 40), (Marker.SPHERE_LIST, palette.JOINT, 1 / 20),
-         (Marker.LINE_STRIP, palette.LOCUS, 1 / 100), (Marker.LINE_LIST, palette.TRACK, 1 / 60),
-         (Marker.LINE_LIST, palette.DARK, 1 / 20))
+(LINKS_ID, JOINTS_ID, LOCUS_ID, GUIDES_ID, BODIES_ID, CRANKS_ID, DRIVEN_ID, PLATES_ID,
+ GROUND_ID) = range(9)
+# How each marker is drawn, by its id: type, colour, width as a part of the longest bar, and its
+# layer. Layers lie one above the other, so that what is in one plane does not flicker.
+LOOKS = (
+    (Marker.LINE_LIST, palette.BAR, 1 / 40, 0),
+    (Marker.SPHERE_LIST, palette.JOINT, 1 / 20, 0),
+    (Marker.LINE_STRIP, palette.LOCUS, 1 / 100, -3),
+    (Marker.LINE_LIST, palette.SLOT, 1 / 14, 1),
+    (Marker.LINE_LIST, palette.BAR, 1 / 22, 3),
+    (Marker.LINE_LIST, palette.DRIVEN, 1 / 40, 2),
+    (Marker.LINE_LIST, palette.DRIVEN, 1 / 22, 4),
+    (Marker.TRIANGLE_LIST, palette.BAR, None, -1),
+    (Marker.TRIANGLE_LIST, palette.EARTH, None, -2))
+# From a layer to the next, as a part of the longest bar.
+STEP = 1 / 250
+
+
+def _rgba(colour):
+    return ColorRGBA(**dict(zip('rgb', palette.rgb(colour))), a=1.0)
+
+
+# Of a plate; its marker's own colour is that of the bars around it.
+FACE = _rgba(palette.PLATE)
 
 
 class JointStates:
@@ -41,7 +60,7 @@ class JointStates:
 
 class Markers:
     """
-    The links, joints, guides and bodies (barrels and blocks) of one mechanism, a marker each.
+    The links, joints, guides and so on of one mechanism, a marker each.
 
     Parameters
     ----------
@@ -54,8 +73,10 @@ class Markers:
     size : float
         The longest bar [m].
     shown : mapping
-        What each marker shows, by its id: joints or ends of lines, by their place among the
-        points.
+        What each marker shows, by its id: joints, ends of lines or corners, by their place among
+        the points.
+    sides : int
+        Legs that stand on different ground: the first ones.
 
     Attributes
     ----------
@@ -65,18 +86,24 @@ class Markers:
     """
 
     def __init__(self, name: str, frame_id: str, pose, size: float,
-                 shown: Mapping[int, Sequence]):
+                 shown: Mapping[int, Sequence], sides: int = 1):
         self._shown = [(_marker(name, id_, frame_id, pose, size), np.array(points, int).ravel())
                        for id_, points in shown.items() if points]
         self._message = MarkerArray(markers=[marker for marker, _ in self._shown])
         self.ids = frozenset(marker.id for marker, _ in self._shown)
+        self._sides = sides
         self._points = {}
 
     def message(self, stamp, places: np.ndarray) -> MarkerArray:
         """Return the markers of places [m], shape (legs, points, 2)."""
         for marker, points in self._shown:
             marker.header.stamp = stamp
-            marker.points = self._filled(marker.id, places[:, points].reshape(-1, 2).tolist())
+            legs = places[:self._sides] if marker.id == GROUND_ID else places
+            marker.points = self._filled(marker.id, legs[:, points].reshape(-1, 2).tolist())
+            if marker.type == Marker.TRIANGLE_LIST:
+                # With colours of their own RViz shows both sides of faces so, lit or not.
+                face = FACE if marker.id == PLATES_ID else marker.color
+                marker.colors = [face] * (len(marker.points) // 3)
         return self._message
 
     def _filled(self, id_, pairs):
@@ -110,13 +137,17 @@ def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
 
 
 def _marker(name, id_, frame_id, pose, size) -> Marker:
-    type_, colour, width = LOOKS[id_]
+    type_, colour, width, layer = LOOKS[id_]
     marker = Marker(ns=name, id=id_, type=type_, action=Marker.ADD)
     marker.header.frame_id = frame_id
-    x, y, z, *angles = pose
-    marker.pose = Pose(position=Point(x=x, y=y, z=z), orientation=quaternion(*angles))
-    marker.scale.x = width * size
-    if type_ == Marker.SPHERE_LIST:
-        marker.scale.y = marker.scale.z = width * size
-    marker.color = ColorRGBA(**dict(zip('rgb', palette.rgb(colour))), a=1.0)
+    turn, height = quaternion(*pose[3:]), STEP * size * layer
+    upright = (2.0 * (turn.x * turn.z + turn.w * turn.y),
+               2.0 * (turn.y * turn.z - turn.w * turn.x),
+               1.0 - 2.0 * (turn.x * turn.x + turn.y * turn.y))
+    x, y, z = (place + height * part for place, part in zip(pose, upright))
+    marker.pose = Pose(position=Point(x=x, y=y, z=z), orientation=turn)
+    marker.scale.x = width * size if width else 1.0
+    if type_ in (Marker.SPHERE_LIST, Marker.TRIANGLE_LIST):
+        marker.scale.y = marker.scale.z = marker.scale.x
+    marker.color = _rgba(colour)
     return marker

@@ -91,7 +91,7 @@ def guides(axes, machine, cycle, unit):
     first_leg = cycle.course[:, 0]
     dashed = {'color': GUIDE, 'lw': 1.6 * unit, 'ls': (0, (6, 4)), 'zorder': 1}
     around = np.exp(1j * np.linspace(0.0, math.tau, 361))
-    for bar in cranks(linkage, 'ground'):
+    for bar in shapes.cranks(linkage, 'ground'):
         centre, pin = (first_leg[0, linkage.points.index(name)] for name in bar)
         circle = centre @ (1, 1j) + around * math.dist(centre, pin)
         axes.plot(circle.real, circle.imag, **dashed)
@@ -109,13 +109,6 @@ def sliding(machine):
     first = len(machine.linkage.points)
     return [(shape, slice(first + 2 * k, first + 2 * k + 2))
             for k, shape in enumerate(shapes.drawn(machine, machine.points))]
-
-
-def cranks(linkage, parent=None):
-    """Return the bars that inputs turn, from centre to pin; all, or those on one link."""
-    names = [input_.name for input_ in linkage.inputs if input_.turns]
-    return [(link.joint, link.tip) for link in linkage.links
-            if link.name in names and parent in (None, link.parent)]
 
 
 def straight(curve):
@@ -143,7 +136,7 @@ class Legs:
     def __init__(self, axes, machine, cycle, parts, unit):
         linkage = machine.linkage
         index = {name: linkage.points.index(name) for name in machine.points}
-        turning = cranks(linkage)
+        turning = shapes.cranks(linkage)
         bars = [bar for bar in linkage.bars if bar not in turning]
         lines = {'bars': bars, 'rods': linkage.cylinders, 'cranks': turning}
         self._lines = {kind: np.array([[index[p], index[q]] for p, q in ends

@@ -2,19 +2,22 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What slides, as it is drawn: a cylinder's barrel and rod, a block, and the guide it runs on.
+What there is to be drawn of a linkage: what slides, which bars are cranks, which make a plate.
 
-Each is a straight piece of one link, so it moves with that link in markers, pictures and models.
+What slides is a cylinder's barrel and rod, a block, and the guide it runs on. Each is a straight
+piece of one link, so it moves with that link in markers, pictures and models.
 """
 
 from __future__ import annotations
 
 import cmath
-from typing import Any, Collection, Dict, Iterable, List, NamedTuple, Sequence, Tuple
+from itertools import combinations
+from typing import Any, Collection, Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
 from ..linkage.builder import GROUND, Link
+from ..linkage.mechanism import Mechanism
 from ..linkage.output_range import ground_frame
 from ..linkage.quantities import Spot
 from ..scene import Drive, Machine
@@ -24,6 +27,10 @@ GUIDE, BLOCK, BARREL, ROD = 'guide', 'block', 'barrel', 'rod'
 HALF_BLOCK = 1 / 20
 # Of a cylinder's shortest length: the least and the most that its barrel takes.
 SHORT_BARREL, LONG_BARREL = 0.5, 0.9
+# Of the longest bar: how high the mark of a joint on the ground is; half its width of its height.
+MARK, HALF_MARK = 1 / 15, 0.6
+# Of the longest bar squared: an area that is none.
+FLAT = 1e-9
 # Poses by which it is found how far something slides.
 SAMPLES = 361
 
@@ -61,6 +68,34 @@ def drawn(machine: Machine, wanted: Collection[str]) -> List[Shape]:
     """Return what is drawn where these joints are wanted; rods are drawn as other bars are."""
     return [shape for shape in shapes(machine)
             if shape.kind != ROD and {shape.slide.joint, shape.slide.tip} <= set(wanted)]
+
+
+def cranks(linkage: Mechanism, parent: Optional[str] = None) -> List[Tuple[str, str]]:
+    """Return the bars that inputs turn, from centre to pin; all, or those on one link."""
+    names = [input_.name for input_ in linkage.inputs if input_.turns]
+    return [(link.joint, link.tip) for link in linkage.links
+            if link.name in names and parent in (None, link.parent)]
+
+
+def plates(linkage: Mechanism, wanted: Collection[str]) -> List[Tuple[str, str, str]]:
+    """Return three by three the wanted joints whose bars are a triangle of one link."""
+    bars = set(map(frozenset, linkage.bars))
+    return [corners for frame in linkage.frames.values()
+            for corners in combinations([name for name in frame if name in wanted], 3)
+            if bars.issuperset(map(frozenset, combinations(corners, 2)))
+            and _area(*(complex(*frame[name]) for name in corners)) > FLAT * linkage.longest ** 2]
+
+
+def _area(p: complex, q: complex, r: complex) -> float:
+    return abs(((q - p).conjugate() * (r - p)).imag) / 2.0
+
+
+def marks(linkage: Mechanism, wanted: Collection[str]) -> List[Tuple[str, Spot, Spot]]:
+    """Return for each wanted joint on the ground the triangle that it stands on."""
+    height = MARK * linkage.longest
+    width = HALF_MARK * height
+    return [(name, Spot(GROUND, x - width, y - height), Spot(GROUND, x + width, y - height))
+            for name, (x, y) in ground_frame(linkage).items() if name in wanted]
 
 
 def _cylinder(link: Link, low: float, high: float) -> Iterable[Tuple[str, Spot, Spot]]:

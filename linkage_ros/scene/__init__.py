@@ -115,8 +115,11 @@ def read(given: Mapping[str, Any], before: Optional[Scene] = None, strict: bool 
 
     """
     parts = _parted(given)
+    if 'mechanisms' not in parts.get('', {}):
+        for name, scale in mechanisms.CATALOGUE.items():
+            parts[name] = {f'{name}.scale': scale, **parts.get(name, {})}
     values = Values(parts.pop('', {}))
-    names = values.take('mechanisms', MECHANISMS, mechanisms.CATALOGUE)
+    names = values.take('mechanisms', MECHANISMS, (*mechanisms.CATALOGUE,))
     if not names or len(set(names)) < len(names):
         raise MECHANISMS.error('mechanisms', names)
     frame_id = values.take('frame_id', FRAME_ID, 'world')

@@ -11,7 +11,8 @@ from visualization_msgs.msg import Marker
 from .bridge import SECONDS_BETWEEN_WARNINGS
 from ..nodes.message_layout import deserialized, MessageLayout, NoLayout
 
-KINDS = {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'strip', Marker.SPHERE_LIST: 'joints'}
+KINDS = {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'strip', Marker.SPHERE_LIST: 'joints',
+         Marker.TRIANGLE_LIST: 'triangles'}
 NO_POINTS = np.empty(0)
 
 

@@ -9,6 +9,7 @@ import { Mechanism } from './mechanism.js';
 import { Panel } from './panel.js';
 import { Picture } from './picture.js';
 import { units } from './units.js';
+import { View } from './view.js';
 
 const mechanisms = new Map();
 const views = document.getElementById('views');
@@ -29,6 +30,12 @@ const hand = new Hand(picture, {
   choose: (mechanism, dimension) => panel.goTo(mechanism.key, dimension),
 });
 picture.pull = () => hand.pull;
+const whole = document.getElementById('whole');
+picture.view = new View(picture.canvas, () => hand.grabbed !== null, () => {
+  whole.hidden = picture.view.whole;
+  draw();
+});
+whole.onclick = () => picture.view.reset();
 
 /** Light up the bars of a dimension, and its slider. */
 function light(mechanism, dimension) {
@@ -109,6 +116,7 @@ function draw(after) {
 }
 
 function show(key) {
+  if (key !== shown) picture.view.reset();
   shown = key;
   const several = mechanisms.size > 1;
   const labels = several

@@ -10,6 +10,8 @@ const SLACK = 0.06;
 const SHRUNK = 10;
 const LINE = 18;
 const MOST_LINES = 100;
+/** How many numbers make a line, a triangle, a joint. */
+const PIECE = { lines: 4, triangles: 6, joints: 2 };
 const FONT = "13px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
 
 /** A colour of the style sheet, which the server fills in. */
@@ -41,14 +43,14 @@ function multiples(step, low, high) {
 
 const dark = matchMedia('(prefers-color-scheme: dark)');
 
-/** A colour that can be seen, made paler; paleness alone tells the pairs of legs apart. */
-function colour([r, g, b, a], paler) {
-  const unseen = dark.matches && Math.max(r, g, b) < 0.3;
-  const paper = dark.matches ? 0.1 : 1;
-  const mixed = [r, g, b].map(part => unseen ? 1 - part : part)
-    .map(part => Math.round(255 * (part + (paper - part) * paler)));
-  return `rgba(${mixed.join(',')},${a})`;
+/** A colour mixed with that of the paper, or of the ink. */
+function mixed([r, g, b, a], part, towards) {
+  const other = dark.matches === (towards === 'ink') ? 0.92 : 0.1;
+  return `rgba(${[r, g, b].map(one => Math.round(255 * (one + (other - one) * part))).join(',')},${a})`;
 }
+
+/** A colour as it is, stronger for the legs in front; each is seen well against the paper. */
+const colour = (rgba, front = 0) => mixed(rgba, 0.55 * front, 'ink');
 
 class Box {
   constructor() {
@@ -89,6 +91,8 @@ export class Picture {
     this.canvas = canvas;
     this.context = canvas.getContext('2d');
     this.named = true;
+    /** From where it is seen; see view.js. */
+    this.view = null;
     this.mechanisms = [];
     this.boxes = new Map();
     /** The mechanism and the dimension whose bars are lit, and the line of a joint that is pulled. */
@@ -120,8 +124,9 @@ export class Picture {
     if (!shapes.length) return;
     // Under a joint that is dragged the paper stays where it is.
     if (!this.scale || !this.pull()) this.fit(shapes, width, height);
-    this.grid(width, height);
-    shapes.sort((a, b) => (a.look.kind === 'lines') - (b.look.kind === 'lines'));
+    if (!this.view.turned) this.grid(width, height);
+    this.planes();
+    shapes.sort((a, b) => a.depth - b.depth);
     const joints = shapes.filter(({ look }) => look.kind === 'joints');
     for (const shape of shapes) if (!joints.includes(shape)) this[shape.look.kind](shape);
     this.light();
@@ -138,7 +143,8 @@ export class Picture {
     for (const mechanism of this.mechanisms) {
       for (const { look, points } of mechanism.markers.values()) {
         const [x, y, z] = axes(look.pose);
-        this.seen ??= { right: x, up: y };
+        this.seen ??= this.view.axes({ right: x, up: y, out: z });
+        const depth = dot(this.seen.out, look.pose.slice(0, 3));
         const map = [this.seen.right, this.seen.up].map(way => [
           dot(way, x), dot(way, y), dot(way, z), dot(way, look.pose.slice(0, 3))]);
         const places = new Float64Array(points.length / 3 * 2);
@@ -147,7 +153,7 @@ export class Picture {
             places[to++] = a * points[from] + b * points[from + 1] + c * points[from + 2] + d;
           }
         }
-        shapes.push({ mechanism, look, points, places, map });
+        shapes.push({ mechanism, look, points, places, map, depth });
       }
     }
     return shapes;
@@ -156,9 +162,11 @@ export class Picture {
   /** Choose scale and place so that everything is seen, and stays where it is while it moves. */
   fit(shapes, width, height) {
     const now = new Map();
-    for (const { mechanism: { key }, places } of shapes) {
+    this.maps = new Map();
+    for (const { mechanism: { key }, points, map } of shapes) {
       if (!now.has(key)) now.set(key, new Box());
-      for (let i = 0; i < places.length; i += 2) now.get(key).add(places[i], places[i + 1]);
+      for (let i = 0; i < points.length; i += 3) now.get(key).add(points[i], points[i + 1]);
+      this.maps.set(key, map);
     }
     const all = new Box();
     for (const [key, box] of now) {
@@ -166,14 +174,38 @@ export class Picture {
       // It was never so large: something far off was drawn that is gone.
       if (box.size > 0 && known.size > SHRUNK * box.size) known = new Box();
       if (!known.holds(box)) this.boxes.set(key, known.grown(box));
-      const { low, high } = this.boxes.get(key) ?? box;
-      all.add(...low);
-      all.add(...high);
+      for (const corner of this.corners(key, this.boxes.get(key) ?? box)) all.add(...corner);
     }
     const span = [0, 1].map(i => Math.max(all.high[i] - all.low[i], 1e-9));
     this.scale = Math.min((width - 2 * MARGIN) / span[0], (height - 2 * MARGIN) / span[1]);
     this.middle = [0, 1].map(i => (all.high[i] + all.low[i]) / 2);
-    this.centre = [width / 2, height / 2];
+    this.scale *= this.view.zoom;
+    this.centre = [width / 2 + this.view.shift[0], height / 2 + this.view.shift[1]];
+  }
+
+  /** Return the corners of a box in a mechanism's plane, one after the other, as they are seen. */
+  corners(key, { low: [left, bottom], high: [right, top] }) {
+    return [[left, bottom], [right, bottom], [right, top], [left, top]].map(
+      ([x, y]) => this.maps.get(key).map(([a, b, , d]) => a * x + b * y + d));
+  }
+
+  /** Draw the planes of the mechanisms that are not seen at a right angle. */
+  planes() {
+    const { context } = this;
+    context.lineWidth = 1;
+    context.strokeStyle = paint('--faint');
+    context.fillStyle = paint('--shade');
+    for (const [key, box] of this.boxes) {
+      const [[a, b], [c, d]] = this.maps.get(key) ?? [[1, 0], [0, 1]];
+      if (Math.abs(a * d - b * c) > 0.9999) continue;
+      context.beginPath();
+      for (const corner of this.corners(key, box)) context.lineTo(...this.at(...corner));
+      context.closePath();
+      context.globalAlpha = 0.6;
+      context.fill();
+      context.globalAlpha = 1;
+      context.stroke();
+    }
   }
 
   at(x, y) {
@@ -223,35 +255,67 @@ export class Picture {
   strip({ look, places }) {
     const { context } = this;
     context.lineWidth = Math.max(1.5, look.width * this.scale);
-    context.strokeStyle = colour(look.colour, 0.35);
+    context.strokeStyle = colour(look.colour);
     context.lineJoin = context.lineCap = 'round';
     context.beginPath();
     for (let i = 0; i < places.length; i += 2) context.lineTo(...this.at(places[i], places[i + 1]));
     context.stroke();
   }
 
-  /** Call back with each leg's part of what is drawn, the palest pair first. */
-  legs({ mechanism, places }, draw) {
+  /** Call back with each leg's part of what is drawn, the last pair first, and how far in front. */
+  legs({ mechanism, look, places }, draw) {
     const { pairs, legs } = mechanism;
     const size = places.length / legs;
-    if (!Number.isInteger(size)) return draw(places, 0);
+    if (size % PIECE[look.kind]) return draw(places, 0);
     for (let leg = legs - 1; leg >= 0; leg--) {
       const pair = Math.floor(leg * pairs / legs);
-      draw(places.subarray(leg * size, (leg + 1) * size), 0.65 * pair / Math.max(pairs - 1, 1));
+      draw(places.subarray(leg * size, (leg + 1) * size), pairs > 1 ? 1 - pair / (pairs - 1) : 0);
     }
   }
 
   lines(shape) {
     const { context } = this;
-    context.lineWidth = Math.max(2, shape.look.width * this.scale);
+    const wide = context.lineWidth = Math.max(2, shape.look.width * this.scale);
+    const joints = [...shape.mechanism.markers.values()].find(({ look }) => look.kind === 'joints');
+    // What is wider than a joint is a slot.
+    const slot = wide > 4 && shape.look.width > joints?.look.width;
     context.lineCap = 'round';
-    this.legs(shape, (places, lighter) => {
-      context.strokeStyle = colour(shape.look.colour, lighter);
+    this.legs(shape, (places, front) => {
+      context.strokeStyle = colour(shape.look.colour, front);
       context.beginPath();
       for (let i = 0; i < places.length; i += 4) {
         context.moveTo(...this.at(places[i], places[i + 1]));
         context.lineTo(...this.at(places[i + 2], places[i + 3]));
       }
+      context.stroke();
+      if (!slot) return;
+      context.strokeStyle = paint('--paper');
+      context.lineWidth = wide - 4;
+      context.stroke();
+      context.lineWidth = wide;
+    });
+  }
+
+  /** Draw plates as pale as paper between their bars; what has no bars of its colour is filled. */
+  triangles(shape) {
+    const { context } = this;
+    const same = [...shape.mechanism.markers.values()].map(({ look }) => look)
+      .filter(({ kind, colour: other }) => kind === 'lines' && `${other}` === `${shape.look.colour}`);
+    const width = Math.min(...same.map(look => look.width));
+    context.lineWidth = Math.max(2, width * this.scale);
+    context.lineJoin = 'round';
+    this.legs(shape, (places, front) => {
+      context.beginPath();
+      for (let i = 0; i < places.length; i += 6) {
+        for (let k = 0; k < 6; k += 2) {
+          context[k ? 'lineTo' : 'moveTo'](...this.at(places[i + k], places[i + k + 1]));
+        }
+        context.closePath();
+      }
+      context.fillStyle = same.length ? mixed(shape.look.colour, 0.8, 'paper') : colour(shape.look.colour);
+      context.fill();
+      if (!same.length) return;
+      context.strokeStyle = colour(shape.look.colour, front);
       context.stroke();
     });
   }
@@ -259,12 +323,15 @@ export class Picture {
   joints(shape) {
     const { context } = this;
     const radius = Math.max(3, shape.look.width * this.scale / 2);
-    this.legs(shape, (places, lighter) => {
-      context.fillStyle = colour(shape.look.colour, lighter);
+    context.lineWidth = Math.max(1.5, radius / 2.5);
+    context.fillStyle = paint('--paper');
+    this.legs(shape, (places, front) => {
+      context.strokeStyle = colour(shape.look.colour, front);
       for (let i = 0; i < places.length; i += 2) {
         context.beginPath();
-        context.arc(...this.at(places[i], places[i + 1]), radius, 0, 2 * Math.PI);
+        context.arc(...this.at(places[i], places[i + 1]), radius - context.lineWidth / 2, 0, 2 * Math.PI);
         context.fill();
+        context.stroke();
       }
     });
   }
@@ -310,7 +377,9 @@ export class Picture {
       const box = this.boxes.get(key);
       if (!box) continue;
       const half = context.measureText(name).width / 2 + 4;
-      let [x, y] = this.at((box.low[0] + box.high[0]) / 2, box.low[1]);
+      const corners = this.corners(key, box).map(corner => this.at(...corner));
+      const x = corners.reduce((sum, [one]) => sum + one / corners.length, 0);
+      let y = Math.max(...corners.map(([, one]) => one));
       const over = () => written.find(other =>
         Math.abs(other.x - x) < other.half + half && Math.abs(other.y - y) < LINE);
       for (let other = over(); other; other = over()) y = other.y + LINE;
