@@ -234,7 +234,11 @@ def test_of_several_inputs_what_cannot_be_had_is_held_and_said(graph, capfd):
                   [0.059, -0.16]):
         held = stream.want(FOOT, place, [0.1, 0.0])
         assert held == {name: (position, 0.0) for name, (position, _) in good.items()}
-    assert stream.want([*FOOT, *BUCKET[:2]], LINE[:4].tolist()).keys() == good.keys()
+    assert graph.set(stream.node, leg__dimensions__a=0.08).successful
+    changed = [row for row, _ in five_bar({**LEG, 'a': 0.08}, complex(*LINE[:2]))]
+    found = stream.want([*FOOT, *BUCKET[:2]], LINE[:4].tolist())
+    assert found.keys() == good.keys()
+    assert min(abs(found['leg_crank'][0] - left) for left, _ in changed) < 1e-12
     said = capfd.readouterr().err
     for reason in ('leg_P.x and leg_P.y cannot be 0.059, 0.5: P.x, P.y at 0.059, 0.5 is nowhere',
                    'digger has 3 inputs: name as many outputs of it, not digger_H.x and'):

@@ -157,8 +157,9 @@ def test_all_working_modes_of_a_foot_are_told_and_the_nearest_comes_first(graph)
     client = graph.node.create_client(InputsFor, 'inputs_for')
     response = graph.call(client, InputsFor.Request(**FOOT))
     assert response.success and response.names == ['leg_crank', 'motor']
+    lengths = mechanisms.create('five_bar').dimensions
     expected = {f'AP{"+-"[bends["AP"] < 0]} CP{"+-"[bends["CP"] < 0]}': inputs
-                for inputs, bends in five_bar(mechanisms.create('five_bar').dimensions, 0.06 + 0.15j)}
+                for inputs, bends in five_bar(lengths, 0.06 + 0.15j)}
     answers = np.reshape(response.positions, (-1, 2))
     assert len(expected) == len(answers) == len(response.modes) and not any(response.singular)
     for mode, (left, motor) in zip(response.modes, answers):
@@ -178,7 +179,7 @@ def test_all_working_modes_of_a_foot_are_told_and_the_nearest_comes_first(graph)
     ({**FOOT, 'outputs': ['P.x']}, 'as many outputs are needed'),
     ({**FOOT, 'outputs': ['P.x', 'Z.y']}, "no output 'Z.y'"),
     ({**FOOT, 'outputs': ['A.x', 'A.y']}, 'A.x, A.y do not tell all inputs'),
-    ({**FOOT, 'mechanism': 'boom'}, "mechanism must be one of leg, drop"),
+    ({**FOOT, 'mechanism': 'boom'}, 'mechanism must be one of leg, drop'),
     ({**FOOT, 'mechanism': 'drop'}, 'drop has 1 inputs')])
 def test_what_cannot_be_asked_of_several_inputs_gets_the_reason(graph, request_, reason):
     node = graph.start(ServoInverse, FIVE_BAR)

@@ -17,7 +17,18 @@ from __future__ import annotations
 
 from itertools import chain, combinations
 import math
-from typing import Any, Callable, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
+from typing import (
+    Any,
+    Callable,
+    Iterator,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Set,
+    Tuple,
+)
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,10 +41,10 @@ from ..formula.program import Pose
 from ..words import listed, quoted
 
 # Starts of a search at first and at most, and those of them that can be assembled at least.
-STARTS, MOST_STARTS, ASSEMBLED = 1024, 1 << 18, 250
+STARTS, MOST_STARTS, ASSEMBLED = 1024, 1 << 16, 250
 # Steps from a start, how far one goes at most, and their damping: at first, at least, and in vain.
 STEPS, LONGEST_STEP = 40, 0.7
-DAMPING, LEAST_DAMPING, HOPELESS, TINY = 1e-3, 1e-15, 1e4, 1e-300
+DAMPING, LEAST_DAMPING, HOPELESS, TINY = 1e-3, 1e-14, 1e4, 1e-300
 # Newton steps that polish a solution; halvings of the way to what may lie beside it.
 POLISHING, HALVINGS = 3, 24
 # Below this margin a pose is singular; below it wherever one looks, outputs tell too little.
@@ -123,15 +134,13 @@ class Several(Analysed):
         for block in equations.blocks:
             found = np.concatenate([found[:0], *(
                 equations.solutions(q, target, *block) for q in found)])
-        with np.errstate(invalid='ignore'):
-            held = self._bound('margins', ()).searched(*equations.given(found)) >= 0.0
-        found = found[held.all(axis=0)]
+        found = found[self._held(found * equations.sizes)]
         found = found[np.lexsort(found.T[::-1])]
         if near is not None:
-            near = self._each('near', near) / equations.sizes
+            beside = self._each('near', near) / equations.sizes
             found = np.stack([input_.beside(x, y) for input_, x, y in zip(
-                equations.inputs, found.T, near)], axis=-1)
-            found = found[np.argsort(np.linalg.norm(found - near, axis=1))]
+                equations.inputs, found.T, beside)], axis=-1)
+            found = found[np.argsort(np.linalg.norm(found - beside, axis=1))]
         return [self._answer(q, equations) for q in found]
 
     def follow_inputs(self, outputs: Sequence[str], values: ArrayLike, near: ArrayLike) -> _Pair:
@@ -155,13 +164,24 @@ class Several(Analysed):
         """
         target, equations = self._asked(outputs, values)
         q, jacobian = equations.followed(self._each('near', near) / equations.sizes, target)
-        return q * equations.sizes, jacobian * equations.scale[:, None] / equations.sizes
+        inputs = q * equations.sizes
+        if not self._held(inputs[None])[0]:
+            inputs, jacobian = inputs * np.nan, jacobian * np.nan
+        return inputs, jacobian * equations.scale[:, None] / equations.sizes
+
+    def _held(self, inputs: np.ndarray) -> np.ndarray:
+        """Return for rows of inputs whether all of the linkage can be assembled there."""
+        with np.errstate(invalid='ignore'):
+            margins = self._bound('margins', ()).searched(*inputs.T)
+            return (margins >= 0.0).all(axis=0) & np.all([
+                input_.turns | (input_.low <= x) & (x <= input_.high)
+                for input_, x in zip(self.inputs, inputs.T)], axis=0)
 
     def _each(self, name: str, values: ArrayLike) -> np.ndarray:
         found = numbers(name, values)
-        if found.shape != (len(self.inputs),):
+        if found.shape != (len(self.inputs),) or name == 'near' and not np.isfinite(found).all():
             raise ValueError(f'{self.type} has {len(self.inputs)} inputs: {name} must be as many '
-                             f'numbers, got the shape {found.shape}')
+                             f'numbers, got {quoted(found.tolist())}')
         return found
 
     def _asked(self, outputs: Any, values: ArrayLike) -> Tuple[np.ndarray, _Equations]:
@@ -189,7 +209,7 @@ class Several(Analysed):
     def _answer(self, q: np.ndarray, equations: _Equations) -> Answer:
         """Return inputs with the names of their working mode."""
         inputs = tuple((q * equations.sizes).tolist())
-        jacobian = equations.over(q[None], np.zeros(len(q)))[1][0]
+        (jacobian,) = equations.over(q[None], np.zeros(len(q)))[1]
         values = np.linalg.svd(jacobian, compute_uv=False)
         margin = float(values[-1] / max(1.0, values[0]))
         cranks = {link.name: link for link in self.links
@@ -219,7 +239,8 @@ class _Equations:
 
     def _sorted_out(self, needs: Sequence[Set[int]]) -> Iterator[Tuple[List[int], List[int]]]:
         """Yield outputs that are solved one after the other, and the inputs that they tell."""
-        left, known = set(range(len(needs))), set()
+        left = set(range(len(needs)))
+        known: Set[int] = set()
         while left:
             for rows in chain(*(combinations(sorted(left), n + 1) for n in range(len(left)))):
                 columns = set().union(*(needs[row] for row in rows)) - known
@@ -234,18 +255,21 @@ class _Equations:
         return ValueError(f'{listed(self.outputs)} do not tell all inputs: '
                           f'{listed(self.outputs[row] for row in rows)} depends on too few')
 
-    def given(self, q: np.ndarray) -> np.ndarray:
-        """Return the inputs [rad or m], an array for each."""
-        return (q * self.sizes).T
-
     def over(self, q: np.ndarray, target: np.ndarray) -> _Pair:
         """Return what outputs miss of their target, and the Jacobian, for each row of q."""
-        n, count = len(target), len(q)
-        rows = np.array(self._pose.at(*self.given(q)[:, 0].tolist()))[:, None] \
-            if count == 1 else self._pose.searched(*self.given(q))
+        return self._missed(self._pose.searched(*(q * self.sizes).T), target)
+
+    def _at(self, q: np.ndarray, target: np.ndarray) -> _Pair:
+        """Return the same for one pose, by code for one."""
+        missed, jacobian = self._missed(
+            np.array(self._pose.at(*(q * self.sizes).tolist()))[:, None], target)
+        return missed[0], jacobian[0]
+
+    def _missed(self, rows: np.ndarray, target: np.ndarray) -> _Pair:
+        n = len(target)
         missed = rows[:n].T - target
         missed -= np.where(self._angular, math.tau * np.round(missed / math.tau), 0.0)
-        jacobian = rows[n:].reshape(n, n, count).transpose(2, 1, 0)
+        jacobian = rows[n:].reshape(n, n, rows.shape[1]).transpose(2, 1, 0)
         return missed / self.scale, jacobian * self.sizes / self.scale[:, None]
 
     def solutions(self, q: np.ndarray, target: np.ndarray, rows: List[int],
@@ -330,10 +354,6 @@ class _Equations:
             elif (piece := 0.25 * piece) < SHORTEST:
                 break
         return np.full(q.shape, np.nan), np.full(jacobian.shape, np.nan)
-
-    def _at(self, q: np.ndarray, target: np.ndarray) -> _Pair:
-        missed, jacobian = self.over(q[None], target)
-        return missed[0], jacobian[0]
 
     def _corrected(self, start: np.ndarray, target: np.ndarray, aim: np.ndarray,
                    side: float) -> Optional[_Pair]:

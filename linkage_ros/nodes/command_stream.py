@@ -110,6 +110,9 @@ class CommandStream:
     def adopt(self, machines):
         """Act on these mechanisms from now on."""
         self._machines, self._wires = machines, {}
+        # The last pose of several inputs may be none of another geometry.
+        self._last = {name: last for name, last in self._last.items() if len(last.inputs) == 1
+                      or last.route.machine is machines.get(name)}
         self._reader = joint_state_reader.Reader(self._understood)
 
     def _output(self, called: str) -> Tuple[Machine, str, JointName]:
@@ -186,7 +189,8 @@ class CommandStream:
     def _command(self, route, positions, speeds) -> Optional[Command]:
         """Return the command for outputs, or the last good one, to be held; None without any."""
         last = self._last.get(route.machine.name)
-        command = Command(route, *route.commanded(positions, speeds, self._near(route), bool(last)))
+        command = Command(route, *route.commanded(
+            positions, speeds, self._near(route), bool(last)))
         if all(map(math.isfinite, command.inputs)):
             self._last[route.machine.name] = command
             return command

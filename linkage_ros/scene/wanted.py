@@ -100,11 +100,11 @@ class Wanted:
             of their actuators. A speed is infinite where an output that moves would turn back.
 
         """
-        (speed,), (value,) = speeds or (None,), values
-        input_, rate = self._machine.measured(self._name, value, *near)
-        if speed:
-            speed = speed / (rate * self._ratio) if rate else math.copysign(math.inf, speed)
-        return (input_,), ((input_ - self._offset) / self._ratio,), speeds and (speed,)
+        input_, rate = self._machine.measured(self._name, *values, *near)
+        if speeds and speeds[0]:
+            speeds = (speeds[0] / (rate * self._ratio) if rate else
+                      math.copysign(math.inf, speeds[0]),)
+        return (input_,), ((input_ - self._offset) / self._ratio,), speeds
 
     def reason(self, value: float) -> str:
         """Return in words why a value cannot be had: which end of the sweep or reach forbids."""
@@ -216,8 +216,8 @@ class WantedTogether:
                 self._outputs, np.divide(values, self._units), np.divide(near, self._scales)):
             inputs = [_inside(drive, value) for drive, value in zip(
                 self._drives, np.multiply(answer.inputs, self._scales).tolist())]
-            if None not in inputs:
-                found.append(answer._replace(inputs=inputs))
+            if np.isfinite(inputs).all():
+                found.append(answer._replace(inputs=tuple(inputs)))
         sizes = [drive.input.size for drive in self._drives]
         return sorted(found, key=lambda answer: math.dist(
             np.divide(answer.inputs, sizes), np.divide(near, sizes)))
@@ -241,10 +241,10 @@ class WantedTogether:
         return f'{what} takes inputs outside {listed(sweeps)}'
 
 
-def _inside(drive: Drive, value: float) -> Optional[float]:
-    """Return an input between its ends, where a crank's whole turns are one; else None."""
+def _inside(drive: Drive, value: float) -> float:
+    """Return an input between its ends, where a crank's whole turns are one; else NaN."""
     low, high = drive.ends or (value, value)
     if drive.input.turns and not low <= value <= high:
         value += math.tau * (math.ceil((low - value) / math.tau) if value < low else
                              math.floor((high - value) / math.tau))
-    return value if low <= value <= high else None
+    return value if low <= value <= high else math.nan

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The inputs of a five-bar, a parallelogram arm and an excavator, by circles from what they hold."""
+"""The inputs of a five-bar, a parallelogram arm and an excavator, by circles from the output."""
 
 import cmath
 import math
@@ -16,7 +16,9 @@ def meet(one, radius, other, radius_, side):
     way = other - one
     along = (abs(way) ** 2 + radius ** 2 - radius_ ** 2) / (2.0 * abs(way))
     height = radius ** 2 - along ** 2
-    return one + way / abs(way) * complex(along, side * math.sqrt(height)) if height >= 0.0 else None
+    if height >= 0.0:
+        return one + way / abs(way) * complex(along, side * math.sqrt(height))
+    return None
 
 
 def side(start, joint, end):
