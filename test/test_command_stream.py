@@ -229,18 +229,19 @@ def test_a_foot_and_a_bucket_go_in_along_a_line_and_back_out(graph):
 
 def test_of_several_inputs_what_cannot_be_had_is_held_and_said(graph, capfd):
     stream = Stream(graph, SEVERAL)
+    bucket = BUCKET, LINE[2:].tolist()
+    assert stream.want(FOOT + bucket[0], [9.0, 9.0, *bucket[1]]).keys() == set(NAMES[2:])
     good = stream.want(FOOT, LINE[:2].tolist(), [0.1, 0.0])
-    for place in ([0.059, 0.5], [math.nan, 0.16], [math.inf, -math.inf], [1e300, 0.0],
-                  [0.059, -0.16]):
+    for place in ([0.059, 0.5], [math.nan, 0.16], [math.inf, -1e300], [0.059, -0.16]):
         held = stream.want(FOOT, place, [0.1, 0.0])
         assert held == {name: (position, 0.0) for name, (position, _) in good.items()}
-    assert graph.set(stream.node, leg__dimensions__a=0.08).successful
-    changed = [row for row, _ in five_bar({**LEG, 'a': 0.08}, complex(*LINE[:2]))]
+    assert graph.set(stream.node, leg__dimensions__a=0.085).successful
+    changed = [row for row, _ in five_bar({**LEG, 'a': 0.085}, complex(*LINE[:2]))]
     found = stream.want([*FOOT, *BUCKET[:2]], LINE[:4].tolist())
     assert found.keys() == good.keys()
     assert min(abs(found['leg_crank'][0] - left) for left, _ in changed) < 1e-12
     said = capfd.readouterr().err
-    for reason in ('leg_P.x and leg_P.y cannot be 0.059, 0.5: P.x, P.y at 0.059, 0.5 is nowhere',
+    for reason in ('leg_P.x and leg_P.y cannot be 9, 9: P.x, P.y at 9, 9 is nowhere in the reach',
                    'digger has 3 inputs: name as many outputs of it, not digger_H.x and'):
         assert reason in said
 

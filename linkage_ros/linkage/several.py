@@ -52,7 +52,7 @@ SINGULAR, DEPENDENT = 1e-6, 1e-10
 # Rounding of an output, and of an input where the Jacobian is one.
 ROUNDED, CLOSE = 32 * 2.0 ** -53, 1e-13
 # Pieces of a way from pose to pose, the shortest of them, and Newton steps to the end of each.
-PIECES, SHORTEST, REFINED = 200, 1e-18, 12
+PIECES, SHORTEST, REFINED = 40, 1e-10, 30
 
 _Pair = Tuple[np.ndarray, np.ndarray]
 
@@ -138,6 +138,8 @@ class Several(Analysed):
         found = found[np.lexsort(found.T[::-1])]
         if near is not None:
             beside = self._each('near', near) / equations.sizes
+            if not np.isfinite(beside).all():
+                raise ValueError(f'near must be finite, got {quoted(beside.tolist())}')
             found = np.stack([input_.beside(x, y) for input_, x, y in zip(
                 equations.inputs, found.T, beside)], axis=-1)
             found = found[np.argsort(np.linalg.norm(found - beside, axis=1))]
@@ -179,7 +181,7 @@ class Several(Analysed):
 
     def _each(self, name: str, values: ArrayLike) -> np.ndarray:
         found = numbers(name, values)
-        if found.shape != (len(self.inputs),) or name == 'near' and not np.isfinite(found).all():
+        if found.shape != (len(self.inputs),):
             raise ValueError(f'{self.type} has {len(self.inputs)} inputs: {name} must be as many '
                              f'numbers, got {quoted(found.tolist())}')
         return found

@@ -24,7 +24,7 @@ from ..words import elided
 
 # What comes while the node is kept waiting is not lost; any source will do.
 ANY = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
-SECONDS_BETWEEN_WARNINGS = 5.0
+SECONDS_BETWEEN_WARNINGS, SECONDS_BETWEEN_SEARCHES = 5.0, 0.5
 # So many arrangements of commands are remembered.
 MOST_WIRES = 100
 
@@ -44,12 +44,12 @@ class Route(NamedTuple):
         return [f'{self.machine.name}_{drive.input.name}' if drive.measures else drive.source
                 for drive in self.machine.inputs.values()]
 
-    def commanded(self, positions, speeds, near, follows=True):
+    def commanded(self, positions, speeds, near, jumps):
         """Return what `Wanted.commanded` does, for what a message says [rad or m]."""
         return self.wanted.commanded(
             self._meant(positions),
             speeds and [name.sign * speeds[place] for name, place in zip(self.names, self.places)],
-            near, follows)
+            near, jumps)
 
     def reason(self, positions):
         """Return in words why positions cannot be had."""
@@ -103,7 +103,7 @@ class CommandStream:
         self._arrays = {name: node.create_publisher(Float64MultiArray, f'{name}/commands', 10)
                         for name in mechanisms}
         self._trajectories = node.create_publisher(JointTrajectory, 'servo_trajectory', 10)
-        self._message, self._last, self._said = JointStates(), {}, {}
+        self._message, self._last, self._said, self._next = JointStates(), {}, {}, {}
         node.create_subscription(JointState, 'wanted_states', self._hear, ANY, raw=True)
         node.create_subscription(JointTrajectory, 'wanted_trajectory', self._plan, 10)
 
@@ -189,8 +189,11 @@ class CommandStream:
     def _command(self, route, positions, speeds) -> Optional[Command]:
         """Return the command for outputs, or the last good one, to be held; None without any."""
         last = self._last.get(route.machine.name)
-        command = Command(route, *route.commanded(
-            positions, speeds, self._near(route), bool(last)))
+        # Before the first command, which may be anywhere: that takes a search, so now and then.
+        jumps = not last and time.monotonic() > self._next.get(route.machine.name, -math.inf)
+        command = Command(route, *route.commanded(positions, speeds, self._near(route), jumps))
+        if jumps:
+            self._next[route.machine.name] = time.monotonic() + SECONDS_BETWEEN_SEARCHES
         if all(map(math.isfinite, command.inputs)):
             self._last[route.machine.name] = command
             return command
@@ -249,7 +252,7 @@ class CommandStream:
             for k, route in enumerate(routes):
                 near[k], *actuator = route.commanded(
                     point.positions, list(point.velocities) or [0.0] * n, near[k],
-                    bool(i) or route.machine.name in self._last)
+                    not (i or route.machine.name in self._last))
                 if not all(map(math.isfinite, near[k])):
                     raise ValueError(f'point {i}: {route.reason(point.positions)}')
                 if not all(map(math.isfinite, actuator[1])):

@@ -78,7 +78,7 @@ class Wanted:
                 rate * (self._scale / unit * self._ratio))
 
     def commanded(self, values: Sequence[float], speeds: Optional[Sequence[float]],
-                  near: Sequence[float], follows: bool = True) -> Command:
+                  near: Sequence[float], jumps: bool = False) -> Command:
         """
         Return the inputs for values and their speeds, and what their actuators are to do.
 
@@ -90,8 +90,8 @@ class Wanted:
             Of each output [rad/s or m/s], if they are known.
         near : sequence of float
             Where the inputs were [rad or m], from which they go on without a jump.
-        follows : bool
-            Whether several inputs go on from there, or may jump to the nearest answer.
+        jumps : bool
+            Whether several inputs may jump to the nearest answer if they cannot go on from there.
 
         Returns
         -------
@@ -188,17 +188,17 @@ class WantedTogether:
         return self._ratios * positions + self._offsets
 
     def commanded(self, values: Sequence[float], speeds: Optional[Sequence[float]],
-                  near: Sequence[float], follows: bool = True) -> Command:
+                  near: Sequence[float], jumps: bool = False) -> Command:
         """Return what `Wanted.commanded` does."""
-        if not follows:
-            near = [*(answer.inputs for answer in self.answers(values, near)),
-                    [math.nan] * len(near)][0]
         inputs, rates = self._linkage.follow_inputs(
             self._outputs, np.divide(values, self._units), np.divide(near, self._scales))
         inputs = inputs * self._scales
         if not all(drive.ends is None or drive.ends[0] <= value <= drive.ends[1]
                    for drive, value in zip(self._drives, inputs.tolist())):
             inputs = inputs * math.nan
+        if jumps and np.isnan(inputs).any():
+            for answer in self.answers(values, near)[:1]:
+                return self.commanded(values, speeds, answer.inputs)
         return inputs.tolist(), self.told(inputs), (
             speeds and self._speeds(speeds, rates * np.divide.outer(self._units, self._scales)))
 
@@ -231,11 +231,12 @@ class WantedTogether:
         if not all(map(math.isfinite, values)):
             return 'a value must be finite'
         what = f'{listed(self._outputs)} at {listed(f"{value:.6g}" for value in values)}'
-        found = self._linkage.inputs_for(self._outputs, np.divide(values, self._units))
-        if not found:
-            return f'{what} is nowhere in the reach'
         if self.answers(values, [drive.start for drive in self._drives]):
             return f'the way to {what} leads through a singular pose, out of the reach or a sweep'
+        limited = any(drive.ends for drive in self._drives)
+        if not limited or not self._linkage.inputs_for(
+                self._outputs, np.divide(values, self._units)):
+            return f'{what} is nowhere in the reach'
         sweeps = (f'{drive.input.name}.sweep {in_words([drive.ends])}'
                   for drive in self._drives if drive.ends)
         return f'{what} takes inputs outside {listed(sweeps)}'
