@@ -5,7 +5,8 @@
 
 import math
 
-from linkage_ros import mechanisms
+from linkage_ros import mechanisms, scene
+from linkage_ros.scene.wanted import WantedTogether
 import numpy as np
 import pytest
 from truth.cases import CASES
@@ -33,7 +34,7 @@ def made(name):
     return mechanisms.create('custom', joints=case.joints, **case.numbers), case.numbers
 
 
-@pytest.mark.parametrize('count', [12, pytest.param(400, marks=pytest.mark.long)])
+@pytest.mark.parametrize('count', [12, pytest.param(80, marks=pytest.mark.long)])
 def test_a_five_bar_has_all_its_working_modes(count):
     rng, modes = np.random.default_rng(7), 0
     for _ in range(count):
@@ -140,3 +141,18 @@ def test_a_place_to_start_from_may_be_anything():
         linkage.inputs_for(('P.x', 'P.y'), (0.059, 0.16), (math.inf, 0.0))
     with pytest.raises(ValueError, match='near must be as many numbers'):
         linkage.follow_inputs(('P.x', 'P.y'), (0.059, 0.16), 1.0)
+
+
+def test_answers_lie_in_the_sweeps_or_the_reason_says_so():
+    swept = {'mechanisms': ['leg'], 'leg.type': 'five_bar', 'leg.crank.sweep': [6.0, 9.0]}
+    wanted = WantedTogether(scene.read(swept).machines['leg'], ('P.x', 'P.y'))
+    answers = wanted.answers((0.05, 0.15), (0.0, 0.0))
+    assert answers and all(6.0 <= answer.inputs[0] <= 9.0 for answer in answers)
+    assert answers[0].inputs[0] == pytest.approx(min(answer.inputs[0] for answer in answers))
+    found, _, _ = wanted.commanded((0.05, 0.15), None, (0.0, 0.0), jumps=True)
+    assert found == pytest.approx(answers[0].inputs)
+    swept['leg.crank.sweep'] = [3.0, 3.5]
+    wanted = WantedTogether(scene.read(swept).machines['leg'], ('P.x', 'P.y'))
+    assert wanted.answers((0.05, 0.15), (3.2, 0.0)) == []
+    assert wanted.reason(0.05, 0.15) == (
+        'P.x, P.y at 0.05, 0.15 takes inputs outside crank.sweep [3, 3.5]')
