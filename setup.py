@@ -46,10 +46,10 @@ def build_interfaces():
 
 def built():
     """Return whether the nested package, as it is here, is there for this build already."""
-    service = 'srv/ServoInverse.srv'
-    there = (Path(prefix, 'share', interfaces.name, service)
-             for prefix in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))
-    return any(file.is_file() and filecmp.cmp(file, interfaces / service) for file in there)
+    services = [f'srv/{file.name}' for file in interfaces.glob('srv/*.srv')]
+    return any(not any(filecmp.cmpfiles(Path(prefix, 'share', interfaces.name), interfaces,
+                                        services, shallow=False)[1:])
+               for prefix in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))
 
 
 if for_ros:

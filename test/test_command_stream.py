@@ -10,7 +10,10 @@ import random
 from builtin_interfaces.msg import Duration
 from linkage_ros import mechanisms, scene
 from linkage_ros.scene.wanted import Wanted
+import numpy as np
 import pytest
+from truth.cases import CASES
+from truth.working_modes import excavator, five_bar
 
 pytest.importorskip('rclpy')
 pytest.importorskip('linkage_interfaces')
@@ -26,6 +29,18 @@ LEVER = {'mechanisms': ['lever', 'bar'], 'lever.type': 'slotted_lever',
          'lever.crank.source': 'servo', 'lever.crank.ratio': 0.5, 'lever.crank.offset': 0.25,
          'lever.crank.sweep': [-1.5, 1.5], 'lever.joint_names': ['lever=-flap+0.1'],
          'bar.type': 'four_bar', 'bar.crank.start': 0.5}
+# A leg of two geared motors, and an excavator's arm told by the strokes of its pistons.
+DIGGER, LEG = CASES['excavator'], mechanisms.create('five_bar').dimensions
+SEVERAL = {
+    'mechanisms': ['leg', 'digger'], 'leg.type': 'five_bar', 'leg.crank.start': 1.9,
+    'leg.crank2.start': 1.24, 'leg.crank2.source': 'motor', 'leg.crank2.ratio': -0.5,
+    'leg.crank2.offset': 0.2, 'leg.crank2.sweep': [-1.0, 2.0],
+    'digger.type': 'custom', 'digger.joints': DIGGER.joints, 'digger.cylinder.start': 108.0,
+    'digger.cylinder.offset': 80.0, 'digger.cylinder2.start': 132.0,
+    'digger.cylinder3.start': 119.0,
+    **{f'digger.dimensions.{name}': value for name, value in DIGGER.numbers.items()}}
+FOOT = ['leg_P.x', 'leg_P.y']
+BUCKET = [f'digger_{output}' for output in ('H.x', 'H.y', 'angle(H,J)')]
 
 
 class Stream:
@@ -167,7 +182,7 @@ def test_a_turning_crank_is_found_again_without_a_jump(type_, output, part):
     for k in range(2, 98):
         crank = start + 0.01 * k * part * (end - start)
         value = float(linkage.joint_angles(crank, [output])[output])
-        found, actuator, _ = wanted.commanded(value, None, near)
+        (found,), (actuator,), _ = wanted.commanded([value], None, [near])
         assert actuator == found and abs(found - near) < 0.3
         again = float(linkage.joint_angles(found, [output])[output])
         assert math.remainder(again - value, math.tau) == pytest.approx(0.0, abs=1e-12 * max(
@@ -175,11 +190,79 @@ def test_a_turning_crank_is_found_again_without_a_jump(type_, output, part):
         near = found
 
 
+# --- several inputs ---
+
+def actuators(foot, bucket):
+    """Return where the motors and pistons are in the mode that the scene starts in."""
+    (left, right), _ = min(five_bar(LEG, complex(*foot)), key=lambda row: abs(row[0][0] - 1.9)
+                           + abs(row[0][1] - 1.24))
+    (boom, arm, tip), _ = min(excavator(DIGGER.numbers, complex(*bucket[:2]), bucket[2]),
+                              key=lambda row: row[0][1])
+    return np.array([left, (right - 0.2) / -0.5, boom - 80.0, arm, tip])
+
+
+NAMES = ['leg_crank', 'motor', 'digger_cylinder', 'digger_cylinder2', 'digger_cylinder3']
+# The foot and the bucket at the start of a straight line, and how fast they run along it.
+LINE = np.array([0.059, 0.16, 160.0, -150.0, -1.6])
+SPEED = np.array([-0.03, -0.03, -40.0, 20.0, -0.5])
+
+
+def actuators_at(part):
+    """Return where actuators are on the line."""
+    place = LINE + part * SPEED
+    return actuators(place[:2], place[2:])
+
+
+def test_a_foot_and_a_bucket_go_in_along_a_line_and_back_out(graph):
+    stream = Stream(graph, SEVERAL)
+    arrays = [graph.listen(Float64MultiArray, f'{name}/commands') for name in ('leg', 'digger')]
+    for part, way in ((0.0, 1.0), (0.3, 1.0), (0.7, 1.0), (1.0, -1.0), (0.4, -1.0), (0.0, -1.0)):
+        commands = stream.want(FOOT + BUCKET, (LINE + part * SPEED).tolist(),
+                               (way * SPEED).tolist())
+        assert list(commands) == NAMES
+        positions, speeds = np.transpose(list(commands.values()))
+        np.testing.assert_allclose(positions, actuators_at(part), rtol=1e-11)
+        np.testing.assert_allclose(speeds, way * slope(actuators_at, part), rtol=1e-6)
+    graph.until(lambda: all(arrays) and np.allclose(
+        [place for array in arrays for place in array[-1].data], actuators_at(0.0), rtol=1e-11))
+
+
+def test_of_several_inputs_what_cannot_be_had_is_held_and_said(graph, capfd):
+    stream = Stream(graph, SEVERAL)
+    bucket = BUCKET, LINE[2:].tolist()
+    assert stream.want(FOOT + bucket[0], [9.0, 9.0, *bucket[1]]).keys() == set(NAMES[2:])
+    good = stream.want(FOOT, LINE[:2].tolist(), [0.1, 0.0])
+    for place in ([0.059, 0.5], [math.nan, 0.16], [math.inf, -1e300], [0.059, -0.16]):
+        held = stream.want(FOOT, place, [0.1, 0.0])
+        assert held == {name: (position, 0.0) for name, (position, _) in good.items()}
+    assert graph.set(stream.node, leg__dimensions__a=0.085).successful
+    changed = [row for row, _ in five_bar({**LEG, 'a': 0.085}, complex(*LINE[:2]))]
+    found = stream.want([*FOOT, *BUCKET[:2]], LINE[:4].tolist())
+    assert found.keys() == good.keys()
+    assert min(abs(found['leg_crank'][0] - left) for left, _ in changed) < 1e-12
+    said = capfd.readouterr().err
+    for reason in ('leg_P.x and leg_P.y cannot be 9, 9: P.x, P.y at 9, 9 is nowhere in the reach',
+                   'digger has 3 inputs: name as many outputs of it, not digger_H.x and'):
+        assert reason in said
+
+
 # --- trajectories ---
 
 @pytest.fixture
 def plan(graph, stream):
     """Return a function that sends a trajectory and returns the actuators'."""
+    return planner(graph)
+
+
+@pytest.fixture
+def several_plan(graph):
+    """Return the same beside a node with several inputs."""
+    graph.start(ServoInverse, SEVERAL)
+    return planner(graph)
+
+
+def planner(graph):
+    """Return a function that sends a trajectory and returns what finds the actuators'."""
     publisher = graph.node.create_publisher(JointTrajectory, 'wanted_trajectory', 10)
     planned = graph.listen(JointTrajectory, 'servo_trajectory')
     graph.until(publisher.get_subscription_count)
@@ -212,6 +295,16 @@ def test_a_trajectory_becomes_that_of_the_actuators(graph, plan):
         assert point.positions.tolist() == pytest.approx([crank, servo], abs=1e-12)
         assert point.velocities.tolist() == pytest.approx(
             [0.2 / slope(rocker, crank), -0.1 / slope(flap, servo)], rel=1e-7)
+
+
+def test_a_trajectory_of_a_foot_and_a_bucket(graph, several_plan):
+    parts = 0.0, 0.5, 1.0
+    found = graph.until(several_plan(FOOT + BUCKET, *(
+        ((LINE + part * SPEED).tolist(), SPEED.tolist()) for part in parts)))[0]
+    assert found.joint_names == NAMES
+    for point, part in zip(found.points, parts):
+        np.testing.assert_allclose(point.positions, actuators_at(part), rtol=1e-11)
+        np.testing.assert_allclose(point.velocities, slope(actuators_at, part), rtol=1e-6)
 
 
 @pytest.mark.parametrize('names, points, reason', [

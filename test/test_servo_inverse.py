@@ -11,11 +11,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from truth.working_modes import five_bar
 
 pytest.importorskip('rclpy')
 pytest.importorskip('linkage_interfaces')
 
-from linkage_interfaces.srv import ServoInverse as Service  # noqa: E402
+from linkage_interfaces.srv import InputsFor, ServoInverse as Service  # noqa: E402
 from linkage_ros import mechanisms, scene  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
@@ -144,6 +145,46 @@ def test_an_output_that_cannot_be_asked_for_gets_the_reason(
         call, parameters, request_, message):
     response = call(parameters, **request_)
     assert not response.success and message in response.message
+
+
+FIVE_BAR = {'mechanisms': ['leg', 'drop'], 'leg.type': 'five_bar', 'leg.scale': 2.0,
+            'leg.crank2.source': 'motor', 'leg.crank2.ratio': 0.5, 'drop.type': 'water_drop'}
+FOOT = {'outputs': ['P.x', 'P.y'], 'values': [0.12, 0.3]}
+
+
+def test_all_working_modes_of_a_foot_are_told_and_the_nearest_comes_first(graph):
+    node = graph.start(ServoInverse, FIVE_BAR)
+    client = graph.node.create_client(InputsFor, 'inputs_for')
+    response = graph.call(client, InputsFor.Request(**FOOT))
+    assert response.success and response.names == ['leg_crank', 'motor']
+    lengths = mechanisms.create('five_bar').dimensions
+    expected = {f'AP{"+-"[bends["AP"] < 0]} CP{"+-"[bends["CP"] < 0]}': inputs
+                for inputs, bends in five_bar(lengths, 0.06 + 0.15j)}
+    answers = np.reshape(response.positions, (-1, 2))
+    assert len(expected) == len(answers) == len(response.modes) and not any(response.singular)
+    for mode, (left, motor) in zip(response.modes, answers):
+        assert np.exp(1j * np.array([left, motor / 2])) == pytest.approx(
+            np.exp(1j * np.array(expected[mode.rpartition(' ')[0]])), abs=1e-12)
+    for answer, mode in zip(answers, response.modes):
+        near = (answer + [2 * math.pi, -8 * math.pi]).tolist()
+        again = node.answer_together(InputsFor.Request(near=near, **FOOT), InputsFor.Response())
+        assert again.positions[:2].tolist() == pytest.approx(near) and again.modes[0] == mode
+
+
+@pytest.mark.parametrize('request_, reason', [
+    ({**FOOT, 'values': [0.12, 3.0]}, 'P.x, P.y at 0.12, 3 is nowhere in the reach'),
+    ({**FOOT, 'values': [math.nan, 0.3]}, 'a value must be finite'),
+    ({**FOOT, 'values': [0.12]}, 'values must have 2 numbers and near as many or none, not 1'),
+    ({**FOOT, 'near': [0.0, 1e9]}, 'near must be finite and within 1e+06'),
+    ({**FOOT, 'outputs': ['P.x']}, 'as many outputs are needed'),
+    ({**FOOT, 'outputs': ['P.x', 'Z.y']}, "no output 'Z.y'"),
+    ({**FOOT, 'outputs': ['A.x', 'A.y']}, 'A.x, A.y do not tell all inputs'),
+    ({**FOOT, 'mechanism': 'boom'}, 'mechanism must be one of leg, drop'),
+    ({**FOOT, 'mechanism': 'drop'}, 'drop has 1 inputs')])
+def test_what_cannot_be_asked_of_several_inputs_gets_the_reason(graph, request_, reason):
+    node = graph.start(ServoInverse, FIVE_BAR)
+    response = node.answer_together(InputsFor.Request(**request_), InputsFor.Response())
+    assert not response.success and reason in response.message
 
 
 def ask(node, wanted, near=(), output='', mechanism=''):

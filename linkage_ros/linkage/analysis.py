@@ -293,11 +293,15 @@ class Analysed(Driven):
 
     def check_output(self, output: str) -> None:
         """Raise ValueError if there is no such output, or it stands still."""
+        self.check_there(output)
+        if not self._structure.moves(output):
+            raise ValueError(f'{output} of {self.type} does not move with the '
+                             f'{self.inputs[0].name}')
+
+    def check_there(self, output: str) -> None:
+        """Raise ValueError if there is no such output."""
         if not self.has_output(output):
             allowed = (*self.joints, *(f'{name}.{axis}' for name in self.points for axis in 'xy'),
                        'distance(A,B)', 'angle(A,B)')
             raise ValueError(f'{self.type} has no output {quoted(output)}; '
                              f'allowed: {listed(allowed)}')
-        if not self._structure.moves(output):
-            raise ValueError(f'{output} of {self.type} does not move with the '
-                             f'{self.inputs[0].name}')

@@ -249,8 +249,8 @@ class Structure:
             return not self._slides(output)
         return output.startswith('angle(')
 
-    def moves(self, output: str) -> bool:
-        """Return whether an output depends on the first input."""
-        rate = self._output(output)[1]
+    def moves(self, output: str, by: int = 0) -> bool:
+        """Return whether an output depends on one of the inputs."""
+        rate, = self._rates((output,), by)
         bare: Real = rate.args[0] if rate.op == 'gated' else rate
         return bare.value != 0.0

@@ -25,13 +25,13 @@ from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, Se
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .analysis import Analysed
 from .arguments import numbers
 from .builder import Builder, GROUND, Link
 from .inputs import Arc
 from .inverse import in_order
 from .planar import Crank, GRAZE
 from .quantities import Structure
+from .several import Several
 from ..formula.expression import (
     arctangent,
     argument,
@@ -69,7 +69,7 @@ class Answer(NamedTuple):
     held: Real
 
 
-class Mechanism(Analysed):
+class Mechanism(Several):
     """
     A linkage whose dimensions are set; make one with `linkage_ros.mechanisms.create`.
 

@@ -3,9 +3,10 @@
 
 """Commands for actuators from what is wanted of outputs, message by message or ahead of time."""
 
+from itertools import chain
 import math
 import time
-from typing import Callable, List, NamedTuple, Optional, Tuple
+from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -16,52 +17,66 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from . import joint_state_reader
 from .message_layout import NEVER, pack, unpack, Unreadable, Wire
 from .messages import JointStates
-from .. import scene
-from ..scene.wanted import Wanted
+from ..scene.joint_names import JointName
+from ..scene.machine import Machine
+from ..scene.wanted import wanted_of
 from ..words import elided
 
 # What comes while the node is kept waiting is not lost; any source will do.
 ANY = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
-SECONDS_BETWEEN_WARNINGS = 5.0
+SECONDS_BETWEEN_WARNINGS, SECONDS_BETWEEN_SEARCHES = 5.0, 0.5
 # So many arrangements of commands are remembered.
 MOST_WIRES = 100
 
 
 class Route(NamedTuple):
-    """From an output, as others call it, to the actuator that moves it."""
+    """From a mechanism's outputs, as others call them, to the actuators that move them."""
 
     called: str
-    machine: scene.Machine
-    actuator: str
-    wanted: Wanted
-    sign: float
-    offset: float
+    machine: Machine
+    wanted: Any
+    places: Tuple[int, ...]
+    names: Tuple[JointName, ...]
 
-    def commanded(self, position, speed, near):
-        """Return what `Wanted.commanded` does, for what others say [rad or m]."""
-        return self.wanted.commanded(self.sign * (position - self.offset),
-                                     speed and self.sign * speed, near)
+    @property
+    def actuators(self):
+        """What moves its inputs: of one that is measured elsewhere, the input itself."""
+        return [f'{self.machine.name}_{drive.input.name}' if drive.measures else drive.source
+                for drive in self.machine.inputs.values()]
 
-    def reason(self, position):
-        """Return in words why a position cannot be had."""
-        return (f'{self.called} cannot be {position:.6g}: '
-                + self.wanted.reason(self.sign * (position - self.offset)))
+    def commanded(self, positions, speeds, near, jumps):
+        """Return what `Wanted.commanded` does, for what a message says [rad or m]."""
+        return self.wanted.commanded(
+            self._meant(positions),
+            speeds and [name.sign * speeds[place] for name, place in zip(self.names, self.places)],
+            near, jumps)
+
+    def reason(self, positions):
+        """Return in words why positions cannot be had."""
+        said = ', '.join(f'{positions[place]:.6g}' for place in self.places)
+        return f'{self.called} cannot be {said}: {self.wanted.reason(*self._meant(positions))}'
+
+    def _meant(self, positions):
+        return [name.sign * (positions[place] - name.offset)
+                for name, place in zip(self.names, self.places)]
 
 
 class Command(NamedTuple):
-    """What an actuator is to do, and where it takes its input [rad or m]; its speed if known."""
+    """What a mechanism's actuators are to do, and its inputs there [rad or m]; speeds if known."""
 
-    actuator: str
-    machine: scene.Machine
-    input: float
-    position: float
-    speed: Optional[float]
+    route: Route
+    inputs: Sequence[float]
+    positions: Sequence[float]
+    speeds: Optional[Sequence[float]]
 
     @property
-    def effort(self) -> float:
-        """What it gives at rest against the loads [N m or N]; 0 where there are none."""
-        loaded, (ratio, _) = self.machine.loads, self.machine.first.actuator
-        return ratio * self.machine.efforts([self.input])[0] if loaded else 0.0
+    def efforts(self) -> List[float]:
+        """What actuators give at rest against the loads [N m or N]; 0 where there are none."""
+        machine = self.route.machine
+        if not machine.loads:
+            return [0.0] * len(self.inputs)
+        return [drive.actuator[0] * effort for drive, effort in zip(
+            machine.inputs.values(), machine.efforts(self.inputs))]
 
 
 class CommandStream:
@@ -78,53 +93,64 @@ class CommandStream:
     mechanisms : iterable of str
         The mechanisms of its scene.
     present : callable
-        From a Wanted to where its input is; infinite if that is not known.
+        From a Machine to where its inputs are; infinite where that is not known.
 
     """
 
-    def __init__(self, node, mechanisms, present: Callable[[Wanted], float]):
+    def __init__(self, node, mechanisms, present: Callable[[Machine], List[float]]):
         self._present, self._logger, self._clock = present, node.get_logger(), node.get_clock()
         self._commands = node.create_publisher(JointState, 'servo_commands', 10)
         self._arrays = {name: node.create_publisher(Float64MultiArray, f'{name}/commands', 10)
                         for name in mechanisms}
         self._trajectories = node.create_publisher(JointTrajectory, 'servo_trajectory', 10)
-        self._message, self._last, self._said = JointStates(), {}, {}
+        self._message, self._last, self._said, self._next = JointStates(), {}, {}, {}
         node.create_subscription(JointState, 'wanted_states', self._hear, ANY, raw=True)
         node.create_subscription(JointTrajectory, 'wanted_trajectory', self._plan, 10)
 
     def adopt(self, machines):
         """Act on these mechanisms from now on."""
         self._machines, self._wires = machines, {}
+        # The last pose of several inputs may be none of another geometry.
+        self._last = {name: last for name, last in self._last.items() if len(last.inputs) == 1
+                      or last.route.machine is machines.get(name)}
         self._reader = joint_state_reader.Reader(self._understood)
 
-    def _route(self, called: str) -> Route:
-        """Return the way of an output that others call so; raise ValueError if there is none."""
+    def _output(self, called: str) -> Tuple[Machine, str, JointName]:
+        """Return whose output others call so, its own name and how that differs."""
         for machine in self._machines.values():
-            own = {name.name: (joint, name.sign, name.offset)
-                   for joint, name in machine.joints.items()}
-            joint, sign, offset = own.get(called) or (
-                called.removeprefix(f'{machine.name}_'), 1.0, 0.0)
+            own = {name.name: (joint, name) for joint, name in machine.joints.items()}
+            joint, name = own.get(called) or (
+                called.removeprefix(f'{machine.name}_'), JointName(called))
             if joint != called and machine.linkage.has_output(joint):
-                drive = machine.first
-                actuator = f'{machine.name}_{drive.input.name}' if drive.measures else drive.source
-                return Route(called, machine, actuator, Wanted(machine, joint), sign, offset)
+                return machine, joint, name
         raise ValueError(f'nothing is called {elided(called)}; an output is called '
                          '<mechanism>_<link>, <mechanism>_<joint>.x, or as joint_names has it')
 
-    def _routes(self, names, leave_out) -> List[Tuple[Route, int]]:
-        """Return the ways of outputs and their places; tell `leave_out` why of the others."""
-        routes, owners = [], {}
-        for place, name in enumerate(names):
+    def _routes(self, names, leave_out) -> List[Route]:
+        """Return the ways of outputs; tell `leave_out` why of the others."""
+        found, routes = {}, []
+        for place, called in enumerate(names):
             try:
-                route = self._route(name)
-                if other := owners.get(route.machine.name):
-                    raise ValueError(f'{other.called} and {elided(name)} are moved by one input: '
-                                     'name one of them')
+                machine, *output = self._output(called)
             except ValueError as error:
                 leave_out(str(error))
                 continue
-            owners[route.machine.name] = route
-            routes.append((route, place))
+            found.setdefault(machine.name, []).append((place, *output))
+        for mechanism, outputs in found.items():
+            machine = self._machines[mechanism]
+            n = len(machine.inputs)
+            called = ' and '.join(elided(names[place]) for place, *_ in outputs)
+            try:
+                if len(outputs) > n == 1:
+                    leave_out(f'{called} are moved by one input: name one of them')
+                elif len(outputs) != n:
+                    raise ValueError(f'{mechanism} has {n} inputs: name as many outputs of it, '
+                                     f'not {called}')
+                places, joints, own = zip(*outputs[:n])
+                routes.append(Route(' and '.join(elided(names[place]) for place in places),
+                                    machine, wanted_of(machine, joints), places, own))
+            except ValueError as error:
+                leave_out(str(error))
         return routes
 
     def _understood(self, message):
@@ -148,47 +174,50 @@ class CommandStream:
                 f'wanted_states: {len(text)} bytes that are no joint states are passed over: '
                 f'{error}', throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
             return
-        commands = [self._command(route, positions[place], speeds[place] if known else None)
-                    for route, place in routes]
+        commands = [self._command(route, positions, speeds if known else None)
+                    for route in routes]
         if commands := [command for command in commands if command]:
             self._send(pack(self._clock.now().to_msg()) if stamp == NEVER else stamp, commands)
 
-    def _near(self, route) -> float:
-        """Return where an input was last, or is; else where it starts."""
+    def _near(self, route) -> List[float]:
+        """Return where inputs were last, or are; else where they start."""
         if last := self._last.get(route.machine.name):
-            return last.input
-        present = self._present(route.wanted)
-        return present if math.isfinite(present) else route.machine.first.start
+            return last.inputs
+        return [place if math.isfinite(place) else drive.start for place, drive in zip(
+            self._present(route.machine), route.machine.inputs.values())]
 
-    def _command(self, route, position, speed) -> Optional[Command]:
-        """Return the command for an output, or the last good one, to be held; None without any."""
-        found = route.commanded(position, speed, self._near(route))
-        if math.isfinite(found[0]):
-            command = Command(route.actuator, route.machine, *found)
+    def _command(self, route, positions, speeds) -> Optional[Command]:
+        """Return the command for outputs, or the last good one, to be held; None without any."""
+        last = self._last.get(route.machine.name)
+        # Before the first command, which may be anywhere: that takes a search, so now and then.
+        jumps = not last and time.monotonic() > self._next.get(route.machine.name, -math.inf)
+        command = Command(route, *route.commanded(positions, speeds, self._near(route), jumps))
+        if jumps:
+            self._next[route.machine.name] = time.monotonic() + SECONDS_BETWEEN_SEARCHES
+        if all(map(math.isfinite, command.inputs)):
             self._last[route.machine.name] = command
             return command
         if time.monotonic() > self._said.get(route.called, -math.inf) + SECONDS_BETWEEN_WARNINGS:
-            self._warn(route.called, route.reason(position))
-        last = self._last.get(route.machine.name)
-        return last and last._replace(speed=0.0)
+            self._warn(route.called, route.reason(positions))
+        return last and last._replace(speeds=[0.0] * len(last.inputs))
 
     def _send(self, stamp, commands):
-        names = tuple(command.actuator for command in commands)
-        values = [command.position for command in commands]
-        speeds = [command.speed for command in commands]
-        moving = None not in speeds and all(map(math.isfinite, speeds))
+        names = tuple(name for command in commands for name in command.route.actuators)
+        values = [position for command in commands for position in command.positions]
+        speeds = [speed for command in commands for speed in command.speeds or [math.nan]]
+        moving = all(map(math.isfinite, speeds))
         if self._commands.get_subscription_count():
-            if any(command.machine.loads for command in commands):
-                efforts = [command.effort for command in commands]
+            if any(command.route.machine.loads for command in commands):
+                efforts = [effort for command in commands for effort in command.efforts]
                 self._commands.publish(self._message.message(
                     unpack(stamp), names, values, speeds if moving else (),
                     () if any(map(math.isnan, efforts)) else efforts))
             else:
                 self._wire(names, moving).send(stamp, np.array(values + speeds * moving))
         for command in commands:
-            publisher = self._arrays[command.machine.name]
+            publisher = self._arrays[command.route.machine.name]
             if publisher.get_subscription_count():
-                publisher.publish(Float64MultiArray(data=[command.position]))
+                publisher.publish(Float64MultiArray(data=command.positions))
 
     def _wire(self, names, moving) -> Wire:
         n = len(names)
@@ -212,24 +241,25 @@ class CommandStream:
         """Return the actuators' trajectory; raise ValueError if one point of it cannot be."""
         n = len(message.joint_names)
         routes = self._routes(message.joint_names, _refuse)
-        near = [self._near(route) for route, _ in routes]
-        planned = JointTrajectory(header=message.header,
-                                  joint_names=[route.actuator for route, _ in routes])
+        near = [self._near(route) for route in routes]
+        planned = JointTrajectory(header=message.header, joint_names=[
+            name for route in routes for name in route.actuators])
         for i, point in enumerate(message.points):
             if len(point.positions) != n or len(point.velocities) not in (0, n):
                 raise ValueError(f'point {i} must have {n} positions, and as many velocities or '
                                  f'none, not {len(point.positions)} and {len(point.velocities)}')
             found = []
-            for route, place in routes:
-                position, speed = point.positions[place], (*point.velocities, *n * [0.0])[place]
-                near[place], *actuator = route.commanded(position, speed, near[place])
-                if not math.isfinite(near[place]):
-                    raise ValueError(f'point {i}: {route.reason(position)}')
-                if not math.isfinite(actuator[1]):
-                    raise ValueError(f'point {i}: {route.called} turns back at {position:.6g} and '
-                                     f'cannot have a speed of {speed:.6g} there')
+            for k, route in enumerate(routes):
+                near[k], *actuator = route.commanded(
+                    point.positions, list(point.velocities) or [0.0] * n, near[k],
+                    not (i or route.machine.name in self._last))
+                if not all(map(math.isfinite, near[k])):
+                    raise ValueError(f'point {i}: {route.reason(point.positions)}')
+                if not all(map(math.isfinite, actuator[1])):
+                    raise ValueError(f'point {i}: {route.called} turns back there and cannot have '
+                                     'a speed other than zero')
                 found.append(actuator)
-            positions, speeds = zip(*found)
+            positions, speeds = (list(chain.from_iterable(part)) for part in zip(*found))
             planned.points.append(JointTrajectoryPoint(
                 positions=positions, velocities=speeds if len(point.velocities) else (),
                 time_from_start=point.time_from_start))

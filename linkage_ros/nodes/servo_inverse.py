@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Node that answers which servo angle puts a lever, or any other output, where it is wanted."""
+"""Node that answers where inputs have to be to put a lever, or any outputs, where it is wanted."""
 
 import math
 from operator import itemgetter
@@ -16,14 +16,14 @@ from .command_stream import CommandStream
 from .message_layout import Unreadable
 from .. import scene
 from ..robot_model import bodies
-from ..scene.wanted import LEVER, Wanted
+from ..scene.wanted import LEVER, present, Wanted, WantedTogether
 from ..words import elided, listed, MESSAGE, quoted
 
 try:
-    from linkage_interfaces.srv import ServoInverse as ServoInverseType
+    from linkage_interfaces.srv import InputsFor, ServoInverse as ServoInverseType
 except ImportError as error:
     raise ImportError(
-        'servo_inverse needs the service type linkage_interfaces/srv/ServoInverse: run colcon '
+        'servo_inverse needs the service types of linkage_interfaces: run colcon '
         'build in the workspace, which builds linkage_interfaces too, and source '
         'install/setup.bash') from error
 
@@ -43,8 +43,9 @@ class ServoInverse(scene_node.SceneNode):
         self._reader = joint_state_reader.Reader(self._inputs_in)
         self.create_subscription(JointState, 'crank_states', self._turn, ANY, raw=True)
         self.create_service(ServoInverseType, 'servo_inverse', self.answer)
-        self._stream = CommandStream(self, self.scene.machines, lambda wanted: wanted.present(
-            self._heard.get(wanted.source)))
+        self.create_service(InputsFor, 'inputs_for', self.answer_together)
+        self._stream = CommandStream(self, self.scene.machines, lambda machine: present(
+            machine, self._heard))
         self.begin()
 
     def serves(self):
@@ -79,12 +80,24 @@ class ServoInverse(scene_node.SceneNode):
 
     def answer(self, request, response):
         """Fill in a response; what cannot be done is said in it, never raised."""
+        def fill():
+            key = request.mechanism, request.output
+            machine = _machine(self.scene, *key)
+            asked = self._known.get(key) or Wanted(machine, request.output)
+            solve(asked, request, response, present(machine, self._heard)[0])
+            self._known[key] = asked
+        return self._filled(fill, response)
+
+    def answer_together(self, request, response):
+        """Fill in a response about several inputs; what cannot be done is said in it."""
+        return self._filled(lambda: solve_together(
+            _machine_together(self.scene, request.mechanism), request, response, self._heard),
+            response)
+
+    def _filled(self, fill, response):
         response.success = False
         try:
-            key = request.mechanism, request.output
-            asked = self._known.get(key) or Wanted(_machine(self.scene, *key), request.output)
-            solve(asked, request, response, asked.present(self._heard.get(asked.source)))
-            self._known[key] = asked
+            fill()
         except ValueError as problem:
             response.message = elided(str(problem), MESSAGE)
         except Exception as problem:
@@ -149,6 +162,38 @@ def _machine(scene_, name, output):
         raise ValueError(f'there is no mechanism {quoted(name)}; allowed: {allowed}')
     what = '' if output else ' slotted lever'
     raise ValueError(f'mechanism may be empty only where there is one{what}; allowed: {allowed}')
+
+
+def solve_together(machine, request, response, heard):
+    """Answer a request for several outputs; raise ValueError if it cannot be answered."""
+    asked, values, near = WantedTogether(machine, request.outputs), request.values, request.near
+    n = len(machine.inputs)
+    if len(values) != n or len(near) not in (0, n):
+        raise ValueError(f'values must have {n} numbers and near as many or none, not '
+                         f'{len(values)} and {len(near)}')
+    if not all(-scene.FARTHEST <= position <= scene.FARTHEST for position in near):
+        raise ValueError(f'near must be finite and within {scene.FARTHEST:g} of zero')
+    start = asked.inputs_of(near) if near else [
+        place if abs(place) <= scene.FARTHEST else drive.start
+        for place, drive in zip(present(machine, heard), machine.inputs.values())]
+    answers = asked.answers(values, start)
+    response.names = [drive.source for drive in machine.inputs.values()]
+    response.positions = [place for answer in answers for place in asked.told(answer.inputs)]
+    response.modes = [answer.mode for answer in answers]
+    response.singular = [answer.is_singular for answer in answers]
+    response.success = bool(answers)
+    response.message = '' if answers else elided(asked.reason(*values), MESSAGE)
+
+
+def _machine_together(scene_, name):
+    """Return a mechanism by its name, or the only one with several inputs."""
+    able = {key: machine for key, machine in scene_.machines.items() if len(machine.inputs) > 1}
+    found = scene_.machines.get(name) or (
+        next(iter(able.values())) if not name and len(able) == 1 else None)
+    if found is None:
+        raise ValueError(f'mechanism must be one of {listed(scene_.machines, MOST)}, or empty '
+                         f'where one has several inputs, not {quoted(name)}')
+    return found
 
 
 def _complaint(asked, missed):

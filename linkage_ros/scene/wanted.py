@@ -1,22 +1,40 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is wanted of an output: where the input has to be, its actuator, and why it cannot be."""
+"""What is wanted of outputs: where the inputs have to be, their actuators, and why not."""
 
 from __future__ import annotations
 
 from functools import cached_property
 import math
-from typing import Any, List, Optional, Sequence, Tuple
+from typing import Any, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .drive import in_words
+from .drive import Drive, in_words
 from .machine import Machine
 from ..linkage.inputs import Arc
 from ..linkage.servo import CLOSE
+from ..linkage.several import Answer
+from ..words import listed
 
 LEVER = 'lever'
+# Of several inputs, their actuators' positions and, where they are known, speeds.
+Command = Tuple[Sequence[float], Sequence[float], Optional[Sequence[float]]]
+
+
+def wanted_of(machine: Machine, outputs: Sequence[str]) -> Any:
+    """Return as many outputs as there are inputs; raise ValueError if they cannot be solved."""
+    if len(machine.inputs) == len(outputs) == 1:
+        return Wanted(machine, *outputs)
+    return WantedTogether(machine, outputs)
+
+
+def present(machine: Machine, heard: Mapping[str, float]) -> List[float]:
+    """Return where the inputs are, from what was heard last by source; inf where unknown."""
+    known = [machine.understood(drive, heard[drive.source], None, None)[0]
+             if drive.source in heard else math.inf for drive in machine.inputs.values()]
+    return [value if math.isfinite(value) else math.inf for value in known]
 
 
 class Wanted:
@@ -35,8 +53,8 @@ class Wanted:
     def __init__(self, machine: Machine, output: str):
         self._machine, self._linkage, self._name = machine, machine.linkage, output or LEVER
         if len(machine.inputs) > 1:
-            raise ValueError(f'{machine.name} has several inputs; only a linkage with one can be '
-                             'solved for an output')
+            raise ValueError(f'{machine.name} has several inputs; one output does not tell them: '
+                             'ask inputs_for')
         self._drive = machine.first
         self.source, self.unit = self._drive.source, self._drive.input.unit
         self.what = 'lever angles' if self._name == LEVER else f'values of {self._name}'
@@ -50,13 +68,6 @@ class Wanted:
         """Return the input [rad or m] of its source's position."""
         return self._ratio * position + self._offset
 
-    def present(self, heard: Optional[float]) -> float:
-        """Return where the input is, from what was heard last; infinite if that is not known."""
-        if heard is None:
-            return math.inf
-        found, _ = self._machine.understood(self._drive, heard, None, None)
-        return found if math.isfinite(found) else math.inf
-
     def servo(self, wanted: Any, near: Any) -> Tuple[Any, Any]:
         """Return for each value where the source has to be, and d output / d source there."""
         unit, ends = self._input_scale, self._drive.ends
@@ -66,31 +77,34 @@ class Wanted:
         return ((value * unit - self._offset) / self._ratio,
                 rate * (self._scale / unit * self._ratio))
 
-    def commanded(self, value: float, speed: Optional[float],
-                  near: float) -> Tuple[float, float, Optional[float]]:
+    def commanded(self, values: Sequence[float], speeds: Optional[Sequence[float]],
+                  near: Sequence[float], jumps: bool = False) -> Command:
         """
-        Return the input for a value and its speed, and what its actuator is to do for it.
+        Return the inputs for values and their speeds, and what their actuators are to do.
 
         Parameters
         ----------
-        value : float
-            Of the output [rad or m].
-        speed : float or None
-            Of the output [rad/s or m/s], if that is known.
-        near : float
-            Where the input was [rad or m], from which it goes on without a jump where it can.
+        values : sequence of float
+            Of each output [rad or m].
+        speeds : sequence of float, optional
+            Of each output [rad/s or m/s], if they are known.
+        near : sequence of float
+            Where the inputs were [rad or m], from which they go on without a jump.
+        jumps : bool
+            Whether several inputs may jump to the nearest answer if they cannot go on from there.
 
         Returns
         -------
-        (float, float, float or None)
-            The input, NaN if there is none inside the reach and the sweep; position and speed of
-            its actuator. The speed is infinite where an output that moves would turn back.
+        (sequence of float, sequence of float, sequence of float or None)
+            The inputs, NaN if there are none inside the reach and the sweeps; positions and speeds
+            of their actuators. A speed is infinite where an output that moves would turn back.
 
         """
-        input_, rate = self._machine.measured(self._name, value, near)
-        if speed:
-            speed = speed / (rate * self._ratio) if rate else math.copysign(math.inf, speed)
-        return input_, (input_ - self._offset) / self._ratio, speed
+        input_, rate = self._machine.measured(self._name, *values, *near)
+        if speeds and speeds[0]:
+            speeds = (speeds[0] / (rate * self._ratio) if rate else
+                      math.copysign(math.inf, speeds[0]),)
+        return (input_,), ((input_ - self._offset) / self._ratio,), speeds
 
     def reason(self, value: float) -> str:
         """Return in words why a value cannot be had: which end of the sweep or reach forbids."""
@@ -147,3 +161,91 @@ class Wanted:
         found = self._linkage.extremes(self._name, [(low / unit, high / unit)
                                                     for low, high in self._arcs])
         return [[(value * self._scale, at * unit) for value, at in span] for span in found]
+
+
+class WantedTogether:
+    """
+    As many outputs of a mechanism as it has inputs, and the values of these that may be taken.
+
+    Raises
+    ------
+    ValueError
+        If these outputs do not tell the inputs.
+
+    """
+
+    def __init__(self, machine: Machine, outputs: Sequence[str]):
+        self._linkage, self._outputs = machine.linkage, list(outputs)
+        self._drives = list(machine.inputs.values())
+        # Nothing has these values; what cannot be asked is refused.
+        self._linkage.inputs_for(self._outputs, [math.nan] * len(self._outputs))
+        self._units = np.array([machine.scale_of(name) for name in outputs])
+        self._scales = np.array([machine.scale_of(name) for name in machine.inputs])
+        self._ratios, self._offsets = np.transpose([drive.actuator for drive in self._drives])
+
+    def inputs_of(self, positions: Sequence[float]) -> np.ndarray:
+        """Return the inputs [rad or m] of their sources' positions."""
+        return self._ratios * positions + self._offsets
+
+    def commanded(self, values: Sequence[float], speeds: Optional[Sequence[float]],
+                  near: Sequence[float], jumps: bool = False) -> Command:
+        """Return what `Wanted.commanded` does."""
+        inputs, rates = self._linkage.follow_inputs(
+            self._outputs, np.divide(values, self._units), np.divide(near, self._scales))
+        inputs = inputs * self._scales
+        if not all(drive.ends is None or drive.ends[0] <= value <= drive.ends[1]
+                   for drive, value in zip(self._drives, inputs.tolist())):
+            inputs = inputs * math.nan
+        if jumps and np.isnan(inputs).any():
+            for answer in self.answers(values, near)[:1]:
+                return self.commanded(values, speeds, answer.inputs)
+        return inputs.tolist(), self.told(inputs), (
+            speeds and self._speeds(speeds, rates * np.divide.outer(self._units, self._scales)))
+
+    def _speeds(self, speeds: Sequence[float], rates: np.ndarray) -> Sequence[float]:
+        try:
+            found = np.linalg.solve(rates, speeds) / self._ratios
+        except np.linalg.LinAlgError:
+            found = np.full(len(speeds), math.inf if any(speeds) else 0.0)
+        return found.tolist()
+
+    def answers(self, values: Sequence[float], near: Sequence[float]) -> List[Answer]:
+        """Return answers inside the sweeps, the nearest first, inputs as the scene has them."""
+        found = []
+        for answer in self._linkage.inputs_for(
+                self._outputs, np.divide(values, self._units), np.divide(near, self._scales)):
+            inputs = [_inside(drive, value) for drive, value in zip(
+                self._drives, np.multiply(answer.inputs, self._scales).tolist())]
+            if np.isfinite(inputs).all():
+                found.append(answer._replace(inputs=tuple(inputs)))
+        sizes = [drive.input.size for drive in self._drives]
+        return sorted(found, key=lambda answer: math.dist(
+            np.divide(answer.inputs, sizes), np.divide(near, sizes)))
+
+    def told(self, inputs: Sequence[float]) -> List[float]:
+        """Return the positions of the sources of inputs."""
+        return ((np.array(inputs) - self._offsets) / self._ratios).tolist()
+
+    def reason(self, *values: float) -> str:
+        """Return in words why values cannot be had."""
+        if not all(map(math.isfinite, values)):
+            return 'a value must be finite'
+        what = f'{listed(self._outputs)} at {listed(f"{value:.6g}" for value in values)}'
+        if self.answers(values, [drive.start for drive in self._drives]):
+            return f'the way to {what} leads through a singular pose, out of the reach or a sweep'
+        limited = any(drive.ends for drive in self._drives)
+        if not limited or not self._linkage.inputs_for(
+                self._outputs, np.divide(values, self._units)):
+            return f'{what} is nowhere in the reach'
+        sweeps = (f'{drive.input.name}.sweep {in_words([drive.ends])}'
+                  for drive in self._drives if drive.ends)
+        return f'{what} takes inputs outside {listed(sweeps)}'
+
+
+def _inside(drive: Drive, value: float) -> float:
+    """Return an input between its ends, where a crank's whole turns are one; else NaN."""
+    low, high = drive.ends or (value, value)
+    if drive.input.turns and not low <= value <= high:
+        value += math.tau * (math.ceil((low - value) / math.tau) if value < low else
+                             math.floor((high - value) / math.tau))
+    return value if low <= value <= high else math.nan

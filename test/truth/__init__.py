@@ -14,6 +14,7 @@ hard_cases             angles and dimensions that are hard on the catalogue
 random_linkages        random joint lines of every word, a third of them nearly degenerate
 linkage_checks         everything that is asked of such a linkage
 hostile_texts          texts that no joint line or number should be
+working_modes          all inputs of linkages with several, by circles
 original_formulas      the formulas of the original documents, which break the rule
 =====================  ============================================================================
 """

@@ -1,0 +1,158 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Several outputs are wanted of several inputs: all answers, and nothing else, by circles."""
+
+import math
+
+from linkage_ros import mechanisms, scene
+from linkage_ros.scene.wanted import WantedTogether
+import numpy as np
+import pytest
+from truth.cases import CASES
+from truth.working_modes import arm, excavator, five_bar
+
+BUCKET = 'H.x', 'H.y', 'angle(H,J)'
+
+
+def agree(linkage, outputs, values, expected, sure=1e-3):
+    """Check that the answers are those expected; return the greatest difference [sizes]."""
+    found, expected, worst = linkage.inputs_for(outputs, values), list(expected), 0.0
+    assert len(found) == len(expected), (linkage, values, found, expected)
+    for inputs, bends in expected:
+        gap, answer = min((max(input_.apart(x, y) / input_.size for input_, x, y in zip(
+            linkage.inputs, answer.inputs, inputs)), answer) for answer in found)
+        assert gap * answer.margin < 1e-12, (linkage, values, inputs, answer)
+        assert answer.margin < sure or bends.items() <= answer.signs.items()
+        worst = max(worst, gap)
+    return worst
+
+
+def made(name):
+    """Return a collected case and its numbers."""
+    case = CASES[name]
+    return mechanisms.create('custom', joints=case.joints, **case.numbers), case.numbers
+
+
+@pytest.mark.parametrize('count', [12, pytest.param(80, marks=pytest.mark.long)])
+def test_a_five_bar_has_all_its_working_modes(count):
+    rng, modes = np.random.default_rng(7), 0
+    for _ in range(count):
+        numbers = dict(zip('abcdf', rng.uniform(0.4, 2.0, 5).tolist()))
+        linkage = mechanisms.create('five_bar', **numbers)
+        foot = linkage.solve(rng.uniform(-math.pi, math.pi, 2), ('P',))['P']
+        if np.isfinite(foot).all():
+            expected = list(five_bar(numbers, complex(*foot)))
+            modes = max(modes, len(expected))
+            agree(linkage, ('P.x', 'P.y'), foot, expected)
+    assert modes == 4
+
+
+@pytest.mark.parametrize('name, outputs, truth', [
+    ('excavator', BUCKET, excavator), ('parallelogram arm', ('W.x', 'W.y'), arm)])
+def test_an_arm_has_both_elbows(name, outputs, truth):
+    rng, (linkage, numbers) = np.random.default_rng(3), made(name)
+    for _ in range(5):
+        pose = [rng.uniform(input_.low, input_.high) for input_ in linkage.inputs]
+        values = list(map(float, linkage.joint_angles(pose, outputs).values()))
+        if np.isfinite(values).all():
+            agree(linkage, outputs, values, truth(numbers, complex(*values[:2]), *values[2:]))
+
+
+def test_an_answer_is_followed_without_a_jump_in_and_back_out():
+    linkage, numbers = made('excavator')
+    start = np.array([108.0, 132.0, 119.0])
+    here = np.array(list(map(float, linkage.joint_angles(start, BUCKET).values())))
+    there = here + (-60.0, 25.0, -0.7)
+    way = [*np.linspace(0.0, 1.0, 41), *np.linspace(1.0, 0.0, 7)]
+    inputs = start
+    for part in way:
+        values = here + part * (there - here)
+        inputs, rates = linkage.follow_inputs(BUCKET, values, inputs)
+        truth = [row for row, _ in excavator(numbers, complex(*values[:2]), values[2])]
+        assert min(np.abs(np.subtract(row, inputs)).max() for row in truth) < 1e-10
+        slopes = [[(ahead - behind) / 2e-4 for ahead, behind in zip(*(
+            np.array(list(linkage.joint_angles(inputs + step * np.eye(3)[i], BUCKET).values()))
+            for step in (1e-4, -1e-4)))] for i in range(3)]
+        np.testing.assert_allclose(rates, np.transpose(slopes), rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(inputs, start, atol=1e-11)
+
+
+def test_whole_turns_are_kept_and_a_singular_pose_is_not_passed():
+    linkage = mechanisms.create('five_bar', a=1.0, b=1.0, c=1.0, d=1.0, f=1.2)
+    outputs, near = ('P.x', 'P.y'), np.array([1.7 + 4.0 * math.pi, 1.4 - 2.0 * math.pi])
+    foot = linkage.solve(near, ('P',))['P']
+    for angle in np.linspace(0.0, 4.0 * math.pi, 33):
+        inputs, _ = linkage.follow_inputs(outputs, foot + 0.1 * np.array(
+            [math.cos(angle) - 1.0, math.sin(angle)]), near)
+        assert np.abs(inputs - near).max() < 0.3
+    nearest = linkage.inputs_for(outputs, foot, near)[0].inputs
+    np.testing.assert_allclose(nearest, near, atol=1e-12)
+    # Stretched legs: on the rim of what the foot can reach, and beyond.
+    rim = math.sqrt(4.0 - 0.36)
+    answer, = linkage.inputs_for(outputs, (0.6, rim))
+    assert answer.is_singular and set(answer.signs.values()) == {0}
+    inputs, rates = linkage.follow_inputs(outputs, (0.6, rim - 1e-9), near)
+    assert np.isfinite(inputs).all()
+    for beyond in (rim + 1e-9, 5.0, math.inf, math.nan):
+        assert np.isnan(linkage.follow_inputs(outputs, (0.6, beyond), inputs)[0]).all()
+        assert linkage.inputs_for(outputs, (0.6, beyond)) == []
+    back, _ = linkage.follow_inputs(outputs, foot, inputs)
+    np.testing.assert_allclose(back, near, atol=1e-9)
+
+
+def test_outputs_of_few_inputs_are_solved_first():
+    # Two levers side by side, and a bar between them that both move.
+    linkage = mechanisms.create('custom', joints=(
+        'O ground 0 0', 'A crank O 1', 'Q ground 3 0', 'C crank Q 1', 'R ground 1.5 3',
+        'D crank R 1', 'B dyad A C 2 2 left'))
+    pose = 0.5, 2.0, -1.0
+    values = [float(value) for value in linkage.joint_angles(
+        pose, ('B.y', 'crank', 'D.x')).values()]
+    found = linkage.inputs_for(('B.y', 'crank', 'D.x'), values)
+    assert any(np.allclose(answer.inputs, pose, atol=1e-12) for answer in found)
+    assert {round(answer.inputs[2], 9) for answer in found} == {-1.0, 1.0}
+
+
+@pytest.mark.parametrize('outputs, values, reason', [
+    (('P.x',), [0.1], '2 inputs: as many outputs are needed, got P.x'),
+    (('P.x', 'P.z'), [0.1, 0.1], "no output 'P.z'; allowed: "),
+    ('P.x', [0.1, 0.1], "outputs must be a list of names, got 'P.x'"),
+    (None, [0.1, 0.1], 'outputs must be a list of names, got None'),
+    (('P.x', 7), [0.1, 0.1], 'outputs must be a list of names'),
+    (('P.x', 'P.x'), [0.1, 0.1], 'P.x, P.x do not tell all inputs: P.x, P.x depends on too few'),
+    (('A.x', 'crank'), [0.1, 0.1], 'A.x, crank do not tell all inputs: crank depends on too few'),
+    (('P.x', 'O.x'), [0.1, 0.1], 'P.x, O.x do not tell all inputs: O.x depends on too few'),
+    (('P.x', 'P.y'), [0.1], r'values must be as many numbers, got \[0.1\]'),
+    (('P.x', 'P.y'), 'ab', "values must be a number or an array of numbers, got 'ab'")])
+def test_what_cannot_be_asked_is_refused_with_the_reason(outputs, values, reason):
+    linkage = mechanisms.create('five_bar')
+    for ask in (linkage.inputs_for, lambda *asked: linkage.follow_inputs(*asked, (1.9, 1.2))):
+        with pytest.raises(ValueError, match=reason):
+            ask(outputs, values)
+
+
+def test_a_place_to_start_from_may_be_anything():
+    linkage = mechanisms.create('five_bar')
+    for near in ((math.nan, 0.0), (math.inf, 0.0), (1e300, 0.0), (2.6, 0.3)):
+        inputs, rates = linkage.follow_inputs(('P.x', 'P.y'), (0.059, 0.16), near)
+        assert np.isnan(inputs).all() and np.isnan(rates).all()
+    with pytest.raises(ValueError, match='near must be finite'):
+        linkage.inputs_for(('P.x', 'P.y'), (0.059, 0.16), (math.inf, 0.0))
+    with pytest.raises(ValueError, match='near must be as many numbers'):
+        linkage.follow_inputs(('P.x', 'P.y'), (0.059, 0.16), 1.0)
+
+
+def test_answers_lie_in_the_sweeps_or_the_reason_says_so():
+    swept = {'mechanisms': ['leg'], 'leg.type': 'five_bar', 'leg.crank.sweep': [6.0, 9.0]}
+    wanted = WantedTogether(scene.read(swept).machines['leg'], ('P.x', 'P.y'))
+    answers = wanted.answers((0.05, 0.15), (0.0, 0.0))
+    assert answers and all(6.0 <= answer.inputs[0] <= 9.0 for answer in answers)
+    assert answers[0].inputs[0] == pytest.approx(min(answer.inputs[0] for answer in answers))
+    found, _, _ = wanted.commanded((0.05, 0.15), None, (0.0, 0.0), jumps=True)
+    assert found == pytest.approx(answers[0].inputs)
+    swept['leg.crank.sweep'] = [3.0, 3.5]
+    wanted = WantedTogether(scene.read(swept).machines['leg'], ('P.x', 'P.y'))
+    assert wanted.answers((0.05, 0.15), (3.2, 0.0)) == []
+    assert wanted.reason(0.05, 0.15) == (
+        'P.x, P.y at 0.05, 0.15 takes inputs outside crank.sweep [3, 3.5]')
