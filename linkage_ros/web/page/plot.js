@@ -118,6 +118,7 @@ export class Plot {
       this.output.replaceChildren(...names.map(textContent => element('option', { textContent })));
     }
     this.output.value = answer.output;
+    this.other.hidden = about === 'joint';
     this.draw();
   }
 
