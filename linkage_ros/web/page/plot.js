@@ -63,7 +63,7 @@ export class Plot {
       this.refresh();
     } });
     this.now = element('div', { className: 'now' });
-    this.place = element('div', { className: 'plot', tabIndex: 0 });
+    this.place = element('div', { className: 'plot', tabIndex: 0, ariaLabel: 'No curve yet' });
     this.place.setAttribute('role', 'img');
     this.read = element('p', { className: 'answer' });
     this.marks = element('p', { className: 'answer' });
