@@ -59,7 +59,7 @@ setup(
     name=package_name,
     version='0.1.0',
     packages=find_packages(include=[f'{package_name}*']),
-    package_data={package_name: ['py.typed'], f'{package_name}.web': ['page/*']},
+    package_data={package_name: ['py.typed'], f'{package_name}.web': ['page/*', 'page/vendor/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),

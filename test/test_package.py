@@ -116,6 +116,7 @@ def test_a_wheel_has_the_library_and_the_page_and_no_commands(copy, tmp_path):
     with zipfile.ZipFile(wheel) as packed:
         names = packed.namelist()
     assert 'linkage_ros/mechanisms/jansen.py' in names
+    assert 'linkage_ros/web/page/vendor/LICENSE' in names
     assert 'linkage_ros/py.typed' in names
     assert any(name.startswith('linkage_ros/web/page/') for name in names)
     assert not any(name.endswith('entry_points.txt') or 'scripts/' in name for name in names)

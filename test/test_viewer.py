@@ -32,15 +32,18 @@ pytest.importorskip('linkage_interfaces')
 import browser  # noqa: E402
 from geometry_msgs.msg import Point  # noqa: E402
 from linkage_ros import mechanisms, scene  # noqa: E402
+from linkage_ros.c_code import header  # noqa: E402
 from linkage_ros.nodes import message_layout, messages  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
+from linkage_ros.robot_model import urdf  # noqa: E402
 from linkage_ros.scene.writing import without_defaults  # noqa: E402
-from linkage_ros.web import feed, scene_view, server  # noqa: E402
+from linkage_ros.web import curves, feed, scene_view, server  # noqa: E402
 from linkage_ros.web.feed import Feed  # noqa: E402
 from linkage_ros.web.scene_view import LATCHED  # noqa: E402
 from linkage_ros.web.viewer import Viewer  # noqa: E402
+from PIL import Image  # noqa: E402
 from rcl_interfaces.msg import (  # noqa: E402
     Parameter as ParameterMessage,  # noqa: E402
     ParameterDescriptor,
@@ -480,6 +483,48 @@ def test_the_page_learns_how_far_dimensions_go_and_which_bars_follow(lever):
     assert all(bar in drop['bars']['dimensions.a'] for bar in (['O', 'A'], ['C', 'B']))
 
 
+def test_the_page_is_sent_what_an_output_does_over_a_turn(lever):
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/lever', '/drop')
+            return [await page.ask('curve', '/lever', kind=kind) for kind in curves.KINDS], [
+                await page.ask('curve', '/drop', kind=kind) for kind in curves.KINDS[3:]]
+
+    about_lever, about_drop = asyncio.run(use(lever.viewer.url))
+    x, step = np.array(about_lever[0]['x']), 1e-4
+    phi, before, after = (np.array([lever_of(theta + shift) for theta in x])
+                          for shift in (0.0, -step, step))
+    speed = (after - before) / (2.0 * step)
+    slope = (after - 2.0 * phi + before) / step ** 2
+    truth = phi, speed, slope, 0.5 * math.pi + 0.0 * x, 1.0 / speed
+    for said, values in zip(about_lever, truth):
+        np.testing.assert_allclose(said['y'], values, rtol=2e-5, atol=2e-7)
+    assert [said['units'][1] for said in about_lever] == ['rad', 'rad/s', 'rad/s²', 'rad', '']
+    assert about_lever[0]['reach'] == [[-math.pi, math.pi]] and about_lever[0]['dead'] == []
+    # A kite lies flat at 0 and at pi: there it may be assembled in two ways.
+    assert about_drop[0]['dead'] == [-math.pi, 0.0] and about_drop[0]['output'] == 'B'
+    assert about_drop[0]['y'][180] in (0.0, math.pi)
+
+
+@pytest.mark.parametrize('name, output', [
+    ('excavator', 'T.y'), ('scissor_lift', 'P.y'), ('jansen', 'EF'), ('peaucellier', 'PB')])
+def test_velocity_and_acceleration_are_the_slopes_of_the_curves(name, output):
+    machine, = scene.load(str(ROOT / 'config' / f'{name}.yaml')).machines.values()
+    present = [drive.start for drive in machine.inputs.values()]
+    position, velocity, acceleration, _, force = (
+        curves.curve(machine, present, kind, None if kind == 'transmission angle' else output)
+        for kind in curves.KINDS)
+    x, inner = position['x'], slice(40, -40)
+    for curve, slope in ((position, velocity), (velocity, acceleration)):
+        slope = np.array(slope['y'], float)[inner]
+        np.testing.assert_allclose(np.gradient(np.array(curve['y'], float), x)[inner], slope,
+                                   atol=2e-3 * np.abs(slope).max())
+    if len(present) == 1:
+        own, unit = machine.scale_of(position['input']), machine.scale_of(output)
+        effort = machine.linkage.output_effort(output, np.array(x) / own, own) / unit
+        np.testing.assert_allclose(np.array(force['y'], float)[inner], effort[inner], rtol=1e-12)
+
+
 def test_nobody_is_listened_to_while_nobody_looks(show, monkeypatch):
     monkeypatch.setattr(scene_view, 'SECONDS_TO_LINGER', 0.2)
     running = show(LEG)
@@ -585,6 +630,11 @@ REQUESTS = [
     ('pose', {'mechanism': '[]'}, 'not understood'), ('tune', {'mechanism': '""'}, 'there is no'),
     ('save', {'values': '{"crank.start": "up"}'}, 'crank.start must be'),
     ('save', {'values': '7'}, 'not understood'),
+    ('curve', {'kind': '"speed"'}, "kind must be one of position, .* not 'speed'"),
+    ('curve', {'output': '"Z.x"'}, "there is no position of 'Z.x'; there is of lever, "),
+    ('curve', {'colour': '1'}, 'not understood'),
+    ('export', {'form': '"pdf"'}, "form must be csv, urdf or c, not 'pdf'"),
+    ('export', {}, "not understood: .* 'form'"),
     (50000 * 'x', {}, "unknown request 'x*[.]{3}x*'$"),
 ]
 
@@ -765,7 +815,8 @@ async def status(url, **headers):
     return (await answer(url, **headers))[0]
 
 
-@pytest.mark.parametrize('name', ['', *sorted(path.name for path in PAGE.iterdir())])
+@pytest.mark.parametrize('name', ['', *sorted(
+    path.relative_to(PAGE).as_posix() for path in PAGE.rglob('*') if path.is_file())])
 def test_the_page_is_served_with_nothing_from_outside(address, name):
     code, headers, served = asyncio.run(answer(address + name))
     assert code == 200
@@ -778,7 +829,8 @@ def test_the_page_is_served_with_nothing_from_outside(address, name):
     named = re.findall(r"""(?:src|href|from|url\()\s*=?\s*["']([^"']+)["']""", text)
     assert all((PAGE / one).is_file() for one in named)
     addresses = set(re.findall(r'https?://[^\s"\'`]+', text))
-    assert addresses <= {'http://www.apache.org/licenses/LICENSE-2.0', 'http://www.w3.org/2000/svg'}
+    assert addresses <= {'http://www.apache.org/licenses/LICENSE-2.0', 'http://www.w3.org/2000/svg',
+                         'https://github.com/leeoniya/uPlot'}
 
 
 @pytest.mark.parametrize('name', ['%2e%2e%2fserver.py', 'server.py', 'none.html', 'page/main.js'])
@@ -1267,7 +1319,7 @@ def looked_at(tmp_path):
                     lambda: page.value('document.querySelectorAll("section").length'))
                 await doing(seen)
                 assert page.complaints == []
-                assert all(url.startswith((running.viewer.url, 'ws://127.0.0.1:', 'data:'))
+                assert all(url.startswith((running.viewer.url, 'ws://127.0.0.1:', 'blob:'))
                            for url in page.requests)
 
         asyncio.run(look())
@@ -1636,8 +1688,11 @@ def test_the_page_is_for_everybody(show, looked_at, path):
     async def doing(seen):
         for width, height, scheme in ((1200, 900, 'light'), (390, 844, 'dark')):
             await seen.page.resize(width, height, scheme)
-            await browser.until(lambda: seen.page.value(
-                '!!document.querySelector("section tbody tr")'))
+            await browser.until(lambda most=width: seen.page.value(
+                '[...document.querySelectorAll(".plot")].every(plot =>'
+                ' (plot.closest("details").open = true) && /^Position of /.test(plot.ariaLabel) &&'
+                f' plot.querySelector("canvas").clientWidth < {most}) &&'
+                ' !!document.querySelector("section tbody tr")'))
             assert await seen.page.value('document.documentElement.scrollWidth') <= width
             found = json.loads(await seen.page.value(
                 f'(() => {{ {axe} }})(), axe.run().then(found => JSON.stringify('
@@ -1645,6 +1700,73 @@ def test_the_page_is_for_everybody(show, looked_at, path):
             assert found == []
 
     looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
+def test_a_plot_follows_what_is_tuned_and_all_can_be_downloaded(show, looked_at, tmp_path):
+    walker = {**LEG, 'leg.scale': 0.01, 'leg.leg_pairs': 2, 'leg.crank.speed': -2.0}
+    running = show(walker)
+
+    async def doing(seen):
+        page, section = seen.page, seen.section('leg')
+        plot = f'{section}.querySelector(".plot")'
+
+        async def plotted(m):
+            leg = mechanisms.create('jansen', m=m)
+            rates = leg.joint_rates(np.radians(np.arange(-180.0, 181.0)), ['G.x'])['G.x']
+            low, high = sorted((f'{-20.0 * rate:.4g}' for rate in (rates.min(), rates.max())),
+                               key=float)
+            await browser.until(lambda: page.value(f"""(() => {{
+                ({plot}).closest('details').open = true;
+                for (const [what, value] of [['Quantity', 'velocity'], ['Output', 'G.x']]) {{
+                    const select = {section}.querySelector(`select[aria-label=${{what}}]`);
+                    if (select.value === value) continue;
+                    select.value = value;
+                    select.dispatchEvent(new Event('change'));
+                }}
+                return {plot}.ariaLabel?.startsWith(
+                    'Velocity of G.x with the crank at -114.6 °/s: from {low} to {high} mm/s.');
+            }})()"""))
+
+        await seen.output('leg', 'BC')
+        await page.value('document.getElementById("workshop").click()')
+        await plotted(15.0)
+
+        async def feet_on_both_sides():
+            columns = coloured(picture := await seen.canvas(), *GREEN)[:, 1]
+            middle = picture.shape[1] / 2
+            return (columns < middle - 20).sum() > 50 and (columns > middle + 20).sum() > 50
+
+        await browser.until(feet_on_both_sides)
+        await seen.write('leg', 'm', '16000')
+        await plotted(16.0)
+
+        async def dragged():
+            await page.value(f'{plot}.scrollIntoView()')
+            x, y, width = await page.middle(f'{plot}.querySelector(".u-over")')
+            await page.drag((x, y), (x + width / 4, y))
+            return abs(running.values('leg.crank.start')[0] - 0.5 * math.pi) < 0.1
+
+        await browser.until(dragged)
+        await page.downloads(tmp_path)
+        for form in ('CSV', 'PNG', 'URDF', 'C'):
+            await page.value(f"""[...{section}.querySelectorAll('button')].find(
+                button => button.textContent === '{form}').click()""")
+        files = [tmp_path / f'leg.{ending}' for ending in ('csv', 'png', 'urdf', 'h')]
+        await browser.until(lambda: all(file.exists() for file in files))
+        size = await page.value('[picture.width, picture.height]')
+        assert list(Image.open(files[1]).size) == size
+
+    looked_at(running, doing)
+    machine = scene.read({**walker, 'leg.dimensions.m': 16.0}).machines['leg']
+    table = np.genfromtxt(tmp_path / 'leg.csv', delimiter=',', names=True, deletechars='"')
+    theta = np.linspace(-math.pi, math.pi, 361)
+    np.testing.assert_allclose(table['crank_[rad]'], theta, atol=1e-11)
+    np.testing.assert_allclose(table['position_G.x_[m]'], 0.01 * machine.linkage.solve(
+        theta, ['G'])['G'][:, 0], rtol=1e-9, atol=1e-12)
+    assert (tmp_path / 'leg.urdf').read_text() == urdf.describe([machine], 'world')
+    assert (tmp_path / 'leg.h').read_text() == header.written(machine)
 
 
 @needs_browser

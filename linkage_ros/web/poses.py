@@ -33,7 +33,7 @@ def described(machine, present) -> dict:
         *(name for name in machine.linkage.joints if name not in machine.inputs),
         *(f'{machine.tracer}.{axis}' for axis in 'xy')]
     own = [machine.scale_of(name) for name in machine.inputs]
-    theta = _theta([value / size for value, size in zip(present, own)])
+    theta = theta_of([value / size for value, size in zip(present, own)])
     values = linkage.joint_angles(theta, names)
     rates = [linkage.joint_rates(theta, names, i) for i in range(len(own))]
     return {
@@ -88,7 +88,7 @@ def _input_at(machine, present, name, value):
     taken = math.remainder(value, math.tau) if whole else near
     inputs = [taken if key == name else old for key, old in zip(machine.inputs, present)]
     own = [value / machine.scale_of(key) for key, value in zip(machine.inputs, inputs)]
-    places = machine.linkage.solve(_theta(own))
+    places = machine.linkage.solve(theta_of(own))
     if not all(math.isfinite(part) for place in places.values() for part in place):
         raise Refused(f'{machine.name} cannot be assembled there')
     missed = not whole and drive.input.apart(near, value) > CLOSE * drive.input.size
@@ -137,7 +137,8 @@ def arcs(drive):
     return [drive.ends] if drive.ends else list(drive.reach)
 
 
-def _theta(values):
+def theta_of(values):
+    """Return the inputs as a linkage takes them: a sequence only of several."""
     return values if len(values) > 1 else values[0]
 
 

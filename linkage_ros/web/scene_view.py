@@ -20,7 +20,7 @@ from rclpy.qos import (
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
-from . import poses
+from . import curves, poses
 from .bridge import NoAnswer
 from .feed import Feed
 from .poses import Refused
@@ -180,8 +180,7 @@ class SceneView:
         that is not all that was wanted.
         """
         mechanism = self._find(key)
-        machine = self._machine_of(mechanism)
-        inputs, reason = self._present(mechanism, machine), ''
+        (machine, inputs), reason = self._state(mechanism), ''
         if want is not None:
             inputs, reason = poses.reached(machine, inputs, dict(want))
             await self._hold(mechanism, machine, inputs)
@@ -208,6 +207,18 @@ class SceneView:
         given = {'mechanisms': [mechanism.name], **mechanism.values()}
         return await self._aside(lambda: poses.tunable(_read(given), mechanism.name))
 
+    async def curve(self, key: str, **about) -> dict:
+        """Return what `curves.curve` does."""
+        machine, inputs = self._state(self._find(key))
+        return await self._aside(lambda: curves.curve(machine, inputs, **about))
+
+    async def export(self, key: str, form: str) -> dict:
+        """Return what `curves.exported` does."""
+        machine, inputs = self._state(self._find(key))
+        frame_id = self._general.get(_space(key), {}).get('frame_id', 'world')
+        return {'text': await self._aside(
+            lambda: curves.exported(machine, inputs, form, frame_id))}
+
     async def save(self, key: str, values=()) -> dict:
         """Return the parameter file of a mechanism's scene, some values replaced."""
         mechanism, space = self._find(key), _space(key)
@@ -226,15 +237,12 @@ class SceneView:
         except scene.SceneError as error:
             raise Refused(str(error)) from None
 
-    def _machine_of(self, mechanism):
+    def _state(self, mechanism):
+        """Return a machine and its inputs [rad or m] as they were told last, or as they start."""
         if mechanism.machine is None:
             given = {'mechanisms': [mechanism.name], **mechanism.values()}
             mechanism.machine = _read(given).machines[mechanism.name]
-        return mechanism.machine
-
-    def _present(self, mechanism, machine):
-        """Return its inputs [rad or m] as they were told last, or where they start."""
-        inputs = []
+        machine, inputs = mechanism.machine, []
         if self._bridge.loop.time() > mechanism.until:
             mechanism.held = {}
         for name, drive in machine.inputs.items():
@@ -245,7 +253,7 @@ class SceneView:
             if drive.input.apart(held, now) < ARRIVED * drive.input.size:
                 mechanism.held.pop(name, None)
             inputs.append(mechanism.held.get(name, now))
-        return inputs
+        return machine, inputs
 
     def _find(self, key):
         if key not in self._mechanisms:

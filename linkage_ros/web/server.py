@@ -23,6 +23,7 @@ from .. import palette
 from ..words import quoted
 
 PAGE = files(__package__) / 'page'
+FOLDERS = {'': PAGE, 'vendor/': PAGE / 'vendor'}
 KINDS = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript',
          '.svg': 'image/svg+xml'}
 # Where the colours of the palette are filled in, by their names in small letters.
@@ -97,7 +98,7 @@ class Server:
         self._bridge.loop = asyncio.get_running_loop()
         app = web.Application(middlewares=[self._guard])
         app.add_routes([web.get('/', _file), web.get('/socket', self._connect),
-                        web.get('/{name}', _file)])
+                        web.get('/{name:.+}', _file)])
         logger = logging.Logger('web', logging.WARNING)
         logger.addHandler(OneLineHandler(self._bridge.warn))
         runner = web.AppRunner(
@@ -274,12 +275,10 @@ class Client:
             if op == 'set':
                 await self._view.set(said['mechanism'], dict(said['values']))
                 return {}
-            if op == 'pose':
-                return await self._view.pose(said['mechanism'], said.get('want'))
-            if op == 'tune':
-                return await self._view.tune(said['mechanism'])
-            if op == 'save':
-                return await self._view.save(said['mechanism'], said.get('values', {}))
+            if op in ('pose', 'tune', 'curve', 'save', 'export'):
+                about = {name: value for name, value in said.items()
+                         if name not in ('op', 'id', 'mechanism')}
+                return await getattr(self._view, op)(said['mechanism'], **about)
             return {'reason': f'unknown request {quoted(op)}'}
         except Refused as reason:
             return {'reason': str(reason)}
@@ -359,13 +358,15 @@ def _parts(url):
 
 async def _file(request):
     name = request.match_info.get('name', 'index.html')
-    path = {file.name: file for file in PAGE.iterdir()}.get(name)
+    path = {start + file.name: file for start, folder in FOLDERS.items()
+            for file in folder.iterdir() if file.is_file()}.get(name)
     if path is None:
         raise web.HTTPNotFound(text=f'There is no {name!r}.\n')
     ending, text = name[name.rfind('.'):], path.read_text('utf-8')
     if ending in COLOURED:
         text = Template(text).substitute(COLOURS)
-    response = web.Response(text=text, charset='utf-8', content_type=KINDS[ending])
+    response = web.Response(text=text, charset='utf-8',
+                            content_type=KINDS.get(ending, 'text/plain'))
     # What follows before the answer was read would be gathered without bound.
     response.force_close()
     return response

@@ -25,6 +25,14 @@ export class Mechanism {
     return this.settings.get(name)?.value;
   }
 
+  /** Its markers, and the curve of the mirrored legs' feet beside that of the others. */
+  *drawn() {
+    for (const { look, points } of this.markers.values()) {
+      yield { look, points };
+      if (look.kind === 'strip' && this.value('mirrored')) yield { look, points: points.map((value, i) => i % 3 ? value : -value) };
+    }
+  }
+
   /** How many pairs of legs there are, and how many legs. */
   get pairs() {
     return this.value('leg_pairs') ?? 1;

@@ -101,7 +101,7 @@ class OutputRow {
   }
 }
 
-/** The part of the panel in which one mechanism is moved. */
+/** The part of the panel in which one mechanism is moved; calls `onshow` when it was heard where it is. */
 export class Motion {
   constructor(mechanism, connection, open) {
     this.mechanism = mechanism;
@@ -140,6 +140,21 @@ export class Motion {
     return Object.fromEntries([...this.speeds].filter(([, speed]) => speed));
   }
 
+  /** The speed with which the first input plays, or would. */
+  get speed() {
+    const name = `${this.inputs.keys().next().value}.speed`;
+    return this.playing[name] ?? this.usual(name);
+  }
+
+  /** Where the inputs are, and whether the first is an angle. */
+  get present() {
+    return [...this.inputs.values()].map(({ slider }) => slider.accepted);
+  }
+
+  get turns() {
+    return this.inputs.values().next().value?.turns;
+  }
+
   renderPlay() {
     for (const name of this.speeds.keys()) {
       this.speeds.set(name, this.mechanism.value(name) || this.speeds.get(name));
@@ -175,6 +190,7 @@ export class Motion {
     const names = [...Object.keys(inputs), ...Object.keys(outputs)].join();
     if (names !== this.built) this.build(names, inputs, outputs);
     for (const [name, input] of Object.entries(inputs)) this.inputs.get(name).show(input);
+    this.onshow();
     if (!this.folding.open) return;
     for (const [name, output] of Object.entries(outputs)) this.outputs.get(name).show(output, Object.values(inputs));
   }

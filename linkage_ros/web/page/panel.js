@@ -4,7 +4,9 @@
 // The panel: for each mechanism that is shown how it moves, and what it is.
 
 import { element } from './control.js';
+import { Files } from './files.js';
 import { Motion } from './motion.js';
+import { Plot } from './plot.js';
 import { Tuning } from './tuning.js';
 import { units } from './units.js';
 
@@ -18,13 +20,17 @@ class Section {
     const type = mechanism.value('type') ?? '';
     this.mechanism = mechanism;
     this.motion = new Motion(mechanism, connection, !folded);
+    this.plot = new Plot(mechanism, connection, this.motion);
+    this.motion.place.after(this.plot.element);
+    this.motion.onshow = () => this.plot.look();
     this.tuning = new Tuning(mechanism, connection, !folded, own => light(mechanism, own));
-    this.parts = [this.motion, this.tuning];
+    this.parts = [this.motion, this.plot, this.tuning];
     this.still = element('p', { className: 'still', hidden: true });
     this.element = element('section', { ariaLabel: name },
       element('header', {}, element('h2', { textContent: name }),
         element('span', { className: 'about', textContent: type === name ? '' : type }), this.motion.play),
-      this.still, this.motion.element, ...this.tuning.speeds, this.tuning.element);
+      this.still, this.motion.element, ...this.tuning.speeds, this.tuning.element,
+      new Files(mechanism, connection).element);
     this.element.dataset.key = key;
   }
 
@@ -32,6 +38,7 @@ class Section {
     this.tuning.update(name, value);
     this.motion.renderPlay();
     this.mechanism.playing = this.motion.playing;
+    this.plot.update(name);
   }
 }
 
@@ -42,6 +49,7 @@ export class Panel {
     this.sections = new Map();
     this.built = '';
     units.onchange(() => this.render());
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.render());
     setInterval(() => this.look(), LOOKS);
     document.addEventListener('keydown', event => this.key(event));
   }
@@ -52,6 +60,7 @@ export class Panel {
       key, [...settings.values()].map(({ value, ...rest }) => rest)])]);
     if (built !== this.built) {
       this.built = built;
+      for (const { plot } of this.sections.values()) plot.end();
       this.sections = new Map(mechanisms.map(one => [one.key, new Section(one, this.connection, folded, this.light)]));
       this.place.replaceChildren(...[...this.sections.values()].map(section => section.element));
     }

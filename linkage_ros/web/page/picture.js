@@ -15,7 +15,7 @@ const PIECE = { lines: 4, triangles: 6, joints: 2 };
 const FONT = "13px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
 
 /** A colour of the style sheet, which the server fills in. */
-const paint = name => getComputedStyle(document.documentElement).getPropertyValue(name);
+export const paint = name => getComputedStyle(document.documentElement).getPropertyValue(name);
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
@@ -141,7 +141,7 @@ export class Picture {
     const shapes = [];
     this.seen = null;
     for (const mechanism of this.mechanisms) {
-      for (const { look, points } of mechanism.markers.values()) {
+      for (const { look, points } of mechanism.drawn()) {
         const [x, y, z] = axes(look.pose);
         this.seen ??= this.view.axes({ right: x, up: y, out: z });
         const depth = dot(this.seen.out, look.pose.slice(0, 3));

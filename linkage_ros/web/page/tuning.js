@@ -4,6 +4,7 @@
 // What a mechanism is: a control for each parameter, undo and reset, and its scene as a file.
 
 import { BY_FACTOR, element, FINE_ABOUT_ZERO, LINEAR, Reason, Slider, Switch } from './control.js';
+import { download } from './files.js';
 
 const DIMENSION = 'dimensions.';
 const MOVES = /\.(speed|start)$/;
@@ -23,11 +24,6 @@ function law({ name, kind, low, high }) {
 
 function folding(title, children, open) {
   return element('details', { open, hidden: !children.length }, element('summary', { textContent: title }), ...children);
-}
-
-/** Let the browser save a text. */
-function download(name, text) {
-  element('a', { download: name, href: `data:application/yaml;charset=utf-8,${encodeURIComponent(text)}` }).click();
 }
 
 export class Tuning {

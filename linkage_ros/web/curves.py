@@ -1,0 +1,108 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Curves for the page: what outputs do over a turn or a stroke; a mechanism as a file."""
+
+import io
+
+import numpy as np
+
+from .poses import Refused, theta_of
+from .settings import shown
+from ..c_code import header
+from ..robot_model import urdf
+from ..words import listed, quoted
+
+SAMPLES = 361
+KINDS = POSITION, VELOCITY, ACCELERATION, TRANSMISSION, FORCE = (
+    'position', 'velocity', 'acceleration', 'transmission angle', 'force ratio')
+# Of an output and an input in these.
+FORCES = {('rad', 'm'): 'N·m/N', ('m', 'rad'): 'N/(N·m)'}
+
+
+class Sweep:
+    """The first input through its reach at 1 rad/s or 1 m/s, the others held [rad or m]."""
+
+    def __init__(self, machine, present):
+        self.linkage, self.input, self._machine = machine.linkage, machine.first.input, machine
+        sizes = [machine.scale_of(name) for name in machine.inputs]
+        others = [value / size for value, size in zip(present, sizes)][1:]
+        reach, dead = self.linkage.reach(*others), self.linkage.dead_points(*others)
+        if not reach:
+            raise Refused(f'{machine.name} cannot be assembled where its other inputs are')
+        # Between two arcs there is a place without values.
+        own = np.unique([*np.linspace(*np.transpose(reach), SAMPLES).ravel(), *(
+            0.5 * (before + after) for (_, before), (after, _) in zip(reach, reach[1:]))])
+        self._size, still = sizes[0], [0.0] * len(others)
+        self._inputs, self._speeds, self._still = map(theta_of, (
+            [own, *others], [1.0 / sizes[0], *still], [0.0, *still]))
+        self.values, self.reach, self.dead = (
+            np.multiply(each, sizes[0]) for each in (own, reach, dead))
+
+    def names(self, kind):
+        """Return the joints with a transmission angle, or the outputs."""
+        linkage = self.linkage
+        if kind == TRANSMISSION:
+            return list(linkage.transmission_angles(self._inputs))
+        return [*(name for name in linkage.joints if name not in self._machine.inputs),
+                *(f'{joint}.{axis}' for joint in linkage.points if joint not in linkage.grounded
+                  for axis in 'xy')]
+
+    def unit(self, kind, name):
+        """Return what a quantity is counted in; nothing: a number."""
+        own = 'rad' if kind == TRANSMISSION or self.linkage.is_angle(name) else 'm'
+        if kind == FORCE:
+            return FORCES.get((own, self.input.unit), '')
+        return own + {VELOCITY: '/s', ACCELERATION: '/s²'}.get(kind, '')
+
+    @np.errstate(all='ignore')
+    def of(self, kind, names):
+        """Return a quantity of each name in the scene's size; not finite where there is none."""
+        linkage, inputs, size = self.linkage, self._inputs, self._machine.scale_of
+        if kind == TRANSMISSION:
+            return linkage.transmission_angles(inputs, names)
+        if kind == FORCE:
+            return {name: 1.0 / value for name, value in self.of(VELOCITY, names).items()}
+        if kind == ACCELERATION:
+            found = linkage.joint_accelerations(inputs, self._speeds, self._still, names)
+        else:
+            find = linkage.joint_angles if kind == POSITION else linkage.joint_rates
+            found = find(inputs, names)
+        factor = 1.0 / self._size if kind == VELOCITY else 1.0
+        return {name: value * factor * size(name) for name, value in found.items()}
+
+
+def curve(machine, present, kind=POSITION, output=None) -> dict:
+    """Return one of KINDS over the first input: x and y in `units`, y None where it has none."""
+    if kind not in KINDS:
+        raise ValueError(f'kind must be one of {", ".join(KINDS)}, not {quoted(kind)}')
+    sweep = Sweep(machine, present)
+    names = sweep.names(kind)
+    output = names[0] if names and output is None else output
+    if not (output in names or kind != TRANSMISSION and sweep.linkage.has_output(output)):
+        raise Refused(f'there is no {kind} of {quoted(output)}; there is of {listed(names)}')
+    y, unit = sweep.of(kind, (output,))[output], sweep.unit(kind, output)
+    if (kind, unit) == (POSITION, 'rad'):
+        known = np.isfinite(y)
+        y[known] = np.unwrap(y[known])
+    return {'input': sweep.input.name, 'output': output, 'names': names,
+            'units': [sweep.input.unit, unit], 'x': sweep.values.tolist(),
+            'y': list(map(shown, y.tolist())), 'reach': sweep.reach.tolist(),
+            'dead': sweep.dead.tolist()}
+
+
+def exported(machine, present, form, frame_id) -> str:
+    """Return as text: 'csv', all kinds of all outputs in rad and m; 'urdf'; or 'c'."""
+    if form == 'urdf':
+        return urdf.describe([machine], machine.frame_id or frame_id)
+    if form == 'c':
+        return header.written(machine)
+    if form != 'csv':
+        raise ValueError(f'form must be csv, urdf or c, not {quoted(form)}')
+    sweep, text = Sweep(machine, present), io.StringIO()
+    columns = {f'{sweep.input.name} [{sweep.input.unit}]': sweep.values, **{
+        f'{kind} {name} [{sweep.unit(kind, name) or 1}]': values for kind in KINDS
+        for name, values in sweep.of(kind, sweep.names(kind)).items()}}
+    np.savetxt(text, np.stack(list(columns.values()), 1), '%.12g', ',', comments='',
+               header=','.join(f'"{name}"' for name in columns))
+    return text.getvalue()

@@ -1,0 +1,51 @@
+// Copyright 2026 linkage_ros contributors
+// SPDX-License-Identifier: Apache-2.0
+
+// What can be taken away of a mechanism: its numbers, its picture, its robot model, its code.
+
+import { element, Reason } from './control.js';
+import { paint } from './picture.js';
+
+const FORMS = {
+  CSV: ['csv', 'All outputs over a turn or a stroke, in radians and metres, the input at 1 rad/s or 1 m/s'],
+  PNG: ['png', 'The picture as it is seen'],
+  URDF: ['urdf', 'The robot model'],
+  C: ['h', 'A C99 header for a microcontroller'],
+};
+
+/** Let the browser save what is in a blob or a text. */
+export function download(name, ...parts) {
+  const href = URL.createObjectURL(new Blob(parts));
+  element('a', { download: name, href }).click();
+  setTimeout(() => URL.revokeObjectURL(href), 1000);
+}
+
+/** The picture on its paper. */
+function painted() {
+  const seen = document.getElementById('picture');
+  const { width, height } = seen;
+  const canvas = element('canvas', { width, height });
+  const context = canvas.getContext('2d');
+  context.fillStyle = paint('--paper');
+  context.fillRect(0, 0, width, height);
+  context.drawImage(seen, 0, 0);
+  return new Promise(done => { canvas.toBlob(done); });
+}
+
+export class Files {
+  constructor(mechanism, connection) {
+    Object.assign(this, { mechanism, connection, reason: new Reason() });
+    this.element = element('div', { className: 'tools' }, element('span', { className: 'about', textContent: 'Download' }),
+      ...Object.entries(FORMS).map(([form, [ending, title]]) => element('button', {
+        type: 'button', textContent: form, title, onclick: () => this.save(form.toLowerCase(), ending),
+      })), this.reason.line);
+  }
+
+  async save(form, ending) {
+    const { name, key } = this.mechanism;
+    const { reason, text } = form === 'png' ? { text: await painted() }
+      : await this.connection.ask({ op: 'export', mechanism: key, form });
+    this.reason.say(reason && `Not saved: ${reason}`);
+    if (!reason) download(`${name}.${ending}`, text);
+  }
+}

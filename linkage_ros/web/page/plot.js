@@ -1,0 +1,261 @@
+// Copyright 2026 linkage_ros contributors
+// SPDX-License-Identifier: Apache-2.0
+
+// What an output does over a turn or a stroke of the first input, the others held where they are.
+
+import { element, Newest, put, Reason } from './control.js';
+import { paint } from './picture.js';
+import { units } from './units.js';
+
+const KINDS = ['position', 'velocity', 'acceleration', 'transmission angle', 'force ratio'];
+// What grows with the input's speed, and by which power of it.
+const POWERS = { velocity: 1, acceleration: 2 };
+const HEIGHT = 220;
+const FONT = "12px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
+const DIGIT = 7.5;
+const DEGREES = [1, 2, 5, 10, 15, 30, 45, 90, 180, 360];
+const FIGURES = 4;
+// What goes further than so many times the way between its outer tenths grows without bound.
+const MOST = 8;
+const NOTHING = 1e-9;
+
+let loading = null;
+
+/** Load the library once, when the first plot is opened. */
+function library() {
+  loading ??= new Promise((done, failed) => document.head.append(
+    element('link', { rel: 'stylesheet', href: 'vendor/uPlot.min.css' }),
+    element('script', { src: 'vendor/uPlot.iife.min.js', onload: done, onerror: failed })));
+  return loading;
+}
+
+const shown = value => value === null || value === undefined ? '—' : String(Number(value.toPrecision(FIGURES)));
+
+/** Between which values curves are drawn: all, but of what grows without bound. */
+function bounds(values) {
+  const sorted = values.filter(value => value !== null).sort((a, b) => a - b);
+  if (!sorted.length) return [-1, 1];
+  const at = part => sorted[Math.round(part * (sorted.length - 1))];
+  const way = at(0.9) - at(0.1);
+  const low = at(0) < at(0.1) - MOST * way ? at(0.1) - way : at(0);
+  const high = at(1) > at(0.9) + MOST * way ? at(0.9) + way : at(1);
+  const size = Math.max(Math.abs(low), Math.abs(high), 1e-3);
+  const room = high - low > NOTHING * size ? 0.06 * (high - low) : 0.5 * size;
+  return [low - room, high + room];
+}
+
+/** The value between the two samples beside a place. */
+function between(xs, ys, x) {
+  const after = xs.findIndex(other => other >= x);
+  if (after < 1) return ys[0] ?? null;
+  const [a, b] = [ys[after - 1], ys[after]];
+  if (a === null || b === null) return null;
+  return a + (b - a) * (x - xs[after - 1]) / (xs[after] - xs[after - 1]);
+}
+
+export class Plot {
+  constructor(mechanism, connection, motion) {
+    Object.assign(this, { mechanism, connection, motion, chosen: {}, sight: '' });
+    this.kind = this.choice('Quantity', KINDS);
+    this.output = this.choice('Output', []);
+    this.other = element('input', { type: 'text', placeholder: 'distance(A,C)', ariaLabel: 'Another output', onchange: () => {
+      this.chosen[this.about] = this.other.value.trim() || undefined;
+      this.refresh();
+    } });
+    this.now = element('div', { className: 'now' });
+    this.place = element('div', { className: 'plot', tabIndex: 0, ariaLabel: 'No curve yet' });
+    this.place.setAttribute('role', 'img');
+    this.read = element('p', { className: 'answer' });
+    this.marks = element('p', { className: 'answer' });
+    this.reason = new Reason();
+    this.element = element('details', {}, element('summary', { textContent: 'Plot' }),
+      element('div', { className: 'tools' }, this.kind, this.output, this.other), this.reason.line, this.place, this.read, this.marks);
+    this.element.ontoggle = () => this.refresh();
+    this.asked = new Newest(() => this.ask());
+    new ResizeObserver(() => {
+      if (this.element.open) this.plot?.setSize({ width: this.place.clientWidth, height: HEIGHT });
+    }).observe(this.place);
+  }
+
+  choice(ariaLabel, names) {
+    const select = element('select', { ariaLabel, onchange: () => this.choose() });
+    select.append(...names.map(textContent => element('option', { textContent })));
+    return select;
+  }
+
+  /** What it is about: what was chosen of the one is kept beside what was chosen of the other. */
+  get about() {
+    return this.kind.value === 'transmission angle' ? 'joint' : 'output';
+  }
+
+  choose() {
+    if (this.curve?.about === this.about) this.chosen[this.about] = this.output.value;
+    this.refresh();
+  }
+
+  /** Ask for the curve anew. */
+  refresh() {
+    if (this.element.open) this.asked.offer();
+  }
+
+  /** Follow a parameter that was changed. */
+  update(name) {
+    if (name.endsWith('.speed')) this.render();
+    else if (!name.endsWith('.start')) this.refresh();
+  }
+
+  async ask() {
+    const { kind: { value: kind }, about } = this;
+    const [answer] = await Promise.all([this.connection.ask({
+      op: 'curve', mechanism: this.mechanism.key, kind, output: this.chosen[about],
+    }), library()]);
+    this.reason.say(answer.reason);
+    if (answer.reason) this.chosen[about] = this.curve?.about === about ? this.curve.output : undefined;
+    if (answer.reason || about !== this.about || !this.element.open) return;
+    this.curve = { ...answer, about, kind };
+    const names = [...new Set([...answer.names, answer.output])];
+    if (names.join() !== [...this.output.options].map(({ value }) => value).join()) {
+      this.output.replaceChildren(...names.map(textContent => element('option', { textContent })));
+    }
+    this.output.value = answer.output;
+    this.other.hidden = about === 'joint';
+    this.draw();
+  }
+
+  /** Draw the curve in the units that are shown. */
+  draw() {
+    const { kind, input, output, units: [across, up], x, y, reach, dead } = this.curve;
+    this.units = [units.of(across), units.of(up)];
+    const [{ name: acrossName, factor: wide }, { name: upName, factor: high }] = this.units;
+    const [{ speed }, power] = [this.motion, POWERS[kind] ?? 0];
+    const title = `${kind} of ${output}${power ? ` with the ${input} at ${shown(speed * wide)} ${acrossName}/s` : ''}`;
+    this.data = [x.map(value => value * wide), y.map(value => value === null ? null : value * high * speed ** power)];
+    this.bounds = bounds(this.data[1]);
+    // From one side of a pole to the other there is no line.
+    const [least, most] = this.bounds;
+    this.data[1] = this.data[1].map((value, i, { [i - 1]: last = null }) =>
+      value > most && last !== null && last < least || last > most && value !== null && value < least ? null : value);
+    this.dead = dead.map(value => value * wide);
+    // A whole turn has no ends.
+    const whole = across === 'rad' && reach[0][1] - reach[0][0] > 2 * Math.PI - NOTHING;
+    this.ends = whole ? [] : reach.flat().map(value => value * wide)
+      .filter(end => !this.dead.some(other => Math.abs(other - end) < NOTHING * Math.abs(end)));
+    const labels = [`${input} [${acrossName}]`, upName];
+    if (this.built !== labels.join() || !this.plot) {
+      this.built = labels.join();
+      this.plot?.destroy();
+      this.plot = new window.uPlot(this.options(...labels), this.data, this.place);
+      this.plot.over.append(this.now);
+      this.hold(this.plot.over);
+    } else {
+      this.plot.setData(this.data);
+    }
+    this.describe(title, upName, labels[0]);
+    this.look();
+  }
+
+  /** Say in words what is drawn. */
+  describe(title, unit, across) {
+    const known = this.data[1].filter(value => value !== null);
+    const [from, to] = [this.data[0][0], this.data[0].at(-1)].map(shown);
+    const cut = this.bounds[0] > Math.min(...known) || this.bounds[1] < Math.max(...known);
+    const [low, high] = cut ? this.bounds : [Math.min(...known), Math.max(...known)];
+    const range = known.length ? `from ${shown(low)} to ${shown(high)}${unit && ` ${unit}`}${cut ? ' and beyond' : ''}` : 'no value anywhere';
+    const places = [['Dead points', this.dead], ['Ends of the reach', this.ends]].filter(([, { length }]) => length)
+      .map(([what, values]) => ` ${what} at ${values.map(shown).join(', ')} ${this.units[0].name}.`);
+    this.marks.textContent = `${title[0].toUpperCase()}${title.slice(1)}: ${range}.${places.join('') || ' No dead points.'}`;
+    this.place.ariaLabel = `${this.marks.textContent} Over the ${across} from ${from} to ${to}.`;
+  }
+
+  options(across, up) {
+    const axis = label => ({
+      label, font: FONT, labelFont: FONT, stroke: () => paint('--ink'), labelSize: 20, labelGap: 0,
+      grid: { stroke: () => paint('--grid'), width: 1 }, ticks: { show: false },
+      values: (_, splits) => splits.map(value => String(Number(value.toPrecision(6)))),
+    });
+    return {
+      width: this.place.clientWidth, height: HEIGHT, legend: { show: false },
+      cursor: { y: false, drag: { x: false, y: false } },
+      scales: { x: { time: false, range: (_, low, high) => [low, high] }, y: { range: () => this.bounds } },
+      series: [{}, { stroke: () => paint('--accent'), width: 2, points: { show: false } }],
+      axes: [
+        { ...axis(across), size: 24, ...(this.units[0].name === '°' && { incrs: DEGREES }) },
+        { ...axis(up), size: (_, values) => 10 + DIGIT * Math.max(2, ...(values ?? []).map(text => text.length)) },
+      ],
+      hooks: { drawAxes: [plot => this.mark(plot)], setCursor: [() => this.look()] },
+    };
+  }
+
+  /** Mark the dead points and the other ends of the reach. */
+  mark(plot) {
+    const { ctx, bbox: { top, height } } = plot;
+    const pixel = window.devicePixelRatio;
+    ctx.save();
+    for (const [places, colour, dash] of [[this.ends, '--faint', []], [this.dead, '--refused', [5, 4]]]) {
+      ctx.strokeStyle = paint(colour);
+      ctx.lineWidth = 1.5 * pixel;
+      ctx.setLineDash(dash.map(length => length * pixel));
+      for (const place of places) {
+        const x = plot.valToPos(this.inside(place), 'x', true);
+        ctx.beginPath();
+        ctx.moveTo(x, top);
+        ctx.lineTo(x, top + height);
+        ctx.stroke();
+      }
+    }
+    ctx.restore();
+  }
+
+  /** A value of the input plus the whole turns that take it into the plot. */
+  inside(value) {
+    if (!this.motion.turns) return value;
+    const [low, high] = [this.data[0][0], this.data[0].at(-1)];
+    const turn = 2 * Math.PI * this.units[0].factor;
+    return value - turn * Math.round((value - (low + high) / 2) / turn);
+  }
+
+  /** Move the input to where the pointer is pressed or drawn. */
+  hold(over) {
+    const move = ({ offsetX }) => this.motion.drag({
+      output: this.curve.input, value: this.plot.posToVal(offsetX, 'x') / this.units[0].factor,
+    });
+    over.onpointerdown = event => {
+      over.setPointerCapture(event.pointerId);
+      move(event);
+    };
+    over.onpointermove = event => { if (event.buttons) move(event); };
+  }
+
+  /** Show where the input is, and the value there or at the pointer. */
+  look() {
+    if (!this.element.open || !this.curve) return;
+    const [present, ...others] = this.motion.present;
+    if (present === undefined) return;
+    const sight = others.map(value => value.toPrecision(6)).join();
+    if (sight !== this.sight) this.refresh();
+    this.sight = sight;
+    const here = this.inside(present * this.units[0].factor);
+    const left = this.plot.valToPos(here, 'x');
+    // It does not fly back where a turn begins anew.
+    this.now.classList.toggle('jumps', Math.abs(left - this.left) > this.plot.over.clientWidth / 2);
+    this.left = left;
+    this.now.style.transform = `translateX(${left}px)`;
+    const { idx } = this.plot.cursor;
+    const [x, y] = idx === null || idx === undefined
+      ? [here, between(...this.data, here)] : this.data.map(values => values[idx]);
+    const { kind, input, output, units: [, unit] } = this.curve;
+    // An angle is drawn without jumps, and said as it is elsewhere.
+    const turn = 2 * Math.PI * this.units[1].factor;
+    const value = kind === 'position' && unit === 'rad' && y ? y - turn * Math.round(y / turn) : y;
+    put(this.read, { textContent: `${input} ${shown(x)} ${this.units[0].name}: ${output} ${shown(value)} ${this.units[1].name}` });
+  }
+
+  render() {
+    if (this.element.open && this.curve) this.draw();
+  }
+
+  /** Leave nothing behind that listens. */
+  end() {
+    this.plot?.destroy();
+  }
+}
