@@ -13,12 +13,14 @@ import time
 from domains import Domain
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 DEADLINE = 20.0
+InvalidHandle = rclpy_implementation.InvalidHandle
 # Until a service is asked once more [s]: of 1000 to 5000 responses one gets lost.
 PATIENCE = 5.0
 # Between publishing once more what may have been lost because nobody was found yet [s].
@@ -81,7 +83,11 @@ class Graph:
         deadline = time.monotonic() + seconds
         while not (held := predicate()):
             assert time.monotonic() < deadline, 'did not happen in time'
-            self._executor.spin_once(timeout_sec=0.02)
+            try:
+                self._executor.spin_once(timeout_sec=0.02)
+            except InvalidHandle:
+                # Another thread ended a node while this one waited for it.
+                continue
         return held
 
     def set(self, node, atomically=True, **values):
