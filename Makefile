@@ -71,6 +71,7 @@ pictures: .venv-docs/.installed ## Draw what pictures/pictures.txt lists, withou
 	@mkdir -p pictures/out
 	@grep -v '^#' pictures/pictures.txt | xargs -t -L 1 $(docs_python) -m linkage_ros.render
 	@PYTHONPATH=. $(docs_python) examples/draw_leg.py pictures/out/leg.png
+	@PYTHONPATH=. $(docs_python) docs/figures.py pictures/out
 
 .PHONY: docs
 docs: .venv-docs/.installed ## Build the documentation to docs/_build/html/ and check its links
