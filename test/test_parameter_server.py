@@ -253,18 +253,22 @@ def test_a_hundred_sets_at_once_cost_as_much_as_the_last(graph):
     assert len(node.prepared) - made <= 10
 
 
-def test_a_change_of_a_walker_of_twelve_legs_takes_less_than_two_ticks_from_the_messages(graph):
-    """Four milliseconds, at 500 Hz; the processor's time is counted: other processes may run."""
-    node = graph.start(Kinematics, {**LEG, 'leg.leg_pairs': 6})
-    client, took = Client(graph, node), []
+def test_of_a_change_the_messages_wait_for_a_part_of_what_it_takes_to_prepare(graph):
+    given = {**LEG, 'leg.leg_pairs': 6}
+    node = graph.start(Kinematics, given)
+    client, waited, prepared = Client(graph, node), [], []
     for value in (14.9, 14.8, 14.7, 14.6, 14.5):
+        # The processor's time is counted: other processes may run.
+        began = time.thread_time()
+        node.prepare(scene.read({**given, 'leg.dimensions.m': value + 0.01}))
+        prepared.append(time.thread_time() - began)
         future = client.ask(SetParameters, parameters=[_message('leg.dimensions.m', value)])
         turns = []
         graph.until(lambda turns=turns, future=future: (
             turns.append(time.thread_time()) or future.done()))
         assert future.result().results[0].successful
-        took.append(max(after - before for before, after in pairwise(turns)))
-    assert sorted(took)[2] < 0.004
+        waited.append(max(after - before for before, after in pairwise(turns)))
+    assert sorted(waited)[2] < 0.5 * sorted(prepared)[2]
 
 
 def test_a_set_among_a_thousand_mechanisms_costs_what_it_changes():
