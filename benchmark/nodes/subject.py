@@ -20,7 +20,8 @@ import time
 from linkage_interfaces.srv import ServoInverse
 from linkage_ros import scene
 from linkage_ros.nodes import joint_state_reader, kinematics, message_layout, messages, scene_node
-from linkage_ros.nodes.kinematics import ANY, Kinematics, MechanismPublisher
+from linkage_ros.nodes.joint_state_reader import ANY
+from linkage_ros.nodes.kinematics import Kinematics, MechanismPublisher
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher

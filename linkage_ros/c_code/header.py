@@ -271,7 +271,7 @@ class _Header:
         """Return in words how far single precision is off, over the reach."""
         linkage = self.linkage
         if len(self.inputs) > 1:
-            return 'float: about seven digits.'
+            return 'float: how far joints are off was not measured, as there are several inputs.'
         (low, high), *_ = linkage.reach()
         edge = 0.0 if linkage.inputs[0].is_whole([(low, high)]) else 0.01 * (high - low)
         theta = np.linspace(low + edge, high - edge, SAMPLED).astype(np.float32)

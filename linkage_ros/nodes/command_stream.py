@@ -9,7 +9,6 @@ import time
 from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -22,8 +21,6 @@ from ..scene.machine import Machine
 from ..scene.wanted import wanted_of
 from ..words import elided
 
-# What comes while the node is kept waiting is not lost; any source will do.
-ANY = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 SECONDS_BETWEEN_WARNINGS, SECONDS_BETWEEN_SEARCHES = 5.0, 0.5
 # So many arrangements of commands are remembered.
 MOST_WIRES = 100
@@ -104,7 +101,8 @@ class CommandStream:
                         for name in mechanisms}
         self._trajectories = node.create_publisher(JointTrajectory, 'servo_trajectory', 10)
         self._message, self._last, self._said, self._next = JointStates(), {}, {}, {}
-        node.create_subscription(JointState, 'wanted_states', self._hear, ANY, raw=True)
+        node.create_subscription(JointState, 'wanted_states', self._hear, joint_state_reader.ANY,
+                                 raw=True)
         node.create_subscription(JointTrajectory, 'wanted_trajectory', self._plan, 10)
 
     def adopt(self, machines):

@@ -13,7 +13,6 @@ from typing import NamedTuple, Optional, Sequence, Tuple
 import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
@@ -27,8 +26,6 @@ from ..linkage.walker import Layout
 from ..robot_model import bodies, shapes, urdf
 from ..words import listed
 
-# Any source will do; what comes while the node is kept waiting, 50 ms at 1000 Hz, is not lost.
-ANY = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 SECONDS_BETWEEN_WARNINGS = 5.0
 # How long inputs that nobody sends are waited for [s], and how many names that are no input's are
 # remembered so that each is said once.
@@ -64,7 +61,8 @@ class Kinematics(scene_node.SceneNode):
             next(iter(self.scene.machines.values())).linkage.accelerated()
         except ImportError as error:
             self.get_logger().info(f'{error}; plain Python moves the legs, to the same places')
-        self.create_subscription(JointState, 'crank_states', self._turn, ANY, raw=True)
+        self.create_subscription(
+            JointState, 'crank_states', self._turn, joint_state_reader.ANY, raw=True)
 
     def serves(self):
         """Say which mechanisms it moves."""

@@ -8,7 +8,6 @@ from operator import itemgetter
 import sys
 
 import numpy as np
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from . import joint_state_reader, scene_node
@@ -31,7 +30,6 @@ except ImportError as error:
 MOST_VALUES = 1_000_000
 # Values named, and letters of names allowed, in a message.
 MOST_NAMED, MOST = 5, 150
-ANY = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 class ServoInverse(scene_node.SceneNode):
@@ -41,7 +39,8 @@ class ServoInverse(scene_node.SceneNode):
         super().__init__(scene.INVERSE, **kwargs)
         self._heard = {}
         self._reader = joint_state_reader.Reader(self._inputs_in)
-        self.create_subscription(JointState, 'crank_states', self._turn, ANY, raw=True)
+        self.create_subscription(
+            JointState, 'crank_states', self._turn, joint_state_reader.ANY, raw=True)
         self.create_service(ServoInverseType, 'servo_inverse', self.answer)
         self.create_service(InputsFor, 'inputs_for', self.answer_together)
         self._stream = CommandStream(self, self.scene.machines, lambda machine: present(
