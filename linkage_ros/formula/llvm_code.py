@@ -30,6 +30,20 @@ llvm.initialize_native_target()
 llvm.initialize_native_asmprinter()
 
 
+def compiled(module: ir.Module) -> llvm.ExecutionEngine:
+    """Return what holds the machine code of a module, for as long as it lives."""
+    target = llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=3)
+    code = llvm.parse_assembly(str(module))
+    options = llvm.create_pipeline_tuning_options(speed_level=3)
+    options.loop_vectorization = options.slp_vectorization = True
+    passes = llvm.create_pass_builder(target, options)
+    passes.getModulePassManager().run(code, passes)
+    engine = llvm.create_mcjit_compiler(code, target)
+    engine.finalize_object()
+    return engine
+
+
 class Loop:
     """
     A loop over poses in machine code, which lives as long as this.
@@ -46,16 +60,9 @@ class Loop:
     """
 
     def __init__(self, operations: Sequence, constants: Sequence[int], outputs: Sequence[int]):
-        target = llvm.Target.from_default_triple().create_target_machine(
-            cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=3)
-        code = llvm.parse_assembly(str(_module(operations, constants, outputs)))
-        options = llvm.create_pipeline_tuning_options(speed_level=3)
-        options.loop_vectorization = options.slp_vectorization = True
-        passes = llvm.create_pass_builder(target, options)
-        passes.getModulePassManager().run(code, passes)
-        self._engine = llvm.create_mcjit_compiler(code, target)
-        self._engine.finalize_object()
-        self.run = SIGNATURE(self._engine.get_function_address('loop'))
+        self._engine = compiled(_module(operations, constants, outputs))
+        self.address = self._engine.get_function_address('loop')
+        self.run = SIGNATURE(self.address)
 
     @staticmethod
     def arguments(given: np.ndarray, constants: np.ndarray, out: np.ndarray) -> tuple:

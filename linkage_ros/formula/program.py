@@ -56,6 +56,20 @@ def keep(found: dict, key: Any, value: Any) -> Any:
     return value
 
 
+def beside(make: Callable[[], Any]) -> Future:
+    """Let something be made in a thread of its own; return where it will be."""
+    made: Future = Future()
+
+    def run() -> None:
+        try:
+            made.set_result(make())
+        except Exception as error:
+            made.set_exception(error)
+
+    Thread(target=run, name='linkage_ros compiler').start()
+    return made
+
+
 def grazed(x: float, tolerance: float) -> float:
     """Return the root of a radicand that is not above zero."""
     return 0.0 if x >= -tolerance else math.nan
@@ -319,17 +333,12 @@ class _Variant:
     @cached_property
     def loop(self) -> Future:
         """The code for many poses as machine code, which is made beside what goes on."""
-        made: Future = Future()
-        Thread(target=self._compile, args=(made,), name='linkage_ros compiler').start()
-        return made
-
-    def _compile(self, made: Future) -> None:
-        try:
+        def make() -> Any:
             from .llvm_code import Loop
 
-            made.set_result(Loop(*self.listing.operations()))
-        except Exception as error:
-            made.set_exception(error)
+            return Loop(*self.listing.operations())
+
+        return beside(make)
 
 
 class Program:
@@ -514,6 +523,12 @@ class Batch:
         self._loop, self._constants = loop, constants
         self._run: Optional[Callable] = None
 
+    @property
+    def code(self) -> Optional[tuple]:
+        """Where the machine code is and what it is called with, see `Loop`, once there is any."""
+        self._look()
+        return (self._code.address, *self._arguments) if self._run else None
+
     def finish(self) -> None:
         """Wait for the machine code, if there is to be any."""
         if self._loop:
@@ -521,17 +536,18 @@ class Batch:
 
     def solve(self) -> None:
         """Fill the rows: plainly until there is machine code, for which nobody waits."""
-        if self._loop and self._loop.done():
-            self._take(self._loop)
+        self._look()
         if self._run:
             self._run(*self._arguments)
         else:
             self.rows[:] = self._plainly(self.given, len(self.rows)).T
 
-    def _take(self, loop: Future) -> None:
-        self._loop = None
+    def _look(self) -> None:
+        if not self._loop or not self._loop.done():
+            return
+        loop, self._loop = self._loop, None
         if error := loop.exception():
-            warnings.warn(f'no machine code, so plain Python goes on: {error}', stacklevel=3)
+            warnings.warn(f'no machine code, so plain Python goes on: {error}', stacklevel=4)
             return
         self._code = loop.result()
         self._arguments = self._code.arguments(self.given, self._constants, self.rows.T)

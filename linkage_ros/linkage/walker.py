@@ -11,7 +11,7 @@ leg at pi - (theta - 2 pi j/N), on the same crank pin.
 from functools import cached_property
 import math
 from struct import Struct
-from typing import Callable, List, NamedTuple, Optional, Sequence, Union
+from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -76,7 +76,7 @@ class Solution:
 
     def __init__(self, layout: Layout, values: np.ndarray, batch: Batch):
         self.layout, self.values, self.rows = layout, values, batch.rows
-        self._batch = batch
+        self.batch = batch
         self._inputs = list(batch.given[:layout.inputs])
         self._speeds = list(batch.given[layout.inputs:2 * layout.inputs])
         self._driven = layout.driven(values)
@@ -84,7 +84,7 @@ class Solution:
 
     def finish(self) -> None:
         """Wait for what makes the first solution slower than the others."""
-        self._batch.finish()
+        self.batch.finish()
 
     def solve(self, inputs: Sequence[float], speeds: Sequence[float] = ()) -> None:
         """Solve at inputs [rad or m] and, if velocities are wanted, their speeds [per second]."""
@@ -96,7 +96,7 @@ class Solution:
             row.fill(speed)
         # Packing costs less than assigning to a part of an array.
         self._pack(self._driven, 0, *inputs, *speeds)
-        self._batch.solve()
+        self.batch.solve()
 
 
 class Assembly:
@@ -175,6 +175,12 @@ class Assembly:
             return first.on(self.reach, [value / self._scale])
         return first.on(self.reach, [leg.start + leg.side * (value - leg.lag)
                                      for leg in self.legs.values()])
+
+    def own_inputs(self) -> List[Tuple[float, float]]:
+        """Return for each leg by what the first input is multiplied, and what is added."""
+        if not self.linkage.inputs[0].turns:
+            return [(1.0 / self._scale, 0.0)]
+        return [(leg.side, leg.start - leg.side * leg.lag) for leg in self.legs.values()]
 
     def locus(self, name: str) -> np.ndarray:
         """

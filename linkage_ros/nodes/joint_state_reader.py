@@ -11,7 +11,7 @@ numbers of the others are taken from where the layout of that one says that they
 from array import array
 from collections import OrderedDict
 from struct import Struct
-from typing import Any, Callable, NamedTuple, Tuple
+from typing import Any, Callable, NamedTuple, Optional, Tuple
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
@@ -55,15 +55,21 @@ class Reader:
         self._used = OrderedDict()
         self._missed = 0
 
+    def source(self, text: bytes) -> Optional['Source']:
+        """Return the source of a message, if it is remembered."""
+        alike = self._sources.get(len(text))
+        number = alike and int.from_bytes(text, 'little')
+        for mask, sources in (alike or {}).items():
+            if source := sources.get(number & mask):
+                self._used.move_to_end(source)
+                return source
+        return None
+
     def read(self, text: bytes) -> JointStateNumbers:
         """Return what a message says; raise Unreadable if that cannot be told."""
+        if source := self.source(text):
+            return source.take(text)
         alike = self._sources.get(len(text), {})
-        if alike:
-            number = int.from_bytes(text, 'little')
-            for mask, sources in alike.items():
-                if source := sources.get(number & mask):
-                    self._used.move_to_end(source)
-                    return source.take(text)
         message = deserialized(text, JointState)
         said = JointStateNumbers(pack(message.header.stamp), self._understand(message),
                                  tuple(message.position), tuple(message.velocity))
@@ -96,15 +102,28 @@ class Reader:
 
 
 class Source:
-    """How messages of a source are told from others, and how their numbers are taken."""
+    """
+    How messages of a source are told from others, and how their numbers are taken.
+
+    Attributes
+    ----------
+    size, same, mask : int
+        How long they are; which bytes they have, as a number, where a mask has ones.
+    positions, velocities : int
+        Where in a message these begin.
+    understood
+        What is handed on with them.
+
+    """
 
     def __init__(self, text: bytes, message: JointState, said: JointStateNumbers):
         layout = MessageLayout(text, message)
         (place, self._first), (then, count) = layout.numbers[:2]
+        self.positions, self.velocities = place, then
         end = place + 8 * self._first
         self._unpack = Struct(f'<{HEADER}x8s{place - HEADER - 8}x{self._first}d'
                               f'{then - end}x{count}d').unpack_from
-        self._understood = said.source
+        self.understood = said.source
         if _bits(self.take(text)) != _bits(said):
             raise NoLayout('its numbers are others')
         # As numbers: with messages as short as these that is the quickest to compare and look up.
@@ -114,7 +133,7 @@ class Source:
     def take(self, text: bytes) -> JointStateNumbers:
         """Return what a message says that has the same bytes where they count."""
         numbers, end = self._unpack(text), 1 + self._first
-        return JointStateNumbers(numbers[0], self._understood, numbers[1:end], numbers[end:])
+        return JointStateNumbers(numbers[0], self.understood, numbers[1:end], numbers[end:])
 
 
 def _bits(said):

@@ -8,7 +8,7 @@ import math
 import sys
 from threading import Lock
 import time
-from typing import NamedTuple, Optional, Sequence, Tuple
+from typing import Any, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from rclpy.clock import Clock, ClockType
@@ -18,11 +18,12 @@ from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from . import joint_state_reader, messages, scene_node
+from .heard import Topic
 from .message_layout import NEVER, pack, unpack, Unreadable, Wire
 from .whole_scene import LATCHED, WholeScene
 from .. import scene
 from ..linkage.quantities import Spot
-from ..linkage.walker import Layout
+from ..linkage.walker import Assembly, Layout, Solution
 from ..robot_model import bodies, shapes, urdf
 from ..words import listed
 
@@ -46,8 +47,11 @@ class Kinematics(scene_node.SceneNode):
         # Each input that a source tells of, by the source's name.
         self._inputs = {drive.source: [] for machine in self.scene.machines.values()
                         for drive in machine.inputs.values()}
-        self._whole, self._own = WholeScene(self, self._inputs), frozenset()
-        self._mechanisms = {name: MechanismPublisher(self, machine, self._whole)
+        # What a source sets off, once it is known and until something changes.
+        self._ticks, self._tick = {}, None
+        changed, self._own = self._forget_ticks, frozenset()
+        self._whole = WholeScene(self, self._inputs, changed)
+        self._mechanisms = {name: MechanismPublisher(self, machine, self._whole, changed)
                             for name, machine in self.scene.machines.items()}
         for name, machine in self.scene.machines.items():
             for i, drive in enumerate(machine.inputs.values()):
@@ -87,6 +91,7 @@ class Kinematics(scene_node.SceneNode):
         with self._drawing:
             if self._ended:
                 return
+            self._forget_ticks()
             self._own = frozenset(called.name for model in models.values()
                                   for called in model.machine.joints.values())
             for name, model in models.items():
@@ -118,6 +123,12 @@ class Kinematics(scene_node.SceneNode):
                 self._draw(text)
 
     def _draw(self, text):
+        if self._tick and self._tick.run(text):
+            return
+        if self._ticks:
+            self._tick = self._ticks.get(self._reader.source(text))
+            if self._tick and self._tick.run(text):
+                return
         try:
             stamp, routes, positions, speeds = self._reader.read(text)
         except Unreadable as error:
@@ -126,12 +137,58 @@ class Kinematics(scene_node.SceneNode):
                 f'{error}', throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
             return
         if stamp == NEVER:
-            stamp = pack(self.get_clock().now().to_msg())
-        self._whole.look()
+            stamp = self._now()
+        self._catch_up()
         for shown, places, known in routes:
             shown.turn(stamp, places, positions, speeds if known else ())
         if routes:
-            self._whole.send(self._mechanisms.values(), stamp)
+            self._send_whole(stamp)
+            self._learn(text, routes)
+
+    def _poses(self, moved):
+        """Return models and poses of all mechanisms that are known; None: one lacks legs."""
+        known = [(shown, *it) for shown in self._mechanisms.values() if (it := shown.known())]
+        return [(model, pose.entire()) if shown in moved or pose.held is None else None
+                for shown, model, pose in known]
+
+    def _now(self):
+        return pack(self.get_clock().now().to_msg())
+
+    def _send_whole(self, stamp):
+        self._whole.send(self._mechanisms.values(), stamp)
+
+    def _send_anew(self, stamp):
+        self._catch_up()
+        self._send_whole(stamp)
+
+    def _catch_up(self):
+        """Let the mechanisms take note of what ticks have done."""
+        if self._ticks:
+            for shown in self._mechanisms.values():
+                shown.forget()
+
+    def _forget_ticks(self):
+        self._catch_up()
+        self._ticks, self._tick = {}, None
+
+    def _learn(self, text, routes):
+        """Let machine code do what this source sets off from now on, where it can."""
+        source = self._reader.source(text)
+        moved = source and [shown.moved(*where) for shown, *where in routes]
+        if not moved or None in moved or source in self._ticks:
+            return
+        poses = self._poses({part.shown for part in moved}) if self._whole.is_heard else []
+        if None in poses:
+            return
+        # It needs llvmlite, which is there where there is machine code.
+        from . import tick
+
+        if tick.is_ready():
+            if len(self._ticks) == tick.TICKS:
+                self._forget_ticks()
+            whole = poses and tick.Whole(
+                self._whole.wire(poses), [pose.values for _, pose in poses], self._send_anew)
+            self._ticks[source] = self._tick = tick.Tick(source, moved, whole or None, self._now)
 
     def _routed(self, message):
         """Return the mechanisms that a message turns, where it says how far, and if how fast."""
@@ -202,10 +259,58 @@ class Pose(NamedTuple):
     held: Optional[np.ndarray]
     moving: bool
 
+    @property
+    def can_be(self) -> bool:
+        """Whether any leg can be assembled."""
+        return self.held is None or bool(self.held.any())
+
+    def entire(self) -> 'Pose':
+        """Return the same as if all legs could be assembled, and all velocities were known."""
+        return self._replace(held=None, moving=self.layout.speeds > 0)
+
+    def is_like(self, other: 'Pose') -> bool:
+        """Return whether it differs from another in nothing but values."""
+        return self.values is other.values and (self.held is None) == (other.held is None)
+
     def rows(self) -> np.ndarray:
         """Return the rows of the legs that can be assembled."""
         rows = self.layout.rows(self.values)
         return rows if self.held is None else rows[self.held]
+
+
+class Moved(NamedTuple):
+    """
+    A mechanism that a source moves.
+
+    Attributes
+    ----------
+    shown : MechanismPublisher
+        What shows it, also where it cannot be assembled.
+    places : sequence of (Drive, int, int)
+        The inputs that the source tells of, their places, and the places in the message.
+    told : float array (2, inputs)
+        Where the inputs are kept, and their speeds.
+    moving : bool
+        Whether the source tells of speeds.
+    assembly : Assembly
+        Its legs.
+    solution : Solution, optional
+        What is solved for those who listen; None: nobody does.
+    changes : sequence of float arrays, optional
+        Factors of the values, what is added, and which come without whole turns.
+    wires : list of Wire
+        What is sent.
+
+    """
+
+    shown: Any
+    places: Sequence[Tuple[scene.Drive, int, int]]
+    told: np.ndarray
+    moving: bool
+    assembly: Assembly
+    solution: Optional[Solution]
+    changes: Optional[Sequence[np.ndarray]]
+    wires: List[Wire]
 
 
 class Model:
@@ -265,15 +370,17 @@ class Model:
                                      and np.isfinite(driven.speeds).all())
         if held is not None and held.all():
             held = None
-        if not self._is_plain:
-            signs, offsets, taken = self._change(layout)
+        if change := self.change(layout):
+            signs, offsets, taken = change
             values *= signs
             values += offsets
             values[taken] -= math.tau * np.round(values[taken] / math.tau)
         return Pose(layout, values, held, moving)
 
-    def _change(self, layout: Layout):
-        """Return what all values are multiplied by, what is added, and where turns come off."""
+    def change(self, layout: Layout):
+        """Return factors of values, what is added, and which lose turns; None: all is as is."""
+        if self._is_plain:
+            return None
         if layout not in self._changes:
             self._changes[layout] = (
                 _arranged(layout, 1.0, self._signs, self._signs),
@@ -363,19 +470,20 @@ def _arranged(layout: Layout, rest: float, joints: np.ndarray, rates: np.ndarray
 class MechanismPublisher:
     """The topics of one mechanism, and the last that was heard of each of its inputs."""
 
-    def __init__(self, node_, machine: scene.Machine, whole: WholeScene):
-        self.name, self._whole = machine.name, whole
+    def __init__(self, node_, machine: scene.Machine, whole: WholeScene, changed):
+        self.name, self._whole, self._changed = machine.name, whole, changed
         name = machine.name
-        self._joint_states = node_.create_publisher(JointState, f'{name}/joint_states', 10)
-        self._markers = node_.create_publisher(MarkerArray, f'{name}/markers', 1)
+        self._joint_states = Topic(node_, JointState, f'{name}/joint_states', 10, changed)
+        self._markers = Topic(node_, MarkerArray, f'{name}/markers', 1, changed)
         self._locus = node_.create_publisher(Marker, f'{name}/locus', LATCHED)
         self._description = node_.create_publisher(String, f'{name}/robot_description', LATCHED)
         # A logger of its own: what is throttled is the warnings of this mechanism alone.
         self._logger = node_.get_logger().get_child(name)
         self._model, self._pose, self._driven = None, None, None
         self._stamp = NEVER
-        self._values = [None] * len(machine.inputs)
-        self._speeds = [None] * len(machine.inputs)
+        # Values and speeds of the inputs, and which of them are known.
+        self._told = np.zeros((2, len(machine.inputs)))
+        self._known = np.zeros((2, len(machine.inputs)), bool)
         # The markers in the picture, and whether the locus is.
         self._drawn, self._curved = frozenset(), False
 
@@ -384,13 +492,12 @@ class MechanismPublisher:
         if self._model and self._model.made_for == wanted:
             return self._model
         model = Model(*wanted)
-        if driven := self._driven:
+        if driven := self._state():
             model.solution(*driven.wanted).finish()
             pose = model.solve(driven)
-            pose = pose._replace(held=None, moving=pose.layout.speeds > 0)
-            for publisher, build in self._listening(model, driven):
+            for topic, build in self._listening(model, driven):
                 if model.is_patched(build):
-                    model.wire(publisher, build, pose, self._logger)
+                    model.wire(topic.publisher, build, pose.entire(), self._logger)
         return model
 
     def adopt(self, model: Model):
@@ -402,9 +509,8 @@ class MechanismPublisher:
             self._description.publish(String(data=model.description))
         self._draw_locus(model)
         self._delete(self._drawn - model.marker_array.ids)
-        if self._driven:
-            self._driven = None
-            self._show()
+        self._driven = None
+        self._show()
 
     def _draw_locus(self, model):
         if model.locus:
@@ -422,7 +528,7 @@ class MechanismPublisher:
 
     def let_arrive(self, until: float):
         """Wait until a time on the steady clock [s] for the picture's topics to be heard."""
-        for publisher in (self._markers, self._locus):
+        for publisher in (self._markers.publisher, self._locus):
             publisher.wait_for_all_acked(Duration(seconds=max(0.0, until - time.monotonic())))
 
     def _delete(self, ids):
@@ -449,11 +555,12 @@ class MechanismPublisher:
         for i, place in places:
             value, speed = positions[place], speeds[place] if speeds else None
             if not (drive := self._model.drives[i]).is_plain:
-                value, speed = self._understood(drive, value, speed, self._values[i])
+                near = float(self._told[0, i]) if self._known[0, i] else None
+                value, speed = self._understood(drive, value, speed, near)
             if value is not None:
-                self._values[i], self._speeds[i] = value, speed
-        self._stamp = stamp
-        self._show()
+                self._told[:, i] = value, 0.0 if speed is None else speed
+                self._known[:, i] = True, speed is not None
+        self.show(stamp)
 
     def _understood(self, drive, position, speed, near):
         """Return an input and its speed as its source tells; None if they cannot be."""
@@ -467,39 +574,66 @@ class MechanismPublisher:
 
     def known(self) -> Optional[Tuple[Model, Pose]]:
         """Return how the mechanism is now, for the whole scene; None if that is not known."""
-        if not self._solve():
+        return (self._model, self._pose) if self._solve() else None
+
+    def moved(self, places, known) -> Optional[Moved]:
+        """Return what a source moves; None if not by machine code alone."""
+        model, driven = self._model, self._state()
+        if model.machine.loads or any(model.drives[i].measures for i, _ in places):
             return None
-        held = self._pose.held
-        return (self._model, self._pose) if held is None or held.any() else None
+        solution, wires = driven and model.solution(*driven.wanted), []
+        if solution:
+            if not solution.batch.code:
+                return None
+            pose = self._pose.entire()
+            wires = [model.wire(topic.publisher, build, pose, self._logger)
+                     for topic, build in self._listening(model, driven)]
+            if not all(wire.template for wire in wires):
+                return None
+        return Moved(self, [(model.drives[i], i, place) for i, place in places], self._told,
+                     known, model.assembly, solution,
+                     solution and model.change(solution.layout), wires)
+
+    def forget(self):
+        """Solve again before anything is shown: the inputs have been moved by others."""
+        self._driven = None
+
+    def show(self, stamp: bytes):
+        """Publish what is listened to."""
+        self._stamp = stamp
+        self._show()
 
     def _show(self):
-        """Publish what is listened to."""
         driven = self._solve()
         if not driven:
             return
-        held = self._pose.held
-        if held is not None:
-            self._warn(driven.values, held)
-        if held is None or held.any():
-            for publisher, build in self._listening(self._model, driven):
-                self._send(publisher, build, self._stamp)
+        if self._pose.held is not None:
+            self._warn(driven.values, self._pose.held)
+        if self._pose.can_be:
+            for topic, build in self._listening(self._model, driven):
+                self._send(topic.publisher, build, self._stamp)
             if driven.markers:
                 self._drawn = self._model.marker_array.ids
         else:
             self._delete(self._drawn)
 
+    def _state(self) -> Optional[InputState]:
+        """Return what a pose is made from; None if nobody listens or not all is known."""
+        listened = self._joint_states.is_heard, self._markers.is_heard, self._whole.is_heard
+        if True not in listened or not self._known[0].all():
+            return None
+        values, speeds = self._told.tolist()
+        return InputState(tuple(values), tuple(speeds) if self._known[1].all() else (), *listened)
+
     def _solve(self) -> Optional[InputState]:
         """Solve for those who listen; return for what, None if for nobody or nothing is known."""
-        listened = (self._joint_states.get_subscription_count() > 0,
-                    self._markers.get_subscription_count() > 0, self._whole.is_heard)
-        if None in self._values or True not in listened:
-            return None
-        speeds = () if None in self._speeds else tuple(self._speeds)
-        driven = InputState(tuple(self._values), speeds, *listened)
-        if driven != self._driven:
+        driven = self._state()
+        if driven and driven != self._driven:
             # What is said again is not solved again.
-            self._driven = driven
+            before, self._driven = self._pose, driven
             self._pose = self._model.solve(driven)
+            if not before or not self._pose.is_like(before):
+                self._changed()
         return driven
 
     def _listening(self, model, driven):

@@ -164,6 +164,11 @@ class Template:
     count : int
         How many values the message is made from.
 
+    Attributes
+    ----------
+    message : memoryview
+        The bytes as they were last patched.
+
     Raises
     ------
     NoLayout
@@ -178,7 +183,7 @@ class Template:
         layout = MessageLayout(text, message)
         # Numbers lie at multiples of 8 after the header; in memory too they are quicker there.
         self._bytes = bytearray(LEAD + text + bytes(-(len(text) - HEADER) % 8))
-        self._message = memoryview(self._bytes)[len(LEAD):len(LEAD) + len(text)]
+        self.message = memoryview(self._bytes)[len(LEAD):len(LEAD) + len(text)]
         self._stamps = [slice(len(LEAD) + place, len(LEAD) + place + _STAMP.size)
                         for place in layout.stamps if any(text[place:place + _STAMP.size])]
         self._numbers = np.frombuffer(self._bytes, float, offset=len(LEAD) + HEADER)
@@ -197,7 +202,14 @@ class Template:
         self._table.take(self._sources, out=self._numbers, mode='clip')
         for place in self._stamps:
             self._bytes[place] = stamp
-        return bytes(self._message)
+        return bytes(self.message)
+
+    def places(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return where in memory numbers lie, which value each is, and where the stamps lie."""
+        own, start = np.flatnonzero(self._sources <= len(self._values)), _address(self._numbers)
+        own = own[self._sources[own] > 0]
+        stamps = [start - len(LEAD) - HEADER + place.start for place in self._stamps]
+        return start + 8 * own, self._sources[own] - 1, np.array(stamps, int)
 
     def _check(self, build, kind, count):
         stamp, values = Time(sec=12, nanosec=345), np.linspace(-1.5, 7.25, count)
@@ -205,6 +217,10 @@ class Template:
         if deserialize_message(self.patched(pack(stamp), values), kind) != deserialize_message(
                 built, kind):
             raise NoLayout('a patched message does not read back as it was written')
+
+
+def _address(array: np.ndarray) -> int:
+    return array.__array_interface__['data'][0]
 
 
 class Wire:
@@ -220,21 +236,30 @@ class Wire:
     logger : rclpy logger
         Told once if messages have to be built one by one.
 
+    Attributes
+    ----------
+    template : Template or None
+        What is patched, where that can be done.
+
     """
 
     def __init__(self, publisher, build: Callable, count: int, logger):
-        self._publisher = publisher
+        self.publisher = publisher
         self._build = build
         try:
-            self._template = Template(build, count)
+            self.template = Template(build, count)
         except NoLayout as reason:
-            self._template = None
+            self.template = None
             logger.warning(f'{publisher.topic_name}: {reason}; publishing ordinary messages',
                            once=True)
 
     def send(self, stamp: bytes, values: np.ndarray):
         """Publish the message with this stamp, packed, and these values."""
-        if self._template:
-            self._publisher.publish(self._template.patched(stamp, values))
+        if self.template:
+            self.publisher.publish(self.template.patched(stamp, values))
         else:
-            self._publisher.publish(self._build(unpack(stamp), values))
+            self.publisher.publish(self._build(unpack(stamp), values))
+
+    def send_patched(self):
+        """Publish the message as it has been patched elsewhere."""
+        self.publisher.publish(self.template.message.tobytes())

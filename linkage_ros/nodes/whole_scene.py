@@ -10,6 +10,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from .heard import Topic
 from .message_layout import unpack, Wire
 from .messages import JointStates
 
@@ -28,25 +29,25 @@ class WholeScene:
         The joints that it hears on `crank_states`: where that is the same topic, they are not
         said again.
 
-    Attributes
-    ----------
-    is_heard : bool
-        Whether anybody but the node itself listened to the joints when that was last looked at.
+    changed : callable
+        Called when somebody begins to listen to the joints, or nobody does any more.
 
     """
 
-    def __init__(self, node, sources):
-        self._joint_states = node.create_publisher(JointState, 'joint_states', 10)
+    def __init__(self, node, sources, changed):
+        same = node.resolve_topic_name('joint_states') == node.resolve_topic_name('crank_states')
+        # The node hears its own joints there.
+        self._joint_states = Topic(node, JointState, 'joint_states', 10, changed, int(same))
         self._descriptions = node.create_publisher(String, 'robot_description', LATCHED)
-        same = self._joint_states.topic_name == node.resolve_topic_name('crank_states')
-        self._own_ears, self._said = int(same), frozenset(sources if same else ())
+        self._said = frozenset(sources if same else ())
         self._logger, self._joints = node.get_logger(), JointStates()
         self._stamp = self._kind = self._wire = None
-        self._description, self.is_heard = '', False
+        self._description = ''
 
-    def look(self):
-        """See whether anybody listens to the joints."""
-        self.is_heard = self._joint_states.get_subscription_count() > self._own_ears
+    @property
+    def is_heard(self) -> bool:
+        """Whether anybody but the node itself listens to the joints."""
+        return self._joint_states.is_heard
 
     def describe(self, text: str):
         """Publish a robot model, if there is one and it is another."""
@@ -67,21 +68,24 @@ class WholeScene:
 
         """
         self._stamp = stamp = stamp or self._stamp
-        shown = [known for mechanism in mechanisms
-                 if (known := mechanism.known())] if stamp and self.is_heard else []
+        shown = [known for mechanism in mechanisms if (known := mechanism.known())
+                 and known[1].can_be] if stamp and self.is_heard else []
         if not shown:
             return
         if any(pose.held is not None or model.machine.loads for model, pose in shown):
             self._joint_states.publish(self._message(unpack(stamp), shown))
             return
-        values = np.concatenate([pose.values for _, pose in shown])
+        self.wire(shown).send(stamp, np.concatenate([pose.values for _, pose in shown]))
+
+    def wire(self, shown) -> Wire:
+        """Return what patches the message of models and poses, which have all their legs."""
         kind = [(model, pose.layout, pose.moving) for model, pose in shown]
         if kind != self._kind:
             self._kind, self._wire = kind, Wire(
-                self._joint_states,
+                self._joint_states.publisher,
                 lambda stamp, values: self._message(stamp, _with(shown, values)),
-                len(values), self._logger)
-        self._wire.send(stamp, values)
+                sum(pose.values.size for _, pose in shown), self._logger)
+        return self._wire
 
     def _message(self, stamp, shown) -> JointState:
         names, positions, velocities, efforts = map(np.concatenate, zip(

@@ -117,7 +117,8 @@ class Machine:
     def understood(self, drive: Drive, position: float, speed: Optional[float],
                    near: Optional[float]) -> Tuple[float, Optional[float]]:
         """Return an input and its speed as its source tells, going on from where it was near."""
-        value, speed = drive.ratio * position + drive.offset, speed and drive.ratio * speed
+        value = drive.ratio * position + drive.offset
+        speed = None if speed is None else drive.ratio * speed
         if not drive.measures:
             return value, speed
         found, rate = self.measured(drive.measures, value, drive.start if near is None else near)

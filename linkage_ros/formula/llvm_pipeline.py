@@ -1,0 +1,293 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+From the bytes of one message to the bytes of others, in one call of machine code.
+
+The numbers of a message that differs from a known one in numbers alone are taken to where loops
+over poses expect them; the loops run; what they found is put into other messages. Where all that
+lies is in tables of addresses, so one piece of code serves all scenes.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+from contextlib import contextmanager
+import ctypes
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Callable, Dict, Iterator, Optional, Sequence, Tuple
+
+from llvmlite import ir
+import numpy as np
+
+from .llvm_code import _count, compiled, COUNT, NUMBER
+from .program import beside
+
+BYTE = ir.IntType(8)
+TYPES = {'i': COUNT, 'f': NUMBER}
+# Every table is rows of these, whole numbers and addresses ('i8') or floats ('f8').
+# A number of the message: factor * number + plus goes to an address.
+TAKE = np.dtype([('offset', 'i8'), ('to', 'i8'), ('factor', 'f8'), ('plus', 'f8')])
+# A loop, what it is called with, and how many numbers from `out` on have to be finite.
+LOOP = np.dtype([('code', 'i8'), ('poses', 'i8'), ('given', 'i8'), ('constants', 'i8'),
+                 ('out', 'i8'), ('by_pose', 'i8'), ('by_output', 'i8'), ('size', 'i8')])
+# What a loop is given, times a factor and plus something, has to be so near a middle, turns aside.
+LIMIT = np.dtype([('loop', 'i8'), ('at', 'i8'), ('factor', 'f8'), ('plus', 'f8'),
+                  ('middle', 'f8'), ('half', 'f8'), ('turn', 'f8')])
+# A number that is multiplied and added to in place, and whole turns come off it.
+CHANGE = np.dtype([('at', 'i8'), ('factor', 'f8'), ('plus', 'f8'), ('turn', 'f8')])
+# Eight bytes that are copied.
+PUT = np.dtype([('from', 'i8'), ('to', 'i8')])
+TABLES = {'takes': TAKE, 'loops': LOOP, 'limits': LIMIT, 'changes': CHANGE, 'puts': PUT}
+# What the code is called with: the length of the known message, its bytes and which of them count;
+# the stamp; which loops failed; then the size and the address of each table.
+HEAD = ('length', 'same', 'mask', 'stamp', 'failed')
+
+# What is returned instead of the number of loops that failed.
+OTHER, UNSTAMPED = -1, -2
+# Where the stamp of a message lies, after the header that says how it is encoded.
+STAMP = 4
+# So near an end of a limit, relatively, it is for others to decide.
+NEAR = 1e-9
+INFINITE = 0x7FF << 52
+
+
+class Pipeline:
+    """
+    What is done with each message of one kind.
+
+    Parameters
+    ----------
+    same, mask : bytes
+        A message of that kind, and a mask of the bytes in which all are the same.
+    stamp : int64 array (2,)
+        Where the bytes of a message's stamp go, for `puts` to copy; then what stands for the stamp
+        of a message that has none, or zero.
+    kept : sequence
+        The arrays that the tables' addresses lie in.
+    **tables : structured arrays
+        What is taken, run and put, each of the type in TABLES.
+
+    Attributes
+    ----------
+    failed : int64 array
+        Which loops did not find finite numbers within their limits in the last call.
+
+    """
+
+    def __init__(self, same: bytes, mask: bytes, stamp: np.ndarray, kept: Sequence[Any],
+                 **tables: np.ndarray):
+        self.failed = np.zeros(len(tables['loops']), np.int64)
+        known = [np.frombuffer(text, np.uint8) for text in (same, mask)]
+        rows = [np.array(tables[name], kind) for name, kind in TABLES.items()]
+        self._table = np.array([len(same), *map(address, (*known, stamp, self.failed)),
+                                *(part for table in rows
+                                  for part in (len(table), address(table)))])
+        self._code, engine = code().result()
+        self._at, self._kept = address(self._table), (kept, stamp, known, rows, engine)
+
+    def run(self, text: bytes) -> int:
+        """Return how many loops failed; OTHER or UNSTAMPED where nothing was done."""
+        return self._code(self._at, text, len(text))
+
+
+def address(array: np.ndarray) -> int:
+    """Return where an array's numbers begin in memory."""
+    return array.__array_interface__['data'][0]
+
+
+def addresses(array: np.ndarray) -> np.ndarray:
+    """Return where each number of an array lies in memory."""
+    return address(array) + np.add.reduce(
+        [index * stride for index, stride in zip(np.indices(array.shape), array.strides)])
+
+
+@lru_cache(maxsize=None)
+def code() -> Future:
+    """Return the machine code, which is made once, beside what goes on."""
+    return beside(_compiled)
+
+
+def _compiled() -> Tuple[Callable[[int, bytes, int], int], Any]:
+    """Return what runs the code, and what holds it."""
+    engine = compiled(_module())
+    # It takes microseconds, so it keeps Python's lock.
+    run = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int64)(
+        engine.get_function_address('run'))
+    return run, engine
+
+
+def _module() -> ir.Module:
+    module = ir.Module()
+    run = ir.Function(module, ir.FunctionType(
+        COUNT, [COUNT.as_pointer(), BYTE.as_pointer(), COUNT]), 'run')
+    table, text, length = run.args
+    write = _Writer(run)
+    head = [write.load(write.step(table, i)) for i in range(len(HEAD) + 2 * len(TABLES))]
+    known = dict(zip(HEAD, head))
+    sizes = dict(zip(TABLES, head[len(HEAD)::2]))
+    tables = {name: (size, head[len(HEAD) + 2 * i + 1])
+              for i, (name, size) in enumerate(sizes.items())}
+    write.leave(write.builder.icmp_signed('!=', length, known['length']), OTHER)
+    write.leave(_differs(write, known, text), OTHER)
+    write.leave(_stamp(write, known, text), UNSTAMPED)
+    _take(write, tables['takes'], text)
+    _run_loops(write, tables['loops'], known['failed'])
+    _check_limits(write, tables['limits'], known['failed'])
+    _change(write, tables['changes'])
+    with write.rows(tables['puts'], PUT) as row:
+        write.store(write.load(write.place(row['from'], COUNT)), write.place(row['to'], COUNT))
+    write.builder.ret(_total(write, sizes['loops'], known['failed']))
+    return module
+
+
+class _Writer:
+    """What appends to a function: loads and stores at any address, loops over tables."""
+
+    def __init__(self, function: ir.Function):
+        self.function = function
+        self.builder = ir.IRBuilder(function.append_basic_block())
+
+    def place(self, at: ir.Value, kind: ir.Type) -> ir.Value:
+        return self.builder.inttoptr(at, kind.as_pointer())
+
+    def step(self, pointer: ir.Value, i: Any) -> ir.Value:
+        return self.builder.gep(pointer, [_count(i) if isinstance(i, int) else i])
+
+    def load(self, pointer: ir.Value) -> ir.Value:
+        # Numbers in a message lie at multiples of 4.
+        return self.builder.load(pointer, align=1)
+
+    def store(self, value: ir.Value, pointer: ir.Value) -> None:
+        self.builder.store(value, pointer, align=1)
+
+    def function_of(self, name: str) -> Callable[[ir.Value], ir.Value]:
+        """Return what calls a function of one number."""
+        function = self.function.module.globals.get(name) or ir.Function(
+            self.function.module, ir.FunctionType(NUMBER, [NUMBER]), name)
+        return lambda value: self.builder.call(function, [value])
+
+    def leave(self, condition: ir.Value, code: int) -> None:
+        """Return a code where a condition holds."""
+        with self.builder.if_then(condition, likely=False):
+            self.builder.ret(_count(code))
+
+    @contextmanager
+    def each(self, size: ir.Value, total: Optional[ir.Value] = None) -> Iterator[_Turn]:
+        """Write what is done for each number below a size; a total may be carried along."""
+        builder, before = self.builder, self.builder.block
+        head, body, end = (self.function.append_basic_block() for _ in range(3))
+        builder.branch(head)
+        builder.position_at_end(head)
+        turn = _Turn(builder.phi(COUNT), total and builder.phi(total.type))
+        builder.cbranch(builder.icmp_signed('<', turn.i, size), body, end)
+        builder.position_at_end(body)
+        yield turn
+        after = builder.add(turn.i, _count(1))
+        for phi, first, then in ((turn.i, _count(0), after), (turn.total, total, turn.then)):
+            if phi:
+                phi.add_incoming(first, before)
+                phi.add_incoming(then, builder.block)
+        builder.branch(head)
+        builder.position_at_end(end)
+
+    @contextmanager
+    def rows(self, table: Tuple[ir.Value, ir.Value], kind: np.dtype) -> Iterator[Dict]:
+        """Write what is done with each row of a table, {field: value}; '' is its number."""
+        size, start = table
+        with self.each(size) as turn:
+            at = self.builder.add(start, self.builder.mul(turn.i, _count(kind.itemsize)))
+            fields = {name: self.load(self.place(
+                self.builder.add(at, _count(field[1])), TYPES[field[0].kind]))
+                for name, field in (kind.fields or {}).items()}
+            yield {'': turn.i, **fields}
+
+
+@dataclass
+class _Turn:
+    """A turn of a loop: its number, what is carried along, and that at its end."""
+
+    i: ir.Value
+    total: Optional[ir.Value]
+    then: Optional[ir.Value] = None
+
+
+def _differs(write: _Writer, known: Dict[str, ir.Value], text: ir.Value) -> ir.Value:
+    """Return whether a message differs where all are the same."""
+    builder = write.builder
+    same, mask = (write.place(known[name], BYTE) for name in ('same', 'mask'))
+    with write.each(known['length'], BYTE(0)) as turn:
+        other, own, counts = (write.load(write.step(each, turn.i)) for each in (text, same, mask))
+        turn.then = builder.or_(turn.total, builder.and_(builder.xor(other, own), counts))
+    return builder.icmp_unsigned('!=', turn.total, BYTE(0))
+
+
+def _stamp(write: _Writer, known: Dict[str, ir.Value], text: ir.Value) -> ir.Value:
+    """Take over the stamp if the message has one; return whether there is none at all."""
+    builder, place = write.builder, write.place(known['stamp'], COUNT)
+    own = write.load(builder.bitcast(write.step(text, STAMP), COUNT.as_pointer()))
+    stamp = builder.select(builder.icmp_unsigned('==', own, _count(0)),
+                           write.load(write.step(place, 1)), own)
+    write.store(stamp, place)
+    return builder.icmp_unsigned('==', stamp, _count(0))
+
+
+def _take(write: _Writer, takes: Any, text: ir.Value) -> None:
+    builder = write.builder
+    with write.rows(takes, TAKE) as row:
+        number = write.load(builder.bitcast(write.step(text, row['offset']), NUMBER.as_pointer()))
+        number = builder.fadd(builder.fmul(row['factor'], number), row['plus'])
+        write.store(number, write.place(row['to'], NUMBER))
+
+
+def _run_loops(write: _Writer, loops: Any, failed: ir.Value) -> None:
+    builder = write.builder
+    kind = ir.FunctionType(ir.VoidType(), [
+        COUNT, *3 * (NUMBER.as_pointer(),), COUNT, COUNT])
+    with write.rows(loops, LOOP) as row:
+        pointers = [write.place(row[name], NUMBER) for name in ('given', 'constants', 'out')]
+        builder.call(write.place(row['code'], kind), [
+            row['poses'], *pointers, row['by_pose'], row['by_output']])
+        numbers, infinite = write.place(row['out'], COUNT), _count(INFINITE)
+        with write.each(row['size'], _count(0)) as turn:
+            bits = builder.and_(write.load(write.step(numbers, turn.i)), infinite)
+            wrong = builder.zext(builder.icmp_unsigned('==', bits, infinite), COUNT)
+            turn.then = builder.or_(turn.total, wrong)
+        write.store(turn.total, write.step(write.place(failed, COUNT), row['']))
+
+
+def _check_limits(write: _Writer, limits: Any, failed: ir.Value) -> None:
+    builder = write.builder
+    size = write.function_of('llvm.fabs.f64')
+    with write.rows(limits, LIMIT) as row:
+        value = builder.fadd(builder.fmul(row['factor'], write.load(
+            write.place(row['at'], NUMBER))), row['plus'])
+        away = size(_folded(write, builder.fsub(value, row['middle']), row['turn']))
+        slack = builder.fmul(NUMBER(NEAR), builder.fadd(size(value), row['half']))
+        near = builder.fcmp_ordered('<=', away, builder.fsub(row['half'], slack))
+        place = write.step(write.place(failed, COUNT), row['loop'])
+        write.store(builder.select(near, write.load(place), _count(1)), place)
+
+
+def _change(write: _Writer, changes: Any) -> None:
+    builder = write.builder
+    with write.rows(changes, CHANGE) as row:
+        place = write.place(row['at'], NUMBER)
+        value = builder.fadd(builder.fmul(write.load(place), row['factor']), row['plus'])
+        write.store(_folded(write, value, row['turn']), place)
+
+
+def _folded(write: _Writer, value: ir.Value, turn: ir.Value) -> ir.Value:
+    """Return a value without its whole turns, if it turns."""
+    builder, whole = write.builder, write.function_of('llvm.rint.f64')
+    turns = whole(builder.fdiv(value, turn))
+    return builder.select(builder.fcmp_ordered('>', turn, NUMBER(0.0)),
+                          builder.fsub(value, builder.fmul(turn, turns)), value)
+
+
+def _total(write: _Writer, size: ir.Value, numbers: ir.Value) -> ir.Value:
+    place = write.place(numbers, COUNT)
+    with write.each(size, _count(0)) as turn:
+        turn.then = write.builder.add(turn.total, write.load(write.step(place, turn.i)))
+    return turn.total

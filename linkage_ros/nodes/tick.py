@@ -1,0 +1,164 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""All that the crank messages of one source set off, in one call of machine code."""
+
+import math
+from typing import Callable, List, NamedTuple, Optional
+
+import numpy as np
+
+from .joint_state_reader import Source
+from .kinematics import Moved
+from .message_layout import Wire
+from ..formula import llvm_pipeline as native
+
+# So many sources have a tick each, at the most.
+TICKS = 64
+
+
+def is_ready() -> bool:
+    """Return whether there is the machine code; if not, it is being made."""
+    return native.code().done()
+
+
+class Whole(NamedTuple):
+    """
+    The joints of the whole scene.
+
+    Attributes
+    ----------
+    wire : Wire
+        What is sent.
+    values : list of float arrays
+        From which, one after the other, it is made.
+    send : callable
+        From a stamp: shows them in the usual way, without what cannot be assembled.
+
+    """
+
+    wire: Wire
+    values: List[np.ndarray]
+    send: Callable[[bytes], None]
+
+
+class Tick:
+    """
+    All that the messages of one source set off.
+
+    Parameters
+    ----------
+    source : Source
+        How its messages are told from others.
+    moved : list of Moved
+        What they move.
+    whole : Whole, optional
+        The joints of the whole scene, where they are listened to.
+    now : callable
+        Returns the time, packed, for messages that have none.
+
+    """
+
+    def __init__(self, source: Source, moved: List[Moved], whole: Optional[Whole], now):
+        self._solved = [part for part in moved if part.solution]
+        self._whole, self._now, self._failed = whole, now, frozenset()
+        self._stamp = np.zeros(2, np.int64)
+        made = [(wire, [part.solution.values]) for part in moved for wire in part.wires]
+        made += [whole[:2]] if whole else []
+        self._pipeline = native.Pipeline(
+            *(number.to_bytes(source.size, 'little') for number in (source.same, source.mask)),
+            self._stamp, (source, moved, whole),
+            takes=[row for part in moved for row in _takes(source, part)],
+            loops=[(*part.solution.batch.code, part.solution.values.size)
+                   for part in self._solved],
+            limits=[row for i, part in enumerate(self._solved) for row in _limits(i, part)],
+            changes=_joined(native.CHANGE, map(_changes, self._solved)),
+            puts=_joined(native.PUT, (_puts(*each, native.address(self._stamp))
+                                      for each in made)))
+        self._sent = [(wire.publisher.publish, wire.template.message) for wire, _ in made]
+
+    def run(self, text: bytes) -> bool:
+        """Return whether a message is of this source; if so, show what it says."""
+        failed = self._pipeline.run(text)
+        if failed == native.UNSTAMPED:
+            self._stamp[1:] = np.frombuffer(self._now(), np.int64)
+            failed = self._pipeline.run(text)
+            self._stamp[1] = 0
+        if failed < 0:
+            return False
+        if failed or self._failed:
+            self._show_each()
+            return True
+        for publish, message in self._sent:
+            publish(message.tobytes())
+        return True
+
+    def _show_each(self):
+        """Show what cannot be assembled, or could not be the last time, in the usual way."""
+        failed = {part.shown for part, wrong in zip(self._solved, self._pipeline.failed) if wrong}
+        stamp = self._stamp[:1].tobytes()
+        for part in self._solved:
+            if part.shown in failed | self._failed:
+                part.shown.forget()
+                part.shown.show(stamp)
+            else:
+                for wire in part.wires:
+                    wire.send_patched()
+        if self._whole and failed:
+            self._whole.send(stamp)
+        elif self._whole:
+            self._whole.wire.send_patched()
+        self._failed = failed
+
+
+def _takes(source: Source, part: Moved):
+    """Yield what is taken of a message: an input goes to each leg, and is kept."""
+    told, n, solution = native.addresses(part.told), part.told.shape[1], part.solution
+    given = solution and native.addresses(solution.batch.given)
+    driven = solution and native.addresses(solution.layout.driven(solution.values))
+    for drive, i, place in part.places:
+        rows = [(source.positions, 0, i, (drive.ratio, -0.0 if drive.is_plain else drive.offset))]
+        if part.moving:
+            rows.append((source.velocities, 1, n + i, (drive.ratio, -0.0)))
+        for start, row, k, change in rows:
+            to = [told[row, i]]
+            if solution and k < len(driven):
+                to += [*given[k], driven[k]]
+            for at in to:
+                yield start + 8 * place, at, *change
+
+
+def _limits(i: int, part: Moved):
+    """Yield for each leg between what it can be assembled, well within its widest reach."""
+    assembly = part.assembly
+    if not assembly.is_limited:
+        return
+    first, (low, high) = assembly.linkage.inputs[0], max(
+        assembly.reach, key=lambda arc: arc[1] - arc[0])
+    for at, (factor, plus) in zip(native.addresses(part.solution.batch.given)[0],
+                                  assembly.own_inputs()):
+        yield (i, at, factor, plus, 0.5 * (low + high), 0.5 * (high - low),
+               math.tau if first.turns else 0.0)
+
+
+def _changes(part: Moved) -> np.ndarray:
+    rows = np.zeros(part.solution.values.size if part.changes else 0, native.CHANGE)
+    if part.changes:
+        rows['at'] = native.addresses(part.solution.values)
+        rows['factor'], rows['plus'], taken = part.changes
+        rows['turn'][taken] = math.tau
+    return rows
+
+
+def _puts(wire: Wire, arrays: List[np.ndarray], stamp: int) -> np.ndarray:
+    """Return what is put into a message: of the values of some arrays, one after the other."""
+    numbers, sources, stamps = wire.template.places()
+    values = np.concatenate([native.addresses(values) for values in arrays])
+    rows = np.empty(len(numbers) + len(stamps), native.PUT)
+    rows['from'] = np.append(values[sources], np.full(len(stamps), stamp))
+    rows['to'] = np.append(numbers, stamps)
+    return rows
+
+
+def _joined(kind: np.dtype, tables) -> np.ndarray:
+    return np.concatenate([np.empty(0, kind), *tables])
