@@ -230,8 +230,13 @@ def test_a_change_and_a_new_listener_count_from_the_next_message_on(graph, runs)
         return list(linkage.joint_angles(0.5).values())
 
     before = angles()
-    assert list(last().position) == pytest.approx(before, abs=1e-15)
+    state = last()
+    assert list(state.position) == pytest.approx(before, abs=1e-15)
+    shown.heard['m/joint_states'].clear()
     assert graph.set(shown.node, m__dimensions__b=40.0).successful
+    changed = graph.until(lambda: shown.heard['m/joint_states'])[0]
+    assert changed.header.stamp == state.header.stamp
+    assert list(changed.position) == pytest.approx(angles(), abs=1e-15)
     assert list(last().position) == pytest.approx(angles(), abs=1e-15) != before
     late = graph.listen(MarkerArray, 'm/markers')
     last()

@@ -48,7 +48,7 @@ class Kinematics(scene_node.SceneNode):
         self._inputs = {drive.source: [] for machine in self.scene.machines.values()
                         for drive in machine.inputs.values()}
         # What a source sets off, once it is known and until something changes.
-        self._ticks, self._tick = {}, None
+        self._ticks, self._tick, self._stamp = {}, None, np.zeros(2, np.int64)
         changed, self._own = self._forget_ticks, frozenset()
         self._whole = WholeScene(self, self._inputs, changed)
         self._mechanisms = {name: MechanismPublisher(self, machine, self._whole, changed)
@@ -97,7 +97,7 @@ class Kinematics(scene_node.SceneNode):
             for name, model in models.items():
                 self._mechanisms[name].adopt(model)
             self._whole.describe(robot)
-            self._whole.send(self._mechanisms.values())
+            self._send_whole(self._stamp[:1].tobytes())
 
     def say_goodbye(self):
         """Take what is drawn out of the picture, for good."""
@@ -139,6 +139,7 @@ class Kinematics(scene_node.SceneNode):
         if stamp == NEVER:
             stamp = self._now()
         self._catch_up()
+        self._stamp[0] = np.frombuffer(stamp, np.int64)[0]
         for shown, places, known in routes:
             shown.turn(stamp, places, positions, speeds if known else ())
         if routes:
@@ -163,9 +164,9 @@ class Kinematics(scene_node.SceneNode):
 
     def _catch_up(self):
         """Let the mechanisms take note of what ticks have done."""
-        if self._ticks:
-            for shown in self._mechanisms.values():
-                shown.forget()
+        for tick in self._ticks.values():
+            for part in tick.moved:
+                part.shown.forget(self._stamp[:1].tobytes())
 
     def _forget_ticks(self):
         self._catch_up()
@@ -188,7 +189,8 @@ class Kinematics(scene_node.SceneNode):
                 self._forget_ticks()
             whole = poses and tick.Whole(
                 self._whole.wire(poses), [pose.values for _, pose in poses], self._send_anew)
-            self._ticks[source] = self._tick = tick.Tick(source, moved, whole or None, self._now)
+            self._ticks[source] = self._tick = tick.Tick(
+                source, moved, whole or None, self._now, self._stamp)
 
     def _routed(self, message):
         """Return the mechanisms that a message turns, where it says how far, and if how fast."""
@@ -510,7 +512,7 @@ class MechanismPublisher:
         self._draw_locus(model)
         self._delete(self._drawn - model.marker_array.ids)
         self._driven = None
-        self._show()
+        self.show()
 
     def _draw_locus(self, model):
         if model.locus:
@@ -560,7 +562,8 @@ class MechanismPublisher:
             if value is not None:
                 self._told[:, i] = value, 0.0 if speed is None else speed
                 self._known[:, i] = True, speed is not None
-        self.show(stamp)
+        self._stamp = stamp
+        self.show()
 
     def _understood(self, drive, position, speed, near):
         """Return an input and its speed as its source tells; None if they cannot be."""
@@ -594,16 +597,12 @@ class MechanismPublisher:
                      known, model.assembly, solution,
                      solution and model.change(solution.layout), wires)
 
-    def forget(self):
-        """Solve again before anything is shown: the inputs have been moved by others."""
-        self._driven = None
+    def forget(self, stamp: bytes):
+        """Solve again before anything is shown: the inputs were moved, at a time, by others."""
+        self._driven, self._stamp = None, stamp
 
-    def show(self, stamp: bytes):
+    def show(self):
         """Publish what is listened to."""
-        self._stamp = stamp
-        self._show()
-
-    def _show(self):
         driven = self._solve()
         if not driven:
             return

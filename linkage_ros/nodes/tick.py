@@ -56,13 +56,22 @@ class Tick:
         The joints of the whole scene, where they are listened to.
     now : callable
         Returns the time, packed, for messages that have none.
+    stamp : int64 array (2,)
+        Where the stamp of the last message is kept; ticks of several sources may share it.
+
+    Attributes
+    ----------
+    moved : list of Moved
+        The same.
 
     """
 
-    def __init__(self, source: Source, moved: List[Moved], whole: Optional[Whole], now):
+    def __init__(self, source: Source, moved: List[Moved], whole: Optional[Whole], now,
+                 stamp: np.ndarray):
+        self.moved = moved
         self._solved = [part for part in moved if part.solution]
         self._whole, self._now, self._failed = whole, now, frozenset()
-        self._stamp = np.zeros(2, np.int64)
+        self._stamp = stamp
         made = [(wire, [part.solution.values]) for part in moved for wire in part.wires]
         made += [whole[:2]] if whole else []
         self._pipeline = native.Pipeline(
@@ -99,8 +108,8 @@ class Tick:
         stamp = self._stamp[:1].tobytes()
         for part in self._solved:
             if part.shown in failed | self._failed:
-                part.shown.forget()
-                part.shown.show(stamp)
+                part.shown.forget(stamp)
+                part.shown.show()
             else:
                 for wire in part.wires:
                     wire.send_patched()

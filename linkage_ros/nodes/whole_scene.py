@@ -3,8 +3,6 @@
 
 """The topics of the whole scene, for one robot_state_publisher: all joints, and a robot model."""
 
-from typing import Optional
-
 import numpy as np
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
@@ -41,7 +39,7 @@ class WholeScene:
         self._descriptions = node.create_publisher(String, 'robot_description', LATCHED)
         self._said = frozenset(sources if same else ())
         self._logger, self._joints = node.get_logger(), JointStates()
-        self._stamp = self._kind = self._wire = None
+        self._kind = self._wire = None
         self._description = ''
 
     @property
@@ -55,7 +53,7 @@ class WholeScene:
             self._description = text
             self._descriptions.publish(String(data=text))
 
-    def send(self, mechanisms, stamp: Optional[bytes] = None):
+    def send(self, mechanisms, stamp: bytes):
         """
         Publish the joints that are known, if anybody listens.
 
@@ -63,13 +61,12 @@ class WholeScene:
         ----------
         mechanisms : iterable of MechanismPublisher
             What is in the scene.
-        stamp : bytes, optional
-            The time, packed; the last one if it is left out.
+        stamp : bytes
+            The time, packed.
 
         """
-        self._stamp = stamp = stamp or self._stamp
         shown = [known for mechanism in mechanisms if (known := mechanism.known())
-                 and known[1].can_be] if stamp and self.is_heard else []
+                 and known[1].can_be] if self.is_heard else []
         if not shown:
             return
         if any(pose.held is not None or model.machine.loads for model, pose in shown):
