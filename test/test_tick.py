@@ -207,7 +207,7 @@ def answers(parameters, runs, is_quick):
             heard = shown.answers([
                 *(hard(random, parts[i % len(parts)], moving) for i in range(24)),
                 usual(drives, moving)])
-            assert (runs[True] > 2) == is_quick
+            assert (runs[True] > 0) == is_quick
             for topic, words in heard.items():
                 found.setdefault(topic, []).extend(words)
     return found

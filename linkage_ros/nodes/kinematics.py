@@ -32,6 +32,8 @@ SECONDS_BETWEEN_WARNINGS = 5.0
 # remembered so that each is said once.
 PATIENCE = 5.0
 STRANGERS = 1000
+# How long nothing is prepared for machine code after something was, in times of what that took.
+REST = 20
 # How long the end may wait for what takes the mechanisms out of the picture [s].
 FAREWELL = 0.1
 
@@ -48,7 +50,8 @@ class Kinematics(scene_node.SceneNode):
         self._inputs = {drive.source: [] for machine in self.scene.machines.values()
                         for drive in machine.inputs.values()}
         # What a source sets off, once it is known and until something changes.
-        self._ticks, self._tick, self._stamp = {}, None, np.zeros(2, np.int64)
+        self._ticks, self._tick, self._rested = {}, None, 0.0
+        self._stamp = np.zeros(2, np.int64)
         changed, self._own = self._forget_ticks, frozenset()
         self._whole = WholeScene(self, self._inputs, changed)
         self._mechanisms = {name: MechanismPublisher(self, machine, self._whole, changed)
@@ -174,23 +177,28 @@ class Kinematics(scene_node.SceneNode):
 
     def _learn(self, text, routes):
         """Let machine code do what this source sets off from now on, where it can."""
-        source = self._reader.source(text)
-        moved = source and [shown.moved(*where) for shown, *where in routes]
-        if not moved or None in moved or source in self._ticks:
+        source, started = self._reader.source(text), time.monotonic()
+        # While the listeners of a large scene come one by one, little time goes into each state.
+        if source is None or source in self._ticks or started < self._rested:
             return
+        moved = [shown.moved(*where) for shown, *where in routes]
+        if None not in moved and (made := self._tick_of(source, moved)):
+            self._ticks[source] = self._tick = made
+            ended = time.monotonic()
+            self._rested = ended + REST * (ended - started)
+
+    def _tick_of(self, source, moved):
         poses = self._poses({part.shown for part in moved}) if self._whole.is_heard else []
-        if None in poses:
-            return
         # It needs llvmlite, which is there where there is machine code.
         from . import tick
 
-        if tick.is_ready():
-            if len(self._ticks) == tick.TICKS:
-                self._forget_ticks()
-            whole = poses and tick.Whole(
-                self._whole.wire(poses), [pose.values for _, pose in poses], self._send_anew)
-            self._ticks[source] = self._tick = tick.Tick(
-                source, moved, whole or None, self._now, self._stamp)
+        if None in poses or not tick.is_ready():
+            return None
+        if len(self._ticks) == tick.TICKS:
+            self._forget_ticks()
+        whole = tick.Whole(self._whole.wire(poses), [pose.values for _, pose in poses],
+                           self._send_anew) if poses else None
+        return tick.Tick(source, moved, whole, self._now, self._stamp)
 
     def _routed(self, message):
         """Return the mechanisms that a message turns, where it says how far, and if how fast."""
