@@ -4,8 +4,8 @@
 """
 Arrays of poses by machine code: eight poses at a time, and on all cores.
 
-Sine, cosine and arctangent are those of `elementary`, the rest is done as in `llvm_code`. What a pose comes to
-depends neither on the poses beside it nor on the number of cores.
+Sine, cosine and arctangent are those of `elementary`, the rest is done as in `llvm_code`. What a
+pose comes to depends neither on the poses beside it nor on the number of cores.
 """
 
 from __future__ import annotations
@@ -21,9 +21,10 @@ import numpy as np
 
 from .elementary import arctangent, sine_and_cosine
 from .expression import argument
-from .llvm_code import address, append, compiled, count, COUNT, function, load, NUMBER, operators
+from .llvm_code import address, append, compiled, COUNT, count, function, load, NUMBER, operators
 from .program import Program
 
+# One register of AVX-512; with AVX2 and SSE2, too, eight are about as fast as any.
 LANES = 8
 VECTOR = ir.VectorType(NUMBER, LANES)
 # Fewer operations than these, some 0.15 ms, are not worth another thread.

@@ -141,7 +141,7 @@ def function(builder: ir.IRBuilder, name: str, kind: ir.Type, arity: int) -> Cal
 
 
 def operators(builder: ir.IRBuilder, kind: ir.Type) -> dict[str, Callable]:
-    """Return what each operation on a kind of number, a vector of them too, appends to the code."""
+    """Return what each operation on a kind of number, or on vectors, appends to the code."""
     def intrinsic(name: str) -> Callable:
         return function(
             builder, f'llvm.{name}.{"f64" if kind == NUMBER else f"v{kind.count}f64"}', kind, 1)
