@@ -33,12 +33,13 @@ ARCTANGENT = (3.33333333333329318027e-01, -1.99999999998764832476e-01, 1.4285714
               -1.11111104054623557880e-01, 9.09088713343650656196e-02, -7.69187620504482999495e-02,
               6.66107313738753120669e-02, -5.83357013379057348645e-02, 4.97687799461593236017e-02,
               -3.65315727442169155270e-02, 1.62858201153657823623e-02)
-# That is for ratios up to this.
-SLANT = 0.4375
+# From the first slope on, angles are counted from the second's: its angle, and the digits after.
+STARTS = ((0.4375, 0.5, 4.63647609000806093515e-01, 2.26987774529616870924e-17),
+          (0.6875, 1.0, 7.85398163397448278999e-01, 3.06161699786838301793e-17))
 # What pi is more than math.pi.
 REST_OF_PI = 1.2246467991473532e-16
-# Sums of sizes up to this are finite.
-HUGE = 2.0 ** 1000
+# Between these, halves lose nothing and sums are finite.
+TINY, HUGE = 2.0 ** -1000, 2.0 ** 1000
 
 
 def sine_and_cosine(x: Real) -> Tuple[Real, Real, Real]:
@@ -99,13 +100,17 @@ def arctangent(y: Real, x: Real) -> Tuple[Real, Real]:
     height, width = abs(y), abs(x)
     steep = width < height
     low, high = where(steep, width, height), where(steep, height, width)
-    # Between the axis and the diagonal the angle is counted from the nearer one.
-    slanting = SLANT * high < low
-    ratio = where(slanting, low - high, low) / where(slanting, low + high, high)
+    numerator, denominator, start, rest = low, high, real(0.0), real(0.0)
+    for least, slope, own, after in STARTS:
+        beyond = least * high < low
+        numerator = where(beyond, low - slope * high, numerator)
+        denominator = where(beyond, high + slope * low, denominator)
+        start, rest = where(beyond, own, start), where(beyond, after, rest)
+    ratio = numerator / denominator
     square = ratio * ratio
-    bent = ratio * (square * _polynomial(ARCTANGENT, square))
-    angle = where(slanting, math.pi / 4 - ((bent - REST_OF_PI / 4) - ratio), ratio - bent)
+    angle = start - ((ratio * (square * _polynomial(ARCTANGENT, square)) - rest) - ratio)
     angle = where(steep, math.pi / 2 - (angle - REST_OF_PI / 2), angle)
     angle = where(x < 0.0, math.pi - (angle - REST_OF_PI), angle)
     # The library knows what infinity comes to, and the signs of zeros.
-    return _signed(angle, y > 0.0), where(high < HUGE, height, 0.0) > 0.0
+    usual = where(high > TINY, where(high < HUGE, height, 0.0), 0.0) > 0.0
+    return _signed(angle, y > 0.0), usual
