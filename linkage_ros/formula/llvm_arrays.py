@@ -29,8 +29,8 @@ LANES = 8
 VECTOR = ir.VectorType(NUMBER, LANES)
 # Fewer operations than these, some 0.15 ms, are not worth another thread.
 SHARE = 3 * 2 ** 19
-# The first pose and the one after the last, all poses, then addresses: of a table of addresses of
-# the arguments, of the constants and the results.
+# The first pose and the one after the last, all poses, then addresses: of the addresses of the
+# arguments, of the constants and of the results.
 SIGNATURE = ctypes.CFUNCTYPE(None, *3 * (ctypes.c_int64,), *3 * (ctypes.c_void_p,))
 
 
@@ -53,9 +53,9 @@ class Arrays:
 
         def solve_from(first: int) -> None:
             # What is referred to here lives as long as a thread needs it.
-            places = np.array([address(each) for each in given])
-            self._run(first, min(first + share, size), size,
-                      *map(address, (places, constants, out)))
+            places = (ctypes.c_int64 * len(given))(*map(address, given))
+            self._run(first, min(first + share, size), size, places,
+                      address(constants), address(out))
 
         others = [_threads(os.getpid(), cores).submit(solve_from, first)
                   for first in range(share, size, share)]
