@@ -64,6 +64,7 @@ bench: build $(venv)/.tools .venv-bench/.installed ## Measure run time against e
 	@.venv-bench/bin/python -m benchmark.run
 	@.venv-bench/bin/python -m benchmark.stability
 	@.venv-bench/bin/python -m benchmark.engines
+	@.venv-bench/bin/python -m benchmark.arrays
 	@$(in_ros) python -m benchmark.nodes --quick
 
 .PHONY: pictures

@@ -6,6 +6,7 @@
 import atexit
 import ctypes
 from pathlib import Path
+import platform
 import shutil
 import subprocess
 import tempfile
@@ -86,8 +87,8 @@ def library(flags):
     return _built[flags]
 
 
-METHODS = [
-    CompiledC('gcc -O3', '-O3'),
-    CompiledC('gcc -O3, this CPU', '-O3', '-march=native', '-fno-math-errno',
-              '-fno-trapping-math'),
-]
+THIS_CPU = '-O3', '-march=native', '-fno-math-errno', '-fno-trapping-math'
+METHODS = [CompiledC('gcc -O3', '-O3'), CompiledC('gcc -O3, this CPU', *THIS_CPU)]
+if platform.machine() == 'x86_64':
+    METHODS.append(CompiledC('gcc -O3, this CPU, vector sine', *THIS_CPU,
+                             '-DVECTOR_SINE'))

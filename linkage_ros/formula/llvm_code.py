@@ -21,7 +21,6 @@ if not hasattr(llvm, 'create_pass_builder'):
     raise ImportError(f'llvmlite 0.44 or newer is needed, this is {llvmlite.__version__}')
 
 NUMBER, COUNT = ir.DoubleType(), ir.IntType(64)
-ZERO, NAN = ir.Constant(NUMBER, 0.0), ir.Constant(NUMBER, float('nan'))
 # Poses, addresses of arguments, constants and results, then the strides of results in numbers.
 SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, *3 * (ctypes.c_void_p,),
                              *2 * (ctypes.c_int64,))
@@ -73,10 +72,11 @@ class Loop:
         shape (outputs, poses).
         """
         by_output, by_pose = (stride // out.itemsize for stride in out.strides)
-        return given.shape[1], *map(_address, (given, constants, out)), by_pose, by_output
+        return given.shape[1], *map(address, (given, constants, out)), by_pose, by_output
 
 
-def _address(array: np.ndarray) -> int:
+def address(array: np.ndarray) -> int:
+    """Return where an array's numbers begin in memory."""
     return array.__array_interface__['data'][0]
 
 
@@ -92,25 +92,19 @@ def _module(operations: Sequence, constants: Sequence[int],
     start, body, end = (loop.append_basic_block(name) for name in ('start', 'body', 'end'))
 
     builder = ir.IRBuilder(start)
-    known = {number: _load(builder, given, _count(i)) for i, number in enumerate(constants)}
-    builder.cbranch(builder.icmp_signed('>', poses, _count(0)), body, end)
+    known = {number: load(builder, given, count(i)) for i, number in enumerate(constants)}
+    builder.cbranch(builder.icmp_signed('>', poses, count(0)), body, end)
 
     builder.position_at_end(body)
     pose = builder.phi(COUNT)
-    spell = _operators(builder)
-    for number, name, operands in operations:
-        if name == 'constant':
-            known[number] = ir.Constant(NUMBER, operands[0])
-        elif name == 'argument':
-            row = builder.mul(_count(operands[0]), poses)
-            known[number] = _load(builder, arguments, builder.add(row, pose))
-        else:
-            known[number] = spell[name](*(known[operand] for operand in operands))
+    spell = {**operators(builder, NUMBER), 'atan2': function(builder, 'atan2', NUMBER, 2)}
+    append(operations, known, spell, NUMBER, lambda index: load(
+        builder, arguments, builder.add(builder.mul(count(index), poses), pose)))
     for column, number in enumerate(outputs):
-        place = builder.add(builder.mul(pose, by_pose), builder.mul(_count(column), by_output))
+        place = builder.add(builder.mul(pose, by_pose), builder.mul(count(column), by_output))
         builder.store(known[number], builder.gep(out, [place]))
-    after = builder.add(pose, _count(1))
-    pose.add_incoming(_count(0), start)
+    after = builder.add(pose, count(1))
+    pose.add_incoming(count(0), start)
     pose.add_incoming(after, body)
     builder.cbranch(builder.icmp_signed('<', after, poses), body, end)
 
@@ -119,20 +113,38 @@ def _module(operations: Sequence, constants: Sequence[int],
     return module
 
 
-def _count(value: int) -> ir.Constant:
+def append(operations: Sequence, known: dict, spell: dict, kind: ir.Type,
+           argument: Callable[[int], ir.Value]) -> None:
+    """Append operations on a kind of number to the code; their values are known by number."""
+    for number, name, operands in operations:
+        if name == 'constant':
+            known[number] = ir.Constant(kind, operands[0])
+        elif name == 'argument':
+            known[number] = argument(operands[0])
+        else:
+            known[number] = spell[name](*(known[operand] for operand in operands))
+
+
+def count(value: int) -> ir.Constant:
     return ir.Constant(COUNT, value)
 
 
-def _load(builder: ir.IRBuilder, array: ir.Value, place: ir.Value) -> ir.Value:
+def load(builder: ir.IRBuilder, array: ir.Value, place: ir.Value) -> ir.Value:
     return builder.load(builder.gep(array, [place]))
 
 
-def _operators(builder: ir.IRBuilder) -> dict[str, Callable]:
-    """Return what each operation appends to the code."""
-    def call(name: str, arity: int = 1) -> Callable:
-        function = builder.module.globals.get(name) or ir.Function(
-            builder.module, ir.FunctionType(NUMBER, [NUMBER] * arity), name)
-        return lambda *operands: builder.call(function, operands)
+def function(builder: ir.IRBuilder, name: str, kind: ir.Type, arity: int) -> Callable:
+    """Return what appends a call of a function of so many numbers of one kind."""
+    called = builder.module.globals.get(name) or ir.Function(
+        builder.module, ir.FunctionType(kind, [kind] * arity), name)
+    return lambda *operands: builder.call(called, operands)
+
+
+def operators(builder: ir.IRBuilder, kind: ir.Type) -> dict[str, Callable]:
+    """Return what each operation on a kind of number, or on vectors, appends to the code."""
+    def intrinsic(name: str) -> Callable:
+        return function(
+            builder, f'llvm.{name}.{"f64" if kind == NUMBER else f"v{kind.count}f64"}', kind, 1)
 
     def compare(sign: str) -> Callable:
         return lambda x, y: builder.fcmp_ordered(sign, x, y)
@@ -141,17 +153,17 @@ def _operators(builder: ir.IRBuilder) -> dict[str, Callable]:
         return compare('>=')(margin, builder.fneg(tolerance))
 
     def root(x: ir.Value, tolerance: ir.Value) -> ir.Value:
-        grazed = builder.select(reaches(x, tolerance), ZERO, NAN)
-        return builder.select(compare('>')(x, ZERO), sqrt(x), grazed)
+        grazed = builder.select(reaches(x, tolerance), zero, nan)
+        return builder.select(compare('>')(x, zero), sqrt(x), grazed)
 
     def gated(x: ir.Value, margin: ir.Value, tolerance: ir.Value) -> ir.Value:
-        return builder.select(reaches(margin, tolerance), x, NAN)
+        return builder.select(reaches(margin, tolerance), x, nan)
 
-    sqrt = call('llvm.sqrt.f64')
+    zero, nan, sqrt = kind(0.0), kind(float('nan')), intrinsic('sqrt')
     return {
         'add': builder.fadd, 'subtract': builder.fsub, 'multiply': builder.fmul,
-        'divide': builder.fdiv, 'negative': builder.fneg, 'absolute': call('llvm.fabs.f64'),
+        'divide': builder.fdiv, 'negative': builder.fneg, 'absolute': intrinsic('fabs'),
         'less': compare('<'), 'less_equal': compare('<='), 'where': builder.select,
-        'sin': call('llvm.sin.f64'), 'cos': call('llvm.cos.f64'), 'sqrt': sqrt,
-        'atan2': call('atan2', 2), 'rint': call('llvm.rint.f64'), 'root': root, 'gated': gated,
+        'sin': intrinsic('sin'), 'cos': intrinsic('cos'), 'sqrt': sqrt,
+        'rint': intrinsic('rint'), 'root': root, 'gated': gated,
     }

@@ -21,7 +21,7 @@ from typing import Any, Callable, Dict, Iterator, Optional, Sequence, Tuple
 from llvmlite import ir
 import numpy as np
 
-from .llvm_code import _count, compiled, COUNT, NUMBER
+from .llvm_code import address, compiled, COUNT, count, NUMBER
 from .program import beside
 
 BYTE = ir.IntType(8)
@@ -92,11 +92,6 @@ class Pipeline:
         return self._code(self._at, text, len(text))
 
 
-def address(array: np.ndarray) -> int:
-    """Return where an array's numbers begin in memory."""
-    return array.__array_interface__['data'][0]
-
-
 def addresses(array: np.ndarray) -> np.ndarray:
     """Return where each number of an array lies in memory."""
     return address(array) + np.add.reduce(
@@ -153,7 +148,7 @@ class _Writer:
         return self.builder.inttoptr(at, kind.as_pointer())
 
     def step(self, pointer: ir.Value, i: Any) -> ir.Value:
-        return self.builder.gep(pointer, [_count(i) if isinstance(i, int) else i])
+        return self.builder.gep(pointer, [count(i) if isinstance(i, int) else i])
 
     def load(self, pointer: ir.Value) -> ir.Value:
         # Numbers in a message lie at multiples of 4.
@@ -171,7 +166,7 @@ class _Writer:
     def leave(self, condition: ir.Value, code: int) -> None:
         """Return a code where a condition holds."""
         with self.builder.if_then(condition, likely=False):
-            self.builder.ret(_count(code))
+            self.builder.ret(count(code))
 
     @contextmanager
     def each(self, size: ir.Value, total: Optional[ir.Value] = None) -> Iterator[_Turn]:
@@ -184,8 +179,8 @@ class _Writer:
         builder.cbranch(builder.icmp_signed('<', turn.i, size), body, end)
         builder.position_at_end(body)
         yield turn
-        after = builder.add(turn.i, _count(1))
-        for phi, first, then in ((turn.i, _count(0), after), (turn.total, total, turn.then)):
+        after = builder.add(turn.i, count(1))
+        for phi, first, then in ((turn.i, count(0), after), (turn.total, total, turn.then)):
             if phi:
                 phi.add_incoming(first, before)
                 phi.add_incoming(then, builder.block)
@@ -197,9 +192,9 @@ class _Writer:
         """Write what is done with each row of a table, {field: value}; '' is its number."""
         size, start = table
         with self.each(size) as turn:
-            at = self.builder.add(start, self.builder.mul(turn.i, _count(kind.itemsize)))
+            at = self.builder.add(start, self.builder.mul(turn.i, count(kind.itemsize)))
             fields = {name: self.load(self.place(
-                self.builder.add(at, _count(field[1])), TYPES[field[0].kind]))
+                self.builder.add(at, count(field[1])), TYPES[field[0].kind]))
                 for name, field in (kind.fields or {}).items()}
             yield {'': turn.i, **fields}
 
@@ -227,10 +222,10 @@ def _stamp(write: _Writer, known: Dict[str, ir.Value], text: ir.Value) -> ir.Val
     """Take over the stamp if the message has one; return whether there is none at all."""
     builder, place = write.builder, write.place(known['stamp'], COUNT)
     own = write.load(builder.bitcast(write.step(text, STAMP), COUNT.as_pointer()))
-    stamp = builder.select(builder.icmp_unsigned('==', own, _count(0)),
+    stamp = builder.select(builder.icmp_unsigned('==', own, count(0)),
                            write.load(write.step(place, 1)), own)
     write.store(stamp, place)
-    return builder.icmp_unsigned('==', stamp, _count(0))
+    return builder.icmp_unsigned('==', stamp, count(0))
 
 
 def _take(write: _Writer, takes: Any, text: ir.Value) -> None:
@@ -249,8 +244,8 @@ def _run_loops(write: _Writer, loops: Any, failed: ir.Value) -> None:
         pointers = [write.place(row[name], NUMBER) for name in ('given', 'constants', 'out')]
         builder.call(write.place(row['code'], kind), [
             row['poses'], *pointers, row['by_pose'], row['by_output']])
-        numbers, infinite = write.place(row['out'], COUNT), _count(INFINITE)
-        with write.each(row['size'], _count(0)) as turn:
+        numbers, infinite = write.place(row['out'], COUNT), count(INFINITE)
+        with write.each(row['size'], count(0)) as turn:
             bits = builder.and_(write.load(write.step(numbers, turn.i)), infinite)
             wrong = builder.zext(builder.icmp_unsigned('==', bits, infinite), COUNT)
             turn.then = builder.or_(turn.total, wrong)
@@ -267,7 +262,7 @@ def _check_limits(write: _Writer, limits: Any, failed: ir.Value) -> None:
         slack = builder.fmul(NUMBER(NEAR), builder.fadd(size(value), row['half']))
         near = builder.fcmp_ordered('<=', away, builder.fsub(row['half'], slack))
         place = write.step(write.place(failed, COUNT), row['loop'])
-        write.store(builder.select(near, write.load(place), _count(1)), place)
+        write.store(builder.select(near, write.load(place), count(1)), place)
 
 
 def _change(write: _Writer, changes: Any) -> None:
@@ -288,6 +283,6 @@ def _folded(write: _Writer, value: ir.Value, turn: ir.Value) -> ir.Value:
 
 def _total(write: _Writer, size: ir.Value, numbers: ir.Value) -> ir.Value:
     place = write.place(numbers, COUNT)
-    with write.each(size, _count(0)) as turn:
+    with write.each(size, count(0)) as turn:
         turn.then = write.builder.add(turn.total, write.load(write.step(place, turn.i)))
     return turn.total

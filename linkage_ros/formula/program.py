@@ -340,6 +340,13 @@ class _Variant:
 
         return beside(make)
 
+    @cached_property
+    def arrays(self) -> Any:
+        """The code for arrays of poses as machine code."""
+        from .llvm_arrays import Arrays
+
+        return Arrays(*self.listing.operations())
+
 
 class Program:
     """
@@ -458,9 +465,7 @@ class Pose:
         shape, size = arrays[0].shape, arrays[0].size
         flat = [a.ravel() for a in arrays]
         if self._accelerate:
-            out = np.empty((self.variant.outputs, size))
-            loop, given = self.variant.loop.result(), np.array(flat)
-            loop.run(*loop.arguments(given, self._given, out))
+            out = self.variant.arrays.solve(flat, self._given)
         else:
             out = self._plainly(flat, size)
         return out.reshape(self.variant.outputs, *shape)

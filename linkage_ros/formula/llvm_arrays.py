@@ -1,0 +1,179 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Arrays of poses by machine code: eight poses at a time, and on all cores.
+
+Sine, cosine and arctangent are those of `elementary`, the rest is done as in `llvm_code`. What a
+pose comes to depends neither on the poses beside it nor on the number of cores.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+import ctypes
+from functools import lru_cache
+import os
+from typing import Callable, Dict, List, Sequence, Tuple
+
+from llvmlite import ir
+import numpy as np
+
+from .elementary import arctangent, sine_and_cosine
+from .expression import argument
+from .llvm_code import address, append, compiled, COUNT, count, function, load, NUMBER, operators
+from .program import Program
+
+# One register of AVX-512; with AVX2 and SSE2, too, eight are about as fast as any.
+LANES = 8
+VECTOR = ir.VectorType(NUMBER, LANES)
+# Fewer operations than these, some 0.15 ms, are not worth another thread.
+SHARE = 3 * 2 ** 19
+# The first pose and the one after the last, all poses, then addresses: of the addresses of the
+# arguments, of the constants and of the results.
+SIGNATURE = ctypes.CFUNCTYPE(None, *3 * (ctypes.c_int64,), *3 * (ctypes.c_void_p,))
+
+
+class Arrays:
+    """Poses in arrays of any size, solved by machine code; the parameters are those of `Loop`."""
+
+    def __init__(self, operations: Sequence, constants: Sequence[int], outputs: Sequence[int]):
+        self._engine = compiled(_module(operations, constants, outputs))
+        self._run = SIGNATURE(self._engine.get_function_address('poses'))
+        self._outputs = len(outputs)
+        self._share = SHARE // (1 + len(operations))
+
+    def solve(self, given: Sequence[np.ndarray], constants: np.ndarray) -> np.ndarray:
+        """Return the outputs, shape (outputs, poses), at arguments that are arrays (poses,)."""
+        size = given[0].size
+        if size < LANES:
+            return self.solve([np.resize(each, LANES) for each in given], constants)[:, :size]
+        out, cores = np.empty((self._outputs, size)), _cores()
+        share = max(self._share, -(-size // cores))
+
+        def solve_from(first: int) -> None:
+            # What is referred to here lives as long as a thread needs it.
+            places = (ctypes.c_int64 * len(given))(*map(address, given))
+            self._run(first, min(first + share, size), size, places,
+                      address(constants), address(out))
+
+        others = [_threads(os.getpid(), cores).submit(solve_from, first)
+                  for first in range(share, size, share)]
+        solve_from(0)
+        for other in others:
+            other.result()
+        return out
+
+
+def _cores() -> int:
+    """Return how many cores this process may use."""
+    own = getattr(os, 'sched_getaffinity', None)
+    return len(own(0)) if own else os.cpu_count() or 1
+
+
+@lru_cache(maxsize=1)
+def _threads(_: int, cores: int) -> ThreadPoolExecutor:
+    """Return the threads of a process; another that is forked from it has none of them."""
+    return ThreadPoolExecutor(cores, 'linkage_ros arrays')
+
+
+def _module(operations: Sequence, constants: Sequence[int],
+            outputs: Sequence[int]) -> ir.Module:
+    module = ir.Module()
+    pointer = NUMBER.as_pointer()
+    poses = ir.Function(module, ir.FunctionType(
+        ir.VoidType(), [*3 * (COUNT,), pointer.as_pointer(), pointer, pointer]), 'poses')
+    first, last, size, arguments, given, out = poses.args
+    start, body, end = (poses.append_basic_block(name) for name in ('start', 'body', 'end'))
+
+    builder = ir.IRBuilder(start)
+    known = {number: _in_all_lanes(builder, load(builder, given, count(i)))
+             for i, number in enumerate(constants)}
+    builder.branch(body)
+
+    builder.position_at_end(body)
+    pose = builder.phi(COUNT)
+    pose.add_incoming(first, start)
+    # The last eight poses of all may overlap those before.
+    latest = builder.sub(size, count(LANES))
+    at = builder.select(builder.icmp_signed('<', pose, latest), pose, latest)
+
+    def lanes(array: ir.Value, offset: ir.Value) -> ir.Value:
+        return builder.bitcast(builder.gep(array, [offset]), VECTOR.as_pointer())
+
+    append(operations, known, _operators(builder), VECTOR, lambda index: builder.load(
+        lanes(load(builder, arguments, count(index)), at), align=1))
+    for column, number in enumerate(outputs):
+        place = builder.add(builder.mul(count(column), size), at)
+        builder.store(known[number], lanes(out, place), align=1)
+    after = builder.add(pose, count(LANES))
+    pose.add_incoming(after, builder.block)
+    builder.cbranch(builder.icmp_signed('<', after, last), body, end)
+
+    builder.position_at_end(end)
+    builder.ret_void()
+    return module
+
+
+def _in_all_lanes(builder: ir.IRBuilder, number: ir.Value) -> ir.Value:
+    none = ir.Constant(VECTOR, ir.Undefined)
+    return builder.shuffle_vector(
+        builder.insert_element(none, number, count(0)), none,
+        ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
+
+
+def _operators(builder: ir.IRBuilder) -> Dict[str, Callable]:
+    """Return what each operation on eight poses appends to the code."""
+    spell = operators(builder, VECTOR)
+    turned = _approximated(builder, spell, sine_and_cosine, (spell['sin'], spell['cos']))
+    angle = _approximated(builder, spell, arctangent, (_by_lane(builder, 'atan2'),))
+    return {**spell, 'sin': lambda x: turned(x)[0], 'cos': lambda x: turned(x)[1],
+            'atan2': lambda y, x: angle(y, x)[0]}
+
+
+def _by_lane(builder: ir.IRBuilder, name: str) -> Callable[[ir.Value, ir.Value], ir.Value]:
+    """Return what calls a function of two numbers for each lane."""
+    one = function(builder, name, NUMBER, 2)
+
+    def all_(x: ir.Value, y: ir.Value) -> ir.Value:
+        result = ir.Constant(VECTOR, ir.Undefined)
+        for lane in map(count, range(LANES)):
+            value = one(builder.extract_element(x, lane), builder.extract_element(y, lane))
+            result = builder.insert_element(result, value, lane)
+        return result
+
+    return all_
+
+
+def _approximated(builder: ir.IRBuilder, spell: Dict[str, Callable], approximation: Callable,
+                  library: Sequence[Callable]) -> Callable:
+    """Return what appends functions of `elementary`, and the library's where they do not hold."""
+    @lru_cache(maxsize=None)
+    def appended(*operands: ir.Value) -> List[ir.Value]:
+        operations, outputs = _listed(approximation, len(operands))
+        known: Dict[int, ir.Value] = {}
+        append(operations, known, spell, VECTOR, lambda index: operands[index])
+        *near, holds = (known[number] for number in outputs)
+        whole, before = builder.bitcast(holds, ir.IntType(LANES)), builder.block
+        with builder.if_then(builder.icmp_unsigned('!=', whole, whole.type(-1)), likely=False):
+            far = [builder.select(holds, value, exact(*operands))
+                   for value, exact in zip(near, library)]
+            beyond = builder.block
+        return [_either(builder, (value, before), (other, beyond))
+                for value, other in zip(near, far)]
+
+    return appended
+
+
+def _either(builder: ir.IRBuilder, *ways: Tuple[ir.Value, ir.Block]) -> ir.Value:
+    value = builder.phi(VECTOR)
+    for way in ways:
+        value.add_incoming(*way)
+    return value
+
+
+@lru_cache(maxsize=None)
+def _listed(approximation: Callable, arguments: int) -> Tuple[Sequence, Sequence[int]]:
+    outputs = approximation(*map(argument, range(arguments)))
+    operations, _, numbers = Program(outputs).bind({}, {}).variant.listing.operations()
+    return operations, numbers
