@@ -753,6 +753,8 @@ def test_all_joints_of_the_scene_come_in_one_message(graph):
     states = graph.listen(JointState, 'joint_states')
     own = {name: graph.listen(JointState, f'{name}/joint_states') for name in LENGTHS}
     turn = graph.crank([f'{name}_crank' for name in LENGTHS])
+    for heard in own.values():
+        turn([0.2] * 4, heard)
     for theta, speeds in ((0.3, [1.0, 2.0, 3.0, 4.0]), (0.4, []), (0.5, [1.0] * 4)):
         state = turn([theta] * 4, states, speeds)
         parts = [graph.until(lambda name=name, at=state.header.stamp: [
