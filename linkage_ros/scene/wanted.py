@@ -7,18 +7,21 @@ from __future__ import annotations
 
 from functools import cached_property
 import math
-from typing import Any, List, Mapping, Optional, Sequence, Tuple
+from threading import Thread
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
 from .drive import Drive, in_words
 from .machine import Machine
 from ..linkage.inputs import Arc
-from ..linkage.servo import CLOSE
+from ..linkage.servo import CLOSE, Mechanism
 from ..linkage.several import Answer
 from ..words import listed
 
 LEVER = 'lever'
+# From so many values at once on it is worth to have machine code made for the next ones.
+MANY = 256
 # Of several inputs, their actuators' positions and, where they are known, speeds.
 Command = Tuple[Sequence[float], Sequence[float], Optional[Sequence[float]]]
 
@@ -63,19 +66,50 @@ class Wanted:
         self._scale = machine.scale_of(self._name)
         self._input_scale = machine.scale_of(self._drive.input.name)
         self._ratio, self._offset = self._drive.actuator
+        self._is_plain = (self._scale, self._input_scale, self._ratio, self._offset) == (1, 1, 1, 0)
+        self._solvers: Dict[Tuple[bool, bool], Callable] = {}
 
     def input_of(self, position: Any) -> Any:
         """Return the input [rad or m] of its source's position."""
         return self._ratio * position + self._offset
 
+    def present(self, heard: Mapping[str, float]) -> float:
+        """Return where the input is, from what was heard last by source; inf where unknown."""
+        return present(self._machine, heard)[0] if self.source in heard else math.inf
+
     def servo(self, wanted: Any, near: Any) -> Tuple[Any, Any]:
         """Return for each value where the source has to be, and d output / d source there."""
-        unit, ends = self._input_scale, self._drive.ends
-        value, rate = self._linkage.servo_for(
-            self._name, wanted / self._scale, near if near is None else near / unit,
-            ends and (ends[0] / unit, ends[1] / unit))
+        kind = isinstance(wanted, np.ndarray) and wanted.size >= MANY, near is not None
+        solve = self._solvers.get(kind) or self._solver(*kind)
+        if self._is_plain:
+            return solve(wanted, *self._limits(near))
+        unit = self._input_scale
+        value, rate = solve(wanted / self._scale, *self._limits(near))
         return ((value * unit - self._offset) / self._ratio,
                 rate * (self._scale / unit * self._ratio))
+
+    def _limits(self, near: Any) -> Tuple[Any, ...]:
+        """Return near, if it is known, and the ends of the sweep, as the linkage counts them."""
+        unit, ends = self._input_scale, self._drive.ends or ()
+        return (*(() if near is None else (near / unit,)), *(end / unit for end in ends))
+
+    def _solver(self, many: bool, follows: bool) -> Callable:
+        """Return what solves; for many values machine code follows it, where llvmlite is."""
+        def made_of(linkage: Mechanism) -> Callable:
+            return linkage.servo_solver(self._name, follows, self._drive.ends is not None)
+
+        def hasten() -> None:
+            try:
+                quick = made_of(self._linkage.accelerated())
+                quick(np.zeros(1), *self._limits(0.0 if follows else None))
+            except ImportError:
+                return
+            self._solvers[many, follows] = quick
+
+        solver = self._solvers[many, follows] = made_of(self._linkage)
+        if many:
+            Thread(target=hasten, name='linkage_ros compiler').start()
+        return solver
 
     def commanded(self, values: Sequence[float], speeds: Optional[Sequence[float]],
                   near: Sequence[float], jumps: bool = False) -> Command:
