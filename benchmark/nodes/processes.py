@@ -1,14 +1,17 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A whole scene in one process, and in three: CPU time, memory, start."""
+"""A whole scene in one process, and in three: CPU time, memory, start. Its driver alone."""
 
 from contextlib import contextmanager
+import pickle
 import time
 
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from . import scenes
+from .campaign import SUBJECT
 from .driving import Process
 
 APART = ('crank_driver', 'kinematics', 'servo_inverse')
@@ -34,6 +37,38 @@ def compare(bench, scene, rate):
                 row['cpu'].append(1e6 * (sum(p.cpu() for p in processes) - before)
                                   / (len(heard[0]) - ticks))
                 row['memory'].append(sum(p.proportional() for p in processes) / 2 ** 20)
+    return list(rows.values())
+
+
+def drive(bench, scene, rate):
+    """Return rows: CPU [us a message] of `crank_driver` and of a bare timer, a value a round."""
+    ready = bench.folder / 'cranks.ready'
+    ready.write_bytes(pickle.dumps({scenes.Topic('crank_states', True): serialize_message(
+        next(scenes.Cranks(scene)))}))
+    node, parameters, rows, ears = bench.driver.node, scenes.write(scene, bench.folder), {}, []
+    pace = '--ros-args', '-p', f'rate:={rate}'
+    processes = {
+        'driver': Process('driver', '-m', 'linkage_ros.nodes.crank_driver', *pace,
+                          parameters=parameters),
+        'timed': Process('timed', *SUBJECT, 'timed', '--ready', str(ready), *pace)}
+    try:
+        heard = {kind: [] for kind in processes}
+        ears = [node.create_subscription(JointState, f'/{kind}/crank_states', times.append, 1000,
+                                         raw=True) for kind, times in heard.items()]
+        assert bench.driver.until(lambda: all(len(times) > rate for times in heard.values()))
+        rows = {kind: {'scene': scene, 'rate': rate, 'kind': kind, 'cpu': []} for kind in heard}
+        for _ in range(bench.rounds):
+            before = {kind: (process.cpu(), len(heard[kind]))
+                      for kind, process in processes.items()}
+            bench.driver.wait(0.5 * SECONDS)
+            for kind, (cpu, ticks) in before.items():
+                rows[kind]['cpu'].append(1e6 * (processes[kind].cpu() - cpu)
+                                         / (len(heard[kind]) - ticks))
+    finally:
+        for process in processes.values():
+            process.end()
+        for ear in ears:
+            node.destroy_subscription(ear)
     return list(rows.values())
 
 
