@@ -169,7 +169,8 @@ class Fresh(Kinematics):
 
 
 KINDS = {'kinematics': Kinematics, 'fresh': Fresh, 'floor': Floor, 'relay': Relay,
-         'timed': Timed, 'deaf': Deaf, 'raw': Raw, 'trigger': Triggered, 'echo': Echoed, 'ear': Ear}
+         'timed': Timed, 'deaf': Deaf, 'raw': Raw, 'trigger': Triggered, 'echo': Echoed,
+         'ear': Ear}
 # The parts of the work of a tick.
 PARTS = {'read': [(joint_state_reader.Reader, 'read')],
          'solve': [(kinematics.Model, 'solve')], 'patch': [(message_layout.Template, 'patched')],

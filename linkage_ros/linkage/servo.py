@@ -171,7 +171,7 @@ class Mechanism(Several):
         return self.servo_solver(output, near is not None, ends is not None)(value, *limits)
 
     def servo_solver(self, output: str, follows: bool, ended: bool) -> Callable:
-        """Return `servo_for` of an output as a function: of value and, if so, near and the ends."""
+        """Return `servo_for` of an output: a function of value and, if so, near and the ends."""
         lever = self._has_lever(output)
         if lever and self._is_free:
             return self._solved_by(_lever_taken, output, follows, ended)

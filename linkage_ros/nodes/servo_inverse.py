@@ -5,7 +5,6 @@
 
 from array import array
 import math
-from operator import itemgetter
 import sys
 
 import numpy as np
@@ -129,9 +128,9 @@ def solve(asked, request, response, heard):
         raise ValueError(f'servo_near must be empty or have one angle for each of the '
                          f'{n} in lever_angle, not {len(near)}')
     # One angle is the usual question, and floats answer it sooner than arrays.
-    given = np.array if n > 1 else itemgetter(0)
+    values = np.array(wanted) if n > 1 else wanted[0]
     if near:
-        start = given(near)
+        start = np.array(near) if n > 1 else near[0]
         if not np.all(abs(start) <= scene.FARTHEST):
             raise ValueError(f'servo_near must be finite and within {scene.FARTHEST:g} '
                              f'{asked.unit} of zero')
@@ -140,7 +139,7 @@ def solve(asked, request, response, heard):
         start = asked.present(heard)
         if not abs(start) <= scene.FARTHEST:
             start = None
-    theta, rate = asked.servo(given(wanted), start)
+    theta, rate = asked.servo(values, start)
     if n > 1:
         finite = np.isfinite(theta)
         response.servo_angle = array('d', theta.tobytes())

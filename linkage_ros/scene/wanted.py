@@ -66,7 +66,10 @@ class Wanted:
         self._scale = machine.scale_of(self._name)
         self._input_scale = machine.scale_of(self._drive.input.name)
         self._ratio, self._offset = self._drive.actuator
-        self._is_plain = (self._scale, self._input_scale, self._ratio, self._offset) == (1, 1, 1, 0)
+        # The ends of the sweep as the linkage counts them.
+        self._ends = tuple(end / self._input_scale for end in self._drive.ends or ())
+        self._is_plain = not self._offset and (
+            self._scale == self._input_scale == self._ratio == 1.0)
         self._solvers: Dict[Tuple[bool, bool], Callable] = {}
 
     def input_of(self, position: Any) -> Any:
@@ -81,27 +84,23 @@ class Wanted:
         """Return for each value where the source has to be, and d output / d source there."""
         kind = isinstance(wanted, np.ndarray) and wanted.size >= MANY, near is not None
         solve = self._solvers.get(kind) or self._solver(*kind)
+        limits = self._ends if near is None else (near / self._input_scale, *self._ends)
         if self._is_plain:
-            return solve(wanted, *self._limits(near))
+            return solve(wanted, *limits)
+        value, rate = solve(wanted / self._scale, *limits)
         unit = self._input_scale
-        value, rate = solve(wanted / self._scale, *self._limits(near))
         return ((value * unit - self._offset) / self._ratio,
                 rate * (self._scale / unit * self._ratio))
-
-    def _limits(self, near: Any) -> Tuple[Any, ...]:
-        """Return near, if it is known, and the ends of the sweep, as the linkage counts them."""
-        unit, ends = self._input_scale, self._drive.ends or ()
-        return (*(() if near is None else (near / unit,)), *(end / unit for end in ends))
 
     def _solver(self, many: bool, follows: bool) -> Callable:
         """Return what solves; for many values machine code follows it, where llvmlite is."""
         def made_of(linkage: Mechanism) -> Callable:
-            return linkage.servo_solver(self._name, follows, self._drive.ends is not None)
+            return linkage.servo_solver(self._name, follows, bool(self._ends))
 
         def hasten() -> None:
             try:
                 quick = made_of(self._linkage.accelerated())
-                quick(np.zeros(1), *self._limits(0.0 if follows else None))
+                quick(np.zeros(1), *(0.0,) * follows, *self._ends)
             except ImportError:
                 return
             self._solvers[many, follows] = quick
