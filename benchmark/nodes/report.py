@@ -118,13 +118,15 @@ def service_targets(rows):
 
 def process_targets(rows):
     """Return what was aimed at for one process, and what came of it at worst."""
-    pairs = list(zip(rows[::2], rows[1::2]))
-    lines = []
+    lines, starts = [], [[start for row in rows if row['kind'] == kind for start in row['start']]
+                         for kind in ('together', 'floor')]
     for what, words, limit in (('cpu', 'CPU', 0.55), ('memory', 'memory', 0.6)):
-        most = max(in_turn(together[what], apart[what]) for apart, together in pairs)
+        most = max(in_turn(together[what], apart[what])
+                   for apart, together, _ in zip(*3 * [iter(rows)]))
         lines.append([f'one process / three, {words}, at most', f'<= {limit}', f'{most:.2f}',
                       met(most, limit)])
-    return lines
+    later = statistics.median(starts[0]) / statistics.median(starts[1])
+    return [*lines, ['start of one process / floor', '<= 1', f'{later:.2f}', met(later, 1.0)]]
 
 
 def driver_targets(rows):
@@ -228,19 +230,22 @@ def services(rows):
 
 
 def processes(rows):
-    """Return what a scene costs in one process, and in three."""
+    """Return what a scene costs in one process, in three, and what any process costs."""
     lines = []
-    for apart, together in zip(rows[::2], rows[1::2]):
+    for apart, together, floor in zip(*3 * [iter(rows)]):
         line = [apart['scene'], f'{apart["rate"]:.0f}']
         for what, digits in (('cpu', 0), ('memory', 0), ('start', 2)):
-            line += [f'{statistics.median(row[what]):.{digits}f}' for row in (apart, together)]
+            line += [f'{statistics.median(row[what]):.{digits}f}'
+                     for row in (floor, apart, together)]
             line.append(f'{in_turn(together[what], apart[what]):.2f}')
         lines.append(line)
-    return ('`scene` beside `crank_driver`, `kinematics` and `servo_inverse`, joint states heard: '
-            'CPU time of all processes [us a tick], their proportional memory [MiB], seconds from '
-            'the start to the first joint states of all.\n\n' + table(
-                ['scene', 'Hz', 'CPU of three', 'of one', 'ratio', 'memory of three', 'of one',
-                 'ratio', 'start of three', 'of one', 'ratio'], lines))
+    return ('`scene` beside `crank_driver`, `kinematics` and `servo_inverse`, and beside a floor, '
+            'a timer that publishes ready joint states; joint states heard: CPU time of all '
+            'processes [us a tick], their proportional memory [MiB], seconds from the start to '
+            'the first joint states of all; ratios of one to three.\n\n' + table(
+                ['scene', 'Hz', 'CPU of floor', 'of three', 'of one', 'ratio', 'memory of floor',
+                 'of three', 'of one', 'ratio', 'start of floor', 'of three', 'of one', 'ratio'],
+                lines))
 
 
 def drivers(rows):

@@ -57,13 +57,14 @@ class Timed(Node):
 
     def __init__(self):
         super().__init__('timed', automatically_declare_parameters_from_overrides=True)
-        (topic, (type_, depth, self._text)), = self.ready.items()
-        self._publisher = self.create_publisher(type_, topic, depth)
+        self._out = [(self.create_publisher(type_, topic, depth), text)
+                     for topic, (type_, depth, text) in self.ready.items()]
         self.create_timer(1.0 / self.get_parameter('rate').value, self._tick)
 
     @scene_node.until_the_end
     def _tick(self):
-        self._publisher.publish(self._text)
+        for publisher, text in self._out:
+            publisher.publish(text)
 
 
 class Deaf(Node):

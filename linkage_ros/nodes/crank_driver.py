@@ -7,7 +7,6 @@ import sys
 from time import monotonic_ns, time_ns
 from typing import NamedTuple
 
-import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
@@ -127,7 +126,7 @@ class CrankDriver(scene_node.SceneNode):
         now = self._settled()
         if self._publisher.is_heard:
             positions, speeds = zip(*[self._said(key, drive, now) for key, drive in self._told])
-            self._wire.send(pack(Stamp(*divmod(now, SECOND))), np.array(positions + speeds))
+            self._wire.send(pack(Stamp(*divmod(now, SECOND))), positions + speeds)
 
     def _said(self, key, drive, now):
         """Return where an input is and how fast, as its source tells it."""

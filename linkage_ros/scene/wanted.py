@@ -15,7 +15,7 @@ import numpy as np
 from .drive import Drive, in_words
 from .machine import Machine
 from ..linkage.inputs import Arc
-from ..linkage.servo import CLOSE, Mechanism
+from ..linkage.servo import CLOSE
 from ..linkage.several import Answer
 from ..words import listed
 
@@ -94,7 +94,7 @@ class Wanted:
 
     def _solver(self, many: bool, follows: bool) -> Callable:
         """Return what solves; for many values machine code follows it, where llvmlite is."""
-        def made_of(linkage: Mechanism) -> Callable:
+        def made_of(linkage: Any) -> Callable:
             return linkage.servo_solver(self._name, follows, bool(self._ends))
 
         def hasten() -> None:
