@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from functools import cached_property
 import math
-from threading import Thread
 from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
 from .drive import Drive, in_words
 from .machine import Machine
+from ..formula.program import beside
 from ..linkage.inputs import Arc
 from ..linkage.servo import CLOSE
 from ..linkage.several import Answer
@@ -98,16 +98,13 @@ class Wanted:
             return linkage.servo_solver(self._name, follows, bool(self._ends))
 
         def hasten() -> None:
-            try:
-                quick = made_of(self._linkage.accelerated())
-                quick(np.zeros(1), *(0.0,) * follows, *self._ends)
-            except ImportError:
-                return
+            quick = made_of(self._linkage.accelerated())
+            quick(np.zeros(1), *(0.0,) * follows, *self._ends)
             self._solvers[many, follows] = quick
 
         solver = self._solvers[many, follows] = made_of(self._linkage)
         if many:
-            Thread(target=hasten, name='linkage_ros compiler').start()
+            beside(hasten)
         return solver
 
     def commanded(self, values: Sequence[float], speeds: Optional[Sequence[float]],
