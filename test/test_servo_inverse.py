@@ -7,6 +7,7 @@ import array
 import cmath
 import math
 import re
+import threading
 from types import SimpleNamespace
 
 import numpy as np
@@ -200,6 +201,25 @@ def test_the_lever_by_its_name_is_the_same_to_the_last_bit(graph):
     for angles in ([], near):
         unnamed, named = (ask(node, wanted, angles, output) for output in ('', 'lever'))
         assert repr(unnamed) == repr(named) and named.reachable == [True, True, True, False]
+
+
+def test_many_angles_at_once_are_answered_like_each_alone(graph):
+    node = graph.start(ServoInverse, SWEPT)
+    wanted = np.linspace(-0.5, 0.5, 600).tolist()
+    alone = [ask(node, [each]) for each in wanted]
+
+    def check():
+        many = ask(node, wanted)
+        assert not many.success and many.message
+        assert many.reachable == [one.success for one in alone]
+        for field in ('servo_angle', 'reduction'):
+            np.testing.assert_allclose(
+                getattr(many, field), [getattr(one, field)[0] for one in alone], rtol=1e-12)
+
+    check()
+    # Machine code is made meanwhile, where llvmlite is, and answers then.
+    graph.until(lambda: 'linkage_ros compiler' not in {t.name for t in threading.enumerate()})
+    check()
 
 
 def test_an_answer_lies_in_the_sweep_or_the_reason_says_which_end_forbids(graph):

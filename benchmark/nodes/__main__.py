@@ -8,7 +8,7 @@ What the nodes cost, next to what any node costs, in the same run.
     python -m benchmark.nodes --quick     a look, within a minute or two
     python -m benchmark.nodes --soak      memory over a million messages
     python -m benchmark.nodes --hold      a minute at 1000 Hz
-    python -m benchmark.nodes --processes a scene in one process, and in three
+    python -m benchmark.nodes --processes a scene in one process, and in three; its driver
     python -m benchmark.nodes --stream    commands for actuators
     python -m benchmark.nodes --trouble   ten minutes of changes, bad bytes and stalled listeners
 
@@ -90,8 +90,9 @@ def run(options):
             if options.stream:
                 return {'stream': stream.compare(bench, campaign.RATES)}
             if options.processes:
-                return {'processes': [row for scene in scenes.SCENES for rate in (50.0, 200.0)
-                                      for row in processes.compare(bench, scene, rate)]}
+                return {what: [row for scene in scenes.SCENES for rate in (50.0, 200.0)
+                               for row in measure(bench, scene, rate)] for what, measure in (
+                    ('processes', processes.compare), ('drivers', processes.drive))}
             rates = (1000.0,) if options.quick else campaign.RATES
             rows, bodies = [], []
             for scene in scenes.SCENES:

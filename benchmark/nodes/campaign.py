@@ -181,6 +181,7 @@ class Bench:
                  'round_trips': [statistics.median(times) for times, _ in found[1:]],
                  'p50': statistics.median(statistics.median(times) for times, _ in found[1:]),
                  'p99': float(np.percentile(np.concatenate([t for t, _ in found[1:]]), 99)),
+                 'cpus': [cpu for _, cpu in found[1:]],
                  'cpu': statistics.median(cpu for _, cpu in found[1:])}
                 for name, found in bursts.items()]
 

@@ -50,6 +50,23 @@ class Floor(Node):
             publisher.publish(text)
 
 
+class Timed(Node):
+    """Publishes ready bytes at a rate."""
+
+    ready = {}
+
+    def __init__(self):
+        super().__init__('timed', automatically_declare_parameters_from_overrides=True)
+        self._out = [(self.create_publisher(type_, topic, depth), text)
+                     for topic, (type_, depth, text) in self.ready.items()]
+        self.create_timer(1.0 / self.get_parameter('rate').value, self._tick)
+
+    @scene_node.until_the_end
+    def _tick(self):
+        for publisher, text in self._out:
+            publisher.publish(text)
+
+
 class Deaf(Node):
     """Does nothing at each crank message."""
 
@@ -153,7 +170,8 @@ class Fresh(Kinematics):
 
 
 KINDS = {'kinematics': Kinematics, 'fresh': Fresh, 'floor': Floor, 'relay': Relay,
-         'deaf': Deaf, 'raw': Raw, 'trigger': Triggered, 'echo': Echoed, 'ear': Ear}
+         'timed': Timed, 'deaf': Deaf, 'raw': Raw, 'trigger': Triggered, 'echo': Echoed,
+         'ear': Ear}
 # The parts of the work of a tick.
 PARTS = {'read': [(joint_state_reader.Reader, 'read')],
          'solve': [(kinematics.Model, 'solve')], 'patch': [(message_layout.Template, 'patched')],
@@ -218,7 +236,7 @@ def main():
     parser.add_argument('--times', type=Path, help='where to write how long its parts took')
     options = parser.parse_args(remove_ros_args()[1:])
     if options.ready:
-        Floor.ready = Ear.ready = ready(pickle.loads(options.ready.read_bytes()))
+        Floor.ready = Timed.ready = Ear.ready = ready(pickle.loads(options.ready.read_bytes()))
     times = Times() if options.times else None
     executor = SingleThreadedExecutor if options.single else scene_node.Executor
     own = len(remove_ros_args())

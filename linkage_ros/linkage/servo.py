@@ -167,19 +167,26 @@ class Mechanism(Several):
             In the shape of value and near broadcast; NaN where there is none.
 
         """
-        lever, kind = self._has_lever(output), (near is not None, ends is not None)
-        limits: Tuple[Any, ...] = ((near,) if kind[0] else ()) + (ends or ())
+        limits: Tuple[Any, ...] = (() if near is None else (near,)) + (ends or ())
+        return self.servo_solver(output, near is not None, ends is not None)(value, *limits)
+
+    def servo_solver(self, output: str, follows: bool, ended: bool) -> Callable:
+        """Return `servo_for` of an output: a function of value and, if so, near and the ends."""
+        lever = self._has_lever(output)
         if lever and self._is_free:
-            return self._solved_by(_lever_taken, output, *kind)(value, *limits)
-        theta, rates = self.servos(output, value)
+            return self._solved_by(_lever_taken, output, follows, ended)
         first = self.inputs[0]
         size, rounding = first.size, GRAZE * (
             math.pi if self._structure.turns(output) else self.longest)
-        choice = _choice(theta.shape[-1], lever, first.turns, *kind)
-        taken, rate = choice.over(*np.moveaxis(theta / size, -1, 0),
-                                  *np.moveaxis(rates * size, -1, 0), rounding,
-                                  *(np.divide(limit, size) for limit in limits))
-        return taken * size, rate / size
+
+        def solve(value: ArrayLike, *limits: Any) -> Sequence:
+            theta, rates = self.servos(output, value)
+            choice = _choice(theta.shape[-1], lever, first.turns, follows, ended)
+            taken, rate = choice.over(*np.moveaxis(theta / size, -1, 0),
+                                      *np.moveaxis(rates * size, -1, 0), rounding,
+                                      *(np.divide(limit, size) for limit in limits))
+            return taken * size, rate / size
+        return solve
 
     def _has_lever(self, output: str) -> bool:
         return (len(self.inputs) == 1 and isinstance(output, str)
@@ -193,7 +200,7 @@ class Mechanism(Several):
     def _solved_by(self, draw: Callable, *args: Any) -> Pose:
         """Return the code that solves for a lever in some way."""
         return self._remembered(draw.__name__, args, lambda: draw(
-            self._structure, *args).bind(self._lengths, self._evaluated))
+            self._structure, *args).bind(self._lengths, self._evaluated, self._accelerate))
 
     def _rates_at(self, output: str, theta: np.ndarray) -> np.ndarray:
         """Return d output / d input."""
@@ -246,6 +253,14 @@ def _lever_all(structure: Structure, name: str) -> Program:
 @lru_cache(maxsize=64)
 def _lever_taken(structure: Structure, name: str, follows: bool, ended: bool) -> Program:
     """Return the code for the crank angle that is taken for a lever's angle, and its rate."""
+    if not (follows or ended):
+        # Chosen before its angle is worked out, which takes longest.
+        first, other = _levers(structure)[name]
+        theta = arctangent(*(where(first.held, *sides) for sides in zip(
+            first.theta.operands, other.theta.operands)))
+        found = where(first.held, 1.0, where(other.held, 1.0, -1.0))
+        return Program([gated(theta, found, 0.0),
+                        gated(where(first.held, first.rate, other.rate), found, 0.0)])
     return _taken(_levers(structure)[name], True, True, real(GRAZE * math.pi), follows, ended, 1)
 
 

@@ -4,14 +4,15 @@
 """Node that moves the inputs of a scene: turns its cranks, pushes and pulls its cylinders."""
 
 import sys
-from time import monotonic_ns
+from time import monotonic_ns, time_ns
+from typing import NamedTuple
 
-import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from . import scene_node
+from .heard import Topic
 from .message_layout import pack, Wire
 from .messages import JointStates
 from .. import scene
@@ -24,6 +25,15 @@ JUMP = 10 ** 8
 # In thirty years [ns] nobody waits for the next message.
 LONGEST_PERIOD = 1e18
 
+SECOND = 10 ** 9
+
+
+class Stamp(NamedTuple):
+    """A time as it is in a message."""
+
+    sec: int
+    nanosec: int
+
 
 class CrankDriver(scene_node.SceneNode):
     """
@@ -34,17 +44,22 @@ class CrankDriver(scene_node.SceneNode):
     beside : sequence of rclpy.node.Node
         Nodes of the same process: they are handed the messages if nobody else hears the topic.
 
+    Attributes
+    ----------
+    system_time : callable
+        What time it is [ns], where no other is simulated.
+
     """
+
+    system_time = staticmethod(time_ns)
 
     def __init__(self, beside=(), **kwargs):
         super().__init__(scene.DRIVER, **kwargs)
         self._motions = {}
-        self._drives, self._machines = {}, {}
+        self._drives, self._machines, self._told = {}, {}, []
         self._now = self._steady = None
         self._names, self._wire = [], None
-        self._publisher = self.create_publisher(JointState, 'crank_states', 10)
-        if beside:
-            self._publisher = HandedOver(self._publisher, beside)
+        self._publisher = HandedOver(self, 'crank_states', beside)
         self._timer = self.create_timer(1.0, self._tick)
         # On system time a timer sleeps until an old time comes round again, if that is set back.
         self.create_timer(1.0, self._wake, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -52,7 +67,7 @@ class CrankDriver(scene_node.SceneNode):
 
     def adopt(self, new):
         """Let every input go on as the scene says: from where it is, or from a new start."""
-        now = 0 if self._now is None else self._settled().nanoseconds
+        now = 0 if self._now is None else self._settled()
         drives = {(name, input_): drive for name, machine in new.machines.items()
                   for input_, drive in machine.inputs.items()}
         for key, drive in drives.items():
@@ -62,7 +77,10 @@ class CrankDriver(scene_node.SceneNode):
             elif (old.speed, old.sweep) != (drive.speed, drive.sweep):
                 self._motions[key] = self._motions[key].changed(drive.speed, drive.sweep, now)
         self._drives, self._machines = drives, new.machines
-        self._name(list(dict.fromkeys(drive.source for drive in drives.values())))
+        # Of inputs with one source the last is told of.
+        told = {drive.source: (key, drive) for key, drive in drives.items()}
+        self._told = list(told.values())
+        self._name(list(told))
         self._pace(new.rate)
 
     def _name(self, sources):
@@ -85,12 +103,14 @@ class CrankDriver(scene_node.SceneNode):
             self._timer.reset()
 
     def _time(self):
-        return self.get_clock().now()
+        """Return the time [ns], and whether it is simulated."""
+        clock = self.get_clock()
+        simulated = clock.ros_time_is_active
+        return clock.now().nanoseconds if simulated else self.system_time(), simulated
 
     def _settled(self):
-        """Return the time; where it jumps, every input goes on from where it is."""
-        time, steady = self._time(), monotonic_ns()
-        now, simulated = time.nanoseconds, self.get_clock().ros_time_is_active
+        """Return the time [ns]; where it jumps, every input goes on from where it is."""
+        (now, simulated), steady = self._time(), monotonic_ns()
         reached = 0
         if self._now is not None:
             reached = self._now if simulated else self._now + steady - self._steady
@@ -99,16 +119,14 @@ class CrankDriver(scene_node.SceneNode):
         if self._now is None or now < self._now or leapt:
             self._motions = {n: m.moved(reached, now) for n, m in self._motions.items()}
         self._now, self._steady = now, steady
-        return time
+        return now
 
     @scene_node.until_the_end
     def _tick(self):
-        time = self._settled()
-        now = time.nanoseconds
-        if self._publisher.get_subscription_count():
-            said = {drive.source: self._said(key, drive, now)
-                    for key, drive in self._drives.items()}
-            self._wire.send(pack(time.to_msg()), np.ravel([*zip(*said.values())]))
+        now = self._settled()
+        if self._publisher.is_heard:
+            positions, speeds = zip(*[self._said(key, drive, now) for key, drive in self._told])
+            self._wire.send(pack(Stamp(*divmod(now, SECOND))), positions + speeds)
 
     def _said(self, key, drive, now):
         """Return where an input is and how fast, as its source tells it."""
@@ -123,33 +141,44 @@ class CrankDriver(scene_node.SceneNode):
         return f'moves {listed(sources, 200)} on crank_states at {self.scene.rate:g} Hz'
 
     def _wake(self):
-        set_back = self._now is not None and self._time().nanoseconds < self._now
+        set_back = self._now is not None and self._time()[0] < self._now
         if set_back and self.scene.rate:
             self._timer.reset()
 
 
 class HandedOver:
     """
-    A topic whose messages the nodes of this process take at once, and all others over the wire.
+    Joint states that the nodes of this process take at once, and all others over the wire.
 
-    As long as others hear it, these nodes do as the others do: then each message comes once.
+    As long as others hear them, these nodes do as the others do: then each message comes once.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        Who publishes them.
+    name : str
+        Their topic.
+    nodes : sequence of rclpy.node.Node
+        Who else is in this process.
 
     """
 
-    def __init__(self, publisher, nodes):
-        self.topic_name = publisher.topic_name
-        self._publisher = publisher
-        self._ears = [subscription for node in nodes for subscription in node.subscriptions
-                      if subscription.topic_name == self.topic_name]
+    def __init__(self, node, name, nodes):
+        path = node.resolve_topic_name(name)
+        self._ears = [subscription for other in nodes for subscription in other.subscriptions
+                      if subscription.topic_name == path]
+        self._topic = Topic(node, JointState, name, 10, lambda: None, len(self._ears))
+        self.topic_name = path
 
-    def get_subscription_count(self) -> int:
-        """Return how many hear it."""
-        return self._publisher.get_subscription_count() or len(self._ears)
+    @property
+    def is_heard(self) -> bool:
+        """Whether there is anybody who hears them."""
+        return self._topic.is_heard or bool(self._ears)
 
     def publish(self, message):
         """Hand over or publish a message: bytes, or one that is not serialised yet."""
-        if self._publisher.get_subscription_count() > len(self._ears):
-            self._publisher.publish(message)
+        if self._topic.is_heard:
+            self._topic.publish(message)
             return
         text = message if isinstance(message, bytes) else serialize_message(message)
         for subscription in self._ears:

@@ -3,8 +3,8 @@
 
 """Node that answers where inputs have to be to put a lever, or any outputs, where it is wanted."""
 
+from array import array
 import math
-from operator import itemgetter
 import sys
 
 import numpy as np
@@ -79,24 +79,26 @@ class ServoInverse(scene_node.SceneNode):
 
     def answer(self, request, response):
         """Fill in a response; what cannot be done is said in it, never raised."""
-        def fill():
-            key = request.mechanism, request.output
-            machine = _machine(self.scene, *key)
-            asked = self._known.get(key) or Wanted(machine, request.output)
-            solve(asked, request, response, present(machine, self._heard)[0])
-            self._known[key] = asked
-        return self._filled(fill, response)
+        return self._filled(self._answer, request, response)
+
+    def _answer(self, request, response):
+        key = request.mechanism, request.output
+        asked = self._known.get(key) or Wanted(_machine(self.scene, *key), request.output)
+        solve(asked, request, response, self._heard)
+        self._known[key] = asked
 
     def answer_together(self, request, response):
         """Fill in a response about several inputs; what cannot be done is said in it."""
-        return self._filled(lambda: solve_together(
-            _machine_together(self.scene, request.mechanism), request, response, self._heard),
-            response)
+        return self._filled(self._answer_together, request, response)
 
-    def _filled(self, fill, response):
+    def _answer_together(self, request, response):
+        solve_together(_machine_together(self.scene, request.mechanism), request, response,
+                       self._heard)
+
+    def _filled(self, fill, request, response):
         response.success = False
         try:
-            fill()
+            fill(request, response)
         except ValueError as problem:
             response.message = elided(str(problem), MESSAGE)
         except Exception as problem:
@@ -106,9 +108,9 @@ class ServoInverse(scene_node.SceneNode):
         return response
 
 
-def solve(asked, request, response, present=math.inf):
+def solve(asked, request, response, heard):
     """
-    Answer a request for values of an output, with the input at a present value if that is finite.
+    Answer a request for values of an output, near where the input was heard to be last.
 
     Raises
     ------
@@ -117,29 +119,40 @@ def solve(asked, request, response, present=math.inf):
 
     """
     wanted, near = request.lever_angle, request.servo_near
-    if not wanted:
+    n = len(wanted)
+    if not n:
         raise ValueError('lever_angle is empty; give at least one value')
-    if len(wanted) > MOST_VALUES:
-        raise ValueError(f'lever_angle has {len(wanted)} values; give up to {MOST_VALUES} at once')
-    if near and len(near) != len(wanted):
+    if n > MOST_VALUES:
+        raise ValueError(f'lever_angle has {n} values; give up to {MOST_VALUES} at once')
+    if near and len(near) != n:
         raise ValueError(f'servo_near must be empty or have one angle for each of the '
-                         f'{len(wanted)} in lever_angle, not {len(near)}')
-    if not all(-scene.FARTHEST <= theta <= scene.FARTHEST for theta in near):
-        raise ValueError(f'servo_near must be finite and within {scene.FARTHEST:g} '
-                         f'{asked.unit} of zero')
+                         f'{n} in lever_angle, not {len(near)}')
     # One angle is the usual question, and floats answer it sooner than arrays.
-    given = np.array if len(wanted) > 1 else itemgetter(0)
-    known = present if abs(present) <= scene.FARTHEST else None
-    found = asked.servo(given(wanted), asked.input_of(given(near)) if near else known)
-    response.servo_angle, response.reduction = map(_listed, found)
-    response.reachable = list(map(math.isfinite, response.servo_angle))
-    response.success = all(response.reachable)
-    response.message = '' if response.success else elided(_complaint(asked, [
-        value for value, reached in zip(wanted, response.reachable) if not reached]), MESSAGE)
-
-
-def _listed(found):
-    return np.ravel(found).tolist() if isinstance(found, np.ndarray) else [float(found)]
+    values = np.array(wanted) if n > 1 else wanted[0]
+    if near:
+        start = np.array(near) if n > 1 else near[0]
+        if not np.all(abs(start) <= scene.FARTHEST):
+            raise ValueError(f'servo_near must be finite and within {scene.FARTHEST:g} '
+                             f'{asked.unit} of zero')
+        start = asked.input_of(start)
+    else:
+        start = asked.present(heard)
+        if not abs(start) <= scene.FARTHEST:
+            start = None
+    theta, rate = asked.servo(values, start)
+    if n > 1:
+        finite = np.isfinite(theta)
+        response.servo_angle = array('d', theta.tobytes())
+        response.reduction = array('d', rate.tobytes())
+        response.success = bool(finite.all())
+        response.reachable = [True] * n if response.success else finite.tolist()
+    else:
+        response.servo_angle, response.reduction = [theta], [rate]
+        response.success = math.isfinite(theta)
+        response.reachable = [response.success]
+    if not response.success:
+        response.message = elided(_complaint(asked, [
+            value for value, reached in zip(wanted, response.reachable) if not reached]), MESSAGE)
 
 
 def _machine(scene_, name, output):

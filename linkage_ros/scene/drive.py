@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 import math
 from typing import Iterable, Optional, Tuple
 
@@ -77,7 +78,7 @@ class Drive:
     measures: str = ''
     period: int = 1
 
-    @property
+    @cached_property
     def is_plain(self) -> bool:
         """Whether its source tells the input as it is."""
         return (self.ratio, self.offset, self.measures) == (1.0, 0.0, '')

@@ -15,7 +15,7 @@ from typing import Optional, Tuple
 from . import Drive
 from ..linkage.inputs import Arc
 
-STEPS = 1 << 160
+STEPS, STEP = 1 << 160, 2.0 ** -160
 TURN = 62831853071795864769252867665590057683943387987502116 * STEPS // 10 ** 52
 
 
@@ -54,16 +54,18 @@ class Motion:
         self._sweep = sweep
         self._turns, self._round = turns, period * TURN
         self._low, high = (0, self._round) if sweep is None else map(_steps, sweep)
-        self._width = high - self._low
+        self._width, self._end = high - self._low, high / STEPS
         self._period = self._round if sweep is None else 2 * self._width
         self._phase = self._place(_steps(start))
         self._since = since
 
     def at(self, now: int) -> Tuple[float, float]:
         """Return the value, an angle from 0 to its period or in the sweep, and its speed."""
-        travelled, ahead = self._fold(self._phase_at(now))
-        angle = (self._low + travelled) / STEPS
-        if self._sweep is None and angle >= self._round / STEPS:
+        travelled, ahead = self._fold((self._phase + self._rate * (now - self._since))
+                                      % self._period)
+        # To multiply by a power of two rounds nothing.
+        angle = float(self._low + travelled) * STEP
+        if self._sweep is None and angle >= self._end:
             # What is just below the period may round up to it.
             angle = 0.0
         return angle, self._speed if ahead else -self._speed or 0.0

@@ -7,18 +7,21 @@ from __future__ import annotations
 
 from functools import cached_property
 import math
-from typing import Any, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
 from .drive import Drive, in_words
 from .machine import Machine
+from ..formula.program import beside
 from ..linkage.inputs import Arc
 from ..linkage.servo import CLOSE
 from ..linkage.several import Answer
 from ..words import listed
 
 LEVER = 'lever'
+# From so many values at once on it is worth to have machine code made for the next ones.
+MANY = 256
 # Of several inputs, their actuators' positions and, where they are known, speeds.
 Command = Tuple[Sequence[float], Sequence[float], Optional[Sequence[float]]]
 
@@ -63,19 +66,46 @@ class Wanted:
         self._scale = machine.scale_of(self._name)
         self._input_scale = machine.scale_of(self._drive.input.name)
         self._ratio, self._offset = self._drive.actuator
+        # The ends of the sweep as the linkage counts them.
+        self._ends = tuple(end / self._input_scale for end in self._drive.ends or ())
+        self._is_plain = not self._offset and (
+            self._scale == self._input_scale == self._ratio == 1.0)
+        self._solvers: Dict[Tuple[bool, bool], Callable] = {}
 
     def input_of(self, position: Any) -> Any:
         """Return the input [rad or m] of its source's position."""
         return self._ratio * position + self._offset
 
+    def present(self, heard: Mapping[str, float]) -> float:
+        """Return where the input is, from what was heard last by source; inf where unknown."""
+        return present(self._machine, heard)[0] if self.source in heard else math.inf
+
     def servo(self, wanted: Any, near: Any) -> Tuple[Any, Any]:
         """Return for each value where the source has to be, and d output / d source there."""
-        unit, ends = self._input_scale, self._drive.ends
-        value, rate = self._linkage.servo_for(
-            self._name, wanted / self._scale, near if near is None else near / unit,
-            ends and (ends[0] / unit, ends[1] / unit))
+        kind = isinstance(wanted, np.ndarray) and wanted.size >= MANY, near is not None
+        solve = self._solvers.get(kind) or self._solver(*kind)
+        limits = self._ends if near is None else (near / self._input_scale, *self._ends)
+        if self._is_plain:
+            return solve(wanted, *limits)
+        value, rate = solve(wanted / self._scale, *limits)
+        unit = self._input_scale
         return ((value * unit - self._offset) / self._ratio,
                 rate * (self._scale / unit * self._ratio))
+
+    def _solver(self, many: bool, follows: bool) -> Callable:
+        """Return what solves; for many values machine code follows it, where llvmlite is."""
+        def made_of(linkage: Any) -> Callable:
+            return linkage.servo_solver(self._name, follows, bool(self._ends))
+
+        def hasten() -> None:
+            quick = made_of(self._linkage.accelerated())
+            quick(np.zeros(1), *(0.0,) * follows, *self._ends)
+            self._solvers[many, follows] = quick
+
+        solver = self._solvers[many, follows] = made_of(self._linkage)
+        if many:
+            beside(hasten)
+        return solver
 
     def commanded(self, values: Sequence[float], speeds: Optional[Sequence[float]],
                   near: Sequence[float], jumps: bool = False) -> Command:
