@@ -169,6 +169,18 @@ def test_a_sweep_is_followed_though_the_crank_was_started_elsewhere(graph):
     assert graph.set(driver, lever__crank__start=2.5).successful
 
 
+def test_of_values_that_change_and_change_back_the_last_holds(graph):
+    service = graph.start(ServoInverse, LEVER)
+    publisher = graph.node.create_publisher(ParameterEvent, TOPIC, LATCHED)
+    scale = 'lever.scale'
+    for values in ({'mechanisms': ['lever'], A: 80.0, scale: 1.0}, {A: 90.0}, {A: 80.0},
+                   {scale: 2.0}):
+        publisher.publish(ParameterEvent(node='/owner', changed_parameters=[
+            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]))
+    graph.until(lambda: of(service, scale) == 2.0)
+    assert of(service) == 80.0
+
+
 def test_announcements_that_make_no_sense_are_passed_over(graph, warned):
     service = graph.start(ServoInverse, LEVER)
     publisher = graph.node.create_publisher(ParameterEvent, TOPIC, LATCHED)

@@ -9,6 +9,7 @@ What the nodes cost, next to what any node costs, in the same run.
     python -m benchmark.nodes --soak      memory over a million messages
     python -m benchmark.nodes --hold      a minute at 1000 Hz
     python -m benchmark.nodes --processes a scene in one process, and in three; its driver
+    python -m benchmark.nodes --growth    1 to 1000 mechanisms and 1 to 100 legs, in six minutes
     python -m benchmark.nodes --stream    commands for actuators
     python -m benchmark.nodes --trouble   ten minutes of changes, bad bytes and stalled listeners
 
@@ -49,6 +50,10 @@ def main():
     tables = report.document(result)
     if options.document:
         document.write('performance.md', tables)
+        if 'growth' in result:
+            from . import growth_plot
+
+            growth_plot.draw(result['growth'], document.DOCS / 'images' / 'growth.png')
     print(tables)
 
 
@@ -61,6 +66,7 @@ def arguments():
     mode.add_argument('--hold', type=float, nargs='?', const=60.0, metavar='SECONDS')
     mode.add_argument('--trouble', type=float, nargs='?', const=600.0, metavar='SECONDS')
     mode.add_argument('--processes', action='store_true', help='one process against three')
+    mode.add_argument('--growth', action='store_true', help='1 to 1000 mechanisms')
     mode.add_argument('--stream', action='store_true', help='commands for actuators')
     mode.add_argument('--tables', action='store_true', help='run nothing, show the last results')
     parser.add_argument('--document', action='store_true', help='write the tables to docs/')
@@ -73,7 +79,7 @@ def run(options):
     """Return the parts of the result that were asked for."""
     from benchmark.machine import machine
 
-    from . import campaign, driving, long, processes, scenes, stream
+    from . import campaign, driving, growth, long, processes, scenes, stream
 
     started = time.time()
     driver = driving.Driver()
@@ -87,6 +93,8 @@ def run(options):
                 return {'hold': long.hold(bench, 1000.0, options.hold)}
             if options.trouble:
                 return {'trouble': long.trouble(bench, options.trouble)}
+            if options.growth:
+                return {'growth': growth.grow(bench)}
             if options.stream:
                 return {'stream': stream.compare(bench, campaign.RATES)}
             if options.processes:

@@ -43,6 +43,11 @@ class Process:
         """Return the CPU time of all its threads [s]."""
         return time.clock_gettime(self._clock)
 
+    def executor(self) -> float:
+        """Return the CPU time of the thread that it began with [s]."""
+        with open(f'/proc/{self._process.pid}/task/{self._process.pid}/schedstat') as text:
+            return 1e-9 * int(text.read().split()[0])
+
     def resident(self) -> int:
         """Return its resident set size [bytes]."""
         return resident(self._process.pid)

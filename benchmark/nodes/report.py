@@ -6,6 +6,8 @@
 import statistics
 
 WALKER = '12 legs'
+# The nodes that grow.
+KINEMATICS, BARE = 'kinematics', 'bare'
 NAMES = {
     'kinematics': 'kinematics', 'floor': 'floor (a): as many ready bytes',
     'fresh': 'ordinary messages (b)', 'relay': 'numerical relay (c), one leg, joint states',
@@ -40,6 +42,8 @@ def document(result):
         parts += ['### The driver alone', drivers(result['drivers'])]
     if 'stream' in result:
         parts += ['### Commands', stream(result['stream'])]
+    if 'growth' in result:
+        parts += ['### Growth', growth(result['growth'])]
     if {'soak', 'hold', 'trouble'} & result.keys():
         parts += ['### At length', long(result)]
     return '\n\n'.join(parts) + '\n'
@@ -266,6 +270,32 @@ def stream(rows):
     return ('`servo_inverse` turns `wanted_states` into `servo_commands`: CPU time of the process '
             '[us a command], and as a ratio to a bare node that sends as many ready bytes.\n\n'
             + table(['wanted', 'Hz', 'CPU', 'x floor'], lines))
+
+
+def grown(rows):
+    """Return the rows of both nodes that grow, scene by scene."""
+    found = {(row['scene'], row['subject']): row for row in rows}
+    return [(row, found[row['scene'], BARE]) for row in rows if row['subject'] == KINEMATICS]
+
+
+def growth(rows):
+    """Return what a scene costs as it grows."""
+    lines = []
+    for own, bare in grown(rows):
+        line = [own['scene'], own['parameters']]
+        for what, digits in (('ticks', 0), ('cpu', 0), ('memory', 0), ('begun', 2), ('start', 2)):
+            line += [f'{statistics.median(own[what]):.{digits}f}',
+                     f'{in_turn(own[what], bare[what]):.2f}']
+        lines.append([*line, *(f'{statistics.median(own[what]):.1f}'
+                               for what in ('changed', 'held'))])
+    return ('![CPU time, memory, start and a change over mechanisms](images/growth.png)\n\n'
+            'Joint states of all mechanisms are heard. Body of a tick in a loop and CPU time of '
+            'the process [us a message], proportional memory [MiB], CPU time and time of a start '
+            'to the first joint states of all [s], each with its ratio to a bare node of as many '
+            'publishers, parameters and bytes; the time until a change of a scale is answered, '
+            'and how long of that the executor is busy [ms].\n\n' + table(
+                ['scene', 'parameters', 'body', 'x bare', 'CPU', 'x bare', 'memory', 'x bare',
+                 'CPU of the start', 'x bare', 'start', 'x bare', 'change', 'executor'], lines))
 
 
 def long(result):

@@ -52,7 +52,7 @@ class Design:
         """Whether a length is written as a number, so that all count in metres."""
         return joint_lines.has_literal_lengths(self.lines)
 
-    @property
+    @cached_property
     def branches(self) -> dict:
         """The assembly sign, +1 or -1, of each joint that has two."""
         return joint_lines.branches(self.lines)

@@ -158,7 +158,8 @@ class Mechanism:
         """
         if not find_spec('llvmlite'):
             raise ImportError('accelerated() needs llvmlite: pip install llvmlite')
-        return type(self)(self._design, self._structure, self.dimensions, self.branches, True)
+        return self.remembered('accelerated', (), lambda: type(self)(
+            self._design, self._structure, self.dimensions, self.branches, True))
 
     def solve(self, theta: Inputs, points: Optional[Sequence[str]] = None) -> dict:
         """
@@ -283,7 +284,7 @@ class Mechanism:
             If not every other input is given, or a dimension is an array.
 
         """
-        return list(self._remembered('reach', others, lambda: self._arcs(others)))
+        return list(self.remembered('reach', others, lambda: self._arcs(others)))
 
     def _arcs(self, others: Tuple[float, ...]) -> List[Arc]:
         _, margins = self._ready('margins', ())
@@ -299,7 +300,7 @@ class Mechanism:
             self._structure.built.limits, self._value,
             lambda theta: self._ready('points', None)[1].searched(theta, *others))]
 
-    def _remembered(self, what: str, about: tuple, find: Callable) -> Any:
+    def remembered(self, what: str, about: tuple, find: Callable) -> Any:
         """Return what was found before, or find it."""
         key = what, *about
         return self._found[key] if key in self._found else keep(self._found, key, find())

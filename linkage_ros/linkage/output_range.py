@@ -33,9 +33,9 @@ def common_reach(assembly: Assembly) -> Sequence[Arc]:
 
 def ground_frame(linkage: Mechanism) -> Dict[str, Tuple[float, float]]:
     """Return where the joints on the ground lie [m]."""
-    anywhere = [0.0] * len(linkage.inputs)
-    return {name: tuple(place.ravel().tolist())
-            for name, place in linkage.solve(anywhere, linkage.grounded).items()}
+    return linkage.remembered('ground', (), lambda: {
+        name: tuple(place.ravel().tolist()) for name, place in linkage.solve(
+            [0.0] * len(linkage.inputs), linkage.grounded).items()})
 
 
 def travels(linkage: Mechanism, reach: Sequence[Arc]) -> Dict[str, Optional[Travel]]:
@@ -67,9 +67,9 @@ def travels(linkage: Mechanism, reach: Sequence[Arc]) -> Dict[str, Optional[Trav
     if not slides:
         return {}
     names, turning = list(slides), ~np.array(list(slides.values()), bool)
-    found = np.array([extremes(
+    found = linkage.remembered('travels', tuple(reach), lambda: np.array([extremes(
         lambda theta: np.stack([*linkage.joint_angles(theta, names).values()]), *arc, turning)
-        for arc in reach])
+        for arc in reach]))
     slack = np.where(turning, SLACK, SLACK * float(linkage.longest))
     lows, highs = found[:, :, 0, 0].min(axis=0) - slack, found[:, :, 1, 0].max(axis=0) + slack
     return {name: None if turns and not -math.pi < lo < hi <= math.pi else (lo, hi)

@@ -199,7 +199,7 @@ class Mechanism(Several):
 
     def _solved_by(self, draw: Callable, *args: Any) -> Pose:
         """Return the code that solves for a lever in some way."""
-        return self._remembered(draw.__name__, args, lambda: draw(
+        return self.remembered(draw.__name__, args, lambda: draw(
             self._structure, *args).bind(self._lengths, self._evaluated, self._accelerate))
 
     def _rates_at(self, output: str, theta: np.ndarray) -> np.ndarray:

@@ -194,7 +194,7 @@ class Several(Analysed):
             raise ValueError(f'{self.type} has {len(self.inputs)} inputs: as many outputs are '
                              f'needed, got {listed(outputs)}')
         names = tuple(outputs)
-        return self._each('values', values), self._remembered(
+        return self._each('values', values), self.remembered(
             'equations', names, lambda: self._equations(names))
 
     def _equations(self, names: Names) -> _Equations:

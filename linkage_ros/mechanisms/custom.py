@@ -4,7 +4,7 @@
 """Linkages that users write down themselves; see `linkage.joint_lines` for the words."""
 
 from collections.abc import Mapping, Set
-from functools import lru_cache, partial
+from functools import partial
 from itertools import islice
 from typing import Any, Iterable, List, Optional, Tuple
 
@@ -13,12 +13,13 @@ import numpy as np
 from ..linkage import joint_lines
 from ..linkage.design import Design
 from ..linkage.mechanism import check_bars, Mechanism
+from ..linkage.shared import Shared
 from ..words import listed, quoted
 
 MOST_LINES = 2000
 
 
-@lru_cache(maxsize=64)
+@partial(Shared, latest=64)
 def design(joints: Tuple[str, ...], tracer: Optional[str], names: Tuple[str, ...]) -> Design:
     """
     Return the design that lines of joints make.

@@ -3,6 +3,7 @@
 
 """Node that publishes joint angles, markers, loci and robot models of a scene's mechanisms."""
 
+from functools import cached_property, partial
 from itertools import combinations
 import math
 import sys
@@ -43,7 +44,7 @@ class Kinematics(scene_node.SceneNode):
 
     def __init__(self, **kwargs):
         # A scene that cannot be read ends the node before there is anything to show.
-        self._mechanisms = {}
+        self._mechanisms, self._models = {}, {}
         self._drawing, self._ended = Lock(), False
         super().__init__(scene.KINEMATICS, **kwargs)
         # Each input that a source tells of, by the source's name.
@@ -64,6 +65,8 @@ class Kinematics(scene_node.SceneNode):
         self._patience = self.create_timer(
             PATIENCE, self._miss, clock=Clock(clock_type=ClockType.STEADY_TIME), autostart=False)
         self.begin()
+        self._later += [*(partial(self._first_picture, shown)
+                          for shown in self._mechanisms.values()), self._first_robot]
         try:
             next(iter(self.scene.machines.values())).linkage.accelerated()
         except ImportError as error:
@@ -80,13 +83,34 @@ class Kinematics(scene_node.SceneNode):
         models = {name: self._mechanisms[name].prepared(
             machine, machine.frame_id or new.frame_id, new.frame_prefix)
             for name, machine in new.machines.items()}
+        return models, self._robot(models) if self._models else ''
+
+    def _robot(self, models):
+        """Return the robot model of the whole scene, if there is one."""
         # Where only named joints are published, they are in a robot model of somebody else's.
         robots = [model.robot for model in models.values() if not model.machine.only_named]
         try:
-            return models, urdf.write(bodies.together(robots)) if robots else ''
+            return urdf.write(bodies.together(robots)) if robots else ''
         except scene.SceneError as error:
             self.get_logger().info(f'no robot_description of the whole scene: {error}', once=True)
-            return models, ''
+            return ''
+
+    def _first_picture(self, shown):
+        """Make what is shown but once of a mechanism; return what publishes it."""
+        shown.finish()
+        return partial(self._while_drawing, shown.picture)
+
+    def _first_robot(self):
+        """Make the robot model of the scene; return what publishes it, if it is that still."""
+        models = self._models
+        robot = self._robot(models)
+        return partial(self._while_drawing, lambda: models is self._models and
+                       self._whole.describe(robot))
+
+    def _while_drawing(self, act):
+        with self._drawing:
+            if not self._ended:
+                act()
 
     def adopt(self, prepared):
         """Show the mechanisms so from now on."""
@@ -97,6 +121,7 @@ class Kinematics(scene_node.SceneNode):
             self._forget_ticks()
             self._own = frozenset(called.name for model in models.values()
                                   for called in model.machine.joints.values())
+            self._models = models
             for name, model in models.items():
                 self._mechanisms[name].adopt(model)
             self._whole.describe(robot)
@@ -338,7 +363,6 @@ class Model:
         self.machine, self.made_for = machine, (machine, frame_id, prefix)
         self.drives = list(machine.inputs.values())
         self.robot = bodies.robot([machine], frame_id)
-        self.description = urdf.write(self.robot)
         self.assembly = machine.assembly()
         self._names, self._signs, self._offsets, self._published, self._taken = map(
             np.array, zip(*machine.joints.values()))
@@ -347,11 +371,22 @@ class Model:
         size = bodies.size(machine)
         self._points, shown = _shown(machine)
         self.drawn = *drawn, size, shown, 1 + machine.mirrored
-        self.marker_array = messages.Markers(*self.drawn)
         self.joint_state = messages.JointStates()
-        curve = self.assembly.locus(machine.tracer)
-        self.locus = messages.locus(*drawn, curve, size) if len(curve) > 1 else None
-        self._solutions, self._changes, self._wires = {}, {}, {}
+        self._solutions, self._changes, self._wires, self.once = {}, {}, {}, None
+
+    @cached_property
+    def marker_array(self):
+        """The markers' message."""
+        return messages.Markers(*self.drawn)
+
+    def finish(self):
+        """Return what is shown but once, the robot model and the locus, and keep it till then."""
+        if not self.once:
+            *drawn, size = self.drawn[:4]
+            curve = self.assembly.locus(self.machine.tracer)
+            self.once = (urdf.write(self.robot),
+                         messages.locus(*drawn, curve, size) if len(curve) > 1 else None)
+        return self.once
 
     def solution(self, joints: bool, markers: bool, moving: bool):
         """Return what solves the legs for those who listen."""
@@ -490,6 +525,7 @@ class MechanismPublisher:
         # A logger of its own: what is throttled is the warnings of this mechanism alone.
         self._logger = node_.get_logger().get_child(name)
         self._model, self._pose, self._driven = None, None, None
+        self._pictured = self._described = None
         self._stamp = NEVER
         # Values and speeds of the inputs, and which of them are known.
         self._told = np.zeros((2, len(machine.inputs)))
@@ -502,6 +538,8 @@ class MechanismPublisher:
         if self._model and self._model.made_for == wanted:
             return self._model
         model = Model(*wanted)
+        if self._model:
+            model.finish()
         if driven := self._state():
             model.solution(*driven.wanted).finish()
             pose = model.solve(driven)
@@ -515,19 +553,32 @@ class MechanismPublisher:
         before, self._model = self._model, model
         if model is before:
             return
-        if not before or model.description != before.description:
-            self._description.publish(String(data=model.description))
-        self._draw_locus(model)
-        self._delete(self._drawn - model.marker_array.ids)
+        if before:
+            self.picture()
+            self._delete(self._drawn - model.marker_array.ids)
         self._driven = None
         self.show()
 
-    def _draw_locus(self, model):
-        if model.locus:
-            self._locus.publish(model.locus)
+    def finish(self):
+        """Make what is shown but once, if it is not shown yet."""
+        if self._model is not self._pictured:
+            self._model.finish()
+
+    def picture(self):
+        """Publish what is shown but once, if it is not yet."""
+        model = self._model
+        if model is self._pictured:
+            return
+        description, locus = model.finish()
+        self._pictured, model.once = model, None
+        if hash(description) != self._described:
+            self._described = hash(description)
+            self._description.publish(String(data=description))
+        if locus:
+            self._locus.publish(locus)
         elif self._curved:
             self._locus.publish(messages.deleted(self.name, messages.LOCUS_ID))
-        self._curved = bool(model.locus)
+        self._curved = bool(locus)
 
     def clear(self):
         """Take the markers and the locus out of the picture."""

@@ -8,13 +8,18 @@ What is asked for waits in a queue. A worker thread takes all that waits, judges
 hands the outcome over to the executor's thread, which acts on it and sends the answers, in order.
 """
 
+from collections import deque
 from dataclasses import dataclass
+from functools import partial
+from itertools import islice
 import threading
-from typing import Any, Callable, List, Mapping, Optional
+from typing import Any, Callable, Deque, Iterable, List, Mapping, Optional
 
-from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rcl_interfaces.srv import DescribeParameters, SetParameters, SetParametersAtomically
+from rclpy.exceptions import ParameterException
 from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_service import ParameterService
 
@@ -30,13 +35,15 @@ class Worker:
     A thread that works through a queue of what is asked for while there is something in it.
 
     `judge` is called there with all that waits; what it returns is called on the executor's
-    thread, and after it one answer after the other.
+    thread, and after it one answer after the other. What may be done later is done bit by bit
+    while nothing waits.
     """
 
     def __init__(self, node, judge: Callable[[list], Callable[[], None]]):
         self._node, self._judge = node, judge
         self._lock = threading.Lock()
         self._waiting: List[Asked] = []
+        self._later: Deque[Callable[[], Callable[[], None]]] = deque()
         self._thread: Optional[threading.Thread] = None
         self._ended = threading.Event()
 
@@ -44,9 +51,18 @@ class Worker:
         """Let something be worked on, after all that waits."""
         with self._lock:
             self._waiting.append(asked)
-            if self._thread is None and not self._ended.is_set():
-                self._thread = threading.Thread(target=self._run, daemon=True)
-                self._thread.start()
+            self._start()
+
+    def add_later(self, makes: Iterable[Callable[[], Callable[[], None]]]):
+        """Let something be made there, and what that returns be called as of `judge`."""
+        with self._lock:
+            self._later.extend(makes)
+            self._start()
+
+    def _start(self):
+        if self._thread is None and not self._ended.is_set():
+            self._thread = threading.Thread(target=self._run, daemon=True)
+            self._thread.start()
 
     def end(self):
         """Take nothing more, and wait for what is being worked on, but not for ever."""
@@ -57,20 +73,27 @@ class Worker:
             thread.join(PATIENCE)
 
     def _run(self):
-        while asked := self._take():
-            self._hand_over(self._judge(asked))
-            for number, one in enumerate(asked, 1):
-                self._hand_over(one.answer)
-                if number % BURST == 0:
-                    self._ended.wait(PAUSE)
+        while work := self._take():
+            work()
 
     def _take(self):
         with self._lock:
             asked, self._waiting = self._waiting, []
-            if not asked or self._ended.is_set():
+            if self._ended.is_set() or not (asked or self._later):
                 self._thread = None
-                return []
-            return asked
+                return None
+            return partial(self._answer, asked) if asked else partial(
+                self._make, self._later.popleft())
+
+    def _answer(self, asked):
+        self._hand_over(self._judge(asked))
+        for number, one in enumerate(asked, 1):
+            self._hand_over(one.answer)
+            if number % BURST == 0:
+                self._ended.wait(PAUSE)
+
+    def _make(self, make):
+        self._hand_over(make())
 
     def _hand_over(self, act):
         """Let the executor act, and wait until it has."""
@@ -115,6 +138,33 @@ class Asked:
     changes: List[Change]
     answer: Callable[[], None]
     names: List[str]
+
+
+def declare(node: Node, parameters: Mapping[str, Parameter],
+            descriptors: Mapping[str, ParameterDescriptor]) -> bool:
+    """
+    Declare parameters by name, all at once; return whether this client library lets that be.
+
+    Its own way checks and announces each by itself, which takes most of the time that a node of a
+    thousand mechanisms needs to start.
+    """
+    kept = [vars(node).get(name) for name in ('_parameters', '_descriptors')]
+    if not all(isinstance(one, dict) for one in kept):
+        return False
+    for one, new in zip(kept, (parameters, descriptors)):
+        one.update(new)
+    try:
+        if all(Node.get_parameter(node, name) is parameters[name]
+               and Node.describe_parameter(node, name) is descriptors[name]
+               for name in islice(parameters, 1)):
+            return True
+    except (AttributeError, ParameterException):
+        # It keeps them elsewhere.
+        pass
+    for one in kept:
+        for name in parameters:
+            del one[name]
+    return False
 
 
 class ParameterServer(ParameterService):

@@ -10,7 +10,7 @@ import gc
 from itertools import groupby
 from shlex import quote
 import sys
-from typing import Any, List, Mapping, NamedTuple
+from typing import Any, List, NamedTuple
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -29,7 +29,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from .ownership import Announcer, Follower
-from .parameter_server import Asked, Change, ParameterServer, Worker
+from .parameter_server import Asked, Change, declare, ParameterServer, Worker
 from .signals import Goodbye
 from .. import scene
 from ..scene import slider
@@ -65,9 +65,8 @@ def until_the_end(callback):
 
 
 class State(NamedTuple):
-    """What a node acts on: the values that were given, their scene, and what is made for it."""
+    """What a node acts on: a scene, and what is made for it."""
 
-    given: Mapping[str, Any]
     scene: scene.Scene
     prepared: Any
 
@@ -93,13 +92,15 @@ class SceneNode(Node):
         given = {key: scene.plain(p.value) for key, p in self._parameter_overrides.items()}
         with self._or_destroyed():
             self.scene = scene.read(given)
-        self._state = State(given, self.scene, None)
+        self._state = State(self.scene, None)
         own = [p for p in self.scene.parameters if name in p.field.readers]
         self.fields = {parameter.name: parameter.field for parameter in own}
-        for parameter in own:
-            self._declare(parameter)
+        self._declare(own)
         self._worker = Worker(self, self._judge)
         self._announcer = self._follower = None
+        self._later = []
+        self._first_spin = self.create_timer(0.0, self._start_later,
+                                             clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def begin(self):
         """Adopt the first scene, and let others ask for changes."""
@@ -108,11 +109,16 @@ class SceneNode(Node):
         self.adopt(self._state.prepared)
         if self._role == scene.OWNER:
             self._announcer = Announcer(self)
+            self._later.append(self._announcer.first)
         else:
             self._follower = Follower(self, self._worker.add)
         self._parameter_service = ParameterServer(self, self._worker.add)
         self._namesakes = self.create_timer(SECONDS_BETWEEN_LOOKS, self._look_for_namesakes,
                                             clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _start_later(self):
+        self._first_spin.cancel()
+        self._worker.add_later(self._later)
 
     def prepare(self, new: scene.Scene) -> Any:
         """
@@ -143,20 +149,23 @@ class SceneNode(Node):
             self.destroy_node()
             raise
 
-    def _declare(self, parameter):
-        """Declare a parameter; its range is no business of the client library's."""
-        field, wanted = parameter.field, _typed(parameter)
-        descriptor = ParameterDescriptor(description=field.meaning, read_only=field.read_only,
-                                         additional_constraints=field.allowed)
-        # The type does not depend on the value: an empty list has none.
-        value = parameter.value if parameter.value != () else wanted.type_
-        self.declare_parameter(parameter.name, value, descriptor, ignore_override=True)
-        if parameter.value == () and not field.read_only:
-            super().set_parameters_atomically([wanted])
+    def _declare(self, own):
+        """Declare parameters; their ranges are no business of the client library's."""
+        typed = {parameter.name: _typed(parameter) for parameter in own}
+        of = {field: _descriptor(field) for field in set(self.fields.values())}
+        descriptors = {parameter.name: of[parameter.field] for parameter in own}
+        if not declare(self, typed, descriptors):
+            for name, parameter in typed.items():
+                # The type does not depend on the value: an empty list has none.
+                value = parameter.value if parameter.value != () else parameter.type_
+                self.declare_parameter(name, value, copy(descriptors[name]), ignore_override=True)
+                if parameter.value == () and not descriptors[name].read_only:
+                    super().set_parameters_atomically([parameter])
 
     def describe_parameter(self, name: str) -> ParameterDescriptor:
         """Describe a parameter, with the range of its slider around the present value."""
         descriptor = copy(super().describe_parameter(name))
+        descriptor.name = name
         if name not in self.fields:
             return descriptor
         value = scene.plain(self.get_parameter_or(name).value)
@@ -222,7 +231,11 @@ class SceneNode(Node):
         able = [change for change in changes if change.result is None]
         for followed, together in groupby(able, lambda change: change.followed):
             strict = not followed and self._role in scene.START.readers
-            base = self._merged(base, list(together), strict)
+            together = list(together)
+            if followed:
+                _leave_out(together, base.scene)
+            if _merge(together) or not followed:
+                base = self._merged(base, together, strict)
         return base
 
     def _wanted(self, change):
@@ -232,8 +245,6 @@ class SceneNode(Node):
                 value = self._checked(parameter)
                 if not change.followed:
                     self._refuse_owned(parameter.name, value)
-                elif value == scene.plain(self.get_parameter(parameter.name).value):
-                    continue
                 values[parameter.name] = value
         return values
 
@@ -255,12 +266,9 @@ class SceneNode(Node):
 
     def _merged(self, base, changes, strict) -> State:
         """Return the state after changes: all of them together, else half by half."""
-        given = {**base.given}
-        for change in changes:
-            given.update(change.values)
         try:
-            new = scene.read(given, base.scene, strict)
-            return State(given, new, self.prepare(new))
+            new = scene.changed(base.scene, _merge(changes), strict)
+            return State(new, self.prepare(new))
         except scene.SceneError as error:
             reason = str(error)
         except Exception as problem:
@@ -275,14 +283,17 @@ class SceneNode(Node):
 
     def _take(self, state, changes):
         """Let a state be the node's, with the parameters of the changes that brought it."""
-        asked = {p.name: p for change in changes for p in change.parameters}
+        asked = {p.name: p for change in changes for p in change.parameters
+                 if not change.followed or p.name in change.values}
         changed = state.scene.changed_from(self.scene)
         # Values that nobody set may follow from others.
         typed = {p.name: _typed(p) for p in changed
                  if p.name in self.fields and not self.fields[p.name].read_only}
         same = {name: self.get_parameter(name) if name in self.fields else parameter
                 for name, parameter in asked.items()}
-        result = super().set_parameters_atomically([*{**same, **typed}.values()])
+        together = [*{**same, **typed}.values()]
+        result = super().set_parameters_atomically(together) if together else (
+            SetParametersResult(successful=True))
         if not result.successful and len(changes) > 1:
             for change in changes:
                 change.result = self.set_parameters_atomically(change.parameters)
@@ -292,8 +303,8 @@ class SceneNode(Node):
         if result.successful and state is not self._state:
             self._state, self.scene = state, state.scene
             self.adopt(state.prepared)
-            if self._announcer and any(parameter.field.shared for parameter in changed):
-                self._announcer.announce(self.scene)
+            if self._announcer:
+                self._announcer.announce(changed)
 
     def _look_for_namesakes(self):
         me = self.get_name(), self.get_namespace()
@@ -304,10 +315,31 @@ class SceneNode(Node):
                 'publishes or answers comes twice; give each a name or a namespace of its own')
 
 
+def _merge(changes):
+    return {name: value for change in changes for name, value in change.values.items()}
+
+
+def _leave_out(changes, old):
+    """Leave out of changes what together they leave as it is in a scene."""
+    new = _merge(changes)
+    machines = {name.partition('.')[0] for name in new} & old.machines.keys()
+    here = {p.name: p.value for name in machines for p in old.machines[name].parameters}
+    for change in changes:
+        change.values = {name: value for name, value in change.values.items()
+                         if new[name] != here.get(name)}
+
+
 def _typed(parameter):
     """Return a parameter whose type does not depend on its value: an empty list has none."""
     kind = Parameter.Type[parameter.field.kind.upper()]
     return Parameter(parameter.name, kind, parameter.value)
+
+
+def _descriptor(field):
+    """Return how a kind of parameter is described, whatever its name."""
+    return ParameterDescriptor(description=field.meaning, read_only=field.read_only,
+                               type=Parameter.Type[field.kind.upper()].value,
+                               additional_constraints=field.allowed)
 
 
 def run(node_class, name: str, args=None, executor_class=Executor) -> int:
@@ -334,6 +366,8 @@ def _run(make, name, args, executor_class, goodbye):
         hint = '; allowed: -p, -r, --params-file, --log-level, ...' if unknown else ''
         return _failed(name, elided(f'bad arguments: {what}{error}', 240) + hint)
     try:
+        # Nothing of what is made is dropped: there is nothing to collect.
+        gc.disable()
         for node in make():
             _refuse_namesake(node, goodbye.nodes)
             goodbye.nodes.append(node)
@@ -341,6 +375,7 @@ def _run(make, name, args, executor_class, goodbye):
                 node.get_logger().info(f'ready: {node.serves()}')
         # What has been made so far stays: the collector need not look through it again and again.
         gc.freeze()
+        gc.enable()
         _spin(executor_class(), goodbye)
     except ExternalShutdownException:
         pass
@@ -350,6 +385,7 @@ def _run(make, name, args, executor_class, goodbye):
         if rclpy.ok():
             raise
     finally:
+        gc.enable()
         for node in goodbye.nodes:
             node.destroy_node()
         rclpy.try_shutdown()

@@ -78,10 +78,11 @@ def assembled(robot: Robot, density: float = DENSITY) -> Assembled:
     homes = {point.name: (body.name, point.place) for body in robot.bodies
              for point in body.points}
     made = Assembled(robot.name, density, [], [], [])
-    for machine, bodies in robot.parts:
+    for part in robot.parts:
+        machine = part.machine
         starts = {name: Motion.of(drive).at(0)[0] for name, drive in machine.inputs.items()}
         positions, rates = _solved(machine, starts)
-        bodies = [*bodies, *_slots(machine, bodies, positions)]
+        bodies = [*part.bodies, *_slots(machine, part.bodies, positions)]
         solids = []
         for body in bodies:
             position = positions.get(body.joint.name, 0.0) if body.joint else 0.0

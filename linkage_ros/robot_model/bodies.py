@@ -22,6 +22,8 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import chain
 import math
 from typing import Dict, Iterable, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
@@ -127,34 +129,49 @@ class Body:
         return x, y, *middle, yaw + moved
 
 
+@dataclass(eq=False)
+class Part:
+    """The bodies of one mechanism, parents first."""
+
+    machine: Machine
+    bodies: List[Body]
+
+    @cached_property
+    def joints(self) -> List[str]:
+        """What the joints are called, those that are fixed as well."""
+        return [name for body in self.bodies for name in (
+            body.joint.name if body.joint else f'{body.name}_fixed',
+            *(f'{point.name}_fixed' for point in body.points))]
+
+    @cached_property
+    def links(self) -> List[str]:
+        """What the bodies and their points are called."""
+        return [name for body in self.bodies for name in (
+            body.name, *(point.name for point in body.points))]
+
+
 @dataclass
 class Robot:
-    """Bodies of some mechanisms, parents first, below a root that is no body."""
+    """Some mechanisms, below a root that is no body."""
 
     name: str
     root: str
-    parts: List[Tuple[Machine, List[Body]]]
+    parts: List[Part]
 
     @property
     def bodies(self) -> List[Body]:
         """The bodies of all mechanisms."""
-        return [body for _, bodies in self.parts for body in bodies]
-
-    def names(self) -> Iterator[Tuple[str, str]]:
-        """Yield what each joint and link is called."""
-        for body in self.bodies:
-            yield 'joint', body.joint.name if body.joint else f'{body.name}_fixed'
-            yield 'link', body.name
-            for point in body.points:
-                yield from (('joint', f'{point.name}_fixed'), ('link', point.name))
+        return [body for part in self.parts for body in part.bodies]
 
     def check_names(self, whose: str) -> None:
         """Raise SceneError where two links or two joints have the same name."""
-        names = list(self.names())
-        if ('link', self.root) in names:
-            raise SceneError(f'frame_id must be no link of the robot model, not {self.root!r}')
-        for (tag, name), count in Counter(names).items():
-            if count > 1:
+        for tag, several in (('joint', [part.joints for part in self.parts]),
+                             ('link', [part.links for part in self.parts])):
+            names = set().union(*several)
+            if tag == 'link' and self.root in names:
+                raise SceneError(f'frame_id must be no link of the robot model, not {self.root!r}')
+            if len(names) < sum(map(len, several)):
+                (name, _), = Counter(chain(*several)).most_common(1)
                 raise SceneError(f'{whose} must be other names: the robot model would have two '
                                  f'{tag}s {name}')
 
@@ -190,7 +207,9 @@ def together(robots: Sequence[Robot]) -> Robot:
     """
     if len(robots) == 1:
         return robots[0]
-    above = {name: robot.root for robot in robots for tag, name in robot.names() if tag == 'link'}
+    roots = {robot.root for robot in robots}
+    above = {name: robot.root for robot in robots for part in robot.parts
+             for name in roots.intersection(part.links)}
 
     def depth(frame: str) -> int:
         return 1 + depth(above[frame]) if frame in above else 0
@@ -204,8 +223,8 @@ def together(robots: Sequence[Robot]) -> Robot:
 
 def _root(robots: Sequence[Robot], above: Mapping[str, str]) -> str:
     """Return the link that all models hang on, by the root of the model that a link is in."""
-    frames = [robot.root for robot in robots]
-    for _ in robots:
+    frames = list(dict.fromkeys(robot.root for robot in robots))
+    for _ in list(frames):
         frames = [above.get(frame, frame) for frame in frames]
     tops = dict.fromkeys(frames)
     if len(tops) > 1 or frames[0] in above:
@@ -216,7 +235,7 @@ def _root(robots: Sequence[Robot], above: Mapping[str, str]) -> str:
 
 def _robot(machine: Machine, frame_id: str, width: Optional[float]) -> Robot:
     bodies = list(_Tree(machine, width).bodies(frame_id))
-    made = Robot(machine.name, frame_id, [(machine, bodies)])
+    made = Robot(machine.name, frame_id, [Part(machine, bodies)])
     made.check_names(f'{machine.name}.joints')
     for value in _numbers(made):
         if not abs(value) <= LARGEST:

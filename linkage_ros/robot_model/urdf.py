@@ -13,12 +13,16 @@ Format: the URDF XML specification of ROS (wiki.ros.org/urdf/XML).
 from __future__ import annotations
 
 from typing import Iterable, Sequence
-from xml.etree import ElementTree
+from weakref import WeakKeyDictionary
+from xml.sax.saxutils import escape
 
 from . import bodies
-from .bodies import Body, COLOURS, numbers, Piece, Robot
+from .bodies import Body, COLOURS, numbers, Part, Piece, Robot
 from .. import palette
 from ..scene import Machine
+
+# Of a scene most mechanisms are as they were when it is written again.
+_written: WeakKeyDictionary[Part, str] = WeakKeyDictionary()
 
 
 def describe(machines: Iterable[Machine], frame_id: str) -> str:
@@ -28,50 +32,61 @@ def describe(machines: Iterable[Machine], frame_id: str) -> str:
 
 def write(robot: Robot) -> str:
     """Return a robot model as URDF."""
-    root = ElementTree.Element('robot', name=robot.name)
-    for colour, code in COLOURS.items():
-        material = ElementTree.SubElement(root, 'material', name=colour)
-        ElementTree.SubElement(material, 'color', rgba=numbers(*palette.rgb(code), 1.0))
-    ElementTree.SubElement(root, 'link', name=robot.root)
-    for body in robot.bodies:
-        _join(root, body)
-        _add_link(root, body.name, body.pieces)
-        for point in body.points:
-            _join(root, Body(point.name, body.name, (*point.place, 0.0, 0.0, 0.0, 0.0)))
-            _add_link(root, point.name, [point.ball()])
-    ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding='unicode')
+    materials = [f"""\
+  <material name="{colour}">
+    <color rgba="{numbers(*palette.rgb(code), 1.0)}" />
+  </material>
+""" for colour, code in COLOURS.items()]
+    name, root = (escape(text, {'"': '&quot;'}) for text in (robot.name, robot.root))
+    return ''.join([f'<robot name="{name}">\n', *materials, f'  <link name="{root}" />\n',
+                    *map(_part, robot.parts), '</robot>'])
 
 
-def _join(root: ElementTree.Element, body: Body) -> None:
-    """Add the joint that a body hangs on."""
+def _part(part: Part) -> str:
+    if part not in _written:
+        _written[part] = ''.join(
+            _joint(body) + _link(body.name, body.pieces) + ''.join(
+                _joint(Body(point.name, body.name, (*point.place, 0.0, 0.0, 0.0, 0.0)))
+                + _link(point.name, [point.ball()]) for point in body.points)
+            for body in part.bodies)
+    return _written[part]
+
+
+def _joint(body: Body) -> str:
+    """Return the joint that a body hangs on."""
     joint = body.joint
     name, kind = (joint.name, joint.kind) if joint else (f'{body.name}_fixed', 'fixed')
     if joint and kind == 'revolute' and not joint.travel:
         kind = 'continuous'
-    element = ElementTree.SubElement(root, 'joint', name=name, type=kind)
-    ElementTree.SubElement(element, 'parent', link=body.parent)
-    ElementTree.SubElement(element, 'child', link=body.name)
-    _place(element, body.pose)
+    text = f"""\
+  <joint name="{name}" type="{kind}">
+    <parent link="{escape(body.parent, {'"': '&quot;'})}" />
+    <child link="{body.name}" />
+{_origin('    ', body.pose)}"""
     if joint:
-        ElementTree.SubElement(element, 'axis', xyz=numbers(*joint.axis))
+        text += f'    <axis xyz="{numbers(*joint.axis)}" />\n'
     if joint and joint.travel:
         lower, upper = map(numbers, joint.travel)
-        ElementTree.SubElement(element, 'limit', lower=lower, upper=upper, effort='0',
-                               velocity='0')
+        text += f'    <limit lower="{lower}" upper="{upper}" effort="0" velocity="0" />\n'
+    return text + '  </joint>\n'
 
 
-def _add_link(root: ElementTree.Element, name: str, pieces: Iterable[Piece]) -> None:
-    """Add a link, and what is seen of it."""
-    link = ElementTree.SubElement(root, 'link', name=name)
-    for piece in pieces:
-        visual = ElementTree.SubElement(link, 'visual')
-        _place(visual, piece.pose)
-        ElementTree.SubElement(ElementTree.SubElement(visual, 'geometry'), piece.shape, {
-            key: numbers(*values) for key, values in piece.sizes.items()})
-        ElementTree.SubElement(visual, 'material', name=piece.colour)
+def _link(name: str, pieces: Iterable[Piece]) -> str:
+    """Return a link, and what is seen of it."""
+    seen = ''.join([f"""\
+    <visual>
+{_origin('      ', piece.pose)}\
+      <geometry>
+        <{piece.shape} {' '.join(
+            f'{key}="{numbers(*values)}"' for key, values in piece.sizes.items())} />
+      </geometry>
+      <material name="{piece.colour}" />
+    </visual>
+""" for piece in pieces])
+    return f'  <link name="{name}">\n{seen}  </link>\n' if seen else f'  <link name="{name}" />\n'
 
 
-def _place(element: ElementTree.Element, pose: Sequence[float]) -> None:
-    if any(pose):
-        ElementTree.SubElement(element, 'origin', xyz=numbers(*pose[:3]), rpy=numbers(*pose[3:]))
+def _origin(indent: str, pose: Sequence[float]) -> str:
+    if not any(pose):
+        return ''
+    return f'{indent}<origin xyz="{numbers(*pose[:3])}" rpy="{numbers(*pose[3:])}" />\n'

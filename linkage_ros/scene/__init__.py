@@ -12,7 +12,7 @@ node declares. No ROS is needed.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field as some
 import re
 from typing import Any, Dict, Iterator, List, Optional, Tuple
 
@@ -35,8 +35,8 @@ from .parameters import (
 from .. import mechanisms
 from ..words import quoted
 
-__all__ = ['Drive', 'DRIVER', 'FARTHEST', 'in_words', 'INVERSE', 'KINEMATICS', 'load', 'Machine',
-           'OWNER', 'Parameter', 'plain', 'read', 'Scene', 'SceneError', 'START']
+__all__ = ['changed', 'Drive', 'DRIVER', 'FARTHEST', 'in_words', 'INVERSE', 'KINEMATICS', 'load',
+           'Machine', 'OWNER', 'Parameter', 'plain', 'read', 'Scene', 'SceneError', 'START']
 
 _NAME = re.compile(r'(?=.{1,64}$)[A-Za-z](_?[A-Za-z0-9])*')
 
@@ -62,6 +62,7 @@ class Scene:
     frame_prefix: str
     rate: float
     general: Tuple[Parameter, ...]
+    given: Mapping[str, Mapping[str, Any]] = some(compare=False, repr=False)
 
     @property
     def parameters(self) -> Tuple[Parameter, ...]:
@@ -118,7 +119,23 @@ def read(given: Mapping[str, Any], before: Optional[Scene] = None, strict: bool 
     if 'mechanisms' not in parts.get('', {}):
         for name, scale in mechanisms.CATALOGUE.items():
             parts[name] = {f'{name}.scale': scale, **parts.get(name, {})}
-    values = Values(parts.pop('', {}))
+    return _read(parts, before, strict)
+
+
+def changed(before: Scene, values: Mapping[str, Any], strict: bool = True) -> Scene:
+    """
+    Read again what these values, by full parameter name, are about; the rest stays as it is.
+
+    Raises what `read` does.
+    """
+    parts = dict(before.given)
+    for name, part in _parted(values).items():
+        parts[name] = {**parts.get(name, {}), **part}
+    return _read(parts, before, strict)
+
+
+def _read(parts: Mapping[str, Mapping[str, Any]], before: Optional[Scene], strict: bool) -> Scene:
+    values = Values(parts.get('', {}))
     names = values.take('mechanisms', MECHANISMS, (*mechanisms.CATALOGUE,))
     if not names or len(set(names)) < len(names):
         raise MECHANISMS.error('mechanisms', names)
@@ -126,13 +143,16 @@ def read(given: Mapping[str, Any], before: Optional[Scene] = None, strict: bool 
     frame_prefix = values.take('frame_prefix', FRAME_PREFIX, '')
     rate = values.take('rate', RATE, 50.0)
     known = before.machines if before else {}
-    machines = {name: read_machine(name, parts.pop(name, {}), known.get(name), strict)
+    machines = {name: read_machine(name, parts.get(name, {}), known.get(name), strict)
                 for name in names}
-    check_distinct({name: machine.joints for name, machine in machines.items()})
+    joints = {name: machine.joints for name, machine in machines.items()}
+    if joints != {name: machine.joints for name, machine in known.items()}:
+        check_distinct(joints)
     allowed = ['mechanisms', 'frame_id', 'frame_prefix', 'rate', *(f'{name}.*' for name in names)]
-    for left in (values.left(), *parts.values()):
+    for left in (values.left(), *(part for name, part in parts.items()
+                                  if name and name not in machines)):
         refuse_unknown(left, allowed)
-    return Scene(machines, frame_id, frame_prefix, rate, tuple(values.parameters))
+    return Scene(machines, frame_id, frame_prefix, rate, tuple(values.parameters), parts)
 
 
 def _parted(given: Any) -> Dict[str, Dict[str, Any]]:

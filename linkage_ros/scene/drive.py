@@ -24,6 +24,7 @@ FARTHEST = 1e6
 FASTEST = 100.0
 
 SPEED = Field('double', 'Speed of the {0} [{1}/s].', -FASTEST, FASTEST, readers=(DRIVER,))
+TURNS = {'low': -4.0 * math.pi, 'high': 4.0 * math.pi}
 START = Field('double', 'Where the {0} starts [{1}]; a new value moves it there.',
               readers=(DRIVER,))
 SOURCE = Field('string', 'Joint in messages that tells of the {0}; empty: its name, or that of '
@@ -117,9 +118,8 @@ def read_drive(name: str, linkage: Mechanism, input_: Input, reach: Tuple[Arc, .
 def _read(name: str, input_: Input, reach: Tuple[Arc, ...], values: Values, old: Optional[Drive],
           strict: bool) -> Drive:
     speed_field, start_field, sweep_field = (
-        field.about(input_.name, input_.unit) for field in (SPEED, START, SWEEP))
-    if input_.turns:
-        start_field = replace(start_field, low=-4.0 * math.pi, high=4.0 * math.pi)
+        field.about(input_.name, input_.unit, **(TURNS if field is START and input_.turns else {}))
+        for field in (SPEED, START, SWEEP))
     name = f'{name}.{input_.name}'
     speed = values.take(f'{name}.speed', speed_field, _usual_speed(input_, reach))
     chosen = values.left(f'{name}.start')

@@ -5,8 +5,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field as some, replace
-from functools import lru_cache
+from dataclasses import dataclass, field as some
+from functools import partial
 import re
 from typing import Any, Dict, Mapping, Optional, Sequence, Tuple
 
@@ -27,6 +27,7 @@ from .. import mechanisms
 from ..linkage.design import Design
 from ..linkage.inputs import Arc
 from ..linkage.servo import Mechanism
+from ..linkage.shared import Shared
 from ..linkage.walker import Assembly
 from ..words import listed, quoted
 
@@ -87,7 +88,7 @@ class Machine:
 
     def is_of(self, given: Mapping[str, Any]) -> bool:
         """Return whether it was read from these very values."""
-        return self.given.keys() == given.keys() and all(
+        return self.given is given or self.given.keys() == given.keys() and all(
             self.given[key] is value for key, value in given.items())
 
     @property
@@ -192,7 +193,10 @@ def _linkage(name: str, type_: str, values: Values) -> Tuple[Mechanism, Tuple[Ar
     dimensions = _dimensions(name, design, values)
     branches = _branches(name, design, values)
     try:
-        linkage, reach = _built(design, tuple(dimensions.items()), tuple(branches.items()))
+        linkage = _built(design, tuple(dimensions.items()), tuple(branches.items()))
+        # How far one of several inputs reaches depends on the others: only a pose tells.
+        first, *others = linkage.inputs
+        reach = ((first.low, first.high),) if others else tuple(linkage.reach())
     except ValueError as error:
         raise SceneError(f'{name}.dimensions: {error}') from None
     if not reach:
@@ -220,7 +224,7 @@ def _design(name: str, type_: str, values: Values) -> Design:
 def _dimensions(name: str, design: Design, values: Values) -> Dict[str, float]:
     taken = {}
     for key in design.dimensions:
-        field = replace(DIMENSION.about(key, design.name), positive=key not in design.signed)
+        field = DIMENSION.about(key, design.name, positive=key not in design.signed)
         taken[key] = values.take(f'{name}.dimensions.{key}', field, design.dimensions[key])
     return taken
 
@@ -233,22 +237,18 @@ def _branches(name: str, design: Design, values: Values) -> Dict[str, int]:
     return taken
 
 
-@lru_cache(maxsize=16)
-def _built(design: Design, dimensions: tuple,
-           branches: tuple) -> Tuple[Mechanism, Tuple[Arc, ...]]:
-    """Return a linkage and its reach; the same ones for the same dimensions."""
+@partial(Shared, latest=16)
+def _built(design: Design, dimensions: tuple, branches: tuple) -> Mechanism:
+    """Return a linkage; the same one for the same dimensions."""
     own: Dict[str, Any] = {} if design.name in mechanisms.TYPES else {
         'joints': design.joints, 'tracer': design.tracer}
-    linkage = mechanisms.create(design.name, branches=dict(branches), **own, **dict(dimensions))
-    # How far one of several inputs reaches depends on the others: only a pose tells.
-    first, *others = linkage.inputs
-    return linkage, ((first.low, first.high),) if others else tuple(linkage.reach())
+    return mechanisms.create(design.name, branches=dict(branches), **own, **dict(dimensions))
 
 
 def _legs(name: str, linkage: Mechanism, values: Values) -> Tuple[int, bool]:
     able = _can_have_more_legs(linkage)
     # A slider for what cannot be changed would only be refused.
-    pairs, mirrored = (replace(field, read_only=not able) for field in (LEG_PAIRS, MIRRORED))
+    pairs, mirrored = (field.about(read_only=not able) for field in (LEG_PAIRS, MIRRORED))
     pairs = values.take(f'{name}.leg_pairs', pairs, 1)
     mirrored = values.take(f'{name}.mirrored', mirrored, pairs > 1)
     if (pairs > 1 or mirrored) and not able:

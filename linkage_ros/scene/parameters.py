@@ -8,6 +8,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 import math
 import re
 from typing import Any, Iterable, List, Optional, Tuple, Type
@@ -80,9 +81,9 @@ class Field:
     readers: Tuple[str, ...] = ()
     read_only: bool = False
 
-    def about(self, *words: str) -> Field:
-        """Return the same with these words in its meaning."""
-        return replace(self, meaning=self.meaning.format(*words))
+    def about(self, *words: str, **other: Any) -> Field:
+        """Return the same with these words in its meaning, and what else is other."""
+        return _with(self, meaning=self.meaning.format(*words), **other)
 
     @property
     def shared(self) -> bool:
@@ -141,6 +142,12 @@ class Field:
             return True
         return self.low <= value <= self.high or any(
             math.isclose(value, end, rel_tol=ROUNDED) for end in (self.low, self.high))
+
+
+@lru_cache(maxsize=2048)
+def _with(field: Field, **other: Any) -> Field:
+    """Return a field in which something is other; the same one for all mechanisms of a type."""
+    return replace(field, **other)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,136 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What many mechanisms share, and what a change to one of them leaves alone, counted."""
+
+import gc
+from types import SimpleNamespace
+import weakref
+
+from linkage_ros import scene
+from linkage_ros.linkage import mechanism, output_range
+import pytest
+
+COUNT = 60
+MANY = {'mechanisms': [f'm{i}' for i in range(COUNT)],
+        **{f'm{i}.type': ('four_bar', 'slider_crank')[i % 2] for i in range(COUNT)},
+        **{f'm{i}.scale': 1.0 + 0.01 * i for i in range(COUNT)}}
+
+
+def linkages(a):
+    """Return the linkages of jansens with a dimension, of three sizes."""
+    given = {f'{name}.{key}': value for i, name in enumerate('xyz') for key, value in (
+        ('type', 'jansen'), ('scale', 1.0 + i), ('dimensions.a', a))}
+    return [one.linkage for one in scene.read({'mechanisms': [*'xyz'], **given}).machines.values()]
+
+
+def test_equal_linkages_are_one_and_their_reach_and_travels_are_found_once(monkeypatch):
+    found = []
+    for module, name in ((mechanism, 'arcs'), (output_range, 'extremes')):
+        find = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda *args, name=name, find=find: (
+            found.append(name) or find(*args)))
+    first, *others = linkages(38.0625)
+    assert all(other is first for other in others)
+    travels = [output_range.travels(one, one.reach()) for one in (first, *others)]
+    assert found == ['arcs', 'extremes'] and travels[0] == travels[2]
+    assert linkages(38.125)[0] is not first
+
+
+def test_a_linkage_that_nobody_holds_is_gone_after_some_others():
+    gone = weakref.ref(linkages(38.25)[0])
+    for i in range(20):
+        linkages(39.0 + i / 64)
+    gc.collect()
+    assert gone() is None
+
+
+@pytest.mark.parametrize('values', [
+    {'m3.scale': 2.0}, {'m3.dimensions.a': 1.01, 'm4.pose': [1.0] * 6}, {'frame_id': 'map'},
+    {'m3.joint_names': ['AB=knee']}, {'m3.nonsense': 1.0}, {'nobody.scale': 1.0},
+    {'m3.scale': -1.0}, {'m3.joint_names': ['AB=knee'], 'm5.joint_names': ['AB=knee']}])
+def test_a_changed_scene_is_what_all_values_read_anew_make(values):
+    def outcome(read):
+        try:
+            return read().parameters
+        except scene.SceneError as error:
+            return str(error)
+
+    before = scene.read(MANY)
+    assert outcome(lambda: scene.changed(before, values)) == outcome(
+        lambda: scene.read({**MANY, **values}))
+
+
+def test_of_a_change_to_one_only_that_is_read_prepared_and_announced(graph, monkeypatch):
+    pytest.importorskip('rclpy')
+    from linkage_ros.nodes import kinematics, ownership
+    from rcl_interfaces.msg import ParameterEvent
+
+    read, made = [], []
+    read_machine, model = scene.read_machine, kinematics.Model
+
+    def reading(name, given, old, strict):
+        machine = read_machine(name, given, old, strict)
+        read.extend([name] if machine is not old else [])
+        return machine
+
+    monkeypatch.setattr(scene, 'read_machine', reading)
+    monkeypatch.setattr(kinematics, 'Model', lambda machine, *args: (
+        made.append(machine.name) or model(machine, *args)))
+    node = graph.start(kinematics.Kinematics, MANY)
+    assert read == made == MANY['mechanisms']
+    heard = graph.listen(ParameterEvent, ownership.TOPIC, ownership.LATCHED)
+    graph.until(lambda: heard)
+    assert {p.name for p in heard[0].new_parameters} == {
+        p.name for p in node.scene.parameters if p.field.shared}
+    assert graph.set(node, m7__scale=2.5).successful
+    graph.until(lambda: len(heard) == 2)
+    assert [p.name for p in heard[1].changed_parameters] == ['m7.scale']
+    assert not heard[1].new_parameters
+    assert set(read[COUNT:]) == set(made[COUNT:]) == {'m7'}
+
+
+def test_whoever_comes_late_gets_all_however_many_changes_were_before(graph, monkeypatch):
+    pytest.importorskip('linkage_interfaces')
+    from linkage_ros.nodes import kinematics, ownership, servo_inverse
+    from rclpy.qos import DurabilityPolicy, QoSProfile
+
+    monkeypatch.setattr(ownership, 'DEPTH', 3)
+    monkeypatch.setattr(ownership, 'LATCHED', QoSProfile(
+        depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+    few = {'mechanisms': ['m0', 'm1'], 'm0.type': 'four_bar', 'm1.type': 'four_bar'}
+    owner = graph.start(kinematics.Kinematics, few)
+    for i in range(1, 8):
+        assert graph.set(owner, **{f'm{i % 2}.scale': 1.0 + i}).successful
+        late = graph.start(servo_inverse.ServoInverse, few)
+        graph.until(lambda late=late: [one.scale for one in late.scene.machines.values()] == [
+            one.scale for one in owner.scene.machines.values()])
+        graph.end(late)
+
+
+def test_parameters_declared_at_once_are_those_that_are_declared_one_by_one(graph, monkeypatch):
+    pytest.importorskip('rclpy')
+    from linkage_ros.nodes import kinematics, parameter_server, scene_node
+
+    def declared():
+        node = graph.start(kinematics.Kinematics, {
+            'mechanisms': ['m'], 'm.type': 'four_bar', 'm.joint_names': ['AB=knee']})
+        names = sorted(node.fields)
+        assert set(names) <= set(node.list_parameters([], 0).names)
+        found = [(node.get_parameter(name).get_parameter_value(), node.describe_parameter(name))
+                 for name in names]
+        assert node.set_parameters([scene_node.Parameter('m.points', value=['A'])])[0].successful
+        assert not node.set_parameters([scene_node.Parameter('m.type', value='x')])[0].successful
+        graph.end(node)
+        return names, found
+
+    at_once, refused = declared(), []
+    monkeypatch.setattr(scene_node, 'declare', lambda *args: refused.append(args))
+    assert declared() == at_once
+    bare, wanted = graph.start(scene_node.Node, node_name='bare'), refused[0][1:]
+    assert parameter_server.declare(bare, *wanted)
+    assert wanted[0].keys() < set(bare.list_parameters([], 0).names)
+    # A client library that keeps parameters elsewhere is left alone.
+    for kept in ({}, {'_parameters': {}, '_descriptors': {}}):
+        assert not parameter_server.declare(SimpleNamespace(**kept), *wanted)
+        assert not any(kept.values())
