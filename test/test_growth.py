@@ -63,11 +63,11 @@ def test_a_changed_scene_is_what_all_values_read_anew_make(values):
 
 def test_of_a_change_to_one_only_that_is_read_prepared_and_announced(graph, monkeypatch):
     pytest.importorskip('rclpy')
-    from linkage_ros.nodes import kinematics, ownership
+    from linkage_ros.nodes import kinematics, mechanism_publisher, ownership
     from rcl_interfaces.msg import ParameterEvent
 
     read, made = [], []
-    read_machine, model = scene.read_machine, kinematics.Model
+    read_machine, model = scene.read_machine, mechanism_publisher.Model
 
     def reading(name, given, old, strict):
         machine = read_machine(name, given, old, strict)
@@ -75,7 +75,7 @@ def test_of_a_change_to_one_only_that_is_read_prepared_and_announced(graph, monk
         return machine
 
     monkeypatch.setattr(scene, 'read_machine', reading)
-    monkeypatch.setattr(kinematics, 'Model', lambda machine, *args: (
+    monkeypatch.setattr(mechanism_publisher, 'Model', lambda machine, *args: (
         made.append(machine.name) or model(machine, *args)))
     node = graph.start(kinematics.Kinematics, MANY)
     assert read == made == MANY['mechanisms']

@@ -9,10 +9,11 @@ import math
 import sys
 
 from builtin_interfaces.msg import Time
-from linkage_ros import mechanisms
+from linkage_ros import mechanisms, scene
 from linkage_ros.linkage.walker import Assembly
-from linkage_ros.nodes import kinematics, message_layout, messages
-from linkage_ros.nodes.kinematics import Kinematics, LATCHED
+from linkage_ros.nodes import mechanism_model, message_layout, messages
+from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.whole_scene import LATCHED
 import numpy as np
 import pytest
 from rclpy.publisher import Publisher
@@ -85,7 +86,7 @@ def test_the_nodes_own_ears_on_joint_states_are_nobody_who_listens(graph, work):
 
 
 def test_a_scene_with_plain_names_changes_no_number(graph, monkeypatch):
-    monkeypatch.setattr(kinematics, '_arranged', None)
+    monkeypatch.setattr(mechanism_model, '_arranged', None)
     graph.start(Kinematics)
     graph.crank(CRANKS)([0.1] * 4, graph.listen(JointState, 'jansen/joint_states'), [1.0] * 4)
 
@@ -140,8 +141,8 @@ def test_the_locus_is_sent_once_and_a_late_subscriber_gets_it(graph, monkeypatch
 def test_a_change_of_dimensions_rebuilds_only_that_mechanism(graph, monkeypatch):
     node = graph.start(Kinematics)
     built = []
-    assembly = kinematics.scene.Machine.assembly
-    monkeypatch.setattr(kinematics.scene.Machine, 'assembly', lambda machine: (
+    assembly = scene.Machine.assembly
+    monkeypatch.setattr(scene.Machine, 'assembly', lambda machine: (
         built.append(machine.name) or assembly(machine)))
     assert graph.set(node, jansen__dimensions__m=14.0).successful
     assert set(built) == {'jansen'}

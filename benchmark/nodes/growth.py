@@ -20,7 +20,8 @@ import time
 from linkage_ros import mechanisms, scene
 from linkage_ros.nodes import scene_node
 from linkage_ros.nodes.joint_state_reader import ANY
-from linkage_ros.nodes.kinematics import Kinematics, LATCHED
+from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.whole_scene import LATCHED
 from linkage_ros.scene.motion import Motion
 from rcl_interfaces.msg import ParameterDescriptor
 from rcl_interfaces.srv import SetParameters

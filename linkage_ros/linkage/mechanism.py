@@ -357,6 +357,11 @@ class Mechanism:
             [rad/s or m/s], and the numbers of its `Leg`.
 
         """
+        pose = self.remembered('legs', (points, joints, moving), lambda: self._legs(
+            points, joints, moving))
+        return pose.batch(rows)
+
+    def _legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...]) -> Pose:
         lengths, unit = dict(self._lengths), self._lengths[UNIT.args[0]]
         named: List[Union[str, Spot]] = []
         for i, point in enumerate(points):
@@ -366,7 +371,7 @@ class Mechanism:
                 point = Spot(point.link, *names)
             named.append(point)
         program = self._structure.legs(tuple(named), joints, moving)
-        return program.bind(lengths, dict(self._evaluated), self._accelerate).batch(rows)
+        return program.bind(lengths, dict(self._evaluated), self._accelerate)
 
     def _vectors(self, kind: str, theta: Inputs, points: Any, *by: int) -> dict:
         names, pose = self._ready(kind, points, *by)

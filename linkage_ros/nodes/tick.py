@@ -9,12 +9,9 @@ from typing import Callable, List, NamedTuple, Optional
 import numpy as np
 
 from .joint_state_reader import Source
-from .kinematics import Moved
+from .mechanism_publisher import Moved
 from .message_layout import Wire
 from ..formula import llvm_pipeline as native
-
-# So many sources have a tick each, at the most.
-TICKS = 64
 
 
 def is_ready() -> bool:
