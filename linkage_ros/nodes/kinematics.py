@@ -39,11 +39,11 @@ class Kinematics(scene_node.SceneNode):
         # Each input that a source tells of, by the source's name.
         self._inputs = {drive.source: [] for machine in self.scene.machines.values()
                         for drive in machine.inputs.values()}
-        self._ticks, self._own = Ticks(self._now, self._send_whole), frozenset()
-        changed = self._ticks.forget
-        self._whole = WholeScene(self, self._inputs, changed)
-        self._mechanisms = {name: MechanismPublisher(self, machine, self._whole, changed)
+        self._ticks, self._own = Ticks(self._now), frozenset()
+        self._whole = WholeScene(self, self._inputs, self._ticks.renew_soon)
+        self._mechanisms = {name: MechanismPublisher(self, machine, self._whole, self._ticks)
                             for name, machine in self.scene.machines.items()}
+        self._ticks.begin(self._mechanisms, self._whole)
         for name, machine in self.scene.machines.items():
             for i, drive in enumerate(machine.inputs.values()):
                 self._inputs[drive.source].append((self._mechanisms[name], i))
@@ -105,7 +105,7 @@ class Kinematics(scene_node.SceneNode):
         with self._drawing:
             if self._ended:
                 return
-            self._ticks.forget()
+            sources = self._ticks.forget()
             self._own = frozenset(called.name for model in models.values()
                                   for called in model.machine.joints.values())
             self._models = models
@@ -113,6 +113,7 @@ class Kinematics(scene_node.SceneNode):
                 self._mechanisms[name].adopt(model)
             self._whole.describe(robot)
             self._send_whole(self._ticks.stamp)
+            self._ticks.learn(sources)
 
     def say_goodbye(self):
         """Take what is drawn out of the picture, for good."""
@@ -154,7 +155,7 @@ class Kinematics(scene_node.SceneNode):
             shown.turn(stamp, places, positions, speeds if known else ())
         if routes:
             self._send_whole(stamp)
-            self._ticks.learn(self._reader.source(text), routes, self._mechanisms, self._whole)
+            self._ticks.learn([self._reader.source(text)])
 
     def _now(self):
         return pack(self.get_clock().now().to_msg())

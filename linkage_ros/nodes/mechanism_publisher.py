@@ -3,9 +3,10 @@
 
 """The topics of one mechanism: what it publishes, as far as anybody listens."""
 
+from dataclasses import dataclass
 import math
 import time
-from typing import Any, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, List, Optional, Sequence, Tuple
 
 import numpy as np
 from rclpy.duration import Duration
@@ -17,6 +18,7 @@ from . import messages
 from .heard import Topic
 from .mechanism_model import InputState, Model, Pose
 from .message_layout import NEVER, unpack, Wire
+from .ticks import MOST, Ticks
 from .whole_scene import LATCHED, WholeScene
 from .. import scene
 from ..linkage.walker import Assembly, Solution
@@ -24,9 +26,10 @@ from ..linkage.walker import Assembly, Solution
 SECONDS_BETWEEN_WARNINGS = 5.0
 
 
-class Moved(NamedTuple):
+@dataclass(eq=False)
+class Moved:
     """
-    A mechanism that a source moves.
+    A mechanism that a source moves; the same one as long as nothing about it changes.
 
     Attributes
     ----------
@@ -46,6 +49,8 @@ class Moved(NamedTuple):
         Factors of the values, what is added, and which come without whole turns.
     wires : list of Wire
         What is sent.
+    made : (Source, dict), optional
+        What was made of it for a source, to be used again.
 
     """
 
@@ -57,14 +62,15 @@ class Moved(NamedTuple):
     solution: Optional[Solution]
     changes: Optional[Sequence[np.ndarray]]
     wires: List[Wire]
+    made: Optional[Tuple[Any, dict]] = None
 
 
 class MechanismPublisher:
     """The topics of one mechanism, and the last that was heard of each of its inputs."""
 
-    def __init__(self, node_, machine: scene.Machine, whole: WholeScene, changed):
-        self.name, self._whole, self._changed = machine.name, whole, changed
-        name = machine.name
+    def __init__(self, node_, machine: scene.Machine, whole: WholeScene, ticks: Ticks):
+        self.name, self._whole, self._ticks = machine.name, whole, ticks
+        name, changed = machine.name, ticks.renew_soon
         self._joint_states = Topic(node_, JointState, f'{name}/joint_states', 10, changed)
         self._markers = Topic(node_, MarkerArray, f'{name}/markers', 1, changed)
         self._locus = node_.create_publisher(Marker, f'{name}/locus', LATCHED)
@@ -79,6 +85,7 @@ class MechanismPublisher:
         self._known = np.zeros((2, len(machine.inputs)), bool)
         # The markers in the picture, and whether the locus is.
         self._drawn, self._curved = frozenset(), False
+        self._moves = {}
 
     def prepared(self, *wanted) -> Model:
         """Return what shows a mechanism, ready for who listens now; the same where it is."""
@@ -185,13 +192,22 @@ class MechanismPublisher:
         """Return how the mechanism is now, for the whole scene; None if that is not known."""
         return (self._model, self._pose) if self._solve() else None
 
-    def moved(self, places, known) -> Optional[Moved]:
+    def moved(self, places: Tuple[Tuple[int, int], ...], known: bool) -> Optional[Moved]:
         """Return what a source moves; None if not by machine code alone."""
-        model, driven = self._model, self._state()
+        driven = self._state()
+        now = self._model, driven and driven.wanted, known
+        then, moved = self._moves.get(places, (None, None))
+        if now != then and (moved := self._moved(driven, places, known)):
+            self._moves = {**dict([*self._moves.items()][1 - MOST:]), places: (now, moved)}
+        return moved
+
+    def _moved(self, driven, places, known):
+        model = self._model
         if model.machine.loads or any(model.drives[i].measures for i, _ in places):
             return None
         solution, wires = driven and model.solution(*driven.wanted), []
         if solution:
+            self._solve()
             if not solution.batch.code:
                 return None
             pose = self._pose.entire()
@@ -238,7 +254,7 @@ class MechanismPublisher:
             before, self._driven = self._pose, driven
             self._pose = self._model.solve(driven)
             if not before or not self._pose.is_like(before):
-                self._changed()
+                self._ticks.forget()
         return driven
 
     def _listening(self, model, driven):

@@ -4,7 +4,7 @@
 """All that the crank messages of one source set off, in one call of machine code."""
 
 import math
-from typing import Callable, List, NamedTuple, Optional
+from typing import Callable, Dict, List, NamedTuple, Optional
 
 import numpy as np
 
@@ -69,19 +69,20 @@ class Tick:
         self._solved = [part for part in moved if part.solution]
         self._whole, self._now, self._failed = whole, now, frozenset()
         self._stamp = stamp
-        made = [(wire, [part.solution.values]) for part in moved for wire in part.wires]
-        made += [whole[:2]] if whole else []
+        at = native.address(stamp)
+        tables = {id(part): _tables(source, part, at) for part in moved}
+        parts, solved = ([tables[id(part)] for part in some] for some in (moved, self._solved))
+        whole_puts = [_puts(whole.wire, whole.values, at)] if whole else []
         self._pipeline = native.Pipeline(
             *(number.to_bytes(source.size, 'little') for number in (source.same, source.mask)),
-            self._stamp, (source, moved, whole),
-            takes=[row for part in moved for row in _takes(source, part)],
-            loops=[(*part.solution.batch.code, part.solution.values.size)
-                   for part in self._solved],
-            limits=[row for i, part in enumerate(self._solved) for row in _limits(i, part)],
-            changes=_joined(native.CHANGE, map(_changes, self._solved)),
-            puts=_joined(native.PUT, (_puts(*each, native.address(self._stamp))
-                                      for each in made)))
-        self._sent = [(wire.publisher.publish, wire.template.message) for wire, _ in made]
+            stamp, (source, moved, whole),
+            takes=_joined(native.TAKE, (part['takes'] for part in parts)),
+            loops=_joined(native.LOOP, (part['loops'] for part in solved)),
+            limits=_joined(native.LIMIT, map(_numbered, range(len(solved)), solved)),
+            changes=_joined(native.CHANGE, (part['changes'] for part in solved)),
+            puts=_joined(native.PUT, [*(part['puts'] for part in solved), *whole_puts]))
+        wires = [wire for part in moved for wire in part.wires] + ([whole.wire] if whole else [])
+        self._sent = [(wire.publisher.publish, wire.template.message) for wire in wires]
 
     def run(self, text: bytes) -> bool:
         """Return whether a message is of this source; if so, show what it says."""
@@ -117,6 +118,28 @@ class Tick:
         self._failed = failed
 
 
+def _tables(source: Source, part: Moved, stamp: int) -> Dict[str, np.ndarray]:
+    """Return what is done with a mechanism; made once for it and a source."""
+    if not part.made or part.made[0] is not source:
+        tables = {'takes': np.array([*_takes(source, part)], native.TAKE)}
+        if solution := part.solution:
+            code = *solution.batch.code, solution.values.size
+            tables.update(
+                loops=np.array([code], native.LOOP), changes=_changes(part),
+                limits=np.array([*_limits(part)], native.LIMIT),
+                puts=_joined(native.PUT, (_puts(wire, [solution.values], stamp)
+                                          for wire in part.wires)))
+        part.made = source, tables
+    return part.made[1]
+
+
+def _numbered(i: int, tables: Dict[str, np.ndarray]) -> np.ndarray:
+    """Return the limits of a loop of that number."""
+    limits = tables['limits']
+    limits['loop'] = i
+    return limits
+
+
 def _takes(source: Source, part: Moved):
     """Yield what is taken of a message: an input goes to each leg, and is kept."""
     told, n, solution = native.addresses(part.told), part.told.shape[1], part.solution
@@ -134,7 +157,7 @@ def _takes(source: Source, part: Moved):
                 yield start + 8 * place, at, *change
 
 
-def _limits(i: int, part: Moved):
+def _limits(part: Moved):
     """Yield for each leg between what it can be assembled, well within its widest reach."""
     assembly = part.assembly
     if not assembly.is_limited:
@@ -143,7 +166,7 @@ def _limits(i: int, part: Moved):
         assembly.reach, key=lambda arc: arc[1] - arc[0])
     for at, (factor, plus) in zip(native.addresses(part.solution.batch.given)[0],
                                   assembly.own_inputs()):
-        yield (i, at, factor, plus, 0.5 * (low + high), 0.5 * (high - low),
+        yield (0, at, factor, plus, 0.5 * (low + high), 0.5 * (high - low),
                math.tau if first.turns else 0.0)
 
 

@@ -4,7 +4,7 @@
 """What is remembered of the sources of crank messages, so that machine code can answer them."""
 
 import time
-from typing import Callable, List, Optional
+from typing import Callable, Iterable, List, Mapping, Optional
 
 import numpy as np
 
@@ -25,15 +25,19 @@ class Ticks:
     ----------
     now : callable
         Returns the time, packed, for messages that have none.
-    send_whole : callable
-        From a stamp: shows the joints of the whole scene in the usual way.
 
     """
 
-    def __init__(self, now: Callable[[], bytes], send_whole: Callable[[bytes], None]):
-        self._now, self._send_whole = now, send_whole
-        self._ticks, self._last, self._rested = {}, None, 0.0
+    def __init__(self, now: Callable[[], bytes]):
+        self._now = now
+        self._mechanisms, self._whole = {}, None
+        self._ticks, self._last = {}, None
+        self._stale, self._rested = False, 0.0
         self._stamp = np.zeros(2, np.int64)
+
+    def begin(self, mechanisms: Mapping, whole):
+        """Take note of the mechanisms, {name: MechanismPublisher}, and of the whole scene."""
+        self._mechanisms, self._whole = mechanisms, whole
 
     @property
     def stamp(self) -> bytes:
@@ -42,10 +46,16 @@ class Ticks:
 
     def run(self, text: bytes, reader: Reader) -> bool:
         """Return whether a message is of a source that has a tick; if so, show what it says."""
+        if self._stale and time.monotonic() >= self._rested:
+            self.learn(self.forget())
         if self._last and self._last.run(text):
             return True
         self._last = self._ticks and self._ticks.get(reader.source(text))
         return bool(self._last) and self._last.run(text)
+
+    def renew_soon(self):
+        """Take note that others listen now."""
+        self._stale = True
 
     def catch_up(self, stamp: bytes):
         """Let the mechanisms take note of what ticks have done before a message with a stamp."""
@@ -54,38 +64,27 @@ class Ticks:
                 part.shown.forget(self.stamp)
         self._stamp[0] = np.frombuffer(stamp, np.int64)[0]
 
-    def forget(self):
-        """Let all messages go the long way: something has changed."""
+    def forget(self) -> List[Source]:
+        """Let all messages go the long way; return whose took the short one."""
         self.catch_up(self.stamp)
-        self._ticks, self._last = {}, None
+        sources, self._ticks, self._last, self._stale = list(self._ticks), {}, None, False
+        return sources
 
-    def learn(self, source: Optional[Source], routes, mechanisms, whole):
-        """
-        Let machine code do what a source sets off from now on, where it can.
+    def learn(self, sources: Iterable[Optional[Source]]):
+        """Let machine code do what sources set off from now on, where it can."""
+        for source in sources:
+            started = time.monotonic()
+            if source is None or source in self._ticks or started < self._rested:
+                continue
+            moved = [shown.moved(tuple(places), known)
+                     for shown, places, known in source.understood]
+            if moved and None not in moved and (tick := self._tick(source, moved)):
+                self._ticks[source] = self._last = tick
+                ended = time.monotonic()
+                self._rested = ended + REST * (ended - started)
 
-        Parameters
-        ----------
-        source : Source, optional
-            Who sent a message that has just been shown.
-        routes : sequence of (MechanismPublisher, places, bool)
-            What it moves, by which of its numbers, and whether it tells of speeds.
-        mechanisms : mapping
-            All that is in the scene.
-        whole : WholeScene
-            Its topics.
-
-        """
-        started = time.monotonic()
-        if source is None or source in self._ticks or started < self._rested:
-            return
-        moved = [shown.moved(*where) for shown, *where in routes]
-        if None not in moved and (tick := self._tick(source, moved, mechanisms, whole)):
-            self._ticks[source] = self._last = tick
-            ended = time.monotonic()
-            self._rested = ended + REST * (ended - started)
-
-    def _tick(self, source, moved, mechanisms, whole):
-        poses = _poses(mechanisms, {part.shown for part in moved}) if whole.is_heard else []
+    def _tick(self, source, moved):
+        poses = self._poses({part.shown for part in moved}) if self._whole.is_heard else []
         # It needs llvmlite, which is there where there is machine code.
         from .tick import is_ready, Tick, Whole
 
@@ -93,17 +92,16 @@ class Ticks:
             return None
         if len(self._ticks) == MOST:
             self.forget()
-        joints = Whole(whole.wire(poses), [pose.values for _, pose in poses],
-                       self._send_anew) if poses else None
+        joints = Whole(self._whole.wire(poses), [pose.values for _, pose in poses],
+                       self._send_whole) if poses else None
         return Tick(source, moved, joints, self._now, self._stamp)
 
-    def _send_anew(self, stamp):
+    def _poses(self, moved):
+        """Return models and poses of all mechanisms that are known; None: one lacks legs."""
+        known = [(shown, *it) for shown in self._mechanisms.values() if (it := shown.known())]
+        return [(model, pose.entire()) if shown in moved or pose.held is None else None
+                for shown, model, pose in known]
+
+    def _send_whole(self, stamp):
         self.catch_up(stamp)
-        self._send_whole(stamp)
-
-
-def _poses(mechanisms, moved) -> List:
-    """Return models and poses of all mechanisms that are known; None: one lacks legs."""
-    known = [(shown, *it) for shown in mechanisms.values() if (it := shown.known())]
-    return [(model, pose.entire()) if shown in moved or pose.held is None else None
-            for shown, model, pose in known]
+        self._whole.send(self._mechanisms.values(), stamp)
