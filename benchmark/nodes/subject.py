@@ -19,9 +19,10 @@ import time
 
 from linkage_interfaces.srv import ServoInverse
 from linkage_ros import scene
-from linkage_ros.nodes import kinematics, messages, scene_node
+from linkage_ros.nodes import mechanism_publisher, messages, scene_node
 from linkage_ros.nodes.joint_state_reader import ANY
-from linkage_ros.nodes.kinematics import Kinematics, Model
+from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.mechanism_model import Model
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -163,14 +164,13 @@ class Fresh(Kinematics):
     """The same node with ordinary messages."""
 
     def __init__(self, **kwargs):
-        usual, kinematics.Model = kinematics.Model, FreshModel
+        usual, mechanism_publisher.Model = mechanism_publisher.Model, FreshModel
         try:
             super().__init__(**kwargs)
         finally:
-            kinematics.Model = usual
-
-    def _learn(self, *_):
-        """Let no machine code send patched ones."""
+            mechanism_publisher.Model = usual
+        # No machine code sends patched ones.
+        self._ticks.learn = lambda *_: None
 
 
 KINDS = {'kinematics': Kinematics, 'fresh': Fresh, 'floor': Floor, 'relay': Relay,
