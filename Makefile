@@ -63,8 +63,9 @@ view: build ## Show SCENE=config/all.yaml in the browser, at PORT=8020
 bench: build $(venv)/.tools .venv-bench/.installed ## Measure run time against error, stability, and the nodes
 	@.venv-bench/bin/python -m benchmark.run
 	@.venv-bench/bin/python -m benchmark.stability
-	@.venv-bench/bin/python -m benchmark.engines
-	@.venv-bench/bin/python -m benchmark.arrays
+	@.venv-bench/bin/python -m benchmark.report
+	@.venv-bench/bin/python -m benchmark.engines --document
+	@.venv-bench/bin/python -m benchmark.arrays --document
 	@$(in_ros) python -m benchmark.nodes --quick
 
 .PHONY: pictures

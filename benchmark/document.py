@@ -1,21 +1,25 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What was measured, put into the pages between two marks."""
+"""What was measured, put into the pages, each part between two marks of its own."""
 
 from pathlib import Path
 
 DOCS = Path(__file__).parents[1] / 'docs'
-BEGIN, END = '<!-- measured -->', '<!-- end of what is measured -->'
+END = '<!-- end of what is measured -->'
 
 
-def write(page, text):
-    """Replace what a page of docs/ says between the marks."""
-    before, _, rest = (DOCS / page).read_text().partition(BEGIN)
+def write(page, text, part='measured'):
+    """Replace what a page of docs/ says between the marks of a part."""
+    before, begin, rest = _split(page, part)
     after = rest.partition(END)[2]
-    (DOCS / page).write_text(f'{before}{BEGIN}\n\n{text.rstrip()}\n\n{END}{after}')
+    (DOCS / page).write_text(f'{before}{begin}\n\n{text.rstrip()}\n\n{END}{after}')
 
 
-def written(page):
-    """Return what a page of docs/ says between the marks."""
-    return (DOCS / page).read_text().partition(BEGIN)[2].partition(END)[0].strip()
+def written(page, part='measured'):
+    """Return what a page of docs/ says between the marks of a part."""
+    return _split(page, part)[2].partition(END)[0].strip()
+
+
+def _split(page, part):
+    return (DOCS / page).read_text().partition(f'<!-- {part} -->')

@@ -1,105 +1,116 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Work-precision plots: error to the right, time upwards, one line a method over its knob."""
+"""Pictures of a run: time a pose over the number of poses and over the error, each curve named."""
 
+from linkage_ros import palette
 import matplotlib
-from matplotlib.lines import Line2D
+from PIL import Image
 
-from .report import any_of, failed, methods, TITLES
+from .report import chosen, TITLES
+from .timing import BATCHES
 
 matplotlib.use('Agg')
 from matplotlib import pyplot  # noqa: E402
 
-PANELS = {1: 'one pose at a time', 1000: '1000 poses at a time'}
-MARKERS = 'osD^v<>Pp*hXd8H'
-COLOURS = ('tab:blue', 'tab:orange', 'tab:green', 'tab:purple', 'tab:brown', 'tab:pink',
-           'tab:gray', 'tab:olive', 'tab:cyan', 'navy', 'teal', 'goldenrod', 'darkgreen',
-           'peru', 'indigo')
+# Inches and dots: the pages show it half as large.
+SIZE, DPI = (7.4, 7.2), 200
+# Errors below this are drawn as this.
 LEAST = 0.3
-CAPTION = """\
-Error: in units of 2^-53 x the longest bar, or of the sensitivity to the rounding of the inputs\
- where that is larger;
-over the poses that did not fail. Hollow: some poses failed (share in the legend). Dashed: each\
- pose is found from the one before."""
+MANY = 1000
+# How far apart the names of two curves are, in parts of a panel's height.
+APART = 0.068
+# Told apart by marker and dashes as well: ours, C, and the kinds of peers.
+LOOKS = (
+    (palette.BLUE, '-', 'o'), (palette.BLUE, '-', 's'), (palette.DARK, '-', 'D'),
+    (palette.ORANGE, '--', '^'), (palette.GREEN, '-.', 'v'), (palette.VERMILION, ':', 'P'),
+    (palette.PURPLE, (0, (6, 1)), 'X'), (palette.SKY, (0, (3, 1, 1, 1)), '*'))
 
 
 def draw(result, folder):
-    """Draw a plot for every linkage that was run."""
+    """Draw a picture of every linkage that was run."""
     for kind, title in TITLES.items():
-        lines = _lines(result, kind)
-        if lines:
-            _plot(title, lines, folder / f'{kind}.png')
+        curves = chosen(result, kind)
+        if curves:
+            _picture(title, curves, folder / f'{kind}.png')
 
 
-def _lines(result, kind):
-    """Return {method: [rows by batch, one a knob]}, without those for a part of the points."""
-    found = {}
-    for (name, _), rows in methods(result, kind).items():
-        if any_of(rows)['kind'] != 'part':
-            found.setdefault(name, []).append(rows)
-    return found
-
-
-def _plot(title, lines, path):
-    figure, axes = pyplot.subplots(1, 2, figsize=(13, 7), sharex=True)
-    looks = {name: _look(number, any_of(knobs[0])['kind'])
-             for number, (name, knobs) in enumerate(lines.items())}
-    for axis, (batch, panel) in zip(axes, PANELS.items()):
-        for name, knobs in lines.items():
-            _line(axis, [rows[batch] for rows in knobs if batch in rows], looks[name])
-        axis.set(xscale='log', yscale='log', title=panel,
-                 xlabel='largest error within a turn')
-        axis.grid(True, which='major', color='0.9')
-        axis.set_axisbelow(True)
-    axes[0].set_ylabel('time per pose [µs]')
-    figure.suptitle(f'{title}: run time against error', x=0.01, ha='left', weight='bold')
-    figure.legend(handles=[_entry(name, knobs, looks[name]) for name, knobs in lines.items()],
-                  loc='center left', bbox_to_anchor=(0.735, 0.5), frameon=False, fontsize=8.5,
-                  labelspacing=0.6)
-    figure.text(0.01, 0.01, CAPTION, fontsize=8.5, color='0.3', va='bottom')
-    figure.subplots_adjust(left=0.055, right=0.73, top=0.9, bottom=0.15, wspace=0.13)
-    figure.savefig(path, dpi=110)
+def _picture(title, curves, path):
+    figure, (above, below) = pyplot.subplots(2, figsize=SIZE)
+    _panel(above, [(curve.name, sorted(
+        (batch, row['median_us']) for batch, row in curve.batches.items())) for curve in curves])
+    above.set(xlabel='poses asked for at once', xticks=BATCHES, xticklabels=map(str, BATCHES))
+    above.minorticks_off()
+    below.invert_xaxis()
+    _panel(below, [(curve.name, [
+        (max(row['max_scaled'], LEAST), row['median_us']) for row in curve.settings(MANY)])
+        for curve in curves])
+    below.set(xlabel='largest error within a turn [2⁻⁵³ of the longest bar]')
+    for axis, what in ((above, 'over how many are asked for'),
+                       (below, f'over the error, {MANY} at once; right: exact')):
+        axis.set_title(f'{title}: time a pose {what}', loc='left', fontsize=11, weight='bold')
+    figure.subplots_adjust(left=0.1, right=0.68, top=0.96, bottom=0.07, hspace=0.33)
+    figure.savefig(path, dpi=DPI)
     pyplot.close(figure)
+    few = Image.new('P', (1, 1))
+    few.putpalette(_shades())
+    Image.open(path).convert('RGB').quantize(palette=few, dither=Image.Dither.NONE).save(
+        path, optimize=True)
 
 
-def _look(number, kind):
-    colour = {'ours': 'crimson', 'limit': 'black'}.get(kind)
-    return {'color': colour or COLOURS[number % len(COLOURS)],
-            'marker': MARKERS[number % len(MARKERS)],
-            'markersize': 9 if colour else 6,
-            'linewidth': 2 if colour else 1.2,
-            'zorder': 4 if colour else 2}
+def _shades():
+    """Return red, green and blue of all colours, fading into white: a picture needs no others."""
+    colours = sorted({'#000000', *(colour for colour, *_ in LOOKS)})
+    faded = [(1.0 + fade * (part - 1.0)) for colour in colours
+             for fade in (0.0, 0.25, 0.5, 0.75, 1.0) for part in palette.rgb(colour)]
+    return [round(255 * part) for part in (
+        *faded, *palette.rgb(palette.FRAME), *palette.rgb(palette.GRID))]
 
 
-def _line(axis, rows, look):
-    """Draw a line through the knob's settings; where poses fail the marker is hollow."""
-    drawn = [row for row in rows
-             if row['median_us'] is not None and row['max_scaled'] is not None]
-    if not drawn:
-        return
-    errors = [max(row['max_scaled'], LEAST) for row in drawn]
-    times = [row['median_us'] for row in drawn]
-    style = '--' if drawn[0]['follows'] else '-'
-    axis.plot(errors, times, **{**look, 'marker': ''}, linestyle=style)
-    for error, time, row in zip(errors, times, drawn):
-        fill = {'markerfacecolor': 'white'} if failed(row) else {}
-        axis.plot(error, time, **{**look, **fill}, linestyle='')
+def _panel(axis, curves):
+    """Draw curves, (name, points (x, microseconds)), and name each where it ends on the right."""
+    axis.set(xscale='log', yscale='log', ylabel='CPU time [ns a pose]')
+    axis.grid(True, color=palette.GRID)
+    axis.set_axisbelow(True)
+    ends = []
+    for (name, points), (colour, dashes, marker) in zip(curves, LOOKS):
+        if points:
+            x, y = zip(*((x, 1e3 * us) for x, us in points))
+            ours = colour == palette.BLUE
+            axis.plot(x, y, color=colour, linestyle=dashes, marker=marker,
+                      markersize=7, linewidth=2.4 if ours else 1.5, zorder=3 if ours else 2)
+            ends.append((name, colour, marker, points))
+    _name(axis, ends)
 
 
-def _entry(name, knobs, look):
-    rows = [any_of(rows) for rows in knobs]
-    shares = sorted(100 * failed(row) / row['angles'] for row in rows)
-    told = name if len(rows) == 1 else f'{name}\n{_range(rows)}'
-    if shares[-1]:
-        told += (f' (fails {shares[-1]:.0f} %)' if shares[-1] - shares[0] < 1
-                 else f' (fails {shares[0]:.0f}-{shares[-1]:.0f} %)')
-    fill = {'markerfacecolor': 'white'} if shares[0] else {}
-    return Line2D([], [], label=told, linestyle='--' if rows[0]['follows'] else '-',
-                  **{**look, **fill})
+def _name(axis, ends):
+    """Write names beside a panel, none over another, with a line to where each curve ends."""
+    axis.figure.canvas.draw()
+    to_panel = axis.transData + axis.transAxes.inverted()
+    placed = []
+    for name, colour, marker, points in ends:
+        spots = to_panel.transform([(x, 1e3 * us) for x, us in points])
+        placed.append((*max(spots.tolist()), name, colour, marker))
+    placed.sort(key=lambda end: end[1])
+    heights = _spread([height for _, height, *_ in placed])
+    for (x, y, name, colour, marker), height in zip(placed, heights):
+        weight = 'bold' if colour == palette.BLUE else 'normal'
+        axis.plot([x, 1.03], [y, height], transform=axis.transAxes, clip_on=False, zorder=1,
+                  color=palette.FRAME, linewidth=0.8)
+        axis.plot([1.045], [height], transform=axis.transAxes, clip_on=False, color=colour,
+                  marker=marker, markersize=6)
+        axis.text(1.07, height, name, transform=axis.transAxes, va='center', fontsize=9,
+                  weight=weight, color=palette.DARK)
 
 
-def _range(rows):
-    """Return the settings of the knob: all of a few, the ends of many."""
-    knobs = [row['knob'] for row in rows]
-    return ', '.join(knobs) if len(', '.join(knobs)) < 34 else f'{knobs[0]} … {knobs[-1]}'
+def _spread(heights):
+    """Return ascending heights, moved apart as little as it takes within 0 to 1."""
+    moved = []
+    for height in heights:
+        moved.append(max(height, moved[-1] + APART) if moved else max(height, 0.0))
+    over = max(0.0, moved[-1] - 1.0) if moved else 0.0
+    limit = 1.0 + over
+    for i in reversed(range(len(moved))):
+        limit = moved[i] = min(moved[i] - (over if i == len(moved) - 1 else 0.0), limit)
+        limit -= APART
+    return moved

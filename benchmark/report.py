@@ -1,11 +1,21 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Words and tables from the rows of a run."""
+"""
+Words and tables from the rows of a run.
 
+    python -m benchmark.report    runs nothing, writes docs/accuracy.md from benchmark/results/
+"""
+
+import json
+from pathlib import Path
+from typing import Dict, List, NamedTuple
+
+from . import document as pages
 from .errors import ENDLESS
 from .timing import BATCHES
 
+RESULTS = Path(__file__).with_name('results')
 TITLES = {'water_drop': 'Water drop', 'jansen': 'Jansen leg', 'peaucellier': 'Peaucellier cell',
           'slotted_lever': 'Slotted lever'}
 FAILURES = ('nan', 'raised', 'astray', 'made_up')
@@ -30,6 +40,7 @@ def document(result):
         f'The run took {result["seconds"]} s.',
         LEGEND,
     ]
+    parts += [CHOICE]
     for kind, title in TITLES.items():
         parts += [f'## {title}', f'![{title}: run time against error]({kind}.png)',
                   table(result, kind)]
@@ -46,6 +57,15 @@ what half an ulp of every input does, after one ulp of the result. Failures are 
 angles: no number (NaN), an exception, astray (off by more than 5 % of the longest bar: another
 assembly, or no convergence), and made up (a pose where there is none). *>* marks methods
 that follow: each pose is found from the one before, two degrees away at most."""
+
+
+CHOICE = """\
+Each picture has linkage_ros in its forms (one pose alone by `function()`), the quickest C, and of
+each kind of peer one method: the quickest at 1000 poses of those that are right at all but one in
+a hundred angles, to all but the last three digits; where none is, the one that comes closest. The
+kinds are formulas, tables, root finders, programs for linkages and sketches, robot libraries and
+simulators. A curve in the lower panel is one method over its knob: nodes, iterations, tolerance.
+What is wrong at some angles says so behind its name."""
 
 
 def table(result, kind):
@@ -76,6 +96,75 @@ def methods(result, kind):
 def any_of(rows):
     """Return one of the rows by batch of a method: of single poses where there is one."""
     return next(iter(rows.values()))
+
+
+class Curve(NamedTuple):
+    """A method in a picture: its name, a row by batch, and the rows of all its settings."""
+
+    name: str
+    batches: Dict[int, dict]
+    knobs: List[Dict[int, dict]]
+
+    def settings(self, batch):
+        """Return the timed rows of all its settings at a batch."""
+        return [rows[batch] for rows in self.knobs
+                if batch in rows and _timed(rows[batch]) and rows[batch]['max_scaled'] is not None]
+
+
+def chosen(result, kind):
+    """Return the curves of a linkage's picture, as CHOICE says."""
+    found = methods(result, kind)
+    curves = []
+    for key in (OURS, FAST):
+        if key in found:
+            rows = {**found[key], **(found.get(FLOATS, {}) if key == OURS else {})}
+            curves.append(_curve(', '.join(key), rows, [found[key]]))
+    limits = {key: rows for key, rows in found.items() if _most(rows)['kind'] == 'limit'}
+    if limits:
+        best = min(limits, key=lambda key: _merit(_most(limits[key])))
+        flags = best[1].removeprefix('gcc -O3, ')
+        curves.append(_curve(f'C ({flags})', limits[best], [limits[best]]))
+    for names in PEERS.values():
+        knobs = {key: rows for key, rows in found.items() if key[0] in names}
+        if knobs:
+            best = min(knobs, key=lambda key: _merit(_most(knobs[key])))
+            curves.append(_curve(best[0], knobs[best],
+                                 [rows for key, rows in knobs.items() if key[0] == best[0]]))
+    return curves
+
+
+def _curve(name, rows, knobs):
+    """Return a curve; its name says at how many angles it fails."""
+    row = _most(rows)
+    share = failed(row) / row['angles']
+    told = f'{name.replace(", pose before", "")}' + (
+        f' ({100 * share:.0f} % wrong)' if share >= RARE else '')
+    return Curve(told, {batch: row for batch, row in rows.items() if _timed(row)}, knobs)
+
+
+def _most(rows):
+    """Return the row by which a setting is judged."""
+    return rows.get(1000) or any_of(rows)
+
+
+def _timed(row):
+    return row['median_us'] is not None
+
+
+def _merit(row):
+    """Return what is the least for the best setting."""
+    share, error = failed(row) / row['angles'], row['max_scaled_all']
+    if not _timed(row):
+        return 2, share, error
+    if _right(row):
+        return 0, row['median_us'], error
+    return 1, share if share >= RARE else 0.0, error
+
+
+def _right(row):
+    """Return whether a method is right at all but a few angles, to the last three digits."""
+    return (failed(row) < RARE * row['angles'] and row['max_scaled_all'] is not None
+            and row['max_scaled_all'] < ACCURATE)
 
 
 def failures(row):
@@ -150,6 +239,16 @@ FLOATS = ('linkage_ros', 'function()')
 # What 100 000 poses may take, in units of what C takes.
 AIMS = {'gcc -O3': {OURS: 4.0, FAST: 0.5}, 'gcc -O3, this CPU': {OURS: 4.0, FAST: 0.5},
         'gcc -O3, this CPU, vector sine': {FAST: 1.5}}
+PEERS = {
+    'formulas': ('original formulas', 'sympy, lambdified'),
+    'tables': ('table, cubic spline',),
+    'root finders': ('Newton, 72 stored poses', 'Newton, pose before', 'scipy fsolve, pose before',
+                     'scipy least_squares, pose before', 'casadi rootfinder, pose before'),
+    'programs for linkages and sketches': (
+        'pylinkage', 'planegcs, pose before', 'SolveSpace, pose before'),
+    'robot libraries and simulators': (
+        'pinocchio, pose before', 'Drake SNOPT, pose before', 'MuJoCo, simulated'),
+}
 # Right: all but one in a hundred poses, and these to the last three digits, whatever the angle.
 ACCURATE = 1e3
 RARE = 0.01
@@ -165,8 +264,7 @@ def _against_peers(result):
         for batch in BATCHES:
             timed = [rows[batch] for rows in found.values() if batch in rows
                      and rows[batch]['kind'] == 'peer' and rows[batch]['median_us'] is not None]
-            right = [row for row in timed
-                     if failed(row) < RARE * row['angles'] and row['max_scaled_all'] < ACCURATE]
+            right = [row for row in timed if _right(row)]
             ours = (found.get(key, {}).get(batch) for key in (FLOATS, OURS, FAST))
             yield '| ' + ' | '.join((
                 f'{title}, {_poses(batch)}', *map(_time, ours),
@@ -194,6 +292,102 @@ def _aim(what, row, other, wanted):
             f'({_number(row["median_us"])} / {_number(other["median_us"])} us) |')
 
 
+def in_short(result):
+    """Return what a pose takes of the largest and of the smallest linkage."""
+    lines = ['| CPU time a pose [us], on one core | ' + ' | '.join(map(_poses, BATCHES)) + ' |',
+             '|---' + '|--:' * len(BATCHES) + '|']
+    for kind in ('jansen', 'slotted_lever'):
+        found = methods(result, kind)
+        for name, rows in (('Python and numpy', {**found[OURS], **found[FLOATS]}),
+                           ('machine code', found.get(FAST, {}))):
+            lines.append(f'| {TITLES[kind]}, {name} | '
+                         + ' | '.join(_time(rows.get(batch)) for batch in BATCHES) + ' |')
+    return '\n'.join(lines)
+
+
+def elsewhere(result):
+    """Return who takes less time, as parts of ours, and is right."""
+    lines = ['| poses at once | less time than Python and numpy | less than machine code |',
+             '|---|---|---|']
+    for batch in BATCHES:
+        lines.append(f'| {batch} | {_ahead(result, batch, OURS, FLOATS)} '
+                     f'| {_ahead(result, batch, FAST, FLOATS)} |')
+    return '\n'.join(lines)
+
+
+def _ahead(result, batch, *forms):
+    """Return the methods of others that take less time than the best of some forms of ours."""
+    told = {}
+    for kind, title in TITLES.items():
+        found = methods(result, kind)
+        own = min((found[form][batch]['median_us'] for form in forms
+                   if batch in found.get(form, {})), default=0.0)
+        best = {}
+        for rows in found.values():
+            row = rows.get(batch)
+            if row and row['kind'] in ('peer', 'limit') and _timed(row) and _right(row):
+                best[row['method']] = min(row['median_us'], best.get(row['method'], own))
+        for method, time in best.items():
+            if time < own:
+                name = method.partition(' through')[0].partition(',')[0]
+                told.setdefault(name, []).append(f'{title} {time / own:.2f}')
+    return '; '.join(f'{name}: {", ".join(where)}' for name, where in told.items()) or 'nobody'
+
+
+def stability(found):
+    """Return what benchmark.stability found, as Markdown."""
+    lines = ["| worst error / sensitivity, and of what | catalogue's dimensions "
+             '| random dimensions | original formulas |', '|---|--:|--:|--:|']
+    for kind, title in TITLES.items():
+        lines.append(f'| {title} | ' + ' | '.join(
+            _worst([row for row in found['accuracy'] if row['mechanism'] == kind
+                    and row['method'] == method and row['set'] in sets])
+            for method, sets in (('library', ('catalogue',)), ('library', ('random',)),
+                                 ('original', ('catalogue', 'random')))) + ' |')
+    own = [row for row in found['accuracy'] if row['method'] == 'library']
+    closed, reached = found['closure'], found['reach']
+    lines += ['', f'Of {_sum(own, "samples")} results of the library {_sum(own, "broken")} break '
+              f'the rule, {_sum(own, "nan")} are NaN where they should not be and '
+              f'{_sum(own, "missed_nan")} a number where NaN is due; of '
+              f'{_sum(closed, "samples")} angles {_sum(closed, "wrong")} are assembled, or not, '
+              f'wrongly. The reach of {_sum(reached, "designs")} random designs differs from '
+              f'brute force in {_sum(reached, "wrong")}.', '']
+    several = found['linkages']
+    lines += [f'| {several["linkages"]} random linkages of every word: error / sensitivity of '
+              '| results | worst | 99.9 % are below |', '|---|--:|--:|--:|']
+    lines += [f'| {row["output"]} | {row["samples"]} | {row["max"]:.2g} | {row["p99.9"]:.2g} |'
+              for row in several['outputs']]
+    lines += ['', 'What was wrong, with them or with the check: ' + (', '.join(
+        f'{row["count"]} x {row["kind"]}' for row in several['problems']) or 'nothing') + '.']
+    return '\n'.join(lines)
+
+
+def _sum(rows, column):
+    return sum(row[column] for row in rows)
+
+
+def _worst(rows):
+    worst = max(rows, key=lambda row: row['max'])
+    return f'{worst["max"]:.2g} ({worst["output"]})'
+
+
+def main():
+    """Write what docs/accuracy.md shows of the last runs."""
+    for part, text in page(*(json.loads((RESULTS / f'{name}.json').read_text())
+                             for name in ('latest', 'stability'))).items():
+        pages.write('accuracy.md', text, part)
+
+
+def page(result, found):
+    """Return the measured parts of docs/accuracy.md."""
+    machine, aims = result['machine'], targets(result).partition('\n\n')[0]
+    return {
+        'measured: in short': in_short(result), 'measured: elsewhere': elsewhere(result),
+        'measured: choice': CHOICE, 'measured: stability': stability(found),
+        'measured: comparison': f'{aims}\n\n{machine["date"]}, {machine["cpu"]}, one core; '
+                                f'commit {machine["commit"]}.'}
+
+
 def comparison(old, new):
     """Return the ratios new / old of median times and largest errors, for rows in both."""
     before = {_key(row): row for row in old['rows']}
@@ -215,3 +409,7 @@ def _key(row):
 
 def _ratio(new, old):
     return f'{new / old:.2f}' if new is not None and old else '-'
+
+
+if __name__ == '__main__':
+    main()

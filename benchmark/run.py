@@ -4,12 +4,13 @@
 """
 Run time against error: every method on every linkage at several batch sizes.
 
-    python -m benchmark.run                      everything, within ten minutes
+    python -m benchmark.run                      everything, in some two minutes
     python -m benchmark.run --quick              a look, within a minute
     python -m benchmark.run --compare old.json   ratios to an earlier run, nothing is run
 
-Rows go to benchmark/results/latest.json, with a table and plots beside it. What it needs is in
-benchmark/requirements.txt; a method whose package is not installed is named and left out.
+Rows go to benchmark/results/latest.json, those of a look to benchmark/.cache/, with a table and
+pictures beside it. What it needs is in benchmark/requirements.txt; a method whose package is not
+installed is named and left out.
 """
 
 import argparse
@@ -22,6 +23,7 @@ import time
 # One core for every method: the numbers are per core.
 for library in ('OMP', 'OPENBLAS', 'MKL', 'NUMEXPR'):
     os.environ.setdefault(f'{library}_NUM_THREADS', '1')
+os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
 
 import numpy as np  # noqa: E402
 
@@ -29,7 +31,6 @@ from . import methods, plots, problems, report, timing  # noqa: E402
 from .errors import judge  # noqa: E402
 from .machine import machine  # noqa: E402
 
-RESULTS = Path(__file__).with_name('results')
 QUICK = ('ours', 'compiled_c', 'original', 'sympy_expression', 'table', 'newton', 'pylinkage_step')
 
 
@@ -54,10 +55,13 @@ def arguments():
     parser.add_argument('--quick', action='store_true', help='fewer methods, less time each')
     parser.add_argument('--families', nargs='+', choices=methods.FAMILIES, metavar='FAMILY',
                         help=f'only these: {", ".join(methods.FAMILIES)}')
-    parser.add_argument('--output', type=Path, default=RESULTS / 'latest.json', metavar='JSON')
+    parser.add_argument('--output', type=Path, metavar='JSON')
     parser.add_argument('--compare', type=Path, metavar='JSON',
                         help='print the ratios of the output to an earlier one')
-    return parser.parse_args()
+    options = parser.parse_args()
+    options.output = options.output or (
+        problems.CACHE if options.quick else report.RESULTS) / 'latest.json'
+    return options
 
 
 def run(options):

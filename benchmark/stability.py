@@ -79,7 +79,7 @@ def parse(args):
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('--samples', type=int, default=100_000, help='angles a mechanism')
     parser.add_argument('--designs', type=int, default=10_000, help='reaches a mechanism')
-    parser.add_argument('--linkages', type=int, default=10_000, help='random linkages')
+    parser.add_argument('--linkages', type=int, default=1000, help='random linkages')
     parser.add_argument('--grid', type=int, default=8000,
                         help='angles at which a random linkage is searched by brute force')
     parser.add_argument('--mechanisms', nargs='*', default=list(hard_cases.CATALOGUE),

@@ -4,8 +4,8 @@
 """
 How long a method takes: samples taken in turn with all the others.
 
-All methods run on one thread, whose own CPU time is what is counted: other programs on the machine
-then matter less.
+All methods run on one core, and the CPU time of the process is what is counted, threads of a
+method's own with it: other programs on the machine then matter less.
 """
 
 import gc
@@ -66,17 +66,17 @@ class Stopwatch:
 
     def _once(self):
         if self._batch > 1:
-            start = time.thread_time()
+            start = time.process_time()
             self._method.solve(self._theta)
-            return time.thread_time() - start
+            return time.process_time() - start
         solve, angles = self._method.solve_one, self._theta.tolist()
-        start = time.thread_time()
+        start = time.process_time()
         for theta in angles:
             try:
                 solve(theta)
             except Exception:  # counted among the failures, not here
                 pass
-        return time.thread_time() - start
+        return time.process_time() - start
 
 
 def _scattered(kind, batch):

@@ -205,24 +205,44 @@ def test_the_page_of_a_mechanism_has_all_of_it(catalogue, type_):
     exec(compile(re.findall(r'```python\n(.*?)```', page, re.DOTALL)[0], type_, 'exec'), {})
 
 
-def test_what_a_scene_costs_is_what_was_measured():
-    head, _, tables = (ROOT / 'docs' / 'performance.md').read_text().partition('<!-- measured -->')
-    cpu = {(scene_, node, int(rate)): int(us) * int(rate) / 1e4 for scene_, rate, node, us
-           in re.findall(r'^\| ([\w ]+) \| (\d+) \| (kin[^|]*) \| (\d+) \|', tables, re.MULTILINE)}
-    rows = re.findall(r'^\| ([\w ]+)(, nobody listens)? \| (.*) % \| (.*) % \| (.*) % \|$', head,
-                      re.MULTILINE)
-    assert len(rows) == 4
-    for scene_, alone, *shares in rows:
-        node = 'kinematics, no subscriber (d)' if alone else 'kinematics'
-        assert shares == [f'{cpu[scene_, node, rate]:.2g}' for rate in (50, 200, 1000)]
-
-
-def test_the_table_of_engines_is_that_of_the_last_run(monkeypatch):
+@pytest.fixture
+def measured(monkeypatch):
     pytest.importorskip('mpmath')
     monkeypatch.syspath_prepend(ROOT)
-    from benchmark import document, engines
-    result = json.loads(engines.RESULTS.read_text())
-    assert document.written('architecture.md') == engines.table(result)
+    import benchmark.document
+    import benchmark.engines
+    import benchmark.nodes.report
+    import benchmark.report
+    results = {path.stem: json.loads(path.read_text())
+               for path in (ROOT / 'benchmark' / 'results').glob('*.json')}
+    return benchmark, results
+
+
+def test_what_a_scene_costs_is_what_was_measured(measured):
+    benchmark, results = measured
+    report, written = benchmark.nodes.report, benchmark.document.written
+    assert written('performance.md') == report.document(results['nodes']).strip()
+    assert written('performance.md', 'measured: in short') == report.in_short(results['nodes'])
+
+
+def test_how_quick_and_how_exact_it_is_said_to_be_is_what_was_measured(measured):
+    benchmark, results = measured
+    for part, text in benchmark.report.page(results['latest'], results['stability']).items():
+        assert benchmark.document.written('accuracy.md', part) == text.strip()
+
+
+def test_a_picture_of_the_comparison_names_eight_curves_at_most(measured):
+    benchmark, results = measured
+    for kind in benchmark.report.TITLES:
+        names = [curve.name for curve in benchmark.report.chosen(results['latest'], kind)]
+        assert len(set(names)) == len(names) <= 8
+        assert sum(name.startswith('linkage_ros') for name in names) >= 2
+
+
+def test_the_table_of_engines_is_that_of_the_last_run(measured):
+    benchmark, results = measured
+    assert (benchmark.document.written('architecture.md')
+            == benchmark.engines.table(results['engines']))
 
 
 def test_text_of_a_docstring_is_taken_for_text(catalogue):

@@ -4,8 +4,6 @@
 """
 How long poses are held up by changes of parameters, at 500 Hz and 12 legs.
 
-    python -m benchmark.nodes.changes
-
 `kinematics` runs as a process; a thread publishes crank messages at equal times, the time between
 one joint state and the next is taken as it arrives here. What no change at all brings is printed
 beside: the machine's own part.
@@ -13,8 +11,6 @@ beside: the machine's own part.
 
 from contextlib import contextmanager
 import itertools
-from pathlib import Path
-import tempfile
 import threading
 import time
 
@@ -23,8 +19,7 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 
 from . import scenes
-from .driving import Driver, Process
-from .report import table
+from .driving import Process
 
 SCENE, NODE, RATE = '12 legs', ('-m', 'linkage_ros.nodes.kinematics'), 500.0
 ROUNDS, BREAK = 12, 0.25
@@ -90,30 +85,21 @@ def gaps(driver, line, client, kind):
     return found, took
 
 
-def main():
-    """Measure and print."""
-    driver = Driver()
+def measure(bench):
+    """Return rows: gaps and answers [ms] of each kind of change."""
+    driver = bench.driver
+    process = Process('changed', *NODE, parameters=scenes.write(SCENE, bench.folder))
     try:
-        with tempfile.TemporaryDirectory() as folder:
-            process = Process('changed', *NODE, parameters=scenes.write(SCENE, Path(folder)))
-            try:
-                line = driver.line(process, SCENE, scenes.topics(SCENE))
-                client = driver.node.create_client(
-                    SetParameters, '/changed/kinematics/set_parameters')
-                rows = []
-                with turning(line):
-                    driver.wait(2.0)
-                    for kind in CHANGES:
-                        found, took = gaps(driver, line, client, kind)
-                        rows.append([kind, *(f'{value:.1f}' for value in (
-                            np.median(found), max(found), np.median(took)))])
-                print(table(['change', 'gap, median [ms]', 'longest', 'answered after [ms]'],
-                            rows))
-            finally:
-                process.end()
+        line = driver.line(process, SCENE, scenes.topics(SCENE))
+        client = driver.node.create_client(SetParameters, '/changed/kinematics/set_parameters')
+        rows = []
+        with turning(line):
+            driver.wait(2.0)
+            for kind in CHANGES:
+                found, took = gaps(driver, line, client, kind)
+                rows.append({'kind': kind, 'gap': float(np.median(found)),
+                             'longest': float(max(found)), 'answered': float(np.median(took))})
+        line.close()
     finally:
-        driver.end()
-
-
-if __name__ == '__main__':
-    main()
+        process.end()
+    return rows

@@ -18,8 +18,16 @@ from visualization_msgs.msg import MarkerArray
 from . import scenes
 
 DEADLINE = 30.0
+# Where the stamp is in the bytes of a message.
+STAMP = slice(4, 12)
+# How late a message may be sent before all that follow are sent later [s].
+LATE = 0.01
 # After the last message of a burst, answers are waited for this long [s].
 PATIENCE = 0.5
+# How many messages are under way at most where each is sent as soon as it may be.
+AHEAD = 4
+# For how long no answer may come until it is lost [s].
+STALL = 5.0
 
 
 def resident(pid='self') -> int:
@@ -109,16 +117,16 @@ class Driver:
         while (left := until - time.perf_counter()) > 0.0:
             self.executor.spin_once(timeout_sec=left)
 
-    def until(self, predicate, seconds=DEADLINE):
+    def until(self, predicate, seconds=DEADLINE, executor=None):
         """Let what arrives be heard until something holds; return whether it did."""
         deadline = time.perf_counter() + seconds
         while not (held := predicate()) and time.perf_counter() < deadline:
-            self.executor.spin_once(timeout_sec=0.02)
+            (executor or self.executor).spin_once(timeout_sec=0.02)
         return held
 
-    def line(self, process, scene, topics):
+    def line(self, process, scene, topics, stamped=False):
         """Return what drives a process that answers on some topics, when both are connected."""
-        line = Line(self, process, scene, topics)
+        line = Line(self, process, scene, topics, stamped)
         if not self.until(line.connected):
             raise RuntimeError(f'{process.name} did not answer in {DEADLINE} s')
         return line
@@ -145,10 +153,15 @@ class Driver:
 
 
 class Line:
-    """From the driver to one process and back."""
+    """
+    From the driver to one process and back.
 
-    def __init__(self, driver, process, scene, topics):
-        self.process = process
+    Where answers are `stamped` as their messages are, what a node shows again after a change, with
+    the stamp of the one before, is not taken for an answer.
+    """
+
+    def __init__(self, driver, process, scene, topics, stamped=False):
+        self.process, self._stamped = process, stamped
         self._driver = driver
         self.cranks = scenes.Cranks(scene)
         self.publisher = driver.node.create_publisher(
@@ -161,10 +174,16 @@ class Line:
             for topic in topics]
 
     def _hear(self, path):
-        times = []
+        times, last = [], b''
+
+        def hear(text):
+            nonlocal last
+            if not self._stamped or text[STAMP] != last:
+                last = text[STAMP]
+                times.append(time.perf_counter())
+
         self.heard.append(times)
-        return self._driver.node.create_subscription(
-            JointState, path, lambda _: times.append(time.perf_counter()), 1000, raw=True)
+        return self._driver.node.create_subscription(JointState, path, hear, 1000, raw=True)
 
     def _ignore(self, _):
         pass
@@ -196,7 +215,10 @@ class Line:
         spin, sent, cpu = self._driver.executor.spin_once, [], self.process.cpu()
         start = time.perf_counter()
         while len(sent) < count:
-            left = start + len(sent) / rate - time.perf_counter()
+            now = time.perf_counter()
+            # A driver that the machine kept waiting does not send in a heap what it missed.
+            start = max(start, now - len(sent) / rate - LATE)
+            left = start + len(sent) / rate - now
             if left > 0.0:
                 spin(timeout_sec=left)
             else:
@@ -210,3 +232,18 @@ class Line:
         if not self.heard:
             self._driver.wait(0.05)
         return Burst(sent, self.heard, self.process.cpu() - cpu)
+
+    def flow(self, count):
+        """Send messages, each when nearly all before it are answered; return how many are lost."""
+        for times in self.heard:
+            times.clear()
+        for sent in range(1, count + 1):
+            self.send()
+            if not self._answered(sent - AHEAD):
+                break
+        self._answered(sent)
+        return sent - min(map(len, self.heard))
+
+    def _answered(self, count):
+        return self._driver.until(
+            lambda: all(len(times) >= count for times in self.heard), STALL)

@@ -7,64 +7,95 @@ import os
 import signal
 import time
 
-from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros import scene
 import numpy as np
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 
 from . import changes, scenes
-from .campaign import NODE, SUBJECT
-from .driving import Process, resident
+from .campaign import latency, NODE, SUBJECT
+from .driving import Process
 
 MIB = 2 ** 20
+# Between two changes of a parameter [s].
+PAUSE = 1.0
+
+
+class Changes:
+    """Changes a dimension by a thousandth again and again, of one mechanism after the other."""
+
+    def __init__(self, driver, process, name):
+        self._node, self.answered, self._count = driver.node, 0, 0
+        self._client = self._node.create_client(
+            SetParameters, f'/{process.name}/kinematics/set_parameters')
+        read = scene.read(scenes.given(name))
+        self._dimensions = [next(p for p in read.parameters
+                                 if p.name.startswith(f'{machine}.dimensions.'))
+                            for machine in read.machines]
+
+    def __enter__(self):
+        self._timer = self._node.create_timer(PAUSE, self._ask)
+        return self
+
+    def _ask(self):
+        turn, which = divmod(self._count, len(self._dimensions))
+        self._count += 1
+        name, value = self._dimensions[which].name, self._dimensions[which].value
+        self._client.call_async(SetParameters.Request(parameters=[Parameter(
+            name, value=value * (1.0 - 1e-3 * (turn % 2))).to_parameter_msg()
+        ])).add_done_callback(self._take)
+
+    def _take(self, future):
+        self.answered += future.result().results[0].successful
+
+    def __exit__(self, *_):
+        self._node.destroy_timer(self._timer)
+        self._node.destroy_client(self._client)
 
 
 def soak(bench, count):
-    """Return the growth of a node that turns 12 legs again and again, heard by a process [MiB]."""
-    scene = '12 legs'
-    ready = bench.ready(scene)
-    node = Kinematics(namespace='/soak', parameter_overrides=[
-        Parameter(name, value=value) for name, value in scenes.SCENES[scene].items()])
-    turn = next(s for s in node.subscriptions if s.topic_name.endswith('crank_states')).callback
-    ear = Process('soak', *SUBJECT, 'ear', '--ready', str(ready))
+    """Return what became of a node that turned 12 legs again and again, as fast as it could."""
+    name = '12 legs'
+    process = Process('soak', *NODE, parameters=scenes.write(name, bench.folder))
     try:
-        assert bench.driver.until(lambda: all(
-            node.count_subscribers(topic.name) for topic in scenes.topics(scene)))
-        cranks, sizes = scenes.Cranks(scene), []
-        for done in range(1, count + 1):
-            turn(serialize_message(next(cranks)))
-            if done % (count // 100) == 0:
-                sizes.append(resident())
-                assert ear.running()
-    finally:
-        ear.end()
-        node.destroy_node()
-    # A tenth is left out: buffers and caches fill.
-    settled = sizes[9:]
-    return {'messages': count, 'growth_mib': (settled[-1] - settled[0]) / MIB,
-            'span_mib': (max(settled) - min(settled)) / MIB,
-            'resident_mib': settled[-1] / MIB}
-
-
-def hold(bench, rate, seconds):
-    """Return what came of turning 12 legs at a rate [Hz] for some seconds."""
-    scene = '12 legs'
-    process = Process('held', *NODE, parameters=scenes.write(scene, bench.folder))
-    try:
-        line = bench.driver.line(process, scene, scenes.topics(scene))
-        line.burst(200.0, 200)
-        size, began = process.resident(), time.perf_counter()
-        burst = line.burst(rate, round(rate * seconds))
+        line = bench.driver.line(process, name, scenes.topics(name), stamped=True)
+        sizes, lost, began = [], 0, time.perf_counter()
+        with Changes(bench.driver, process, name) as changed:
+            for _ in range(100):
+                lost += line.flow(count // 100)
+                sizes.append(process.resident())
         took = time.perf_counter() - began
-        grown = process.resident() - size
+        line.close()
     finally:
         process.end()
-    found = burst.latencies or [float('nan')]
-    return {'rate': rate, 'seconds': seconds, 'took': took, 'lost': burst.lost, 'cpu': burst.cpu,
-            'p50': float(np.percentile(found, 50)), 'p99': float(np.percentile(found, 99)),
-            'max': float(max(found)), 'growth_mib': grown / MIB,
-            'load': os.getloadavg()[0]}
+    return {'messages': count, 'took': took, 'lost': lost, 'changes': changed.answered,
+            **_grown(sizes)}
+
+
+def hold(bench, name, rate, seconds):
+    """Return what came of turning a scene at a rate [Hz] for some seconds."""
+    process = Process('held', *NODE, parameters=scenes.write(name, bench.folder))
+    try:
+        line = bench.driver.line(process, name, scenes.topics(name), stamped=True)
+        line.burst(200.0, 200)
+        began = time.perf_counter()
+        with Changes(bench.driver, process, name) as changed:
+            burst = line.burst(rate, round(rate * seconds))
+        took = time.perf_counter() - began
+        line.close()
+    finally:
+        process.end()
+    return {'scene': name, 'rate': rate, 'seconds': seconds, 'took': took, 'lost': burst.lost,
+            'changes': changed.answered, 'cpu': burst.cpu, **latency(burst.latencies),
+            'longest': max(burst.latencies, default=None), 'load': os.getloadavg()[0]}
+
+
+def _grown(sizes):
+    """Return what memory did [MiB]; a tenth is left out, while buffers and caches fill."""
+    settled = sizes[len(sizes) // 10:]
+    return {'growth_mib': (settled[-1] - settled[0]) / MIB,
+            'span_mib': (max(settled) - min(settled)) / MIB, 'resident_mib': settled[-1] / MIB}
 
 
 def trouble(bench, seconds):
@@ -102,8 +133,5 @@ def trouble(bench, seconds):
         stalled.signal(signal.SIGCONT)
         stalled.end()
         process.end()
-    settled = sizes[len(sizes) // 10:]
-    return {'seconds': len(sizes), 'growth_mib': (settled[-1] - settled[0]) / MIB,
-            'span_mib': (max(settled) - min(settled)) / MIB,
-            'resident_mib': settled[-1] / MIB, 'answered_ms': float(np.median(took)),
+    return {'seconds': len(sizes), **_grown(sizes), 'answered_ms': float(np.median(took)),
             'longest_answer_ms': max(took)}

@@ -6,19 +6,63 @@
 import statistics
 
 WALKER = '12 legs'
+# What tells how fast Python runs.
+YARDSTICK = 'sum(range(100000))'
 # The nodes that grow.
 KINEMATICS, BARE = 'kinematics', 'bare'
 NAMES = {
     'kinematics': 'kinematics', 'floor': 'floor (a): as many ready bytes',
     'fresh': 'ordinary messages (b)', 'relay': 'numerical relay (c), one leg, joint states',
-    'unheard': 'kinematics, no subscriber (d)', 'deaf': 'subscriber that does nothing',
-    'raw': 'the same, message left as bytes', 'kinematics_plain': 'kinematics',
-    'floor_plain': 'floor (a)'}
+    'joints': 'kinematics, joint states alone',
+    'unheard': 'kinematics, no subscriber (d)', 'deaf': 'subscriber that does nothing'}
 SERVICES = {
     'trigger': 'std_srvs/Trigger', 'echo 1': 'ServoInverse, 1 angle, echoed',
     'servo 1': 'servo_inverse, 1 angle', 'echo 1000': 'ServoInverse, 1000, echoed',
     'servo 1000': 'servo_inverse, 1000 angles'}
-LAYERS = ('read', 'ask who listens', 'solve', 'patch', 'publish')
+# What is aimed at as a multiple of the floor: the body of a tick by scene, and CPU a message.
+BODIES = {'one leg': 1.5, '12 legs': 1.5, 'four mechanisms': 1.3, 'sixty mechanisms': 1.3}
+CPU = 1.15
+
+
+def in_short(result):
+    """Return what a scene costs, and what else a user wants to know of it, as Markdown."""
+    if 'rows' not in result:
+        return ''
+    rows = result['rows']
+    columns, scenes = rates(rows), list(dict.fromkeys(row['scene'] for row in rows))
+    cpu = {(row['scene'], row['subject'], row['rate']): row['cpu'] for row in rows}
+    shown = [(scene, scene, 'kinematics', 'floor') for scene in scenes]
+    shown += [(f'{WALKER}, {what}', WALKER, subject, other) for what, subject, other in (
+        ('joint states alone', 'joints', None), ('nobody listens', 'unheard', 'deaf'))]
+    lines = [[name, *(_share(cpu, (scene, subject, rate), (scene, other, rate))
+                      for rate in columns)] for name, scene, subject, other in shown
+             if any((scene, subject, rate) in cpu for rate in columns)]
+    delays = [row['p50'] for row in rows if row['subject'] == 'kinematics' and row['p50']]
+    told = [table(['part of one core [%]', *(f'{rate:.0f} Hz' for rate in columns)], lines), '',
+            "- **From an encoder's message to the last joint** pass "
+            f'{1e-3 * min(delays):.1f} to {1e-3 * max(delays):.1f} ms (medians), both ways '
+            'through the middleware included.']
+    if 'soak' in result:
+        soak = result['soak']
+        told.append(f'- **Memory**: {soak["resident_mib"]:.0f} MiB for 12 legs with machine code; '
+                    f'it grew by {soak["growth_mib"]:.1f} MiB over {soak["messages"]:,} messages.')
+    if 'processes' in result:
+        three, one = ([row for row in result['processes'] if row['kind'] == kind]
+                      for kind in ('apart', 'together'))
+        cpus, sizes = (statistics.median(in_turn(a[what], b[what]) for a, b in zip(one, three))
+                       for what in ('cpu', 'memory'))
+        told.append(f'- **Run `scene`**, all nodes in one process: {cpus:.2f} of the CPU of three '
+                    f'processes and {sizes:.2f} of their memory.')
+    if 'yardstick' in result:
+        told.append('- **On another processor** take the time of `python -m timeit '
+                    f'"{YARDSTICK}"`; here it is {result["yardstick"]:.0f} us.')
+    return '\n'.join(told)
+
+
+def _share(cpu, own, other):
+    """Return parts of one core [%], the own and in brackets the other's; nothing where not run."""
+    parts = [f'{1e-4 * cpu[key] * key[-1]:.2g}' for key in (own, other) if key in cpu]
+    return parts[0] + (f' ({parts[1]})' if parts[1:] else '') if own in cpu else ''
 
 
 def document(result):
@@ -31,7 +75,8 @@ def document(result):
             f'{machine["date"]}, {machine["cpu"]}, {result["cores"]} cores, load '
             f'{result["load"]:.1f}; Python {machine["python"]}, {packages}; commit '
             f'{machine["commit"]}. The run took {result["seconds"]} s.',
-            '### Targets', targets(result), '### CPU time and latency', costs(result['rows']),
+            '### Targets', beside_the_floor(result), targets(result),
+            '### CPU time and latency', costs(result['rows']),
             '### Executors', executors(result['rows']),
             '### Where the time goes', layers(result),
             '### Body of the tick', bodies(result),
@@ -42,6 +87,8 @@ def document(result):
         parts += ['### The driver alone', drivers(result['drivers'])]
     if 'stream' in result:
         parts += ['### Commands', stream(result['stream'])]
+    if 'changes' in result:
+        parts += ['### Changes', changes(result['changes'])]
     if 'growth' in result:
         parts += ['### Growth', growth(result['growth'])]
     if {'soak', 'hold', 'trouble'} & result.keys():
@@ -67,45 +114,71 @@ def in_turn(values, others):
     return statistics.median(a / b for a, b in zip(values, others))
 
 
-def rates(rows):
-    """Return the rates that were measured."""
-    return sorted({row['rate'] for row in rows})
+def rates(rows, scene=None):
+    """Return the rates that were measured, of one scene or of all."""
+    return sorted({row['rate'] for row in rows if scene in (None, row['scene'])})
+
+
+def beside_the_floor(result):
+    """Return what a tick and a message cost as multiples of the floor, and what was aimed at."""
+    rows, lines = result['rows'], []
+    ticks = {(body['scene'], body['subject']): body['ticks'] for body in result['bodies']}
+    columns = rates(rows)
+    for scene in dict.fromkeys(row['scene'] for row in rows):
+        body = in_turn(ticks[scene, 'kinematics'], ticks[scene, 'floor'])
+        measured = {row['rate'] for row in rows if row['scene'] == scene}
+        lines.append([scene, f'<= {BODIES[scene]}', within(body, BODIES[scene]), *(
+            within(ratio(rows, scene, rate, 'kinematics', 'floor'), CPU) if rate in measured
+            else beyond(rows, scene, rate) for rate in columns)])
+    return table(['x floor (a)', 'body of the tick: target', 'measured', *(
+        f'CPU a message, {rate:.0f} Hz: <= {CPU}' for rate in columns)], lines)
+
+
+def beyond(rows, scene, rate):
+    """Return what part of one core the floor alone would take at a rate that is too high."""
+    most = max((row for row in rows if row['scene'] == scene and row['subject'] == 'floor'),
+               key=lambda row: row['rate'])
+    if rate < most['rate']:
+        return ''
+    return f'not run: the floor alone takes {1e-4 * most["cpu"] * rate:.0f} % of a core'
+
+
+def within(value, limit):
+    """Return a ratio, and mark it where it is above its limit."""
+    return f'{value:.2f}' if value <= limit else f'**{value:.2f}**'
 
 
 def targets(result):
-    """Return what was aimed at and what came of it."""
+    """Return what else was aimed at, and what came of it."""
     rows, lines = result['rows'], []
     tick = {(body['scene'], body['subject']): body for body in result['bodies']}
-    for rate in rates(rows):
-        whole = ratio(rows, WALKER, rate, 'kinematics', 'floor')
+    for rate in rates(rows, WALKER):
         nobody = ratio(rows, WALKER, rate, 'unheard', 'deaf')
-        lines += [
-            [f'CPU a message / floor (a), {rate:.0f} Hz', '<= 1.3', f'{whole:.2f}',
-             met(whole, 1.3)],
-            [f'no subscriber (d) / does nothing, {rate:.0f} Hz', '<= 1.1', f'{nobody:.2f}',
-             met(nobody, 1.1)]]
-    body = tick[WALKER, 'kinematics']['tick']
-    times = in_turn(tick[WALKER, 'fresh']['ticks'], tick[WALKER, 'kinematics']['ticks'])
-    a_leg = 12 * tick['one leg', 'relay']['tick'] / body
-    lines += [['body of the tick', '<= 80 us', f'{body:.0f} us', met(body, 80.0)],
-              ['body with ordinary messages (b) / body', '>= 10', f'{times:.1f}',
+        lines.append([f'12 legs, no subscriber (d) / does nothing, {rate:.0f} Hz', '<= 1.1',
+                      f'{nobody:.2f}', met(nobody, 1.1)])
+    body = tick[WALKER, 'kinematics']['ticks']
+    times = in_turn(tick[WALKER, 'fresh']['ticks'], body)
+    a_leg = 12 * statistics.median(tick['one leg', 'relay']['ticks']) / statistics.median(body)
+    lines += [['12 legs, body with ordinary messages (b) / body', '>= 10', f'{times:.1f}',
                met(times, -10.0)],
-              ['body of the relay (c) / body a leg', '>= 20', f'{a_leg:.0f}', met(a_leg, -20.0)]]
+              ['body of the relay (c) / body a leg of 12', '>= 20', f'{a_leg:.0f}',
+               met(a_leg, -20.0)]]
     lines += service_targets(result['services'])
     lines += process_targets(result['processes']) if 'processes' in result else []
     lines += driver_targets(result['drivers']) if 'drivers' in result else []
     starts = result['starts']
     start = statistics.median(starts['kinematics'])
-    lines += [['start to first joint states', '< 1.5 s',
+    lines += [['12 legs, start to first joint states', '< 1.5 s',
                f'{_seconds(starts["kinematics"])} (floor: {_seconds(starts["floor"])}; '
                f'to make the node and end: {_seconds(starts["made"])})', met(start, 1.5)]]
     for soak in [result['soak']] if 'soak' in result else []:
-        lines += [[f'growth over {soak["messages"]:,} messages', '<= 2 MiB',
-                   f'{soak["span_mib"]:.2f} MiB', met(soak['span_mib'], 2.0)]]
-    for hold in [result['hold']] if 'hold' in result else []:
-        lines += [[f'{hold["rate"]:.0f} Hz for {hold["seconds"]:.0f} s, messages lost', '0',
-                   hold['lost'], met(hold['lost'], 0)]]
-    return table(['12 legs, all topics subscribed', 'target', 'measured', 'met'], lines)
+        lines += [[f'12 legs, growth over {soak["messages"]:,} messages', '<= 2 MiB',
+                   f'{soak["span_mib"]:.2f} MiB', met(soak['span_mib'], 2.0)],
+                  ['the same, messages lost', '0', soak['lost'], met(soak['lost'], 0)]]
+    for hold in result.get('hold', ()):
+        lines += [[f'{hold["scene"]}, {hold["rate"]:.0f} Hz for {hold["seconds"]:.0f} s, messages '
+                   'lost', '0', hold['lost'], met(hold['lost'], 0)]]
+    return table(['all topics subscribed', 'target', 'measured', 'met'], lines)
 
 
 def service_targets(rows):
@@ -151,7 +224,7 @@ def costs(rows):
     for row in rows:
         if row['subject'].endswith('_plain'):
             continue
-        base = 'deaf' if row['subject'] in ('unheard', 'raw', 'deaf') else 'floor'
+        base = 'deaf' if row['subject'] in ('unheard', 'deaf') else 'floor'
         times = ratio(rows, row['scene'], row['rate'], row['subject'], base)
         lines.append([
             row['scene'], f'{row["rate"]:.0f}', NAMES[row['subject']], f'{row["cpu"]:.0f}',
@@ -173,50 +246,38 @@ def _latency(row):
 def executors(rows):
     """Return what the plain executor costs next to the one that waits for events."""
     lines = []
-    for rate in rates(rows):
+    for rate in rates(rows, WALKER):
         found = {r['subject']: r for r in rows if (r['scene'], r['rate']) == (WALKER, rate)}
-        for subject in ('kinematics', 'floor'):
-            events, plain = found[subject], found[f'{subject}_plain']
-            lines.append([f'{NAMES[f"{subject}_plain"]}, {rate:.0f} Hz',
-                          f'{events["cpu"]:.0f}', f'{plain["cpu"]:.0f}',
-                          f'{ratio(rows, WALKER, rate, f"{subject}_plain", subject):.2f}',
-                          *_latency(events), *_latency(plain)])
-    return table(['12 legs', 'Events CPU', 'Single CPU', 'ratio', 'Events p50', 'p99',
+        events, plain = found['kinematics'], found['kinematics_plain']
+        lines.append([f'{rate:.0f}', f'{events["cpu"]:.0f}', f'{plain["cpu"]:.0f}',
+                      f'{ratio(rows, WALKER, rate, "kinematics_plain", "kinematics"):.2f}',
+                      *_latency(events), *_latency(plain)])
+    return table(['12 legs, Hz', 'Events CPU', 'Single CPU', 'ratio', 'Events p50', 'p99',
                   'Single p50', 'p99'], lines)
 
 
 def layers(result):
-    """Return a message's way through the node of 12 legs, layer by layer."""
-    rows, lines = result['rows'], []
-    columns = rates(rows)
-    for rate in columns:
-        cpu = {r['subject']: r['cpu'] for r in rows if (r['scene'], r['rate']) == (WALKER, rate)}
-        part = next(p for p in result['parts'] if (p['scene'], p['rate'], p['subject'])
-                    == (WALKER, rate, 'kinematics'))
-        rest = part['tick'] - sum(part[layer] for layer in LAYERS)
-        lines.append([
-            cpu['raw'], *(part[layer] for layer in LAYERS), rest,
-            cpu['kinematics'] - cpu['raw'] - part['tick'], cpu['kinematics']])
-    names = ('middleware, wake-up and taking the bytes', *(f'tick: {layer}' for layer in LAYERS),
-             'tick: the rest', 'what is left to all', 'all')
-    return table(['CPU [us a message]', *(f'{rate:.0f} Hz' for rate in columns)],
-                 [[name, *(f'{v:.0f}' for v in values)]
-                  for name, values in zip(names, zip(*lines))])
+    """Return what publishing is of a tick, and a tick of a message, at each rate."""
+    lines = []
+    for part in result['parts']:
+        whole = next(row['cpu'] for row in result['rows'] if row['subject'] == part['subject']
+                     and (row['scene'], row['rate']) == (part['scene'], part['rate']))
+        lines.append([f'{part["rate"]:.0f}', NAMES[part['subject']], *(f'{time:.0f}' for time in (
+            whole, part['tick'], part['publish'], part['tick'] - part['publish']))])
+    return ('CPU time [us a message]; the tick is the callback, the rest of a message is the '
+            'middleware, wake-up and what is shared by all.\n\n' + table(
+                ['12 legs, Hz', 'node', 'all', 'tick', 'of it publishing', 'the rest of it'],
+                lines))
 
 
 def bodies(result):
     """Return what the callbacks take."""
-    hot = table(['in a loop', 'node', 'tick [us]', 'x floor'], [
-        [body['scene'], NAMES[body['subject']], f'{body["tick"]:.0f}',
-         f'{in_turn(body["ticks"], floor["ticks"]):.1f}']
-        for body in result['bodies'] for floor in result['bodies']
-        if floor['subject'] == 'floor' and floor['scene'] == body['scene']])
-    cold = table(['12 legs, Hz', 'node', 'tick', *LAYERS], [
-        [f'{p["rate"]:.0f}', NAMES[p['subject']],
-         *(f'{p[layer]:.0f}' for layer in ('tick', *LAYERS))] for p in result['parts']])
     return ("CPU time of the callback's thread, medians: one tick after the other in one process, "
-            'and in processes that are driven at a rate, where each tick finds caches that others '
-            f'have filled [us].\n\n{hot}\n\n{cold}')
+            'nothing between them [us].\n\n' + table(['in a loop', 'node', 'tick', 'x floor'], [
+                [body['scene'], NAMES[body['subject']], f'{body["tick"]:.0f}',
+                 f'{in_turn(body["ticks"], floor["ticks"]):.2f}']
+                for body in result['bodies'] for floor in result['bodies']
+                if floor['subject'] == 'floor' and floor['scene'] == body['scene']]))
 
 
 def services(rows):
@@ -272,6 +333,15 @@ def stream(rows):
             + table(['wanted', 'Hz', 'CPU', 'x floor'], lines))
 
 
+def changes(rows):
+    """Return how long poses are held up by a change."""
+    return ('12 legs at 500 Hz: the longest time between two poses around a change, its median '
+            'and the longest, and when the change was answered [ms].\n\n' + table(
+                ['change', 'gap', 'longest', 'answered after'],
+                [[row['kind'], *(f'{row[name]:.1f}' for name in ('gap', 'longest', 'answered'))]
+                 for row in rows]))
+
+
 def grown(rows):
     """Return the rows of both nodes that grow, scene by scene."""
     found = {(row['scene'], row['subject']): row for row in rows}
@@ -300,23 +370,30 @@ def growth(rows):
 
 def long(result):
     """Return the long runs."""
-    lines = []
+    parts = ['A parameter changes each second all the while; a message without an answer is lost.']
+    if 'hold' in result:
+        parts.append(table(
+            ['hold', 'Hz', 'seconds', 'changes', 'lost', 'CPU [us a message]', 'p50', 'p99',
+             'longest', 'load'],
+            [[hold['scene'], f'{hold["rate"]:.0f}', f'{hold["took"]:.0f}', hold['changes'],
+              hold['lost'], f'{hold["cpu"]:.0f}', *_latency(hold),
+              f'{hold["longest"]:.0f}' if hold['longest'] else '', f'{hold["load"]:.1f}']
+             for hold in result['hold']]))
+    runs = []
     if 'soak' in result:
         soak = result['soak']
-        lines.append(['soak', f'{soak["messages"]:,} messages: {soak["resident_mib"]:.0f} MiB, '
-                      f'first to last {soak["growth_mib"]:+.2f} MiB, '
-                      f'span {soak["span_mib"]:.2f} MiB'])
-    if 'hold' in result:
-        hold = result['hold']
-        lines.append(['hold', f'{hold["rate"]:.0f} Hz for {hold["seconds"]:.0f} s (took '
-                      f'{hold["took"]:.1f} s): {hold["lost"]} lost, CPU {hold["cpu"]:.0f} us a '
-                      f'message, latency p50 {hold["p50"]:.0f}, p99 {hold["p99"]:.0f}, longest '
-                      f'{hold["max"]:.0f} us; load {hold["load"]:.1f}'])
+        runs.append([f'soak: {soak["messages"]:,} messages, as fast as they are answered',
+                     f'{soak["took"]:.0f}', soak['changes'], soak['lost'], *_memory(soak)])
     if 'trouble' in result:
         one = result['trouble']
-        lines.append(['trouble', f'{one["seconds"]} s with a change, bad bytes and listeners that '
-                      f'stall: {one["resident_mib"]:.0f} MiB, first to last '
-                      f'{one["growth_mib"]:+.2f} MiB, span {one["span_mib"]:.2f} MiB; a change is '
-                      f'answered after {one["answered_ms"]:.0f} ms, at most '
-                      f'{one["longest_answer_ms"]:.0f} ms'])
-    return table(['run', 'result'], lines)
+        runs.append(['500 Hz, bad bytes each second, listeners that stall', one['seconds'],
+                     one['seconds'], '', *_memory(one)])
+    if runs:
+        parts.append(table(['12 legs', 'seconds', 'changes', 'lost', 'MiB', 'first to last',
+                            'span'], runs))
+    return '\n\n'.join(parts)
+
+
+def _memory(run):
+    return (f'{run["resident_mib"]:.0f}',
+            *(f'{run[name]:+.2f}' for name in ('growth_mib', 'span_mib')))

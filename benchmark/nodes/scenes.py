@@ -11,14 +11,29 @@ from linkage_ros.scene.motion import Motion
 from sensor_msgs.msg import JointState
 import yaml
 
+KINDS = ('water_drop', 'jansen', 'peaucellier', 'slotted_lever')
+
+
+def many(count: int) -> dict:
+    """Return the parameters of so many mechanisms, each with a crank of its own."""
+    kinds = {f'{KINDS[i % len(KINDS)]}_{i}': KINDS[i % len(KINDS)] for i in range(count)}
+    return {'mechanisms': list(kinds), **{f'{name}.type': kind for name, kind in kinds.items()}}
+
+
 SCENES = {
     'one leg': {'mechanisms': ['leg'], 'leg.type': 'jansen', 'leg.scale': 0.01},
     '12 legs': {'mechanisms': ['walker'], 'walker.type': 'jansen', 'walker.scale': 0.01,
                 'walker.leg_pairs': 6},
-    'four mechanisms': {'mechanisms': ['water_drop', 'jansen', 'peaucellier', 'slotted_lever']},
+    'four mechanisms': {'mechanisms': list(KINDS)},
 }
+MANY = {'sixteen mechanisms': many(16), 'sixty mechanisms': many(60)}
 # Of the motion, between two messages [ns]: a hundredth of a second or so, but never the same.
 STEP = 10_000_019
+
+
+def given(name: str) -> dict:
+    """Return the parameters of a scene."""
+    return SCENES[name] if name in SCENES else MANY[name]
 
 
 class Topic(NamedTuple):
@@ -31,14 +46,14 @@ class Topic(NamedTuple):
 def topics(name: str) -> Tuple[Topic, ...]:
     """Return the topics of a scene."""
     return tuple(Topic(f'{mechanism}/{what}', what == 'joint_states')
-                 for mechanism in SCENES[name]['mechanisms']
+                 for mechanism in given(name)['mechanisms']
                  for what in ('joint_states', 'markers'))
 
 
 def write(name: str, folder: Path) -> Path:
     """Write the parameter file of a scene."""
     path = folder / f'{name.replace(" ", "_")}.yaml'
-    path.write_text(yaml.safe_dump({'/**': {'ros__parameters': SCENES[name]}}))
+    path.write_text(yaml.safe_dump({'/**': {'ros__parameters': given(name)}}))
     return path
 
 
@@ -46,7 +61,7 @@ class Cranks:
     """One crank message after the other."""
 
     def __init__(self, name: str):
-        machines = scene.read(SCENES[name]).machines
+        machines = scene.read(given(name)).machines
         self._motions = [Motion.of(machine.first) for machine in machines.values()]
         self._message = JointState(name=[f'{machine}_crank' for machine in machines])
         self._count = 0

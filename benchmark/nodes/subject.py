@@ -19,9 +19,10 @@ import time
 
 from linkage_interfaces.srv import ServoInverse
 from linkage_ros import scene
-from linkage_ros.nodes import joint_state_reader, kinematics, message_layout, messages, scene_node
+from linkage_ros.nodes import mechanism_publisher, messages, scene_node
 from linkage_ros.nodes.joint_state_reader import ANY
-from linkage_ros.nodes.kinematics import Kinematics, MechanismPublisher
+from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.mechanism_model import Model
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -70,29 +71,30 @@ class Timed(Node):
 class Deaf(Node):
     """Does nothing at each crank message."""
 
-    raw = False
-
     def __init__(self):
         super().__init__('deaf')
-        self.create_subscription(JointState, 'crank_states', self._turn, ANY, raw=self.raw)
+        self.create_subscription(JointState, 'crank_states', self._turn, ANY)
 
     def _turn(self, _):
         pass
 
 
-class Raw(Deaf):
-    """Does nothing, and does not even look at what the message says."""
-
-    raw = True
-
-
-class FreshPublisher(MechanismPublisher):
+class FreshModel(Model):
     """Builds ordinary messages, as one writes it: new ones each time."""
 
-    def _send(self, publisher, build, stamp):
-        self._model.joint_state = messages.JointStates()
-        self._model.marker_array = messages.Markers(*self._model.drawn)
-        publisher.publish(build(self._pose, message_layout.unpack(stamp)))
+    def is_patched(self, build):
+        """Never."""
+        return False
+
+    def joint_message(self, pose, stamp):
+        """Return new joint states."""
+        self.joint_state = messages.JointStates()
+        return super().joint_message(pose, stamp)
+
+    def marker_message(self, pose, stamp):
+        """Return new markers."""
+        self.marker_array = messages.Markers(*self.drawn)
+        return super().marker_message(pose, stamp)
 
 
 class Relay(Node):
@@ -162,32 +164,25 @@ class Fresh(Kinematics):
     """The same node with ordinary messages."""
 
     def __init__(self, **kwargs):
-        usual, kinematics.MechanismPublisher = kinematics.MechanismPublisher, FreshPublisher
+        usual, mechanism_publisher.Model = mechanism_publisher.Model, FreshModel
         try:
             super().__init__(**kwargs)
         finally:
-            kinematics.MechanismPublisher = usual
+            mechanism_publisher.Model = usual
+        # No machine code sends patched ones.
+        self._ticks.learn = lambda *_: None
 
 
 KINDS = {'kinematics': Kinematics, 'fresh': Fresh, 'floor': Floor, 'relay': Relay,
-         'timed': Timed, 'deaf': Deaf, 'raw': Raw, 'trigger': Triggered, 'echo': Echoed,
-         'ear': Ear}
-# The parts of the work of a tick.
-PARTS = {'read': [(joint_state_reader.Reader, 'read')],
-         'solve': [(kinematics.Model, 'solve')], 'patch': [(message_layout.Template, 'patched')],
-         'publish': [(Publisher, 'publish')],
-         'ask who listens': [(Publisher, 'get_subscription_count')]}
+         'timed': Timed, 'deaf': Deaf, 'trigger': Triggered, 'echo': Echoed, 'ear': Ear}
 
 
 class Times:
-    """What the parts of a tick take: CPU time of their thread [us], per tick."""
+    """What a tick takes, and publishing of it: CPU time of their thread [us], per tick."""
 
     def __init__(self):
-        self._taken = dict.fromkeys(['tick', *PARTS], 0)
-        self._ticks = {part: [] for part in self._taken}
-        for part, methods in PARTS.items():
-            for class_, method in methods:
-                setattr(class_, method, self._timed(part, getattr(class_, method)))
+        self._taken, self._ticks = {'tick': 0, 'publish': 0}, {'tick': [], 'publish': []}
+        Publisher.publish = self._timed('publish', Publisher.publish)
         Node.create_subscription = self._with_ticks_timed(Node.create_subscription)
 
     def _with_ticks_timed(self, subscribe):
