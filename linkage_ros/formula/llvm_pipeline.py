@@ -15,7 +15,7 @@ from concurrent.futures import Future
 from contextlib import contextmanager
 import ctypes
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, Callable, Dict, Iterator, Optional, Sequence, Tuple
 
 from llvmlite import ir
@@ -71,6 +71,9 @@ class Pipeline:
 
     Attributes
     ----------
+    run : callable
+        From a message's bytes and their number: how many loops failed; OTHER or UNSTAMPED where
+        nothing was done.
     failed : int64 array
         Which loops did not find finite numbers within their limits in the last call.
 
@@ -84,12 +87,9 @@ class Pipeline:
         self._table = np.array([len(same), *map(address, (*known, stamp, self.failed)),
                                 *(part for table in rows
                                   for part in (len(table), address(table)))])
-        self._code, engine = code().result()
-        self._at, self._kept = address(self._table), (kept, stamp, known, rows, engine)
-
-    def run(self, text: bytes) -> int:
-        """Return how many loops failed; OTHER or UNSTAMPED where nothing was done."""
-        return self._code(self._at, text, len(text))
+        run, engine = code().result()
+        self.run = partial(run, address(self._table))
+        self._kept = kept, stamp, known, rows, engine
 
 
 def addresses(array: np.ndarray) -> np.ndarray:

@@ -135,12 +135,10 @@ class Kinematics(scene_node.SceneNode):
     @scene_node.until_the_end
     def _turn(self, text):
         with self._drawing:
-            if not self._ended:
+            if not self._ended and not self._ticks.run(text, self._reader):
                 self._draw(text)
 
     def _draw(self, text):
-        if self._ticks.run(text, self._reader):
-            return
         try:
             stamp, routes, positions, speeds = self._reader.read(text)
         except Unreadable as error:

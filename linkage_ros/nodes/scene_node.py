@@ -45,8 +45,8 @@ RCLError = rclpy_implementation.RCLError
 # Some builds of the EventsExecutor wait well for a while, but busily and deaf to signals for ever.
 LONGEST_WAIT = 1.0
 
-# How long a thread that prepares a change may keep a message waiting [s].
-SWITCH_INTERVAL = 0.0005
+# How long a thread that prepares a change may keep a message waiting [s], at each publisher.
+SWITCH_INTERVAL = 0.00005
 
 SECONDS_BETWEEN_LOOKS = 2.0
 

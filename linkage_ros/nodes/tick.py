@@ -86,18 +86,18 @@ class Tick:
 
     def run(self, text: bytes) -> bool:
         """Return whether a message is of this source; if so, show what it says."""
-        failed = self._pipeline.run(text)
+        failed = self._pipeline.run(text, len(text))
         if failed == native.UNSTAMPED:
             self._stamp[1:] = np.frombuffer(self._now(), np.int64)
-            failed = self._pipeline.run(text)
+            failed = self._pipeline.run(text, len(text))
             self._stamp[1] = 0
         if failed < 0:
             return False
         if failed or self._failed:
             self._show_each()
-            return True
-        for publish, message in self._sent:
-            publish(message.tobytes())
+        else:
+            for publish, message in self._sent:
+                publish(message.tobytes())
         return True
 
     def _show_each(self):

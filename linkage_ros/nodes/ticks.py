@@ -48,10 +48,10 @@ class Ticks:
         """Return whether a message is of a source that has a tick; if so, show what it says."""
         if self._stale and time.monotonic() >= self._rested:
             self.learn(self.forget())
-        if self._last and self._last.run(text):
+        if self._last is not None and self._last.run(text):
             return True
-        self._last = self._ticks and self._ticks.get(reader.source(text))
-        return bool(self._last) and self._last.run(text)
+        self._last = self._ticks.get(reader.source(text)) if self._ticks else None
+        return self._last is not None and self._last.run(text)
 
     def renew_soon(self):
         """Take note that others listen now."""
