@@ -497,7 +497,7 @@ def refused(ask, text) -> bool:
     except ValueError as error:
         said, kind = str(error), type(error)
     finally:
-        assert time.process_time() - start < 0.5, text[:60]
+        assert time.process_time() - start < 5.0, text[:60]
     assert kind in (ValueError, scene.SceneError), (kind, text[:60])
     assert 10 < len(said) < 300 and said.isprintable(), (text[:60], said)
     return True
