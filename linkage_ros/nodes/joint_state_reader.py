@@ -18,8 +18,8 @@ from sensor_msgs.msg import JointState
 
 from .message_layout import deserialized, HEADER, MessageLayout, NoLayout, pack
 
-# Any source will do; what comes while the node is kept waiting, 50 ms at 1000 Hz, is not lost.
-ANY = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
+# Any source will do; what comes while the node is kept waiting, 100 ms at 1000 Hz, is not lost.
+ANY = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 # So many sources are remembered, of messages that are no longer [bytes]; of those that are of one
 # length, so many arrangements of names. Where there are more, one in so many messages is learnt:
