@@ -20,7 +20,7 @@ NAMES = ('chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable'
 FLAGS = ('--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
          '--disable-background-networking', '--disable-component-update', '--disable-sync',
          '--window-size=1200,900', '--remote-debugging-port=0')
-DEADLINE = 90.0
+DEADLINE = 30.0
 
 
 def found():

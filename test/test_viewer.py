@@ -1682,7 +1682,9 @@ def test_a_bar_and_its_slider_light_up_and_changes_are_undone_and_saved(show, lo
 
 @pytest.mark.long
 @needs_browser
-@pytest.mark.parametrize('path', sorted((ROOT / 'config').glob('*.yaml')), ids=lambda p: p.stem)
+# Not all sixteen mechanisms at once: see the limits in docs/viewer.md.
+@pytest.mark.parametrize('path', sorted(p for p in (ROOT / 'config').glob('*.yaml')
+                                        if p.stem != 'all'), ids=lambda p: p.stem)
 def test_the_page_is_for_everybody(show, looked_at, path):
     checker = pytest.importorskip('axe_core_python')
     axe = (Path(checker.__file__).parent / 'axe.min.js').read_text('utf-8')
