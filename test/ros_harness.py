@@ -164,14 +164,14 @@ def module(name):
 class Process:
     """An executable of this package as users start it, with a parameter file."""
 
-    def __init__(self, name, parameter_file, *arguments, domain=None):
+    def __init__(self, name, parameter_file, *arguments, domain=None, env=None):
         self._domain = None if domain else Domain()
         self.domain = domain or self._domain.id
         self._process = subprocess.Popen(
             [sys.executable, '-m', module(name), *arguments, '--ros-args',
              '--params-file', str(parameter_file)],
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-            env=dict(os.environ, ROS_DOMAIN_ID=str(self.domain)))
+            env={**os.environ, **(env or {}), 'ROS_DOMAIN_ID': str(self.domain)})
 
     def interrupt(self, signal):
         """Send a signal."""

@@ -57,9 +57,14 @@ class Pose(NamedTuple):
         """Return the same as if all legs could be assembled, and all velocities were known."""
         return self._replace(held=None, moving=self.layout.speeds > 0)
 
+    @property
+    def is_entire(self) -> bool:
+        """Whether all legs can be assembled, and all velocities are known that are wanted."""
+        return self.held is None and self.moving == (self.layout.speeds > 0)
+
     def is_like(self, other: 'Pose') -> bool:
         """Return whether it differs from another in nothing but values."""
-        return self.values is other.values and (self.held is None) == (other.held is None)
+        return self.values is other.values and self.is_entire == other.is_entire
 
     def rows(self) -> np.ndarray:
         """Return the rows of the legs that can be assembled."""

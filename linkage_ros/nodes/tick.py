@@ -67,7 +67,9 @@ class Tick:
                  stamp: np.ndarray):
         self.moved = moved
         self._solved = [part for part in moved if part.solution]
-        self._whole, self._now, self._failed = whole, now, frozenset()
+        # The first message is shown in the usual way: what is drawn may be something else.
+        self._whole, self._now = whole, now
+        self._failed = frozenset(part.shown for part in self._solved)
         self._stamp = stamp
         at = native.address(stamp)
         tables = {id(part): _tables(source, part, at) for part in moved}

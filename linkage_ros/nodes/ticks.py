@@ -85,9 +85,11 @@ class Ticks:
 
     def _tick(self, source, moved):
         poses = self._poses({part.shown for part in moved}) if self._whole.is_heard else []
-        # It needs llvmlite, which is there where there is machine code.
-        from .tick import is_ready, Tick, Whole
-
+        try:
+            from .tick import is_ready, Tick, Whole
+        except ImportError:
+            # Without llvmlite there is no machine code.
+            return None
         if None in poses or not is_ready():
             return None
         if len(self._ticks) == MOST:
@@ -99,8 +101,8 @@ class Ticks:
     def _poses(self, moved):
         """Return models and poses of all mechanisms that are known; None: one lacks legs."""
         known = [(shown, *it) for shown in self._mechanisms.values() if (it := shown.known())]
-        return [(model, pose.entire()) if shown in moved or pose.held is None else None
-                for shown, model, pose in known]
+        return [None if model.machine.loads or shown not in moved and not pose.is_entire
+                else (model, pose.entire()) for shown, model, pose in known]
 
     def _send_whole(self, stamp):
         self.catch_up(stamp)

@@ -1,0 +1,149 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Defects of the nodes that were found from outside, each as what it has to be instead."""
+
+import math
+import os
+from pathlib import Path
+import signal
+import sys
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
+from ros_harness import Graph, Process  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+
+TWO = {'mechanisms': ['a', 'b'], 'a.type': 'four_bar', 'b.type': 'jansen'}
+LOADED = {'mechanisms': ['a', 'b'], 'a.type': 'slotted_lever', 'a.loads': ['L=0 -9.81'],
+          'b.type': 'jansen'}
+NOT_INSTALLED = "import sys; sys.modules['llvmlite'] = None\n"
+
+
+@pytest.fixture(params=['machine code', 'plain Python'])
+def executor(request, monkeypatch):
+    """Machine code where it is installed, and as if it were not."""
+    if request.param == 'plain Python':
+        for name in [name for name in sys.modules if name.startswith('linkage_ros.nodes')
+                     and name.rpartition('.')[2] in ('tick', 'plan_llvm')]:
+            monkeypatch.delitem(sys.modules, name)
+        monkeypatch.setitem(sys.modules, 'llvmlite', None)
+        monkeypatch.setitem(sys.modules, 'linkage_ros.formula.llvm_pipeline', None)
+    return request.param
+
+
+class Scene:
+    """A node, and what is published on each topic that somebody subscribes to."""
+
+    def __init__(self, graph, parameters, topics):
+        self._graph, self._stamp = graph, 0
+        self.node = graph.start(Kinematics, parameters)
+        self.received = {topic: graph.listen(MarkerArray if topic.endswith('markers') else
+                                             JointState, topic, 1000) for topic in topics}
+        self._publisher = graph.node.create_publisher(JointState, 'crank_states', 1000)
+        graph.until(lambda: self._publisher.get_subscription_count() and all(
+            self.node.count_subscribers(topic) for topic in topics))
+
+    def send(self, **message):
+        """Publish a message with a stamp of its own."""
+        self._stamp += 1
+        message = JointState(**message)
+        message.header.stamp.sec = self._stamp
+        self._publisher.publish(message)
+
+    def settle(self, topic, **message):
+        """Publish a message and wait until it is answered on a topic."""
+        self.send(**message)
+        self.until_answered(topic)
+
+    def until_answered(self, topic):
+        """Wait for what the last message set off."""
+        self._graph.until(lambda: self.received[topic] and (
+            self.received[topic][-1].header.stamp.sec == self._stamp))
+
+
+@pytest.mark.parametrize('name', ['kinematics', 'together'])
+def test_without_llvmlite_and_without_subscribers_a_node_goes_on(tmp_path, name):
+    (tmp_path / 'sitecustomize.py').write_text(NOT_INSTALLED)
+    scene = Path(__file__).parents[1] / 'config' / 'jansen.yaml'
+    path = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', '')])
+    with Graph() as graph:
+        process = Process(name, scene, domain=graph.context.get_domain_id(),
+                          env={'PYTHONPATH': path})
+        publisher = graph.node.create_publisher(JointState, 'crank_states', 10)
+
+        def answered():
+            for _ in range(5):
+                publisher.publish(JointState(name=['jansen_crank'], position=[0.5]))
+            return answers
+
+        try:
+            graph.until(lambda: graph.node.count_publishers('jansen/joint_states'))
+            answers = [None]
+            for _ in range(10):
+                graph.until(answered)
+            answers = graph.listen(JointState, 'jansen/joint_states')
+            graph.until(answered)
+        finally:
+            process.interrupt(signal.SIGINT)
+            code, printed = process.end()
+    assert code == 0 and 'Traceback' not in printed
+
+
+def test_loads_beside_another_mechanism_come_with_every_message(graph, executor):
+    scene = Scene(graph, LOADED, ['joint_states'])
+    for message in ({'name': ['a_crank'], 'position': [0.3]},
+                    {'name': ['b_crank'], 'position': [0.4]}):
+        scene.settle('joint_states', **message)
+    scene.received['joint_states'].clear()
+    for k in range(60):
+        scene.send(name=['ab'[k % 2] + '_crank'], position=[0.01 * k])
+    scene.until_answered('joint_states')
+    received = scene.received['joint_states']
+    assert len(received) == 60
+    assert all(len(state.effort) == len(state.name) for state in received)
+
+
+@pytest.mark.parametrize('wrong', [math.nan, math.inf, 1e308])
+def test_a_speed_that_is_no_number_is_in_no_message(graph, executor, wrong):
+    scene = Scene(graph, TWO, ['joint_states'])
+    for _ in range(3):
+        for name in ('a_crank', 'b_crank'):
+            scene.settle('joint_states', name=[name], position=[0.3], velocity=[1.0])
+    scene.received['joint_states'].clear()
+    for k in range(60):
+        name = 'ab'[k % 2] + '_crank'
+        scene.send(name=[name], position=[0.01 * k],
+                   velocity=[wrong if name == 'a_crank' and k % 4 == 0 else 1.0])
+    scene.until_answered('joint_states')
+    assert len(scene.received['joint_states']) == 60
+    for state in scene.received['joint_states']:
+        assert np.isfinite([*state.position, *state.velocity]).all()
+
+
+def test_markers_are_gone_wherever_noise_about_the_end_of_the_reach_was(graph, executor):
+    # Peaucellier's cell is assembled from -1.2 to 1.2 rad or so.
+    node = {'mechanisms': ['m'], 'm.type': 'peaucellier'}
+    scene = Scene(graph, node, ['m/markers', 'm/joint_states'])
+    end = scene.node.scene.machines['m'].reach[0][1]
+    random = np.random.default_rng(3)
+    for _ in range(30):
+        scene.settle('m/joint_states', name=['m_crank'], position=[end - 0.1])
+        for angle in (end + random.normal(0.0, 2e-3, 20)).tolist():
+            scene.send(name=['m_crank'], position=[angle])
+        for _ in range(5):
+            scene.send(name=['m_crank'], position=[end + 0.3])
+        graph.until(lambda: scene.received['m/markers'] and all(
+            marker.action == Marker.DELETE for marker in scene.received['m/markers'][-1].markers))
+        drawn = set()
+        for markers in scene.received['m/markers']:
+            for marker in markers.markers:
+                (drawn.discard if marker.action == Marker.DELETE else drawn.add)(marker.id)
+        assert not drawn
+
+
