@@ -39,7 +39,7 @@ from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
 from linkage_ros.robot_model import urdf  # noqa: E402
 from linkage_ros.scene.writing import without_defaults  # noqa: E402
-from linkage_ros.web import curves, feed, scene_view, server  # noqa: E402
+from linkage_ros.web import curves, feed, scene_view, server, settings  # noqa: E402
 from linkage_ros.web.feed import Feed  # noqa: E402
 from linkage_ros.web.scene_view import LATCHED  # noqa: E402
 from linkage_ros.web.viewer import Viewer  # noqa: E402
@@ -55,6 +55,7 @@ from rclpy.logging import get_logger  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from ros_harness import Graph, Process  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import ColorRGBA  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray, UVCoordinate  # noqa: E402
 
@@ -523,6 +524,55 @@ def test_velocity_and_acceleration_are_the_slopes_of_the_curves(name, output):
         own, unit = machine.scale_of(position['input']), machine.scale_of(output)
         effort = machine.linkage.output_effort(output, np.array(x) / own, own) / unit
         np.testing.assert_allclose(np.array(force['y'], float)[inner], effort[inner], rtol=1e-12)
+
+
+def test_a_node_that_is_silent_at_first_is_waited_for_and_not_guessed(show, monkeypatch):
+    asked, answered = settings.RemoteNode.parameters, asyncio.Event()
+
+    async def late(self, prefixes, known=()):
+        if self.name == '/kinematics' and not answered.is_set():
+            raise scene_view.NoAnswer('busy')
+        return await asked(self, prefixes, known)
+
+    monkeypatch.setattr(settings.RemoteNode, 'parameters', late)
+    running = show({**LEG, 'leg.scale': 0.5})
+
+    async def use(url):
+        async with Page(url) as page:
+            await browser.until(lambda: any(said.get('mechanisms') for said in page.said))
+            reasons = [(await page.ask(op, '/leg'))['reason'] for op in ('pose', 'tune', 'curve')]
+            answered.set()
+            await page.cast('/leg')
+            return reasons, await page.ask('pose', '/leg')
+
+    reasons, answer = asyncio.run(use(running.viewer.url))
+    assert reasons == ['the nodes of leg have not told its parameters yet'] * 3
+    g_x = 0.5 * mechanisms.create('jansen').solve(1.0, ('G',))['G'][0]
+    assert answer['outputs']['G.x']['value'] == pytest.approx(g_x)
+
+
+def test_what_a_sensor_cannot_be_at_is_nowhere_on_the_page(show):
+    lift = scene.load(str(ROOT / 'config' / 'scissor_lift.yaml'))
+    running = show({**without_defaults(lift), 'rate': 0.0})
+    crank_states = running.graph.node.create_publisher(JointState, 'crank_states', 10)
+
+    async def use(url):
+        async with Page(url) as page:
+            async def carriage(told):
+                crank_states.publish(JointState(name=['lift_cylinder'], position=[told]))
+                value = (await page.ask('pose', '/lift'))['inputs']['carriage']['value']
+                assert math.isfinite(value)
+                return value
+
+            async def is_at(told, value):
+                return abs(await carriage(told) - value) < 1e-9
+
+            await page.cast('/lift')
+            told, _ = lift.machines['lift'].told(lift.machines['lift'].first, 1.0, 0.0)
+            await browser.until(lambda: is_at(told, 1.0))
+            await browser.until(lambda: is_at(99.0, 1.2))
+
+    asyncio.run(use(running.viewer.url))
 
 
 def test_nobody_is_listened_to_while_nobody_looks(show, monkeypatch):
@@ -1680,11 +1730,46 @@ def test_a_bar_and_its_slider_light_up_and_changes_are_undone_and_saved(show, lo
     looked_at(running, doing)
 
 
+# Titles of mechanisms wherever they are; at a quarter of all heights (y + 18) - y < 18.
+TITLES = """
+import('/picture.js').then(({ Picture }) => {
+  let seed = 1;
+  const random = () => (seed = seed * 16807 % 2147483647) / 2147483647;
+  return Array.from({ length: 2000 }, () => {
+    const picture = new Picture(document.getElementById('picture')), written = [];
+    picture.mechanisms = Array.from({ length: 16 }, (_, i) => (
+      { key: i, name: 'linkage'.slice(i % 5) }));
+    Object.assign(picture, { scale: 1, middle: [0, 0], centre: [0, 0], maps: new Map() });
+    const y = 4 ** (5 * random()), x = 4 ** (5 * random());
+    for (const { key } of picture.mechanisms) {
+      picture.maps.set(key, [[1, 0, 0, 0], [0, 1, 0, 0]]);
+      const [left, top] = [x * random(), -y * (random() < 0.5 || random())];
+      picture.boxes.set(key, { low: [left, top], high: [left, top] });
+    }
+    picture.text = (name, x, y) => written.push([x, y, picture.context.measureText(name).width]);
+    picture.titles();
+    return written;
+  });
+})"""
+
+
+@needs_browser
+def test_titles_are_written_beside_or_below_each_other_wherever_they_are(address, tmp_path):
+    async def look():
+        async with browser.Browser(tmp_path) as page:
+            await page.open(address)
+            return await page.value(TITLES)
+
+    for written in asyncio.run(look()):
+        x, y, width = np.transpose(written)
+        apart = np.maximum(abs(y[:, None] - y) / 18.0,
+                           2.0 * abs(x[:, None] - x) / (width[:, None] + width))
+        assert apart[~np.eye(len(x), dtype=bool)].min() > 1.0 - 1e-9
+
+
 @pytest.mark.long
 @needs_browser
-# Not all sixteen mechanisms at once: see the limits in docs/viewer.md.
-@pytest.mark.parametrize('path', sorted(p for p in (ROOT / 'config').glob('*.yaml')
-                                        if p.stem != 'all'), ids=lambda p: p.stem)
+@pytest.mark.parametrize('path', sorted((ROOT / 'config').glob('*.yaml')), ids=lambda p: p.stem)
 def test_the_page_is_for_everybody(show, looked_at, path):
     checker = pytest.importorskip('axe_core_python')
     axe = (Path(checker.__file__).parent / 'axe.min.js').read_text('utf-8')

@@ -69,6 +69,12 @@ class ShownMechanism:
         """Return its parameters by full name."""
         return {f'{self.name}.{name}': setting.value for name, setting in self.settings.items()}
 
+    def scene(self):
+        """Return the scene of it alone; raise Refused if its parameters tell none."""
+        if 'type' not in self.settings:
+            raise Refused(f'the nodes of {self.name} have not told its parameters yet')
+        return _read({'mechanisms': [self.name], **self.values()})
+
     def described(self) -> dict:
         """Return what the page needs to draw it."""
         return {'key': self.key, 'name': self.name,
@@ -100,6 +106,7 @@ class SceneView:
         self._seen = None
         self._mechanisms = {}
         self._general = {}
+        self._found = {}
         self._watching = None
         self._stopping = None
         # What follows is changed in the executor's thread alone.
@@ -130,7 +137,7 @@ class SceneView:
     def _stop(self):
         self._watching.cancel()
         self._watching = self._stopping = None
-        self._seen, self._mechanisms = None, {}
+        self._seen, self._mechanisms, self._found = None, {}, {}
         self._bridge.ask(self._close)
 
     def feeds(self):
@@ -204,8 +211,7 @@ class SceneView:
     async def tune(self, key: str) -> dict:
         """Return what `poses.tunable` does."""
         mechanism = self._find(key)
-        given = {'mechanisms': [mechanism.name], **mechanism.values()}
-        return await self._aside(lambda: poses.tunable(_read(given), mechanism.name))
+        return await self._aside(lambda: poses.tunable(mechanism.scene(), mechanism.name))
 
     async def curve(self, key: str, **about) -> dict:
         """Return what `curves.curve` does."""
@@ -240,8 +246,7 @@ class SceneView:
     def _state(self, mechanism):
         """Return a machine and its inputs [rad or m] as they were told last, or as they start."""
         if mechanism.machine is None:
-            given = {'mechanisms': [mechanism.name], **mechanism.values()}
-            mechanism.machine = _read(given).machines[mechanism.name]
+            mechanism.machine = mechanism.scene().machines[mechanism.name]
         machine, inputs = mechanism.machine, []
         if self._bridge.loop.time() > mechanism.until:
             mechanism.held = {}
@@ -249,6 +254,7 @@ class SceneView:
             told = next((self._told[topic][drive.source] for topic in mechanism.sources
                          if drive.source in self._told.get(topic, ())), None)
             now = drive.start if told is None else machine.understood(drive, told, None, None)[0]
+            now = now if math.isfinite(now) else drive.start
             held = mechanism.held.get(name, now)
             if drive.input.apart(held, now) < ARRIVED * drive.input.size:
                 mechanism.held.pop(name, None)
@@ -316,27 +322,34 @@ class SceneView:
         sources = {topic for topics in heard.values() for topic in topics}
         await self._bridge.ask(self._open, list(owners), nodes, sources)
         names = sorted({*GENERAL, *(key.rsplit('/', 1)[1] for key in owners)})
-        found = dict(zip(nodes, await asyncio.gather(
-            *(self._parameters(node, names) for node in nodes))))
+        # What the nodes that draw have is theirs, and asked of no other.
+        found = {}
+        for part in ([node for node in nodes if node in heard],
+                     [node for node in nodes if node not in heard]):
+            known = {space: {name for node, own in found.items() if _space(node) == space
+                             for name in own or ()} for space in spaces}
+            found.update(zip(part, await asyncio.gather(
+                *(self._parameters(node, names, known[_space(node)]) for node in part))))
+        self._found = found
         self._mechanisms = {key: self._mechanism(key, own_nodes, found, heard)
                             for key, own_nodes in owners.items()}
         self._general = {}
-        for node in sorted(found, key=lambda node: node not in heard):
-            for name in found[node].keys() & set(GENERAL):
-                descriptor, value = found[node][name]
+        for node, own in found.items():
+            for name in (own or {}).keys() & set(GENERAL):
+                descriptor, value = own[name]
                 with suppress(ValueError):
                     self._general.setdefault(_space(node), {}).setdefault(
                         name, Setting(name, node, descriptor, value).value)
         for client in self.clients:
             self._show(client)
 
-    async def _parameters(self, node, prefixes):
+    async def _parameters(self, node, prefixes, known):
         try:
-            return await self._nodes[node].parameters(prefixes)
+            return await self._nodes[node].parameters(prefixes, known)
         except NoAnswer:
-            # It may be on its way up or down: look again.
+            # It may be on its way up or down: look again; what it said before holds till then.
             self._seen = None
-            return {}
+            return self._found.get(node)
 
     def _mechanism(self, key, own_nodes, found, heard) -> ShownMechanism:
         """Return a mechanism with what the nodes of its namespace say of it, its own first."""
@@ -344,9 +357,10 @@ class SceneView:
             topic for node in own_nodes for topic in heard.get(node, ())))
         spaces = {_space(node) for node in own_nodes}
         prefix = f'{mechanism.name}.'
-        near = [node for node in found if _space(node) in spaces]
+        silent = any(found.get(node, {}) is None for node in own_nodes)
+        near = [] if silent else [node for node in found if _space(node) in spaces]
         for node in sorted(near, key=lambda node: node not in own_nodes):
-            for full, (descriptor, value) in found[node].items():
+            for full, (descriptor, value) in (found[node] or {}).items():
                 name = full[len(prefix):]
                 if full.startswith(prefix) and name not in mechanism.settings:
                     with suppress(ValueError):

@@ -20,6 +20,8 @@ from ..words import quoted
 
 SERVICES = {'list_parameters': ListParameters, 'describe_parameters': DescribeParameters,
             'get_parameters': GetParameters, 'set_parameters_atomically': SetParametersAtomically}
+# The range of a dimension takes a node some 20 ms.
+NAMES_AT_ONCE = 20
 
 
 class RemoteNode:
@@ -36,16 +38,25 @@ class RemoteNode:
         for client in self._clients.values():
             self._bridge.node.destroy_client(client)
 
-    async def parameters(self, prefixes) -> dict:
-        """Return descriptor and value message by name; raise NoAnswer if the node is silent."""
-        listed = await self._call('list_parameters', prefixes=prefixes)
-        names = listed.result.names
-        if not names:
-            return {}
-        described, got = await asyncio.gather(
-            self._call('describe_parameters', names=names),
-            self._call('get_parameters', names=names))
-        return dict(zip(names, zip(described.descriptors, got.values)))
+    async def parameters(self, prefixes, known=()) -> dict:
+        """
+        Return descriptor and value message by name, but for names that are known.
+
+        Raises
+        ------
+        NoAnswer
+            If the node is silent.
+
+        """
+        listed, found = await self._call('list_parameters', prefixes=prefixes), {}
+        names = [name for name in listed.result.names if name not in known]
+        for start in range(0, len(names), NAMES_AT_ONCE):
+            part = names[start:start + NAMES_AT_ONCE]
+            described, got = await asyncio.gather(
+                self._call('describe_parameters', names=part),
+                self._call('get_parameters', names=part))
+            found.update(zip(part, zip(described.descriptors, got.values)))
+        return found
 
     async def set(self, parameters) -> str:
         """Set all parameters or none; return the reason of a refusal, or nothing."""

@@ -34,6 +34,20 @@ class Section {
     this.element.dataset.key = key;
   }
 
+  /** Unfold what was unfolded of the section before, which was built of other settings. */
+  after(old, built) {
+    this.built = built;
+    const title = folding => folding.firstElementChild.textContent;
+    const open = new Set([...old?.element.querySelectorAll('details[open]') ?? []].map(title));
+    for (const folding of this.element.querySelectorAll('details')) folding.open ||= open.has(title(folding));
+    return this;
+  }
+
+  get inSight() {
+    const { top, bottom } = this.element.getBoundingClientRect();
+    return bottom > 0 && top < window.innerHeight;
+  }
+
   update(name, value) {
     this.tuning.update(name, value);
     this.motion.renderPlay();
@@ -47,22 +61,24 @@ export class Panel {
   constructor(place, connection, light) {
     Object.assign(this, { place, connection, light });
     this.sections = new Map();
-    this.built = '';
     units.onchange(() => this.render());
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.render());
     setInterval(() => this.look(), LOOKS);
     document.addEventListener('keydown', event => this.key(event));
   }
 
-  /** Show mechanisms; sections that stay as they are keep what is unfolded and typed. */
+  /** Show mechanisms; a section whose settings stay as they are stays. */
   show(mechanisms, folded) {
-    const built = JSON.stringify([folded, mechanisms.map(({ key, settings }) => [
-      key, [...settings.values()].map(({ value, ...rest }) => rest)])]);
-    if (built !== this.built) {
-      this.built = built;
-      for (const { plot } of this.sections.values()) plot.end();
-      this.sections = new Map(mechanisms.map(one => [one.key, new Section(one, this.connection, folded, this.light)]));
-      this.place.replaceChildren(...[...this.sections.values()].map(section => section.element));
+    const before = this.sections;
+    this.sections = new Map(mechanisms.map(one => {
+      const built = JSON.stringify([folded, [...one.settings.values()].map(({ value, ...rest }) => rest)]);
+      const old = before.get(one.key);
+      return [one.key, old?.built === built ? old : new Section(one, this.connection, folded, this.light).after(old, built)];
+    }));
+    for (const [key, section] of before) if (this.sections.get(key) !== section) section.plot.end();
+    const parts = [...this.sections.values()].map(section => section.element);
+    if (parts.length !== this.place.children.length || parts.some((one, i) => one !== this.place.children[i])) {
+      this.place.replaceChildren(...parts);
     }
     for (const { key, settings } of mechanisms) {
       for (const { name, value } of settings.values()) this.sections.get(key).update(name, value);
@@ -74,7 +90,7 @@ export class Panel {
   }
 
   look() {
-    for (const { motion } of this.sections.values()) motion.look();
+    for (const { motion, inSight } of this.sections.values()) if (inSight || !motion.inputs.size) motion.look();
   }
 
   /** Undo by the usual key, where no text is written. */

@@ -35,10 +35,15 @@ function round(value) {
 }
 
 /** The multiples of a step between two ends; few, even so far out that adding one changes nothing. */
-function multiples(step, low, high) {
+export function multiples(step, low, high) {
   const first = Math.ceil(low / step);
   const count = Math.max(0, Math.floor(high / step) - first + 1) || 0;
   return Array.from({ length: Math.min(count, MOST_LINES) }, (_, i) => (first + i) * step);
+}
+
+/** A height for a line of text, no higher than `y`, that is clear of the lines at other heights. */
+function below(y, others) {
+  return others.sort((a, b) => a - b).reduce((free, other) => Math.abs(other - free) < LINE ? other + LINE : free, y);
 }
 
 const dark = matchMedia('(prefers-color-scheme: dark)');
@@ -379,10 +384,8 @@ export class Picture {
       const half = context.measureText(name).width / 2 + 4;
       const corners = this.corners(key, box).map(corner => this.at(...corner));
       const x = corners.reduce((sum, [one]) => sum + one / corners.length, 0);
-      let y = Math.max(...corners.map(([, one]) => one));
-      const over = () => written.find(other =>
-        Math.abs(other.x - x) < other.half + half && Math.abs(other.y - y) < LINE);
-      for (let other = over(); other; other = over()) y = other.y + LINE;
+      const beside = written.filter(other => Math.abs(other.x - x) < other.half + half);
+      const y = below(Math.max(...corners.map(([, one]) => one)), beside.map(other => other.y));
       written.push({ x, y, half });
       this.text(name, x, y);
     }

@@ -4,7 +4,7 @@
 // What an output does over a turn or a stroke of the first input, the others held where they are.
 
 import { element, Newest, put, Reason } from './control.js';
-import { paint } from './picture.js';
+import { multiples, paint } from './picture.js';
 import { units } from './units.js';
 
 const KINDS = ['position', 'velocity', 'acceleration', 'transmission angle', 'force ratio'];
@@ -171,6 +171,8 @@ export class Plot {
     const axis = label => ({
       label, font: FONT, labelFont: FONT, stroke: () => paint('--ink'), labelSize: 20, labelGap: 0,
       grid: { stroke: () => paint('--grid'), width: 1 }, ticks: { show: false },
+      // The library's own way to these adds until an end is reached.
+      splits: (_, axis, low, high, step) => multiples(step, low, high),
       values: (_, splits) => splits.map(value => String(Number(value.toPrecision(6)))),
     });
     return {
