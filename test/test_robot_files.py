@@ -387,6 +387,52 @@ def test_joints_that_an_equality_ties_together_are_geared(imported, tmp_path):
     assert (right.first.ratio, left.first.ratio) == (2.0, 1.0)
 
 
+def test_names_of_a_file_stay_names(imported, capsys, tmp_path):
+    yaml = pytest.importorskip('yaml')
+    name = 'jy\n/crank_driver: {ros__parameters: {rate: 1.0}}\n#'
+    text = name.replace('\n', '&#10;')
+    file = written(tmp_path, 'four_bar.urdf', ('"shoulder"', f'"{text}"'), (
+        '"elbow"', '"finger-1"'), ('"wrist"', '"&#x2028;evil: 1&#x85;"'))
+    evil = file.rename(tmp_path / 'robot\nevil: 2\n#.urdf')
+    machine, = imported(evil).values()
+    assert published(machine, motor=0.4).keys() == {name, 'finger-1', 'motor'}
+    assert yaml.safe_load(printed(capsys, evil)).keys() == {'/**'}
+
+
+def test_bodies_that_are_welded_apart_are_refused(capsys, tmp_path):
+    loops = tmp_path / 'loops.yaml'
+    loops.write_text('{closed_loop: [[front_foot, back_foot]], type: [6d], name_mot: [mot_front]}')
+    assert 'front_foot=back_foot makes front_foot and back_foot one, which the pose' in refused(
+        capsys, ROBOTS / 'five_bar.urdf', '--loops', loops)
+    pytest.importorskip('mujoco')
+    weld = written(tmp_path, 'gripper.xml', (
+        '<connect name="right_loop"', '<weld body1="palm" body2="right_follower" '
+        'relpose="0 0.1 0 1 0 0 0"/><connect name="right_loop"'))
+    assert 'equality0 makes palm and right_follower one' in refused(capsys, weld)
+
+
+AXIS = '<axis><xyz>1 0 0</xyz>{}</axis>'
+TURNED = [0.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize('version, more, axis', [
+    ('1.4', '', [1.0, 0.0, 0.0]), ('1.5', '', TURNED),
+    ('1.4', '<use_parent_model_frame>false</use_parent_model_frame>', TURNED),
+    ('1.6', '<use_parent_model_frame>1</use_parent_model_frame>', [1.0, 0.0, 0.0]),
+    ('1.9', '', TURNED)])
+@pytest.mark.parametrize('pose', ['<pose>0 0 1 0 -1.5707963267948966 0</pose>',
+                                  '<pose degrees="true">0 0 1 0 -90 0</pose>'])
+def test_axes_and_poses_of_an_sdf_are_seen_as_its_version_says(
+        tmp_path, version, more, axis, pose):
+    file = tmp_path / 'model.sdf'
+    file.write_text(f"""<sdf version="{version}"><model name="m"><link name="a"/><link name="b">
+        {pose}</link><joint name="j" type="revolute"><parent>a</parent><child>b</child>
+        {AXIS.format(more)}</joint></model></sdf>""")
+    joint, = readers.read(str(file)).joints
+    assert joint.axis == pytest.approx(np.array(axis), abs=1e-15)
+    assert joint.places[0] == pytest.approx(np.array([0.0, 0.0, 1.0]))
+
+
 def robot_of(linkage, values):
     """Return a linkage as a robot: a tree of its links, and cuts where they meet once more."""
     places = {name: complex(*place) for name, place in linkage.solve(values).items()}

@@ -11,6 +11,7 @@ from linkage_ros import mechanisms, scene
 from linkage_ros.linkage.walker import Assembly
 from linkage_ros.render.cycle import Cycle
 from linkage_ros.scene import slider, writing
+from linkage_ros.scene.joint_names import quoted_name
 from linkage_ros.scene.motion import Motion
 import numpy as np
 import pytest
@@ -159,6 +160,7 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     *[({'jansen.joint_names': [text]}, 'jansen.joint_names must be texts such as .* each about '
        'another of crank, BC, .*, not ') for text in (
         '', 'BC', 'BC=', '=shin', 'BC=3', 'BC=left shin', 'ZZ=shin', 'left0_BC=shin', 'BC=shin+',
+        'BC=""', 'BC="', 'BC="shin', 'BC="sh"in"', r'BC="\x"',
         'BC=shin+x', 'BC=shin+1+1', 'BC==shin', 'BC=--shin', 'BC=' + 'x' * 900 + '!')],
     ({'jansen.joint_names': ['BC=a', 'BC=b']}, "jansen.joint_names must be .* another .*'BC=b'"),
     ({'jansen.joint_names': ['BC=knee', 'EF=-knee']}, 'jansen.joint_names must give each joint '
@@ -205,6 +207,15 @@ def test_joints_bear_a_robots_own_names_signs_and_zeros():
                      'left0_BC': ('left-knee', -1.0, 0.0, True, False),
                      'right1_EF': ('ankle.2', -1.0, -0.15, True, True)}
     assert joints['left1_BC'].name == 'jansen_left1_BC' and len(joints) == 1 + 4 * 6
+
+
+@pytest.mark.parametrize('name', [
+    'finger-1', '3', 'left knee', 'a"b', "a'b", 'a\\', 'jy\n/crank_driver: {}', 'Hüfte', '-a+1',
+    ' ', '\u2028', 'a=b', '#'])
+def test_any_name_of_a_joint_can_be_quoted(name):
+    line = f'BC=-{quoted_name(name)}+1'
+    joints = scene.read({'jansen.joint_names': [line]}).machines['jansen'].joints
+    assert joints['BC'] == (name, -1.0, 1.0, True, True)
 
 
 def test_a_whole_number_is_taken_for_the_number_that_it_is():

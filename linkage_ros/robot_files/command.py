@@ -17,7 +17,9 @@ from . import loops, readers
 from .dyads import Drawing, Drive, short
 from .. import command, mechanisms, scene
 from ..linkage.mechanism import Mechanism
+from ..scene.joint_names import quoted_name
 from ..scene.writing import in_yaml
+from ..words import elided
 
 NAME = 'from_robot'
 NEEDS = 'pip install pyyaml, and mujoco for MJCF'
@@ -42,8 +44,10 @@ def show(args: Optional[List[str]]) -> None:
         robot = readers.read(asked.file, asked.loops)
         robot.driven = asked.driven or robot.driven
         given, said = described(robot)
-    print(f'# From {asked.file}.', *(f'# {line}' for line in said), in_yaml(given),
-          sep='\n', end='')
+    # Names in the file are the file's: what is no letter in them could end a comment.
+    said = [elided(line, 10 ** 6) for line in said]
+    print(elided(f'# From {asked.file}.', 10 ** 4), *(f'# {line}' for line in said),
+          in_yaml(given), sep='\n', end='')
     print(*(f'{NAME}: {line}' for line in said), sep='\n', file=sys.stderr)
 
 
@@ -192,7 +196,8 @@ def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
         if links[link].kind != 'prismatic':
             angle = math.remainder(angle - float(np.asarray(links[link].zero)), math.tau)
         zero = float(short((joint.position or 0.0) - sign * angle))
-        names.append(f'{link}={"-" * (sign < 0.0)}{joint.name}' + (f'{zero:+}' if zero else ''))
+        names.append(f'{link}={"-" * (sign < 0.0)}{quoted_name(joint.name)}'
+                     + (f'{zero:+}' if zero else ''))
     yield 'joint_names', names
     yield 'only_named', True
 

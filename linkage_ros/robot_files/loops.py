@@ -11,6 +11,7 @@ from typing import Dict, Iterator, List, NamedTuple, Sequence, Set, Tuple
 import numpy as np
 
 from .readers import BALL, FIXED, HINGE, Joint, Robot, SLIDE
+from ..command import RequestError
 
 # Axes that differ by more [rad] are not parallel: files have angles such as 1.5708.
 ASKEW = 1e-4
@@ -45,6 +46,10 @@ def groups(robot: Robot) -> Iterator[Tuple[str, str, List[Joint]]]:
     home = {body: body for body in robot.frames}
     for joint in robot.joints:
         if joint.kind == FIXED:
+            if joint.gap > TOGETHER:
+                raise RequestError(f'{joint.name} makes {joint.bodies[0]} and {joint.bodies[1]} '
+                                   f'one, which the pose of the file has {joint.gap:.3g} apart [m '
+                                   'or rad]: give it a pose in which they fit')
             new, old = sorted((home[body] for body in joint.bodies), key=robot.root.__ne__)
             home = {body: new if at == old else at for body, at in home.items()}
     moved = [replace(joint, bodies=(home[joint.bodies[0]], home[joint.bodies[1]]))

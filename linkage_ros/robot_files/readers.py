@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+import math
 from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple
 import xml.etree.ElementTree as ElementTree
 
@@ -22,7 +23,11 @@ Element = ElementTree.Element
 
 @dataclass(eq=False)
 class Joint:
-    """What joins two bodies: its place on each, its axis; with a name, position and limits."""
+    """
+    What joins two bodies: its place on each, its axis; with a name, position and limits.
+
+    By its gap its frames on both bodies differ, in place [m] or turn [rad].
+    """
 
     name: str
     kind: str
@@ -31,6 +36,7 @@ class Joint:
     axis: Any
     position: Optional[float] = None
     limits: Optional[Tuple[float, float]] = None
+    gap: float = 0.0
 
 
 @dataclass
@@ -61,7 +67,8 @@ class Robot:
         low, high = (float(str(limit) or 'nan') for limit in limits)
         self.joints.append(Joint(
             name, kind, bodies, places, frame[:3, :3] @ axis / (size or 1.0), position,
-            (low, high) if -FARTHEST < low < high < FARTHEST else None))
+            (low, high) if -FARTHEST < low < high < FARTHEST else None,
+            0.0 if other is None else float(np.linalg.norm(frame - other))))
 
     def follow(self, name: str, other: str, ratio: float, offset: float) -> None:
         """Have a joint be a multiple of another, plus an offset."""
@@ -156,13 +163,20 @@ def _mjcf(path: str) -> Robot:
             robot.follow(names[ends[0]], names[ends[1]], given[1],
                          given[0] + one - given[1] * other)
         if kind in ('connect', 'weld'):
+            turned = np.zeros((2, 9))
+            turns = np.array([[1.0, 0.0, 0.0, 0.0]] * 2)
+            if kind == 'weld':
+                places, turns[0] = places[::-1], given[6:10]
             if mj.mjtObj(model.eq_objtype[i]) == mj.mjtObj.mjOBJ_SITE:
-                ends, places = model.site_bodyid[ends], model.site_pos[ends]
+                places, turns = model.site_pos[ends], model.site_quat[ends]
+                ends = model.site_bodyid[ends]
+            for quaternion, matrix in zip(turns, turned):
+                mj.mju_quat2Mat(matrix, quaternion)
             first, second = (bodies[end] for end in ends)
+            one, other = (robot.frames[bodies[end]] @ _frame(place, matrix.reshape(3, 3))
+                          for end, place, matrix in zip(ends, places, turned))
             robot.join(model.equality(i).name or f'equality{i}',
-                       BALL if kind == 'connect' else FIXED, (first, second),
-                       robot.frames[first] @ _frame(places[0]),
-                       other=robot.frames[second] @ _frame(places[1]))
+                       BALL if kind == 'connect' else FIXED, (first, second), one, other=other)
     for way, target in zip(model.actuator_trntype, model.actuator_trnid[:, 0]):
         kind = mj.mjtTrn(way).name[6:].lower()
         wraps = model.tendon_adr[target] + np.arange(model.tendon_num[target]) \
@@ -189,11 +203,17 @@ def _sdf(root: Element) -> Robot:
         if name in ('', 'world', '__model__'):
             return np.eye(4)
         base = _attribute(parts[name], 'pose', 'relative_to') or above(name)
-        return frame(base) @ _pose(_text(parts[name], 'pose', '0 0 0 0 0 0'))
+        return frame(base) @ _sdf_pose(parts[name].find('pose'))
 
     def body(name: str) -> str:
         return name if name not in parts or parts[name].tag == 'link' else body(above(name))
 
+    def is_seen_from_model(axis: Optional[Element]) -> bool:
+        # As all axes were up to version 1.4.
+        text = _text(axis, 'use_parent_model_frame') if axis is not None else ''
+        return text in ('1', 'true') or not text and version <= (1, 4)
+
+    version = tuple(int(part) for part in root.get('version', '1.12').split('.'))
     joints = {name: (body(_text(part, 'parent')), body(_text(part, 'child')))
               for name, part in parts.items() if part.tag == 'joint'}
     parents, children = zip(*joints.values())
@@ -205,6 +225,8 @@ def _sdf(root: Element) -> Robot:
         axis = _numbers(_text(part, 'axis/xyz', '0 0 1'))
         if seen := _attribute(part, 'axis/xyz', 'expressed_in'):
             axis = turned[:3, :3].T @ frame(seen)[:3, :3] @ axis
+        elif is_seen_from_model(part.find('axis')):
+            axis = turned[:3, :3].T @ axis
         robot.join(name, part.get('type', ''), ends, turned, axis, None, 0.0,
                    [_text(part, f'axis/limit/{end}') for end in ('lower', 'upper')])
     robot.driven = [str(name.text).strip() for name in model.findall('plugin/joint_name')]
@@ -282,9 +304,20 @@ def _origin(part: Element, tag: str) -> np.ndarray:
     return _pose(' '.join(_attribute(part, tag, key, '0 0 0') for key in ('xyz', 'rpy')))
 
 
-def _pose(text: str) -> np.ndarray:
+def _sdf_pose(pose: Optional[Element]) -> np.ndarray:
+    text = (pose.text or '').strip() if pose is not None else ''
+    if pose is None or not text:
+        return np.eye(4)
+    if (form := pose.get('rotation_format', 'euler_rpy')) != 'euler_rpy':
+        raise RequestError(f'a pose has the rotation_format {form}, which is not read')
+    unit = math.pi / 180.0 if pose.get('degrees') in ('1', 'true') else 1.0
+    return _pose(text, unit)
+
+
+def _pose(text: str, unit: float = 1.0) -> np.ndarray:
     x, y, z, roll, pitch, yaw = _numbers(text, 6)
-    (cr, cp, cy), (sr, sp, sy) = np.cos((roll, pitch, yaw)), np.sin((roll, pitch, yaw))
+    angles = np.multiply((roll, pitch, yaw), unit)
+    (cr, cp, cy), (sr, sp, sy) = np.cos(angles), np.sin(angles)
     about_z, about_y, about_x = np.array([
         [[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]], [[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]],
         [[1, 0, 0], [0, cr, -sr], [0, sr, cr]]])

@@ -37,9 +37,13 @@ def write(robot: Robot) -> str:
     <color rgba="{numbers(*palette.rgb(code), 1.0)}" />
   </material>
 """ for colour, code in COLOURS.items()]
-    name, root = (escape(text, {'"': '&quot;'}) for text in (robot.name, robot.root))
+    name, root = (_escaped(text) for text in (robot.name, robot.root))
     return ''.join([f'<robot name="{name}">\n', *materials, f'  <link name="{root}" />\n',
                     *map(_part, robot.parts), '</robot>'])
+
+
+def _escaped(text: str) -> str:
+    return escape(text, {'"': '&quot;', '\n': '&#10;', '\r': '&#13;', '\t': '&#9;'})
 
 
 def _part(part: Part) -> str:
@@ -59,8 +63,8 @@ def _joint(body: Body) -> str:
     if joint and kind == 'revolute' and not joint.travel:
         kind = 'continuous'
     text = f"""\
-  <joint name="{name}" type="{kind}">
-    <parent link="{escape(body.parent, {'"': '&quot;'})}" />
+  <joint name="{_escaped(name)}" type="{kind}">
+    <parent link="{_escaped(body.parent)}" />
     <child link="{body.name}" />
 {_origin('    ', body.pose)}"""
     if joint:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from typing import Any, Dict, Iterable, Mapping, NamedTuple, Optional, Tuple
@@ -15,7 +16,9 @@ from .parameters import SceneError
 from ..words import elided, listed
 
 # A sign and a figure after a name are an offset; before a letter a hyphen is part of the name.
-_LINE = re.compile(r'(\w+)=(-?)([A-Za-z_][\w./:]*(?:-[A-Za-z_][\w./:]*)*)'
+_PLAIN = r'[A-Za-z_][\w./:]*(?:-[A-Za-z_][\w./:]*)*'
+# Any other name is in quotes, as JSON writes it.
+_LINE = re.compile(rf'(\w+)=(-?)({_PLAIN}|"(?:[^"\\]|\\.)+")'
                    r'([+-](?:\d{1,99}\.?\d{0,99}|\.\d{1,99})(?:[eE][+-]?\d\d?)?)?', re.ASCII)
 
 
@@ -59,15 +62,29 @@ def read_joint_names(mechanism: str, joints: Mapping[str, bool], lines: Iterable
     own: Dict[str, JointName] = {}
     for line in lines:
         match = _LINE.fullmatch(line)
-        if not match or match[1] not in usual or match[1] in own:
+        name = _unquoted(match[3]) if match else ''
+        if not match or not name or match[1] not in usual or match[1] in own:
             raise SceneError(
                 f"{mechanism}.joint_names must be texts such as 'BC=left_shin' or "
-                f"'EF=-left_ankle+0.35', each about another of {listed(joints, 90)}, not "
+                f"'EF=-\"ankle-2\"+0.35', each about another of {listed(joints, 90)}, not "
                 f'{elided(line)!r}')
         offset = float(match[4] or 0.0)
-        own[match[1]] = JointName(match[3], -1.0 if match[2] else 1.0, offset,
+        own[match[1]] = JointName(name, -1.0 if match[2] else 1.0, offset,
                                   taken=joints[match[1]] and offset != 0.0)
     return {**usual, **own}
+
+
+def quoted_name(name: str) -> str:
+    """Return a name as `joint_names` has it: in quotes, unless it is plain."""
+    plain = re.fullmatch(_PLAIN, name, re.ASCII)
+    return name if plain else json.dumps(name, ensure_ascii=False)
+
+
+def _unquoted(text: str) -> str:
+    try:
+        return str(json.loads(text)) if text[0] == '"' else text
+    except ValueError:
+        return ''
 
 
 def check_distinct(names: Mapping[str, Mapping[str, JointName]]) -> None:
