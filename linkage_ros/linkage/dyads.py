@@ -15,10 +15,22 @@ modular approaches to planar linkage kinematic analysis", Mechanism and Machine 
 
 from __future__ import annotations
 
+from cmath import phase
 from functools import partial
 from itertools import combinations
 import math
-from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import (
+    Any,
+    Callable,
+    Dict,
+    Iterator,
+    List,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Tuple,
+    Union,
+)
 
 # Of the size of a linkage, what is rounding.
 ROUNDING = 1e-12
@@ -37,6 +49,23 @@ class Slide(NamedTuple):
     origins: Tuple[complex, complex]
     axes: Tuple[complex, complex]
     joint: Any = None
+
+
+class Hinge(NamedTuple):
+    """
+    Two bodies that a motor turns: where on each.
+
+    The second is turned by sign * position + zero [rad] as seen from the first.
+    """
+
+    bodies: Tuple[str, str]
+    places: Tuple[complex, complex]
+    sign: float
+    zero: float
+    joint: Any = None
+
+
+Motor = Union[Hinge, Slide]
 
 
 class Part(NamedTuple):
@@ -81,6 +110,8 @@ class Dyads:
         Hinges: where each is on the bodies that it joins, as these have it.
     slides : sequence of Slide
         What slides on what, without a motor.
+    motors : sequence of Hinge or Slide
+        What is known of the others: an input places it.
     size : float
         About how large the linkage is [m].
     near : float
@@ -98,14 +129,14 @@ class Dyads:
     """
 
     def __init__(self, ground: str, bodies: Sequence[str], pins: Sequence[Dict[str, complex]],
-                 slides: Sequence[Slide], size: float, near: float):
+                 slides: Sequence[Slide], motors: Sequence[Motor], size: float, near: float):
         self.lines: List[str] = []
         self.on: Dict[str, Dict[str, complex]] = {body: {} for body in bodies}
         self.parts: Dict[str, Part] = {}
-        self.ground, self.size, self.near = ground, size, near
+        self.ground, self.size, self.near, self.farthest = ground, size, near, size
         # The body that each joint of the lines was placed with: others turn against that.
         self.home: Dict[str, str] = {}
-        self.pins, self.slides = list(pins), list(slides)
+        self.pins, self.slides, self.motors = list(pins), list(slides), list(motors)
 
     def take_apart(self) -> None:
         """Place what can be placed."""
@@ -115,11 +146,15 @@ class Dyads:
 
     def rules(self) -> Iterator[Callable[[], bool]]:
         """Yield what may place bodies next, each telling whether it has."""
-        for body in self.left:
-            yield partial(self._dyad, body)
+        for motor in self.motors:
+            yield from (partial(self._crank, motor, way) if isinstance(motor, Hinge)
+                        else partial(self._carriage, motor, way) for way in (0, 1))
+        yield from (partial(self._dyad, body) for body in self.left)
         for slide in self.slides:
             yield from (partial(rule, slide, way) for way in (0, 1)
                         for rule in (self._slider, self._slot, self._yoke))
+        yield from (partial(self._cylinder, motor, way) for motor in self.motors
+                    if isinstance(motor, Slide) for way in (0, 1))
 
     @property
     def left(self) -> List[str]:
@@ -130,9 +165,17 @@ class Dyads:
         """Return where a place on a body is in the pose that sides are told from."""
         return place
 
-    def are_driven(self, first: str, second: str) -> bool:
-        """Return whether a motor moves two bodies against each other."""
-        return False
+    def drive(self, word: str, joint: Any, ratio: float, offset: float) -> Tuple[str, str]:
+        """
+        Note an input, ratio * position + offset of a joint.
+
+        Return its number, and what its line says of it if it is geared to another.
+        """
+        raise NotImplementedError
+
+    def position(self, joint: Any) -> float:
+        """Return about where the motor of a joint is."""
+        return 0.0
 
     def alike(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
         """Return what a better line than `dyad` says of two bars, if there is one."""
@@ -187,20 +230,14 @@ class Dyads:
         else:
             _, (first, start), (second, end) = max(bars)
             seen = (place - start) / (end - start) * abs(end - start)
-            side = 'left' if seen.imag > 0.0 else 'right'
+            side = self._side(start, end, place)
             line = (f'rigid {first} {second} {said(abs(place - start))} {said(abs(place - end))} '
                     f'{side}' if abs(seen.imag) >= self.near else
                     f'line {first} {second} {said(seen.real)}')
         return self.name(place, body, line), place
 
-    def bars(self, first: str, second: str, pin: Dict[str, complex]) -> str:
-        """Return what a line says of the bars of two bodies that meet in a pin."""
-        (one, start), (two, end) = self.end(first), self.end(second)
-        foot = self.seen(first, start)
-        side = 'left' if ((self.seen(first, pin[first]) - foot)
-                          / (self.seen(second, end) - foot)).imag > 0.0 else 'right'
-        return (f'{one} {two} {self.said(abs(pin[first] - start))} '
-                f'{self.said(abs(pin[second] - end))} {side}')
+    def _side(self, first: complex, second: complex, place: complex) -> str:
+        return 'left' if ((place - first) / (second - first)).imag > 0.0 else 'right'
 
     def other(self, body: str, name: str) -> Pin:
         """Return another joint of a body that is placed."""
@@ -240,15 +277,86 @@ class Dyads:
                 if rod != body and rod not in self.parts and self.on[rod]
                 and not self.known(rod, pin[rod]))
 
+    def _crank(self, hinge: Hinge, way: int) -> bool:
+        """Place the body that a motor turns on one that is placed."""
+        base, body = hinge.bodies[way], hinge.bodies[1 - way]
+        if base not in self.parts or body in self.parts:
+            return False
+        (centre, start), zero, along = self.fixed(base, hinge.places[way]), '', 1.0 + 0.0j
+        if base != self.ground:
+            mark, end = self.other(base, centre)
+            zero, along = f' zero {mark}', end - start
+        rail = next((axis for slide in (*self.slides, *self.motors) if isinstance(slide, Slide)
+                     for each, axis in zip(slide.bodies, slide.axes) if each == body), 1.0 + 0.0j)
+        centred = hinge.places[1 - way]
+        place = next((pin[body] for pin in self.pins
+                      if body in pin and abs(pin[body] - centred) > self.near),
+                     centred + self.size * rail)
+        sign = -1.0 if way else 1.0
+        number, geared = self.drive('crank', hinge.joint, sign * hinge.sign, sign * hinge.zero
+                                    + phase((place - centred) / along))
+        name = self.name(place, body, f'crank {centre} {self.said(abs(place - centred))}{zero}'
+                         f'{geared}')
+        self.on[body].setdefault(centre, centred)
+        return self.hang(body, centre, name, f'crank{number}')
+
+    def _carriage(self, slide: Slide, way: int) -> bool:
+        """Place the body that a motor moves along one that is placed."""
+        base, body = slide.bodies[way], slide.bodies[1 - way]
+        if base not in self.parts or body in self.parts:
+            return False
+        place = next((pin[body] for pin in self.pins if body in pin), slide.origins[1 - way])
+        ahead = (place - slide.origins[1 - way]) / slide.axes[1 - way]
+        (origin, start), towards, along = self.line(
+            base, slide.origins[way] + slide.axes[way] * ahead, slide.axes[way])
+        on = along / slide.axes[way]
+        sign = (-1.0 if way else 1.0) * math.copysign(1.0, on.real)
+        number, geared = self.drive('carriage', slide.joint, sign, 0.0)
+        low, high = (sign * self.position(slide.joint) + end for end in (
+            -self.farthest, self.farthest))
+        name = self.name(place, body, f'carriage {origin} along {towards} {self.said(low)} '
+                         f'{self.said(high)}{geared}')
+        return self.place(body, Part(f'carriage{number}', name, slide.axes[1 - way] * on,
+                                     slide.joint, start))
+
+    def _cylinder(self, slide: Slide, way: int) -> bool:
+        """Place two bodies that a motor moves along each other, and a bar that hangs on them."""
+        barrel, rod = slide.bodies[way], slide.bodies[1 - way]
+        if not self.on[barrel] or {barrel, rod} & self.parts.keys():
+            return False
+        base, start = self.end(barrel)
+        foot = self.seen(barrel, start)
+        back = (start - slide.origins[way]) / slide.axes[way]
+        for bar, pin in self.rods(rod):
+            ahead = (pin[rod] - slide.origins[1 - way]) / slide.axes[1 - way] - back
+            if bar == barrel or base == self.end(bar)[0] or abs(ahead.imag) > self.near:
+                continue
+            sign = math.copysign(1.0, ((self.seen(rod, pin[rod]) - foot) / (
+                self.seen(barrel, start + slide.axes[way]) - foot)).real)
+            number, geared = self.drive('cylinder', slide.joint, sign * (-1.0 if way else 1.0),
+                                        sign * ahead.real)
+            pivot, at = self.end(bar)
+            side = self._side(foot, self.seen(bar, at), self.seen(bar, pin[bar]))
+            name = self.name(pin[bar], bar, f'cylinder {base} {pivot} '
+                             f'{self.said(abs(pin[bar] - at))} {side}{geared}')
+            axis = sign * slide.axes[1 - way]
+            return self.place(barrel, Part(f'barrel{number}', base, sign * slide.axes[way])) \
+                and self.place(rod, Part(f'cylinder{number}', name, axis, slide.joint, start)) \
+                and self.hang(bar, pivot, name)
+        return False
+
     def _dyad(self, first: str) -> bool:
         for second, pin in self.rods(first) if self.on[first] else ():
             one, two = self.end(first), self.end(second)
-            if one[0] == two[0] or self.are_driven(first, second):
+            if one[0] == two[0] or any({first, second} == {*each.bodies} for each in self.motors):
                 continue
             if abs(self.seen(first, one[1]) - self.seen(second, two[1])) < self.near:
                 raise ValueError(f'{first} and {second} are folded on each other')
-            line = self.alike(pin[first], pin[second], one, two) or \
-                f'dyad {self.bars(first, second, pin)}'
+            side = self._side(*(self.seen(*seen) for seen in (
+                (first, one[1]), (second, two[1]), (first, pin[first]))))
+            line = self.alike(pin[first], pin[second], one, two) or (
+                f'dyad {one[0]} {two[0]} {self.said(abs(pin[first] - one[1]))} '
+                f'{self.said(abs(pin[second] - two[1]))} {side}')
             name = self.name(pin[first], first, line)
             return self.hang(first, one[0], name) and self.hang(second, two[0], name)
         return False

@@ -6,13 +6,12 @@
 from __future__ import annotations
 
 from cmath import phase
-from functools import partial
 import math
-from typing import Callable, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 from .loops import Loop, ROUNDING
 from .readers import Joint, Robot, SLIDE
-from ..linkage.dyads import bar_name, Dyads, Part, Pin, short, Slide
+from ..linkage.dyads import bar_name, Dyads, Hinge, Motor, Pin, short, Slide
 
 
 class Drive(NamedTuple):
@@ -51,24 +50,17 @@ class Drawing(Dyads):
                 pins = [other for other in pins if other not in same]
                 pins.append({body: place for each in (*same, pin)
                              for body, place in each.items()})
-        slides = [Slide(joint.bodies, (joint.places[1] - joint.axis * (joint.position or 0.0),
-                                       joint.places[1]), (joint.axis, joint.axis), joint)
-                  for joint in loop.joints if joint.kind == SLIDE and joint not in self.driven]
-        super().__init__(loop.ground, [body for joint in loop.joints for body in joint.bodies],
-                         pins, slides, loop.size, loop.near)
+        moved: List[Motor] = [
+            Slide(joint.bodies, (joint.places[1] - joint.axis * (joint.position or 0.0),
+                                 joint.places[1]), (joint.axis, joint.axis), joint)
+            if joint.kind == SLIDE else
+            Hinge(joint.bodies, joint.places, joint.axis, -joint.axis * (joint.position or 0.0),
+                  joint) for joint in loop.joints]
+        super().__init__(
+            loop.ground, [body for joint in loop.joints for body in joint.bodies], pins,
+            [each for each in moved if isinstance(each, Slide) and each.joint not in self.driven],
+            [each for each in moved if each.joint in self.driven], loop.size, loop.near)
         self.take_apart()
-
-    def rules(self) -> Iterator[Callable[[], bool]]:
-        """Yield what may place bodies next: motors, dyads, cylinders."""
-        ways = [(joint, *way) for joint in self.driven for way in (
-            (*joint.bodies, 1.0), (*joint.bodies[::-1], -1.0))]
-        yield from (partial(self._drive, *way) for way in ways)
-        yield from super().rules()
-        yield from (partial(self._cylinder, *way) for way in ways)
-
-    def are_driven(self, first: str, second: str) -> bool:
-        """Return whether a motor moves two bodies against each other."""
-        return any({first, second} == {*each.bodies} for each in self.driven)
 
     @property
     def allowed(self) -> float:
@@ -106,10 +98,9 @@ class Drawing(Dyads):
         return link, joint.axis if body == child else -joint.axis, phase(
             along / self.parts[base].along)
 
-    def _input(self, word: str, joint: Joint, ratio: float, value: float) -> Tuple[str, str]:
-        """Note an input; return its number, and what its line says of it if it is geared."""
+    def drive(self, word: str, joint: Joint, ratio: float, offset: float) -> Tuple[str, str]:
+        """Note an input, as `Dyads` asks for; those of one source are geared to the first."""
         source, factor, start = self._robot.source(joint.name)
-        offset = value - ratio * (joint.position or 0.0)
         ends = joint.limits and tuple(sorted(ratio * limit + offset for limit in joint.limits))
         ratio, offset, number = ratio * factor, offset + ratio * start, self.number(word)
         for other in self.drives:
@@ -123,36 +114,9 @@ class Drawing(Dyads):
             self._robot.positions.get(source) or 0.0) + offset, ends))
         return number, ''
 
-    def _drive(self, joint: Joint, base: str, body: str, sign: float) -> bool:
-        """Place the body that a motor moves on one that is placed."""
-        places = [pin[body] for pin in self.pins if body in pin]
-        if joint not in self.driven or base not in self.parts or body in self.parts or not places:
-            return False
-        size, position = self.loop.size, joint.position or 0.0
-        if joint.kind == SLIDE:
-            (origin, start), towards, along = self.line(
-                base, places[0] - joint.axis * sign * position, joint.axis)
-            value = ((places[0] - start) / along).real
-            number, geared = self._input('carriage', joint, math.copysign(
-                1.0, sign * (along / joint.axis).real), value)
-            name = self.name(places[0], body, f'carriage {origin} along {towards} '
-                             f'{self.said(value - size)} {self.said(value + size)}{geared}')
-            return self.place(body, Part(f'carriage{number}', name, along, joint, start))
-        (centre, start), zero, along = self.fixed(
-            base, joint.places[joint.bodies[1] == base]), '', 1.0 + 0.0j
-        if base != self.loop.ground:
-            mark, end = self.other(base, centre)
-            zero, along = f' zero {mark}', end - start
-        rail = next((each.axis for each in self.loop.joints
-                     if each.kind == SLIDE and body in each.bodies), 1.0 + 0.0j)
-        centred = joint.places[joint.bodies[1] == body]
-        place = next((place for place in places if abs(place - centred) > self.loop.near),
-                     centred + size * rail)
-        number, geared = self._input('crank', joint, sign * joint.axis, phase(
-            (place - centred) / along))
-        name = self.name(place, body, f'crank {centre} {self.said(abs(place - centred))}{zero}'
-                         f'{geared}')
-        return self.hang(body, centre, name, f'crank{number}')
+    def position(self, joint: Joint) -> float:
+        """Return where the motor of a joint is in the file."""
+        return joint.position or 0.0
 
     def alike(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
         """Return what a line says of bars like those from a corner: they pass their flat poses."""
@@ -170,22 +134,3 @@ class Drawing(Dyads):
                 if max(abs(seen - place), abs(seen - other)) < self.loop.near < abs(at - place):
                     return f'{word} {corner} {first} {second}'
         return None
-
-    def _cylinder(self, slide: Joint, barrel: str, rod: str, sign: float) -> bool:
-        if slide not in self.driven or slide.kind != SLIDE or not self.on[barrel] \
-                or {barrel, rod} & self.parts.keys():
-            return False
-        for bar, pin in self.rods(rod):
-            one, two = self.end(barrel), self.end(bar)
-            seen = (pin[rod] - one[1]) / slide.axis
-            if bar != barrel and one[0] != two[0] and abs(seen.imag) < self.loop.near:
-                way = math.copysign(1.0, seen.real)
-                number, geared = self._input('cylinder', slide, sign * way, abs(seen))
-                base, pivot, _, more = self.bars(
-                    barrel, bar, {barrel: pin[rod], bar: pin[bar]}).split(' ', 3)
-                name = self.name(pin[bar], bar, f'cylinder {base} {pivot} {more}{geared}')
-                return self.place(barrel, Part(f'barrel{number}', base, way * slide.axis)) \
-                    and self.place(rod, Part(
-                        f'cylinder{number}', name, way * slide.axis, slide, one[1])) \
-                    and self.hang(bar, pivot, name)
-        return False
