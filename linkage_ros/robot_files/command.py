@@ -180,7 +180,7 @@ def _bent(linkage: Mechanism, drawing: Drawing) -> float:
 
 def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
     seen = [(joint, found) for joint in drawing.loop.joints if joint.position is not None
-            and joint not in drawing.driven and (found := drawing.seen(joint))]
+            and joint not in drawing.driven and (found := drawing.measured_by(joint))]
     frame = drawing.loop.frame
     yield 'type', 'custom'
     yield 'joints', drawing.lines

@@ -1,0 +1,424 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+A planar linkage of bodies, hinges and slides, taken apart into dyads.
+
+From the bodies that are placed, two others that meet in a joint, and are each joined to a placed
+one, are placed next by one joint line: RRR by `dyad`, RRP by `slider`, RPR by `slot`, RPP by
+`yoke` where its slides are square to each other. PRP has no word. Bodies that are left are an
+Assur group of class III or higher, or hang on one.
+
+Source: Assur's groups as in Norton, "Design of Machinery", sec. 2.13, and Galletti, "A note on
+modular approaches to planar linkage kinematic analysis", Mechanism and Machine Theory 21 (1986).
+"""
+
+from __future__ import annotations
+
+from cmath import phase
+from functools import partial
+from itertools import combinations
+import math
+from typing import (
+    Any,
+    Callable,
+    Dict,
+    Iterator,
+    List,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Tuple,
+    Union,
+)
+
+# Of the size of a linkage, what is rounding.
+ROUNDING = 1e-12
+
+Pin = Tuple[str, complex]
+
+
+class Slide(NamedTuple):
+    """
+    Two bodies that slide on each other: on each a point of the line, and which way it goes.
+
+    Where the points meet, the slide is at zero. `joint` is what a caller knows it by.
+    """
+
+    bodies: Tuple[str, str]
+    origins: Tuple[complex, complex]
+    axes: Tuple[complex, complex]
+    joint: Any = None
+
+
+class Hinge(NamedTuple):
+    """
+    Two bodies that a motor turns: where on each.
+
+    The second is turned by sign * position + zero [rad] as seen from the first.
+    """
+
+    bodies: Tuple[str, str]
+    places: Tuple[complex, complex]
+    sign: float
+    zero: float
+    joint: Any = None
+
+
+Motor = Union[Hinge, Slide]
+
+
+class Part(NamedTuple):
+    """
+    A body that is placed: its link, and the joint that this hangs on.
+
+    Angles on it are counted from `along`, as it is in the pose; a block is on a slide, which is
+    counted from `start`.
+    """
+
+    link: str
+    joint: str
+    along: complex
+    slide: Any = None
+    start: complex = 0.0j
+
+
+def short(value: float, near: float = 2e-16) -> str:
+    """Return a number, and one of few digits where that is as near to it as rounding."""
+    if abs(value) <= 5.0 * near:
+        return '0'
+    return next((text for text in (f'{value:.{digits}g}' for digits in range(1, 13))
+                 if abs(float(text) - value) <= near), repr(float(value)))
+
+
+def bar_name(joint: str, tip: str) -> str:
+    """Return what the link of a bar is called."""
+    return ('' if len(joint + tip) == 2 else '_').join((joint, tip))
+
+
+class Dyads:
+    """
+    The joint lines that place bodies, one dyad after the other.
+
+    Parameters
+    ----------
+    ground : str
+        The body that is placed from the start.
+    bodies : sequence of str
+        All of them.
+    pins : sequence of dict
+        Hinges: where each is on the bodies that it joins, as these have it.
+    slides : sequence of Slide
+        What slides on what, without a motor.
+    motors : sequence of Hinge or Slide
+        What is known of the others: an input places it.
+    size : float
+        About how large the linkage is [m].
+    near : float
+        What is nearer than this [m] is at one place.
+
+    Attributes
+    ----------
+    lines : list of str
+        Joint lines so far.
+    on : dict
+        For each body the joints of the lines that are on it, and where.
+    parts : dict
+        The bodies that are placed.
+
+    """
+
+    def __init__(self, ground: str, bodies: Sequence[str], pins: Sequence[Dict[str, complex]],
+                 slides: Sequence[Slide], motors: Sequence[Motor], size: float, near: float):
+        self.lines: List[str] = []
+        self.on: Dict[str, Dict[str, complex]] = {body: {} for body in bodies}
+        self.parts: Dict[str, Part] = {}
+        self.ground, self.size, self.near, self.farthest = ground, size, near, size
+        # The body that each joint of the lines was placed with: others turn against that.
+        self.home: Dict[str, str] = {}
+        self.pins, self.slides, self.motors = list(pins), list(slides), list(motors)
+
+    def take_apart(self) -> None:
+        """Place what can be placed."""
+        self.place(self.ground, Part('', '', 1.0 + 0.0j))
+        while any(rule() for rule in self.rules()):
+            pass
+
+    def rules(self) -> Iterator[Callable[[], bool]]:
+        """Yield what may place bodies next, each telling whether it has."""
+        for motor in self.motors:
+            yield from (partial(self._crank, motor, way) if isinstance(motor, Hinge)
+                        else partial(self._carriage, motor, way) for way in (0, 1))
+        yield from (partial(self._dyad, body) for body in self.left)
+        for slide in self.slides:
+            yield from (partial(rule, slide, way) for way in (0, 1)
+                        for rule in (self._slider, self._slot, self._yoke))
+        yield from (partial(self._cylinder, motor, way) for motor in self.motors
+                    if isinstance(motor, Slide) for way in (0, 1))
+
+    @property
+    def left(self) -> List[str]:
+        """The bodies that are not placed."""
+        return [body for body in self.on if body not in self.parts]
+
+    def seen(self, body: str, place: complex) -> complex:
+        """Return where a place on a body is in the pose that sides are told from."""
+        return place
+
+    def drive(self, word: str, joint: Any, ratio: float, offset: float) -> Tuple[str, str]:
+        """
+        Note an input, ratio * position + offset of a joint.
+
+        Return its number, and what its line says of it if it is geared to another.
+        """
+        raise NotImplementedError
+
+    def position(self, joint: Any) -> float:
+        """Return about where the motor of a joint is."""
+        return 0.0
+
+    def alike(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
+        """Return what a better line than `dyad` says of two bars, if there is one."""
+        return None
+
+    def said(self, value: float) -> str:
+        """Return a length in a line."""
+        return short(value, 1e-15 * self.size)
+
+    def number(self, *words: str) -> str:
+        """Return what the next link or input of some words is called."""
+        count = sum(line.split()[1] in words for line in self.lines)
+        return f'{count + 1 if count else ""}'
+
+    def called(self, place: complex, body: str) -> str:
+        """Return the name of a new joint at a place on a body."""
+        count = len(self.lines)
+        return 'ABCDEFGHIJKLMNPQRSTUVWXYZ'[count % 25] + str(count // 25 or '')
+
+    def name(self, place: complex, body: str, line: str) -> str:
+        """Write the line that places a joint, and return its name."""
+        name = self.called(place, body)
+        self.home[name] = body
+        self.on[body][name] = place
+        for pin in self.pins:
+            if body in pin and abs(pin[body] - place) < self.near:
+                self.on.update({each: {**self.on[each], name: at} for each, at in pin.items()})
+        self.lines.append(f'{name} {line}')
+        return name
+
+    def known(self, body: str, place: complex) -> Optional[str]:
+        """Return the joint at a place on a body, if there is one."""
+        return next((name for name, at in self.on[body].items()
+                     if abs(at - place) < self.near), None)
+
+    def fixed(self, body: str, place: complex) -> Pin:
+        """Return the joint at a place on a body that is placed, a new one if there is none."""
+        if name := self.known(body, place):
+            return name, self.on[body][name]
+        said, on, part = self.said, self.on[body], self.parts[body]
+        # On the bar from which the triangle is the least flat.
+        bars = [(abs(((place - start) / (end - start)).imag), (first, start), (second, end))
+                for (first, start), (second, end) in combinations(on.items(), 2)
+                if abs(end - start) > self.near]
+        if body == self.ground:
+            line = f'ground {said(place.real)} {said(place.imag)}'
+        elif part.slide:
+            seen = (place - on[part.joint]) / part.along
+            line = f'block {part.joint} {said(seen.real)} {said(seen.imag)}'
+        elif not bars:
+            raise ValueError(f'{body} is a barrel with another joint, which no word can place')
+        else:
+            _, (first, start), (second, end) = max(bars)
+            seen = (place - start) / (end - start) * abs(end - start)
+            side = self._side(start, end, place)
+            line = (f'rigid {first} {second} {said(abs(place - start))} {said(abs(place - end))} '
+                    f'{side}' if abs(seen.imag) >= self.near else
+                    f'line {first} {second} {said(seen.real)}')
+        return self.name(place, body, line), place
+
+    def _side(self, first: complex, second: complex, place: complex) -> str:
+        return 'left' if ((place - first) / (second - first)).imag > 0.0 else 'right'
+
+    def other(self, body: str, name: str) -> Pin:
+        """Return another joint of a body that is placed."""
+        return next((pin for pin in self.on[body].items() if pin[0] != name), None) or self.fixed(
+            body, self.on[body][name] + self.size * self.parts[body].along)
+
+    def line(self, body: str, place: complex, axis: complex, but: str = ''
+             ) -> Tuple[Pin, str, complex]:
+        """Return a joint at a place on a body, another on a line through it, and which way."""
+        origin, at = self.fixed(body, place)
+        name, end = next(((name, end) for name, end in self.on[body].items()
+                          if name not in (origin, but)
+                          and abs(((end - at) / axis).imag) < ROUNDING * self.size), None) \
+            or self.fixed(body, at + self.size * axis)
+        return (origin, at), name, (end - at) / abs(end - at)
+
+    def end(self, body: str) -> Pin:
+        """Return the first joint of the lines on a body."""
+        return next(iter(self.on[body].items()))
+
+    def place(self, body: str, part: Part) -> bool:
+        """Note a body that is placed, and place what else there is on it."""
+        self.parts[body] = part
+        for pin in self.pins:
+            if body in pin:
+                self.fixed(body, pin[body])
+        return True
+
+    def hang(self, body: str, joint: str, tip: str, link: str = '') -> bool:
+        """Note a body that turns about a joint."""
+        on = self.on[body]
+        return self.place(body, Part(link or bar_name(joint, tip), joint, on[tip] - on[joint]))
+
+    def rods(self, body: str) -> Iterator[Tuple[str, Dict[str, complex]]]:
+        """Yield what hangs on a joint and shares a pin with a body, and the pin, not placed."""
+        return ((rod, pin) for pin in self.pins if body in pin for rod in pin
+                if rod != body and rod not in self.parts and self.on[rod]
+                and not self.known(rod, pin[rod]))
+
+    def _crank(self, hinge: Hinge, way: int) -> bool:
+        """Place the body that a motor turns on one that is placed."""
+        base, body = hinge.bodies[way], hinge.bodies[1 - way]
+        if base not in self.parts or body in self.parts:
+            return False
+        (centre, start), zero, along = self.fixed(base, hinge.places[way]), '', 1.0 + 0.0j
+        if base != self.ground:
+            mark, end = self.other(base, centre)
+            zero, along = f' zero {mark}', end - start
+        rail = next((axis for slide in (*self.slides, *self.motors) if isinstance(slide, Slide)
+                     for each, axis in zip(slide.bodies, slide.axes) if each == body), 1.0 + 0.0j)
+        centred = hinge.places[1 - way]
+        place = next((pin[body] for pin in self.pins
+                      if body in pin and abs(pin[body] - centred) > self.near),
+                     centred + self.size * rail)
+        sign = -1.0 if way else 1.0
+        number, geared = self.drive('crank', hinge.joint, sign * hinge.sign, sign * hinge.zero
+                                    + phase((place - centred) / along))
+        name = self.name(place, body, f'crank {centre} {self.said(abs(place - centred))}{zero}'
+                         f'{geared}')
+        self.on[body].setdefault(centre, centred)
+        return self.hang(body, centre, name, f'crank{number}')
+
+    def _carriage(self, slide: Slide, way: int) -> bool:
+        """Place the body that a motor moves along one that is placed."""
+        base, body = slide.bodies[way], slide.bodies[1 - way]
+        if base not in self.parts or body in self.parts:
+            return False
+        place = next((pin[body] for pin in self.pins if body in pin), slide.origins[1 - way])
+        ahead = (place - slide.origins[1 - way]) / slide.axes[1 - way]
+        (origin, start), towards, along = self.line(
+            base, slide.origins[way] + slide.axes[way] * ahead, slide.axes[way])
+        on = along / slide.axes[way]
+        sign = (-1.0 if way else 1.0) * math.copysign(1.0, on.real)
+        number, geared = self.drive('carriage', slide.joint, sign, 0.0)
+        low, high = (sign * self.position(slide.joint) + end for end in (
+            -self.farthest, self.farthest))
+        name = self.name(place, body, f'carriage {origin} along {towards} {self.said(low)} '
+                         f'{self.said(high)}{geared}')
+        return self.place(body, Part(f'carriage{number}', name, slide.axes[1 - way] * on,
+                                     slide.joint, start))
+
+    def _cylinder(self, slide: Slide, way: int) -> bool:
+        """Place two bodies that a motor moves along each other, and a bar that hangs on them."""
+        barrel, rod = slide.bodies[way], slide.bodies[1 - way]
+        if not self.on[barrel] or {barrel, rod} & self.parts.keys():
+            return False
+        base, start = self.end(barrel)
+        foot = self.seen(barrel, start)
+        back = (start - slide.origins[way]) / slide.axes[way]
+        for bar, pin in self.rods(rod):
+            ahead = (pin[rod] - slide.origins[1 - way]) / slide.axes[1 - way] - back
+            if bar == barrel or base == self.end(bar)[0] or abs(ahead.imag) > self.near:
+                continue
+            sign = math.copysign(1.0, ((self.seen(rod, pin[rod]) - foot) / (
+                self.seen(barrel, start + slide.axes[way]) - foot)).real)
+            number, geared = self.drive('cylinder', slide.joint, sign * (-1.0 if way else 1.0),
+                                        sign * ahead.real)
+            pivot, at = self.end(bar)
+            side = self._side(foot, self.seen(bar, at), self.seen(bar, pin[bar]))
+            name = self.name(pin[bar], bar, f'cylinder {base} {pivot} '
+                             f'{self.said(abs(pin[bar] - at))} {side}{geared}')
+            axis = sign * slide.axes[1 - way]
+            return self.place(barrel, Part(f'barrel{number}', base, sign * slide.axes[way])) \
+                and self.place(rod, Part(f'cylinder{number}', name, axis, slide.joint, start)) \
+                and self.hang(bar, pivot, name)
+        return False
+
+    def _dyad(self, first: str) -> bool:
+        for second, pin in self.rods(first) if self.on[first] else ():
+            one, two = self.end(first), self.end(second)
+            if one[0] == two[0] or any({first, second} == {*each.bodies} for each in self.motors):
+                continue
+            if abs(self.seen(first, one[1]) - self.seen(second, two[1])) < self.near:
+                raise ValueError(f'{first} and {second} are folded on each other')
+            side = self._side(*(self.seen(*seen) for seen in (
+                (first, one[1]), (second, two[1]), (first, pin[first]))))
+            line = self.alike(pin[first], pin[second], one, two) or (
+                f'dyad {one[0]} {two[0]} {self.said(abs(pin[first] - one[1]))} '
+                f'{self.said(abs(pin[second] - two[1]))} {side}')
+            name = self.name(pin[first], first, line)
+            return self.hang(first, one[0], name) and self.hang(second, two[0], name)
+        return False
+
+    def _slider(self, slide: Slide, way: int) -> bool:
+        base, block = slide.bodies[way], slide.bodies[1 - way]
+        if base not in self.parts or block in self.parts:
+            return False
+        origin, axis = slide.origins[way], slide.axes[way]
+        for rod, pin in self.rods(block):
+            (joint, at), length = self.end(rod), abs(pin[rod] - self.end(rod)[1])
+            ahead = (pin[block] - slide.origins[1 - way]) / slide.axes[1 - way]
+            (start, on_base), towards, along = self.line(base, origin + axis * ahead, axis, joint)
+            foot = self.seen(base, on_base)
+            half = 'out' if ((self.seen(rod, pin[rod]) - self.seen(rod, at)) / (
+                self.seen(base, on_base + along) - foot)).real > 0.0 else 'in'
+            number = self.number('slider', 'yoke')
+            name = self.name(pin[rod], rod, f'slider {joint} {self.said(length)} {start} '
+                             f'along {towards} {half}')
+            on_block = slide.axes[1 - way] * (along / axis)
+            return self.hang(rod, joint, name) and self.place(
+                block, Part(f'block{number}', name, on_block, slide.joint, on_base))
+        return False
+
+    def _slot(self, slide: Slide, way: int) -> bool:
+        lever, block = slide.bodies[way], slide.bodies[1 - way]
+        if {lever, block} & self.parts.keys() or not self.on[lever] or not self.on[block]:
+            return False
+        (pivot, start), (pin, end) = self.end(lever), self.end(block)
+        if pivot == pin:
+            return False
+        axis, across = slide.axes[way], slide.axes[1 - way]
+        foot = self.seen(lever, start)
+        ahead = ((self.seen(block, end) - foot) / (self.seen(lever, start + axis) - foot)).real
+        sign, length = math.copysign(1.0, ahead), abs(ahead)
+        offset = sign * (((end - slide.origins[1 - way]) / across).imag
+                         - ((start - slide.origins[way]) / axis).imag)
+        number = self.number('slot')
+        name = self.name(start + length * sign * axis, lever,
+                         f'slot {pivot} {pin} {self.said(offset)} out {self.said(length)}')
+        return self.hang(lever, pivot, name, f'lever{number}') and self.place(
+            block, Part(f'slide{number}', pin, sign * across, slide.joint, start))
+
+    def _yoke(self, slide: Slide, way: int) -> bool:
+        base, block = slide.bodies[way], slide.bodies[1 - way]
+        if base not in self.parts or block in self.parts:
+            return False
+        for slot in self.slides:
+            own = int(slot.bodies[1] == block)
+            pin_body, along = slot.bodies[1 - own], slide.axes[1 - way]
+            if slot is slide or block not in slot.bodies or pin_body in self.parts or \
+                    abs((slot.axes[own] / along).real) > ROUNDING or not self.on[pin_body]:
+                continue
+            pin, at = self.end(pin_body)
+            aside = ((at - slot.origins[1 - own]) / slot.axes[1 - own]).imag
+            ahead = ((slot.origins[own] + 1j * slot.axes[own] * aside
+                      - slide.origins[1 - way]) / along).real
+            (start, on_base), towards, on = self.line(base, slide.origins[way], slide.axes[way])
+            number = self.number('slider', 'yoke')
+            name = self.name(slide.origins[1 - way] + ahead * along, block,
+                             f'yoke {pin} {start} along {towards}')
+            return self.place(block, Part(f'block{number}', name, along * (on / slide.axes[way]),
+                                          slide.joint, on_base)) and self.place(
+                pin_body, Part('', pin, slot.axes[1 - own]))
+        return False
