@@ -19,7 +19,7 @@ for_ros = sys.argv[1:2] != ['--help'] and {'install', 'develop'} & set(sys.argv)
 commands = {
     'c_code': 'c_code.command', 'crank_driver': 'nodes.crank_driver',
     'from_robot': 'robot_files.command', 'kinematics': 'nodes.kinematics',
-    'render': 'render', 'scene': 'nodes.together', 'servo_inverse': 'nodes.servo_inverse',
+    'render': 'render', 'scene': 'nodes.scene_process', 'servo_inverse': 'nodes.servo_inverse',
     'urdf': 'nodes.urdf_command', 'viewer': 'web.viewer'}
 
 

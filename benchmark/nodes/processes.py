@@ -16,7 +16,7 @@ from .driving import Process
 
 APART = ('crank_driver', 'kinematics', 'servo_inverse')
 NODES = {'apart': [('-m', f'linkage_ros.nodes.{name}') for name in APART],
-         'together': [('-m', 'linkage_ros.nodes.together')],
+         'together': [('-m', 'linkage_ros.nodes.scene_process')],
          'floor': [(*SUBJECT, 'timed', '--ready')]}
 # How long each runs in a round [s].
 SECONDS = 2.5

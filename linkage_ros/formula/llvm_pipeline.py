@@ -39,7 +39,9 @@ LIMIT = np.dtype([('loop', 'i8'), ('at', 'i8'), ('factor', 'f8'), ('plus', 'f8')
 CHANGE = np.dtype([('at', 'i8'), ('factor', 'f8'), ('plus', 'f8'), ('turn', 'f8')])
 # Eight bytes that are copied.
 PUT = np.dtype([('from', 'i8'), ('to', 'i8')])
-TABLES = {'takes': TAKE, 'loops': LOOP, 'limits': LIMIT, 'changes': CHANGE, 'puts': PUT}
+# The tables of a pipeline, and those of what ends it.
+TABLES = {'takes': TAKE, 'loops': LOOP, 'limits': LIMIT}
+ENDING = {'changes': CHANGE, 'puts': PUT}
 # What the code is called with: the length of the known message, its bytes and which of them count;
 # the stamp; which loops failed; then the size and the address of each table.
 HEAD = ('length', 'same', 'mask', 'stamp', 'failed')
@@ -62,34 +64,68 @@ class Pipeline:
     same, mask : bytes
         A message of that kind, and a mask of the bytes in which all are the same.
     stamp : int64 array (2,)
-        Where the bytes of a message's stamp go, for `puts` to copy; then what stands for the stamp
-        of a message that has none, or zero.
-    kept : sequence
-        The arrays that the tables' addresses lie in.
-    **tables : structured arrays
-        What is taken, run and put, each of the type in TABLES.
+        Where the bytes of a message's stamp go, for an ending to copy; then what stands for the
+        stamp of a message that has none, or zero.
+    owner
+        Whatever the arrays belong to that the tables' addresses lie in.
+    takes, loops, limits : structured arrays
+        What is taken and run, of the types in TABLES.
 
     Attributes
     ----------
-    run : callable
-        From a message's bytes and their number: how many loops failed; OTHER or UNSTAMPED where
-        nothing was done.
     failed : int64 array
         Which loops did not find finite numbers within their limits in the last call.
 
     """
 
-    def __init__(self, same: bytes, mask: bytes, stamp: np.ndarray, kept: Sequence[Any],
-                 **tables: np.ndarray):
-        self.failed = np.zeros(len(tables['loops']), np.int64)
+    def __init__(self, same: bytes, mask: bytes, stamp: np.ndarray, owner: Any, takes: Any,
+                 loops: Any, limits: Any):
+        self.failed = np.zeros(len(loops), np.int64)
         known = [np.frombuffer(text, np.uint8) for text in (same, mask)]
-        rows = [np.array(tables[name], kind) for name, kind in TABLES.items()]
-        self._table = np.array([len(same), *map(address, (*known, stamp, self.failed)),
-                                *(part for table in rows
-                                  for part in (len(table), address(table)))])
-        run, engine = code().result()
-        self.run = partial(run, address(self._table))
-        self._kept = kept, stamp, known, rows, engine
+        tables = _Tables(TABLES, (takes, loops, limits))
+        self._table = np.array([
+            len(same), *map(address, (*known, stamp, self.failed)), *tables.head])
+        run, _, engine = code().result()
+        self._run = partial(run, address(self._table))
+        self._used = owner, stamp, known, tables, engine
+
+    def run(self, message: bytes, ending: Optional[Ending]) -> int:
+        """
+        Take, run and, if no loop failed, do what ends it.
+
+        It returns how many loops failed; OTHER or UNSTAMPED where nothing was done.
+        """
+        return self._run(message, len(message), ending.address if ending else 0)
+
+
+class Ending:
+    """
+    What becomes of the numbers that a pipeline has found.
+
+    Parameters
+    ----------
+    owner
+        Whatever the arrays belong to that the tables' addresses lie in.
+    changes, puts : structured arrays
+        What is changed in place, then copied, of the types in ENDING.
+
+    """
+
+    def __init__(self, owner: Any, changes: Any, puts: Any):
+        tables = _Tables(ENDING, (changes, puts))
+        self._head = np.array(tables.head)
+        self.address = address(self._head)
+        _, run, engine = code().result()
+        self.run = partial(run, self.address)
+        self._used = owner, tables, engine
+
+
+class _Tables:
+    """Tables of rows, and the size and address of each."""
+
+    def __init__(self, kinds: Dict[str, np.dtype], rows: Sequence[Any]):
+        self._rows = [np.array(each, kind) for each, kind in zip(rows, kinds.values())]
+        self.head = [part for table in self._rows for part in (len(table), address(table))]
 
 
 def addresses(array: np.ndarray) -> np.ndarray:
@@ -100,41 +136,56 @@ def addresses(array: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=None)
 def code() -> Future:
-    """Return the machine code, which is made once, beside what goes on."""
+    """Return the machine code, which is compiled once, in the background."""
     return beside(_compiled)
 
 
-def _compiled() -> Tuple[Callable[[int, bytes, int], int], Any]:
-    """Return what runs the code, and what holds it."""
+def _compiled() -> Tuple[Callable[[int, bytes, int, int], int], Callable[[int], None], Any]:
+    """Return what runs a pipeline, what runs an ending, and what holds their code."""
     engine = compiled(_module())
     # It takes microseconds, so it keeps Python's lock.
-    run = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int64)(
-        engine.get_function_address('run'))
-    return run, engine
+    run = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int64,
+                            ctypes.c_int64)(engine.get_function_address('run'))
+    end = ctypes.PYFUNCTYPE(None, ctypes.c_int64)(engine.get_function_address('end'))
+    return run, end, engine
 
 
 def _module() -> ir.Module:
     module = ir.Module()
+    end = ir.Function(module, ir.FunctionType(ir.VoidType(), [COUNT]), 'end')
+    write = _Writer(end)
+    tables = _read(write, write.place(end.args[0], COUNT), (), ENDING)[1]
+    _change(write, tables['changes'])
+    with write.rows(tables['puts'], PUT) as row:
+        write.store(write.load(write.place(row['from'], COUNT)), write.place(row['to'], COUNT))
+    write.builder.ret_void()
+
     run = ir.Function(module, ir.FunctionType(
-        COUNT, [COUNT.as_pointer(), BYTE.as_pointer(), COUNT]), 'run')
-    table, text, length = run.args
+        COUNT, [COUNT.as_pointer(), BYTE.as_pointer(), COUNT, COUNT]), 'run')
+    table, text, length, ending = run.args
     write = _Writer(run)
-    head = [write.load(write.step(table, i)) for i in range(len(HEAD) + 2 * len(TABLES))]
-    known = dict(zip(HEAD, head))
-    sizes = dict(zip(TABLES, head[len(HEAD)::2]))
-    tables = {name: (size, head[len(HEAD) + 2 * i + 1])
-              for i, (name, size) in enumerate(sizes.items())}
+    known, tables = _read(write, table, HEAD, TABLES)
     write.leave(write.builder.icmp_signed('!=', length, known['length']), OTHER)
     write.leave(_differs(write, known, text), OTHER)
     write.leave(_stamp(write, known, text), UNSTAMPED)
     _take(write, tables['takes'], text)
     _run_loops(write, tables['loops'], known['failed'])
     _check_limits(write, tables['limits'], known['failed'])
-    _change(write, tables['changes'])
-    with write.rows(tables['puts'], PUT) as row:
-        write.store(write.load(write.place(row['from'], COUNT)), write.place(row['to'], COUNT))
-    write.builder.ret(_total(write, sizes['loops'], known['failed']))
+    failed = _total(write, tables['loops'][0], known['failed'])
+    ends = write.builder.and_(write.builder.icmp_signed('==', failed, count(0)),
+                              write.builder.icmp_signed('!=', ending, count(0)))
+    with write.builder.if_then(ends):
+        write.builder.call(end, [ending])
+    write.builder.ret(failed)
     return module
+
+
+def _read(write: _Writer, table: ir.Value, head: Sequence[str], kinds: Dict[str, np.dtype]
+          ) -> Tuple[Dict[str, ir.Value], Dict[str, Tuple[ir.Value, ir.Value]]]:
+    """Load a head: what it begins with by name, then the size and the address of each table."""
+    values = [write.load(write.step(table, i)) for i in range(len(head) + 2 * len(kinds))]
+    sizes, places = values[len(head)::2], values[len(head) + 1::2]
+    return dict(zip(head, values)), dict(zip(kinds, zip(sizes, places)))
 
 
 class _Writer:

@@ -27,7 +27,7 @@ class Layout(NamedTuple):
     How the numbers of a solution follow each other: a row for each leg, then the inputs.
 
     A row holds so many coordinates, joint angles and joint velocities; of the inputs there are
-    the values and, where velocities are wanted, as many speeds.
+    the values, where velocities are wanted as many speeds, and room for as many efforts as are.
     """
 
     legs: int
@@ -36,6 +36,7 @@ class Layout(NamedTuple):
     joints: int
     velocities: int
     speeds: int
+    efforts: int = 0
 
     @property
     def posed(self) -> int:
@@ -45,7 +46,7 @@ class Layout(NamedTuple):
     @property
     def size(self) -> int:
         """How many numbers there are."""
-        return self._rows_end() + self.inputs + self.speeds
+        return self._rows_end() + self.inputs + self.speeds + self.efforts
 
     def rows(self, values: np.ndarray) -> np.ndarray:
         """Return the rows, one for each leg."""
@@ -53,7 +54,11 @@ class Layout(NamedTuple):
 
     def driven(self, values: np.ndarray) -> np.ndarray:
         """Return the inputs' values and, where velocities are wanted, their speeds."""
-        return values[self._rows_end():]
+        return values[self._rows_end():len(values) - self.efforts]
+
+    def effort(self, values: np.ndarray) -> np.ndarray:
+        """Return the efforts of the inputs, which a solution leaves to its user."""
+        return values[len(values) - self.efforts:]
 
     def _rows_end(self) -> int:
         return self.legs * (self.posed + self.velocities)
@@ -156,13 +161,17 @@ class Assembly:
             return self.linkage
 
     def solution(self, points: Sequence[Union[str, Spot]] = (), joints: Sequence[str] = (),
-                 rates: Optional[Sequence[str]] = None) -> Solution:
-        """Return what solves all legs for points, joint angles and rates, and nothing else."""
+                 rates: Optional[Sequence[str]] = None, efforts: int = 0) -> Solution:
+        """
+        Return what solves all legs for points, joint angles and rates, and nothing else.
+
+        Its values have room for so many efforts.
+        """
         inputs, moving = len(self.linkage.inputs), rates is not None
         rates = tuple(rates or ())
         layout = Layout(len(self.legs), inputs, 2 * len(points), len(joints), len(rates),
-                        inputs if moving else 0)
-        values = np.empty(layout.size)
+                        inputs if moving else 0, efforts)
+        values = np.zeros(layout.size)
         batch = self._fastest.legs(
             tuple(points), tuple(joints), rates, layout.rows(values))
         batch.given[2 * layout.inputs:].T[:] = list(self.legs.values())

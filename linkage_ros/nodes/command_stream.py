@@ -14,7 +14,7 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from . import joint_state_reader
-from .message_layout import NEVER, pack, unpack, Unreadable, Wire
+from .message_layout import NEVER, pack, PatchedPublisher, unpack, Unreadable
 from .messages import JointStates
 from ..scene.joint_names import JointName
 from ..scene.machine import Machine
@@ -166,7 +166,8 @@ class CommandStream:
         if not any(publisher.get_subscription_count() for publisher in publishers):
             return
         try:
-            stamp, (routes, known), positions, speeds = self._reader.read(text)
+            source = self._reader.source(text)
+            (routes, known), (stamp, positions, speeds) = source.meaning, source.take(text)
         except Unreadable as error:
             self._logger.warning(
                 f'wanted_states: {len(text)} bytes that are no joint states are passed over: '
@@ -211,18 +212,18 @@ class CommandStream:
                     unpack(stamp), names, values, speeds if moving else (),
                     () if any(map(math.isnan, efforts)) else efforts))
             else:
-                self._wire(names, moving).send(stamp, np.array(values + speeds * moving))
+                self._wire(names, moving).publish(stamp, [np.array(values + speeds * moving)])
         for command in commands:
             publisher = self._arrays[command.route.machine.name]
             if publisher.get_subscription_count():
                 publisher.publish(Float64MultiArray(data=command.positions))
 
-    def _wire(self, names, moving) -> Wire:
+    def _wire(self, names, moving) -> PatchedPublisher:
         n = len(names)
         if len(self._wires) > MOST_WIRES:
             self._wires.clear()
         if (names, moving) not in self._wires:
-            self._wires[names, moving] = Wire(
+            self._wires[names, moving] = PatchedPublisher(
                 self._commands, lambda stamp, values: self._message.message(
                     stamp, names, values[:n], values[n:]), (1 + moving) * n, self._logger)
         return self._wires[names, moving]

@@ -3,18 +3,20 @@
 
 """Node that moves the inputs of a scene: turns its cranks, pushes and pulls its cylinders."""
 
+from __future__ import annotations
+
 import sys
 from time import monotonic_ns, time_ns
-from typing import NamedTuple
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from rclpy.clock import Clock, ClockType
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from . import scene_node
-from .heard import Topic
-from .message_layout import pack, Wire
+from .message_layout import pack, PatchedPublisher
 from .messages import JointStates
+from .publishers import TrackedPublisher
 from .. import scene
 from ..scene.motion import Motion
 from ..words import listed
@@ -41,8 +43,9 @@ class CrankDriver(scene_node.SceneNode):
 
     Parameters
     ----------
-    beside : sequence of rclpy.node.Node
-        Nodes of the same process: they are handed the messages if nobody else hears the topic.
+    in_process : sequence of rclpy.node.Node
+        Nodes of the same process: they get the messages without the middleware if nobody else
+        subscribes to the topic.
 
     Attributes
     ----------
@@ -53,19 +56,23 @@ class CrankDriver(scene_node.SceneNode):
 
     system_time = staticmethod(time_ns)
 
-    def __init__(self, beside=(), **kwargs):
+    def __init__(self, in_process: Sequence[Any] = (), **kwargs: Any):
         super().__init__(scene.DRIVER, **kwargs)
-        self._motions = {}
-        self._drives, self._machines, self._told = {}, {}, []
-        self._now = self._steady = None
-        self._names, self._wire = [], None
-        self._publisher = HandedOver(self, 'crank_states', beside)
-        self._timer = self.create_timer(1.0, self._tick)
+        self._motions: Dict[Tuple[str, str], Motion] = {}
+        self._drives: Dict[Tuple[str, str], scene.Drive] = {}
+        self._machines: Mapping[str, scene.Machine] = {}
+        self._sent: List[Tuple[Tuple[str, str], scene.Drive]] = []
+        self._now: Optional[int] = None
+        self._steady = 0
+        self._names: List[str] = []
+        self._message: PatchedPublisher
+        self._publisher = InProcessPublisher(self, 'crank_states', in_process)
+        self._timer = self.create_timer(1.0, self.guarded('a crank message', self._tick))
         # On system time a timer sleeps until an old time comes round again, if that is set back.
-        self.create_timer(1.0, self._wake, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_timer(1.0, self.guarded('a look at the clock', self._wake), clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.begin()
 
-    def adopt(self, new):
+    def adopt(self, new: scene.Scene) -> None:
         """Let every input go on as the scene says: from where it is, or from a new start."""
         now = 0 if self._now is None else self._settled()
         drives = {(name, input_): drive for name, machine in new.machines.items()
@@ -77,23 +84,23 @@ class CrankDriver(scene_node.SceneNode):
             elif (old.speed, old.sweep) != (drive.speed, drive.sweep):
                 self._motions[key] = self._motions[key].changed(drive.speed, drive.sweep, now)
         self._drives, self._machines = drives, new.machines
-        # Of inputs with one source the last is told of.
-        told = {drive.source: (key, drive) for key, drive in drives.items()}
-        self._told = list(told.values())
-        self._name(list(told))
+        # Of inputs with one source the last is sent.
+        sent = {drive.source: (key, drive) for key, drive in drives.items()}
+        self._sent = list(sent.values())
+        self._name(list(sent))
         self._pace(new.rate)
 
-    def _name(self, sources):
-        """Tell of these joints from now on."""
+    def _name(self, sources: List[str]) -> None:
+        """Send these joints from now on."""
         if sources == self._names:
             return
         joint_states, n = JointStates(), len(sources)
-        self._names, self._wire = sources, Wire(
+        self._names, self._message = sources, PatchedPublisher(
             self._publisher,
             lambda stamp, values: joint_states.message(stamp, sources, values[:n], values[n:]),
             2 * n, self.get_logger())
 
-    def _pace(self, rate):
+    def _pace(self, rate: float) -> None:
         if not rate:
             self._timer.cancel()
             return
@@ -102,13 +109,13 @@ class CrankDriver(scene_node.SceneNode):
             self._timer.timer_period_ns = period
             self._timer.reset()
 
-    def _time(self):
+    def _time(self) -> Tuple[int, bool]:
         """Return the time [ns], and whether it is simulated."""
         clock = self.get_clock()
         simulated = clock.ros_time_is_active
         return clock.now().nanoseconds if simulated else self.system_time(), simulated
 
-    def _settled(self):
+    def _settled(self) -> int:
         """Return the time [ns]; where it jumps, every input goes on from where it is."""
         (now, simulated), steady = self._time(), monotonic_ns()
         reached = 0
@@ -121,36 +128,36 @@ class CrankDriver(scene_node.SceneNode):
         self._now, self._steady = now, steady
         return now
 
-    @scene_node.until_the_end
-    def _tick(self):
+    def _tick(self) -> None:
         now = self._settled()
-        if self._publisher.is_heard:
-            positions, speeds = zip(*[self._said(key, drive, now) for key, drive in self._told])
-            self._wire.send(pack(Stamp(*divmod(now, SECOND))), positions + speeds)
+        if self._publisher.has_subscribers:
+            positions, speeds = zip(*[self._position(key, drive, now) for key, drive in self._sent])
+            self._message.publish(pack(Stamp(*divmod(now, SECOND))),
+                                  [positions + speeds])
 
-    def _said(self, key, drive, now):
-        """Return where an input is and how fast, as its source tells it."""
+    def _position(self, key: Tuple[str, str], drive: scene.Drive, now: int) -> Tuple[float, float]:
+        """Return the position and the speed of an input's source [rad or m, per second]."""
         value, speed = self._motions[key].at(now)
         if drive.is_plain:
             return value, speed
         return self._machines[key[0]].told(drive, value, speed)
 
-    def serves(self):
+    def serves(self) -> str:
         """Say which inputs it moves, how often."""
         sources = [drive.source for drive in self._drives.values()]
         return f'moves {listed(sources, 200)} on crank_states at {self.scene.rate:g} Hz'
 
-    def _wake(self):
+    def _wake(self) -> None:
         set_back = self._now is not None and self._time()[0] < self._now
         if set_back and self.scene.rate:
             self._timer.reset()
 
 
-class HandedOver:
+class InProcessPublisher:
     """
-    Joint states that the nodes of this process take at once, and all others over the wire.
+    Publishes joint states; nodes of this process get them without the middleware.
 
-    As long as others hear them, these nodes do as the others do: then each message comes once.
+    While there are other subscribers these nodes get them as the others do: each message once.
 
     Parameters
     ----------
@@ -163,29 +170,28 @@ class HandedOver:
 
     """
 
-    def __init__(self, node, name, nodes):
-        path = node.resolve_topic_name(name)
-        self._ears = [subscription for other in nodes for subscription in other.subscriptions
-                      if subscription.topic_name == path]
-        self._topic = Topic(node, JointState, name, 10, lambda: None, len(self._ears))
-        self.topic_name = path
+    def __init__(self, node: Any, name: str, nodes: Sequence[Any]):
+        path = self.topic_name = node.resolve_topic_name(name)
+        self._subscriptions = [one for other in nodes for one in other.subscriptions
+                               if one.topic_name == path]
+        self._others = TrackedPublisher(node, JointState, name, 10, own=len(self._subscriptions))
 
     @property
-    def is_heard(self) -> bool:
-        """Whether there is anybody who hears them."""
-        return self._topic.is_heard or bool(self._ears)
+    def has_subscribers(self) -> bool:
+        """Whether there are subscribers, here or elsewhere."""
+        return self._others.has_subscribers or bool(self._subscriptions)
 
-    def publish(self, message):
-        """Hand over or publish a message: bytes, or one that is not serialised yet."""
-        if self._topic.is_heard:
-            self._topic.publish(message)
+    def publish(self, message: Any) -> None:
+        """Publish a message: bytes, or one that is not serialised yet."""
+        if self._others.has_subscribers:
+            self._others.publish(message)
             return
         text = message if isinstance(message, bytes) else serialize_message(message)
-        for subscription in self._ears:
+        for subscription in self._subscriptions:
             subscription.callback(text)
 
 
-def main(args=None):
+def main(args: Any = None) -> int:
     """Run the node; return the exit code."""
     return scene_node.run(CrankDriver, scene.DRIVER, args)
 

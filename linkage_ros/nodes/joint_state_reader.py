@@ -5,94 +5,91 @@
 Joint states read from their bytes, which costs a tenth of deserialising them.
 
 Of each source, whose messages differ in numbers alone, the first message is deserialised; the
-numbers of the others are taken from where the layout of that one says that they lie.
+numbers of the others are read from where the layout of that one says that they lie.
 """
+
+from __future__ import annotations
 
 from array import array
 from collections import OrderedDict
 from struct import Struct
-from typing import Any, Callable, NamedTuple, Optional, Tuple
+from typing import Any, Callable, Dict, NamedTuple, Optional, Tuple
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from .message_layout import deserialized, HEADER, MessageLayout, NoLayout, pack
 
-# Any source will do; what comes while the node is kept waiting, 100 ms at 1000 Hz, is not lost.
+# Best effort matches every publisher; 100 messages are what comes in 100 ms at 1000 Hz.
 ANY = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 
-# So many sources are remembered, of messages that are no longer [bytes]; of those that are of one
-# length, so many arrangements of names. Where there are more, one in so many messages is learnt:
-# that costs more than it saves if the source is soon forgotten.
+# Sources that are cached, of messages up to so many bytes; arrangements of names among those of
+# one length. Where there are more, one in so many messages is cached: that costs more than it
+# saves if the source is soon dropped again.
 SOURCES, LONGEST, ARRANGEMENTS, SAMPLED = 256, 1 << 16, 4, 256
 
 
-class JointStateNumbers(NamedTuple):
-    """What a source was understood as, positions and, where they are known, velocities."""
+class Numbers(NamedTuple):
+    """What a message says: its stamp, packed, its positions and its velocities."""
 
     stamp: bytes
-    source: Any
     positions: Tuple[float, ...]
     velocities: Tuple[float, ...]
 
 
 class Reader:
     """
-    Reads serialised joint states.
+    Tells the sources of serialised joint states.
 
     Parameters
     ----------
-    understand : callable
-        From a message to what is handed on with it and with all that differ in numbers alone.
+    interpret : callable
+        From a message to the `meaning` of its source, which all its messages share.
 
     """
 
-    def __init__(self, understand: Callable[[JointState], Any]):
-        self._understand = understand
+    def __init__(self, interpret: Callable[[JointState], Any]):
+        self._interpret = interpret
         # By length, then by the bytes that count: a mask, and the sources by those bytes.
-        self._sources = {}
+        self._sources: Dict[int, Dict[int, Dict[int, Source]]] = {}
         # The same ones, the latest used last.
-        self._used = OrderedDict()
+        self._used: OrderedDict[Source, None] = OrderedDict()
         self._missed = 0
 
-    def source(self, text: bytes) -> Optional['Source']:
-        """Return the source of a message, if it is remembered."""
-        alike = self._sources.get(len(text))
+    def source(self, text: bytes) -> Source:
+        """
+        Return the source of a message.
+
+        Raises
+        ------
+        Unreadable
+            If the bytes are no joint states.
+
+        """
+        alike = self._sources.get(len(text), {})
         number = alike and int.from_bytes(text, 'little')
-        for mask, sources in (alike or {}).items():
+        for mask, sources in alike.items():
             if source := sources.get(number & mask):
                 self._used.move_to_end(source)
                 return source
-        return None
-
-    def read(self, text: bytes) -> JointStateNumbers:
-        """Return what a message says; raise Unreadable if that cannot be told."""
-        if source := self.source(text):
-            return source.take(text)
-        alike = self._sources.get(len(text), {})
         message = deserialized(text, JointState)
-        said = JointStateNumbers(pack(message.header.stamp), self._understand(message),
-                                 tuple(message.position), tuple(message.velocity))
+        source = Source(text, message, self._interpret(message))
         self._missed += 1
         crowded = len(self._used) == SOURCES or len(alike) == ARRANGEMENTS
-        if len(text) <= LONGEST and not (crowded and self._missed % SAMPLED):
-            self._learn(text, message, said)
-        return said
+        if source.size and len(text) <= LONGEST and not (crowded and self._missed % SAMPLED):
+            self._cache(source)
+        return source
 
-    def _learn(self, text, message, said):
-        try:
-            source = Source(text, message, said)
-        except NoLayout:
-            return
+    def _cache(self, source: Source) -> None:
         alike = self._sources.get(source.size, {})
         if source.mask not in alike and len(alike) == ARRANGEMENTS:
             return
         if len(self._used) == SOURCES:
-            self._forget(self._used.popitem(last=False)[0])
+            self._drop(self._used.popitem(last=False)[0])
         self._sources.setdefault(source.size, {}).setdefault(source.mask, {})[source.same] = source
-        self._used[source] = True
+        self._used[source] = None
 
-    def _forget(self, source):
+    def _drop(self, source: Source) -> None:
         alike = self._sources[source.size]
         del alike[source.mask][source.same]
         if not alike[source.mask]:
@@ -103,40 +100,62 @@ class Reader:
 
 class Source:
     """
-    How messages of a source are told from others, and how their numbers are taken.
+    How messages of a source are told from others, and how their numbers are read.
+
+    Parameters
+    ----------
+    text : bytes
+        A message, serialised.
+    message : JointState
+        The same.
+    meaning
+        What else is known of all its messages.
 
     Attributes
     ----------
     size, same, mask : int
-        How long they are; which bytes they have, as a number, where a mask has ones.
+        How long its messages are, 0 if they are read one by one; which bytes they have, as a
+        number, where a mask has ones.
     positions, velocities : int
         Where in a message these begin.
-    understood
-        What is handed on with them.
 
     """
 
-    def __init__(self, text: bytes, message: JointState, said: JointStateNumbers):
-        layout = MessageLayout(text, message)
-        (place, self._first), (then, count) = layout.numbers[:2]
-        self.positions, self.velocities = place, then
-        end = place + 8 * self._first
-        self._unpack = Struct(f'<{HEADER}x8s{place - HEADER - 8}x{self._first}d'
-                              f'{then - end}x{count}d').unpack_from
-        self.understood = said.source
-        if _bits(self.take(text)) != _bits(said):
-            raise NoLayout('its numbers are others')
+    def __init__(self, text: bytes, message: JointState, meaning: Any):
+        self.meaning, self.size = meaning, 0
+        numbers = Numbers(pack(message.header.stamp), tuple(message.position),
+                          tuple(message.velocity))
+        self._only: Tuple[bytes, Optional[Numbers]] = text, numbers
+        try:
+            layout = MessageLayout(text, message)
+        except NoLayout:
+            return
+        (self.positions, self._first), (self.velocities, count) = layout.numbers[:2]
+        end = self.positions + 8 * self._first
+        self._unpack = Struct(f'<{HEADER}x8s{self.positions - HEADER - 8}x{self._first}d'
+                              f'{self.velocities - end}x{count}d').unpack_from
         # As numbers: with messages as short as these that is the quickest to compare and look up.
-        self.size, self.mask = len(text), int.from_bytes(layout.fixed, 'little')
+        self.mask = int.from_bytes(layout.fixed, 'little')
         self.same = int.from_bytes(text, 'little') & self.mask
+        if _bits(self._unpacked(text)) == _bits(numbers):
+            self.size, self._only = len(text), (b'', None)
 
-    def take(self, text: bytes) -> JointStateNumbers:
-        """Return what a message says that has the same bytes where they count."""
+    def is_of(self, text: bytes) -> bool:
+        """Return whether a message is of this source."""
+        if not self.size:
+            return text is self._only[0]
+        return len(text) == self.size and int.from_bytes(text, 'little') & self.mask == self.same
+
+    def take(self, text: bytes) -> Numbers:
+        """Return what a message of this source says."""
+        return self._only[1] or self._unpacked(text)
+
+    def _unpacked(self, text: bytes) -> Numbers:
         numbers, end = self._unpack(text), 1 + self._first
-        return JointStateNumbers(numbers[0], self.understood, numbers[1:end], numbers[end:])
+        return Numbers(numbers[0], numbers[1:end], numbers[end:])
 
 
-def _bits(said):
-    """Return the numbers as bytes, in which what is no number is equal to itself."""
-    return said.stamp, *(array('d', numbers).tobytes()
-                           for numbers in (said.positions, said.velocities))
+def _bits(numbers: Numbers) -> tuple:
+    """Return the numbers as bytes, in which NaN is equal to itself."""
+    return numbers.stamp, *(array('d', each).tobytes()
+                            for each in (numbers.positions, numbers.velocities))

@@ -3,206 +3,171 @@
 
 """Node that publishes joint angles, markers, loci and robot models of a scene's mechanisms."""
 
+from __future__ import annotations
+
 from functools import partial
 import sys
-from threading import Lock
 import time
+from typing import Any, Callable, Dict, Iterable, List, Tuple
 
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
 
 from . import joint_state_reader, scene_node
-from .mechanism_publisher import MechanismPublisher, SECONDS_BETWEEN_WARNINGS
-from .message_layout import NEVER, pack, Unreadable
-from .ticks import Ticks
-from .whole_scene import WholeScene
+from .driven_mechanism import DrivenMechanism
+from .mechanism_model import MechanismModel
+from .message_layout import pack, Unreadable
+from .plan import Planner, Route
+from .scene_joint_states import SceneJointStates
+from .throttle import Once, Throttle
 from .. import scene
 from ..robot_model import bodies, urdf
 from ..words import listed
 
-# How long inputs that nobody sends are waited for [s], and how many names that are no input's are
-# remembered so that each is said once.
-PATIENCE = 5.0
-STRANGERS = 1000
-# How long the end may wait for what takes the mechanisms out of the picture [s].
+# After how long inputs that nobody sends are named [s], and how many unknown joint names are
+# warned about.
+PATIENCE, UNKNOWN_NAMES = 5.0, 1000
+# How long the end of the node waits for its deletions of markers to arrive [s].
 FAREWELL = 0.1
 
 
 class Kinematics(scene_node.SceneNode):
-    """Solves the mechanisms at the inputs on `crank_states`, as far as anyone listens."""
+    """Solves the mechanisms at the inputs on `crank_states`, for the topics with subscribers."""
 
-    def __init__(self, **kwargs):
-        # A scene that cannot be read ends the node before there is anything to show.
-        self._mechanisms, self._models = {}, {}
-        self._drawing, self._ended = Lock(), False
+    def __init__(self, **kwargs: Any):
+        self._mechanisms: Dict[str, DrivenMechanism] = {}
+        self._models: Dict[str, MechanismModel] = {}
         super().__init__(scene.KINEMATICS, **kwargs)
-        # Each input that a source tells of, by the source's name.
-        self._inputs = {drive.source: [] for machine in self.scene.machines.values()
-                        for drive in machine.inputs.values()}
-        self._ticks, self._own = Ticks(self._now), frozenset()
-        self._whole = WholeScene(self, self._inputs, self._ticks.renew_soon)
-        self._mechanisms = {name: MechanismPublisher(self, machine, self._whole, self._ticks)
-                            for name, machine in self.scene.machines.items()}
-        self._ticks.begin(self._mechanisms, self._whole)
+        self._inputs: Dict[str, List[Tuple[str, int]]] = {}
         for name, machine in self.scene.machines.items():
-            for i, drive in enumerate(machine.inputs.values()):
-                self._inputs[drive.source].append((self._mechanisms[name], i))
-        self._unheard, self._strangers = set(self._inputs), set()
-        self._reader = joint_state_reader.Reader(self._routed)
+            for i, input_ in enumerate(machine.inputs.values()):
+                self._inputs.setdefault(input_.source, []).append((name, i))
+        self._scene_joint_states = SceneJointStates(self, self._inputs, self._invalidate)
+        self._mechanisms.update((name, DrivenMechanism(self, machine, self._invalidate))
+                                for name, machine in self.scene.machines.items())
+        self._planner = Planner([*self._mechanisms.values()], self._scene_joint_states,
+                                joint_state_reader.Reader(self._interpret), self._now)
+        self._own: frozenset = frozenset()
+        self._missing, self._unknown = set(self._inputs), Once(UNKNOWN_NAMES)
+        self._throttle = Throttle(self.get_logger())
         self._patience = self.create_timer(
-            PATIENCE, self._miss, clock=Clock(clock_type=ClockType.STEADY_TIME), autostart=False)
+            PATIENCE, self.guarded('the inputs that nobody sends', self._name_missing),
+            clock=Clock(clock_type=ClockType.STEADY_TIME), autostart=False)
         self.begin()
-        self._later += [*(partial(self._first_picture, shown)
-                          for shown in self._mechanisms.values()), self._first_robot]
         try:
             next(iter(self.scene.machines.values())).linkage.accelerated()
         except ImportError as error:
-            self.get_logger().info(f'{error}; plain Python moves the legs, to the same places')
+            self.get_logger().info(f'{error}; plain Python solves the mechanisms, to the same bits')
         self.create_subscription(
-            JointState, 'crank_states', self._turn, joint_state_reader.ANY, raw=True)
+            JointState, 'crank_states', self.guarded('crank_states', self._receive,
+                                                     self._planner.discard),
+            joint_state_reader.ANY, raw=True)
 
-    def serves(self):
+    def serves(self) -> str:
         """Say which mechanisms it moves."""
         return f'moves {listed(self.scene.machines, 200)} by crank_states'
 
-    def prepare(self, new):
-        """Return what shows each mechanism, another for each that has changed; the whole robot."""
-        models = {name: self._mechanisms[name].prepared(
-            machine, machine.frame_id or new.frame_id, new.frame_prefix)
-            for name, machine in new.machines.items()}
-        return models, self._robot(models) if self._models else ''
+    def check(self, new: scene.Scene) -> None:
+        """Refuse what has no robot model; SceneError says why."""
+        for name, machine in new.machines.items():
+            if name not in self.scene.machines or machine is not self.scene.machines[name]:
+                bodies.robot([machine], machine.frame_id or new.frame_id)
 
-    def _robot(self, models):
-        """Return the robot model of the whole scene, if there is one."""
+    def prepare(self, new: scene.Scene) -> Any:
+        """Return the model of each mechanism, another for each that has changed, and its robot."""
+        in_scene = self._scene_joint_states.has_subscribers
+        return {name: self._mechanisms[name].prepared(
+            machine, machine.frame_id or new.frame_id, new.frame_prefix, in_scene)
+            for name, machine in new.machines.items()}
+
+    def adopt(self, models: Dict[str, MechanismModel]) -> None:
+        """Publish the mechanisms so from now on."""
+        changed = [self._mechanisms[name] for name, model in models.items()
+                   if model is not self._models.get(name)]
+        is_first, self._models = not self._models, models
+        self._own = frozenset(joint.name for model in models.values()
+                              for joint in model.machine.joints.values())
+        for one in changed:
+            one.adopt(models[one.name])
+        self._invalidate()
+        if not is_first:
+            self._planner.publish(changed)
+        self.later([*(partial(self._latched, one, models[one.name]) for one in changed),
+                    partial(self._robot, models)])
+
+    def _latched(self, one: DrivenMechanism, model: MechanismModel) -> Callable[[], None]:
+        """Make what is published once of a mechanism; return what publishes it."""
+        latched = model.latched()
+        return lambda: one.publish_latched(latched) if one.model is model else None
+
+    def _robot(self, models: Dict[str, MechanismModel]) -> Callable[[], None]:
+        """Make the robot model of the scene; return what publishes it."""
         # Where only named joints are published, they are in a robot model of somebody else's.
         robots = [model.robot for model in models.values() if not model.machine.only_named]
+        text = ''
         try:
-            return urdf.write(bodies.together(robots)) if robots else ''
+            text = urdf.write(bodies.together(robots)) if robots else ''
         except scene.SceneError as error:
             self.get_logger().info(f'no robot_description of the whole scene: {error}', once=True)
-            return ''
+        return lambda: self._scene_joint_states.describe(text) if models is self._models else None
 
-    def _first_picture(self, shown):
-        """Make what is shown but once of a mechanism; return what publishes it."""
-        shown.finish()
-        return partial(self._while_drawing, shown.picture)
-
-    def _first_robot(self):
-        """Make the robot model of the scene; return what publishes it, if it is that still."""
-        models = self._models
-        robot = self._robot(models)
-        return partial(self._while_drawing, lambda: models is self._models and
-                       self._whole.describe(robot))
-
-    def _while_drawing(self, act):
-        with self._drawing:
-            if not self._ended:
-                act()
-
-    def adopt(self, prepared):
-        """Show the mechanisms so from now on."""
-        models, robot = prepared
-        with self._drawing:
-            if self._ended:
-                return
-            sources = self._ticks.forget()
-            self._own = frozenset(called.name for model in models.values()
-                                  for called in model.machine.joints.values())
-            self._models = models
-            for name, model in models.items():
-                self._mechanisms[name].adopt(model)
-            self._whole.describe(robot)
-            self._send_whole(self._ticks.stamp)
-            self._ticks.learn(sources)
-
-    def say_goodbye(self):
-        """Take what is drawn out of the picture, for good."""
-        with self._drawing:
-            self._ended = True
-            for shown in self._mechanisms.values():
-                shown.clear()
+    def say_goodbye(self) -> None:
+        """Delete what is displayed."""
+        for one in self._mechanisms.values():
+            one.clear()
         # What has not arrived when a process ends is lost.
-        until = time.monotonic() + FAREWELL
-        for shown in self._mechanisms.values():
-            shown.let_arrive(until)
+        deadline = time.monotonic() + FAREWELL
+        for one in self._mechanisms.values():
+            one.let_arrive(deadline)
 
-    def destroy_node(self):
-        """Say goodbye where that is still possible, and end."""
-        if self.context.ok() and not self._ended:
-            self.say_goodbye()
-        super().destroy_node()
+    def _invalidate(self) -> None:
+        self._planner.invalidate()
 
-    @scene_node.until_the_end
-    def _turn(self, text):
-        with self._drawing:
-            if not self._ended and not self._ticks.run(text, self._reader):
-                self._draw(text)
-
-    def _draw(self, text):
-        try:
-            stamp, routes, positions, speeds = self._reader.read(text)
-        except Unreadable as error:
-            self.get_logger().warning(
-                f'crank_states: {len(text)} bytes that are no joint states are passed over: '
-                f'{error}', throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
-            return
-        if stamp == NEVER:
-            stamp = self._now()
-        self._ticks.catch_up(stamp)
-        for shown, places, known in routes:
-            shown.turn(stamp, places, positions, speeds if known else ())
-        if routes:
-            self._send_whole(stamp)
-            self._ticks.learn([self._reader.source(text)])
-
-    def _now(self):
+    def _now(self) -> bytes:
         return pack(self.get_clock().now().to_msg())
 
-    def _send_whole(self, stamp):
-        self._whole.send(self._mechanisms.values(), stamp)
+    def _receive(self, text: bytes) -> None:
+        try:
+            self._planner.process(text)
+        except Unreadable as error:
+            reason = str(error)
+            self._throttle.warn('unreadable', lambda: (
+                f'crank_states: {len(text)} bytes that are no joint states are ignored: {reason}'))
 
-    def _routed(self, message):
-        """Return the mechanisms that a message turns, where it says how far, and if how fast."""
-        known = len(message.velocity) == len(message.name)
-        routes = {}
-        for name, place in dict(zip(message.name, range(len(message.position)))).items():
-            for shown, i in self._inputs.get(name, ()):
-                routes.setdefault(shown, []).append((i, place))
-            if name in self._inputs:
-                self._hear(name)
-        self._meet(message.name)
-        return [(shown, places, known) for shown, places in routes.items()]
+    def _interpret(self, message: JointState) -> Tuple[Tuple[Route, ...], bool]:
+        """Return the inputs that a source sets, and whether it says how fast they move."""
+        places = dict(zip(message.name, range(len(message.position))))
+        routes = tuple(Route(self._mechanisms[mechanism], i, place)
+                       for name, place in places.items()
+                       for mechanism, i in self._inputs.get(name, ()))
+        self._note(message.name, places)
+        return routes, len(message.velocity) == len(message.name)
 
-    def _hear(self, name):
-        if len(self._unheard) == len(self._inputs):
+    def _note(self, names: Iterable[str], sent: Iterable[str]) -> None:
+        """Note which inputs are sent; name those that there are not, each once."""
+        if len(self._missing) == len(self._inputs) and not self._missing.isdisjoint(sent):
             self._patience.reset()
-        self._unheard.discard(name)
-
-    def _meet(self, names):
-        """Say once which names are no input's."""
-        room = STRANGERS - len(self._strangers)
-        new = room and [name for name in dict.fromkeys(names) if name not in self._inputs
-                        and name not in self._own and hash(name) not in self._strangers][:room]
-        if new:
-            # Names may be long, and many.
-            self._strangers.update(map(hash, new))
+        self._missing.difference_update(sent)
+        unknown = self._unknown.new(name for name in names if name not in self._inputs
+                                    and name not in self._own)
+        if unknown:
             self.get_logger().warning(
-                f'crank_states: nothing is called {listed(new, 150)}; the inputs are '
-                f'{listed(self._inputs, 150)}'
-                f'{"; no more will be named" if len(new) == room else ""}')
+                f'crank_states: nothing is called {listed(unknown, 150)}; the inputs are '
+                f'{listed(self._inputs, 150)}{self._unknown.ending}')
 
-    def _miss(self):
+    def _name_missing(self) -> None:
         """Say once which inputs nobody sends."""
         self._patience.cancel()
-        if self._unheard:
-            waiting = [name for name in self._inputs if name in self._unheard]
+        if self._missing:
+            waiting = [name for name in self._inputs if name in self._missing]
+            stuck = dict.fromkeys(mechanism for name in waiting
+                                  for mechanism, _ in self._inputs[name])
             self.get_logger().warning(
-                f'crank_states: nothing was heard of {listed(waiting, 150)}, without which '
-                f'{listed(dict.fromkeys(self._inputs[name][0][0].name for name in waiting), 150)} '
-                'cannot move')
+                f'crank_states: nothing was received of {listed(waiting, 150)}, without which '
+                f'{listed(stuck, 150)} cannot move')
 
 
-def main(args=None):
+def main(args: Any = None) -> int:
     """Run the node; return the exit code."""
     return scene_node.run(Kinematics, scene.KINEMATICS, args)
 

@@ -1,208 +1,200 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A mechanism as it is shown: what is solved for whom, and the messages made of it."""
+"""A mechanism ready to be published: its solutions, its messages, its locus and robot model."""
 
+from __future__ import annotations
+
+from collections import OrderedDict
 from functools import cached_property
 from itertools import combinations
 import math
-from typing import NamedTuple, Optional, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import MarkerArray
 
 from . import messages
-from .message_layout import Wire
+from .message_layout import PatchedPublisher
 from .. import scene
 from ..linkage.quantities import Spot
-from ..linkage.walker import Layout
+from ..linkage.walker import Layout, Solution
 from ..robot_model import bodies, shapes, urdf
 
-
-class InputState(NamedTuple):
-    """What a pose is made from: inputs [rad or m], speeds if known, and who listens."""
-
-    values: Tuple[float, ...]
-    speeds: Tuple[float, ...]
-    joints: bool
-    markers: bool
-    whole: bool
-
-    @property
-    def wanted(self):
-        """Whether joint states, markers and velocities are."""
-        return self.joints or self.whole, self.markers, len(self.speeds) > 0
+# Arrangements of messages that are cached: a walker may lose its legs one by one.
+ARRANGEMENTS = 128
 
 
 class Pose(NamedTuple):
     """
-    What is shown of a mechanism.
+    What the numbers of a solution are good for; it selects the messages made of them.
 
-    `held` tells which legs can be assembled, None that all can; `moving` whether all velocities
-    are known.
+    `assembled` has a byte for each leg, or is None where all are assembled; `moving` tells whether
+    all velocities are finite, `loaded` whether all efforts are.
     """
 
-    layout: Layout
-    values: np.ndarray
-    held: Optional[np.ndarray]
+    solution: Solution
+    assembled: Optional[bytes]
     moving: bool
+    loaded: bool
 
     @property
-    def can_be(self) -> bool:
-        """Whether any leg can be assembled."""
-        return self.held is None or bool(self.held.any())
+    def exists(self) -> bool:
+        """Whether any leg is assembled."""
+        return self.assembled is None or 1 in self.assembled
 
-    def entire(self) -> 'Pose':
-        """Return the same as if all legs could be assembled, and all velocities were known."""
-        return self._replace(held=None, moving=self.layout.speeds > 0)
-
-    @property
-    def is_entire(self) -> bool:
-        """Whether all legs can be assembled, and all velocities are known that are wanted."""
-        return self.held is None and self.moving == (self.layout.speeds > 0)
-
-    def is_like(self, other: 'Pose') -> bool:
-        """Return whether it differs from another in nothing but values."""
-        return self.values is other.values and self.is_entire == other.is_entire
-
-    def rows(self) -> np.ndarray:
-        """Return the rows of the legs that can be assembled."""
-        rows = self.layout.rows(self.values)
-        return rows if self.held is None else rows[self.held]
+    def legs(self) -> np.ndarray:
+        """Return the numbers of the assembled legs."""
+        count = self.solution.layout.legs
+        return np.arange(count) if self.assembled is None else np.flatnonzero(
+            np.frombuffer(self.assembled, bool))
 
 
-class Model:
+class MechanismModel:
     """
-    A mechanism as it is shown: solutions, messages, locus and robot model.
+    What a mechanism needs to be published; immutable but for its caches.
+
+    Parameters
+    ----------
+    machine : Machine
+        The mechanism.
+    frame_id, prefix : str
+        The frame of its pose, and what is put before it in markers.
 
     Raises
     ------
     SceneError
-        If that cannot be published.
+        If it has no robot model.
 
     """
 
     def __init__(self, machine: scene.Machine, frame_id: str, prefix: str):
-        self.machine, self.made_for = machine, (machine, frame_id, prefix)
-        self.drives = list(machine.inputs.values())
+        self.machine, self.made_of = machine, (machine, frame_id, prefix)
+        self.inputs = list(machine.inputs.values())
         self.robot = bodies.robot([machine], frame_id)
         self.assembly = machine.assembly()
-        self._names, self._signs, self._offsets, self._published, self._taken = map(
+        self._names, self._signs, self._offsets, self._published, self._wrapped = map(
             np.array, zip(*machine.joints.values()))
         self._is_plain = bool((self._signs > 0.0).all()) and not self._offsets.any()
         drawn = machine.name, prefix + frame_id, machine.pose
-        size = bodies.size(machine)
         self._points, shown = _shown(machine)
-        self.drawn = *drawn, size, shown, 1 + machine.mirrored
-        self.joint_state = messages.JointStates()
-        self._solutions, self._changes, self._wires, self.once = {}, {}, {}, None
+        self._drawn = *drawn, bodies.size(machine), shown
+        self._joint_states = messages.JointStates()
+        self._solutions: Dict[tuple, Solution] = {}
+        self._conversions: Dict[Layout, tuple] = {}
+        self._publishers: OrderedDict[tuple, PatchedPublisher] = OrderedDict()
 
     @cached_property
-    def marker_array(self):
+    def marker_array(self) -> messages.Markers:
         """The markers' message."""
-        return messages.Markers(*self.drawn)
+        return messages.Markers(*self._drawn)
 
-    def finish(self):
-        """Return what is shown but once, the robot model and the locus, and keep it till then."""
-        if not self.once:
-            *drawn, size = self.drawn[:4]
-            curve = self.assembly.locus(self.machine.tracer)
-            self.once = (urdf.write(self.robot),
-                         messages.locus(*drawn, curve, size) if len(curve) > 1 else None)
-        return self.once
+    def latched(self) -> Tuple[str, Optional[Any]]:
+        """Return the messages that are published once: the robot model and, if any, the locus."""
+        *drawn, size = self._drawn[:4]
+        curve = self.assembly.locus(self.machine.tracer)
+        return (urdf.write(self.robot),
+                messages.locus(*drawn, curve, size) if len(curve) > 1 else None)
 
-    def solution(self, joints: bool, markers: bool, moving: bool):
-        """Return what solves the legs for those who listen."""
-        wanted = joints, markers, moving
-        if wanted not in self._solutions:
+    def solution(self, joints: bool, markers: bool, moving: bool) -> Solution:
+        """Return the solver of all legs for the topics that have subscribers."""
+        # Only a pose tells how far several inputs reach, so all its angles are needed to know.
+        joints = joints or len(self.inputs) > 1
+        key = joints, markers, moving
+        if key not in self._solutions:
             names = self.assembly.joints if joints else ()
-            self._solutions[wanted] = self.assembly.solution(
-                self._points if markers else (), names, names if joints and moving else None)
-        return self._solutions[wanted]
+            self._solutions[key] = self.assembly.solution(
+                self._points if markers else (), names, names if joints and moving else None,
+                len(self.inputs) if self.machine.loads else 0)
+        return self._solutions[key]
 
-    def solve(self, driven: InputState) -> Pose:
-        """Solve the legs."""
-        solution = self.solution(*driven.wanted)
-        solution.solve(driven.values, driven.speeds)
-        layout, values = solution.layout, solution.values
-        held, moving = None, layout.speeds > 0
+    def regular(self, solution: Solution) -> Pose:
+        """Return the pose of a solution in which every number is finite and within reach."""
+        return Pose(solution, None, solution.layout.speeds > 0, solution.layout.efforts > 0)
+
+    def pose(self, solution: Solution, inputs: np.ndarray) -> Pose:
+        """Return what a solution is good for, at inputs and speeds (2, inputs)."""
+        layout, values, pose = solution.layout, solution.values, self.regular(solution)
+        assembled = None
         if self.assembly.is_limited:
-            held = self.assembly.within_reach(driven.values[0])
-        # One sum, of squares, tells whether all values are finite; it is rarely asked which are.
-        # It may overflow: unlike `dot`, `vdot` says nothing then.
+            assembled = self.assembly.within_reach(inputs[0, 0])
+        # The sum of squares tells at once whether all are finite; unlike `dot`, `vdot` may
+        # overflow without a warning.
         if not math.isfinite(np.vdot(values, values)):
             finite = np.isfinite(solution.rows[:, :layout.posed]).all(axis=1)
-            finite &= bool(np.isfinite(driven.values).all())
-            held = finite if held is None else held & finite
-            moving = moving and bool(np.isfinite(solution.rows[held, layout.posed:]).all()
-                                     and np.isfinite(driven.speeds).all())
-        if held is not None and held.all():
-            held = None
-        if change := self.change(layout):
-            signs, offsets, taken = change
-            values *= signs
-            values += offsets
-            values[taken] -= math.tau * np.round(values[taken] / math.tau)
-        return Pose(layout, values, held, moving)
+            finite &= bool(np.isfinite(inputs[0]).all())
+            assembled = finite if assembled is None else assembled & finite
+            rates = solution.rows[assembled, layout.posed:]
+            pose = pose._replace(
+                moving=pose.moving and bool(np.isfinite(rates).all()
+                                            and np.isfinite(inputs[1]).all()),
+                loaded=pose.loaded and bool(np.isfinite(layout.effort(values)).all()))
+        if assembled is None or assembled.all():
+            return pose
+        return pose._replace(assembled=assembled.tobytes())
 
-    def change(self, layout: Layout):
-        """Return factors of values, what is added, and which lose turns; None: all is as is."""
+    def conversion(self, layout: Layout) -> Optional[Tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """
+        Return how values become those of the robot's joints; None if they do as they are.
+
+        That is factors, what is added, and the indices of what is wrapped to half a turn.
+        """
         if self._is_plain:
             return None
-        if layout not in self._changes:
-            self._changes[layout] = (
+        if layout not in self._conversions:
+            none = np.zeros(len(self._signs))
+            self._conversions[layout] = (
                 _arranged(layout, 1.0, self._signs, self._signs),
-                _arranged(layout, 0.0, self._offsets, 0.0 * self._offsets),
-                np.flatnonzero(_arranged(layout, 0.0, self._taken, 0.0 * self._offsets)))
-        return self._changes[layout]
+                _arranged(layout, 0.0, self._offsets, none),
+                np.flatnonzero(_arranged(layout, 0.0, self._wrapped, none)))
+        return self._conversions[layout]
 
-    def wire(self, publisher, build, pose: Pose, logger) -> Wire:
-        """Return a publisher of messages of all legs that patches one that is built once."""
-        kind = build, pose.moving, pose.layout
-        if kind not in self._wires:
-            self._wires[kind] = Wire(
-                publisher, lambda stamp, values: build(pose._replace(values=values), stamp),
-                pose.layout.size, logger)
-        return self._wires[kind]
+    def publisher(self, publisher: Any, build: Callable, pose: Pose, logger: Any
+                  ) -> PatchedPublisher:
+        """Return what publishes the message that `build` makes of the values of a pose."""
+        key = publisher, pose
+        if key not in self._publishers:
+            self._publishers[key] = PatchedPublisher(
+                publisher, lambda stamp, values: build(pose, values, stamp),
+                pose.solution.layout.size, logger)
+            if len(self._publishers) > ARRANGEMENTS:
+                self._publishers.popitem(last=False)
+        return self._publishers[key]
 
-    def is_patched(self, build) -> bool:
-        """Return whether a kind of message changes in nothing but what is solved for."""
-        return build != self.joint_message or not self.machine.loads
+    def joint_message(self, pose: Pose, values: np.ndarray, stamp: Any) -> JointState:
+        """Return the joint states of the assembled legs."""
+        names, positions, velocities, efforts = self.joints(pose, values)
+        return self._joint_states.message(
+            stamp, names.tolist(), positions, velocities if pose.moving else (),
+            efforts if pose.loaded else ())
 
-    def joint_message(self, pose: Pose, stamp) -> JointState:
-        """Return the joint states of the legs that can be assembled."""
-        names, positions, velocities, efforts = self.joints(pose)
-        known = self.machine.loads and not np.isnan(efforts).any()
-        return self.joint_state.message(stamp, names.tolist(), positions, velocities,
-                                        efforts if known else ())
-
-    def joints(self, pose: Pose):
+    def joints(self, pose: Pose, values: np.ndarray) -> List[np.ndarray]:
         """
-        Return names, positions, velocities and efforts of what is published of a pose.
+        Return names, positions, velocities and efforts of the joints that are published.
 
-        There are no velocities where they are not known; what is no input has no effort.
+        Velocities are empty where they are not solved; only inputs have an effort other than 0.
         """
-        layout, n, chosen = pose.layout, pose.layout.inputs, self._published
-        if pose.held is not None:
-            chosen = chosen & np.append([True] * n, pose.held.repeat(layout.joints))
-        rows, driven = layout.rows(pose.values), layout.driven(pose.values)
+        layout, n, legs = pose.solution.layout, len(self.inputs), pose.legs()
+        chosen = self._published.copy()
+        chosen[n:].reshape(layout.legs, -1)[np.isin(np.arange(layout.legs), legs, invert=True)] = 0
+        rows, driven = layout.rows(values), layout.driven(values)
         positions = np.append(driven[:n], rows[:, layout.coordinates:layout.posed])
         velocities = np.append(driven[n:], rows[:, layout.posed:])
-        efforts = np.zeros(len(positions))
-        if self.machine.loads:
-            inputs = (driven[:n] - self._offsets[:n]) * self._signs[:n]
-            efforts[:n] = self._signs[:n] * self.machine.efforts(inputs)
-        return (self._names[chosen], positions[chosen],
-                velocities[chosen] if pose.moving else velocities[:0], efforts[chosen])
+        efforts = np.append(layout.effort(values), np.zeros(len(positions) - layout.efforts))
+        return [self._names[chosen], positions[chosen],
+                velocities[chosen] if layout.speeds else velocities[:0], efforts[chosen]]
 
-    def marker_message(self, pose: Pose, stamp) -> MarkerArray:
-        """Return the markers of the legs that can be assembled."""
-        places = pose.rows()[:, :pose.layout.coordinates]
-        return self.marker_array.message(stamp, places.reshape(len(places), -1, 2))
+    def marker_message(self, pose: Pose, values: np.ndarray, stamp: Any) -> MarkerArray:
+        """Return the markers of the assembled legs."""
+        layout, legs = pose.solution.layout, pose.legs()
+        places = layout.rows(values)[legs, :layout.coordinates].reshape(len(legs), -1, 2)
+        # Legs on the left and on the right follow each other; each side stands on ground of its own.
+        _, grounded = np.unique(legs % (1 + self.machine.mirrored), return_index=True)
+        return self.marker_array.message(stamp, places, sorted(grounded))
 
 
-def _shown(machine: scene.Machine):
+def _shown(machine: scene.Machine) -> Tuple[Sequence, Dict[int, list]]:
     """Return the points of the markers, joints and others, and which of them each marker shows."""
     linkage, wanted = machine.linkage, machine.points
     cranks, plates = shapes.cranks(linkage), shapes.plates(linkage, wanted)
@@ -227,10 +219,11 @@ def _shown(machine: scene.Machine):
 
 
 def _arranged(layout: Layout, rest: float, joints: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Return numbers for joints, inputs first, for their velocities and for the rest."""
+    """Return numbers for joints, inputs first, for their velocities and efforts, and the rest."""
     values, n = np.full(layout.size, rest), layout.inputs
     rows, driven = layout.rows(values), layout.driven(values)
     driven[:n], rows[:, layout.coordinates:layout.posed].flat = np.split(joints, [n])
+    layout.effort(values)[:] = rates[:layout.efforts]
     if layout.speeds:
         driven[n:], rows[:, layout.posed:].flat = np.split(rates, [n])
     return values

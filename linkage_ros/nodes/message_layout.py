@@ -11,7 +11,7 @@ message says.
 """
 
 import struct
-from typing import Callable, List, Tuple
+from typing import Callable, List, Optional, Sequence, Tuple
 
 from builtin_interfaces.msg import Time
 import numpy as np
@@ -229,9 +229,9 @@ def _address(array: np.ndarray) -> int:
     return array.__array_interface__['data'][0]
 
 
-class Wire:
+class PatchedPublisher:
     """
-    A publisher of one message that is sent again and again with other values.
+    Publishes one message again and again with other values.
 
     Parameters
     ----------
@@ -240,32 +240,29 @@ class Wire:
     build, count
         As for Template.
     logger : rclpy logger
-        Told once if messages have to be built one by one.
+        Logs once if messages have to be built one by one.
 
     Attributes
     ----------
     template : Template or None
-        What is patched, where that can be done.
+        The bytes that are patched, where that can be done.
 
     """
 
     def __init__(self, publisher, build: Callable, count: int, logger):
         self.publisher = publisher
         self._build = build
+        self.template: Optional[Template] = None
         try:
             self.template = Template(build, count)
         except NoLayout as reason:
-            self.template = None
             logger.warning(f'{publisher.topic_name}: {reason}; publishing ordinary messages',
                            once=True)
 
-    def send(self, stamp: bytes, values: np.ndarray):
-        """Publish the message with this stamp, packed, and these values."""
+    def publish(self, stamp: bytes, values: Sequence[np.ndarray]) -> None:
+        """Publish the message with this stamp, packed, and values, one array after the other."""
+        joined = np.concatenate(values) if len(values) > 1 else values[0]
         if self.template:
-            self.publisher.publish(self.template.patched(stamp, values))
+            self.publisher.publish(self.template.patched(stamp, joined))
         else:
-            self.publisher.publish(self._build(unpack(stamp), values))
-
-    def send_patched(self):
-        """Publish the message as it has been patched elsewhere."""
-        self.publisher.publish(self.template.message.tobytes())
+            self.publisher.publish(self._build(unpack(stamp), joined))

@@ -75,9 +75,6 @@ class Markers:
     shown : mapping
         What each marker shows, by its id: joints, ends of lines or corners, by their place among
         the points.
-    sides : int
-        Legs that stand on different ground: the first ones.
-
     Attributes
     ----------
     ids : frozenset of int
@@ -86,19 +83,31 @@ class Markers:
     """
 
     def __init__(self, name: str, frame_id: str, pose, size: float,
-                 shown: Mapping[int, Sequence], sides: int = 1):
+                 shown: Mapping[int, Sequence]):
         self._shown = [(_marker(name, id_, frame_id, pose, size), np.array(points, int).ravel())
                        for id_, points in shown.items() if points]
         self._message = MarkerArray(markers=[marker for marker, _ in self._shown])
         self.ids = frozenset(marker.id for marker, _ in self._shown)
-        self._sides = sides
         self._points = {}
 
-    def message(self, stamp, places: np.ndarray) -> MarkerArray:
-        """Return the markers of places [m], shape (legs, points, 2)."""
+    def message(self, stamp, places: np.ndarray, grounded: Sequence[int] = (0,)
+                ) -> MarkerArray:
+        """
+        Return the markers of some legs.
+
+        Parameters
+        ----------
+        stamp : builtin_interfaces.msg.Time
+            The time.
+        places : float array (legs, points, 2)
+            Where the points are [m].
+        grounded : sequence of int
+            Legs whose ground is shown, one for each ground that there is.
+
+        """
         for marker, points in self._shown:
             marker.header.stamp = stamp
-            legs = places[:self._sides] if marker.id == GROUND_ID else places
+            legs = places[grounded] if marker.id == GROUND_ID else places
             marker.points = self._filled(marker.id, legs[:, points].reshape(-1, 2).tolist())
             if marker.type == Marker.TRIANGLE_LIST:
                 # With colours of their own RViz shows both sides of faces so, lit or not.

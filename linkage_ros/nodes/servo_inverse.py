@@ -51,11 +51,10 @@ class ServoInverse(scene_node.SceneNode):
         """Say of which mechanisms it answers."""
         return f'answers servo_inverse for {listed(self.scene.machines, 200)}'
 
-    def prepare(self, new):
+    def check(self, new):
         """Refuse lengths that `kinematics` could not publish; SceneError says which."""
         for machine in new.machines.values():
             bodies.size(machine)
-        return new
 
     def adopt(self, new):
         """Forget what was asked about."""
@@ -71,11 +70,12 @@ class ServoInverse(scene_node.SceneNode):
 
     def _turn(self, text):
         try:
-            turned = self._reader.read(text)
+            source = self._reader.source(text)
         except Unreadable:
             # `kinematics` says so.
             return
-        self._heard.update((name, turned.positions[place]) for name, place in turned.source)
+        positions = source.take(text).positions
+        self._heard.update((name, positions[place]) for name, place in source.meaning)
 
     def answer(self, request, response):
         """Fill in a response; what cannot be done is said in it, never raised."""

@@ -14,8 +14,8 @@ pytest.importorskip('rclpy')
 pytest.importorskip('linkage_interfaces')
 
 from linkage_interfaces.srv import ServoInverse as ServoInverseType  # noqa: E402
-from linkage_ros.nodes import together  # noqa: E402
-from linkage_ros.nodes.crank_driver import CrankDriver, HandedOver  # noqa: E402
+from linkage_ros.nodes import scene_process  # noqa: E402
+from linkage_ros.nodes.crank_driver import CrankDriver, InProcessPublisher  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
 from rclpy.serialization import deserialize_message  # noqa: E402
@@ -30,7 +30,7 @@ LEVER = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever', 'lever.crank.sp
 def nodes(graph):
     """Start them as the process does."""
     kinematics, inverse = graph.start(Kinematics, LEVER), graph.start(ServoInverse, LEVER)
-    return kinematics, inverse, graph.start(CrankDriver, LEVER, beside=[kinematics, inverse])
+    return kinematics, inverse, graph.start(CrankDriver, LEVER, in_process=[kinematics, inverse])
 
 
 def told(message):
@@ -59,8 +59,8 @@ def test_what_nobody_else_hears_is_handed_over_without_the_wire(graph):
     taken = []
     own = graph.start(Kinematics, LEVER)
     own.create_subscription(JointState, 'turned', taken.append, 10, raw=True)
-    publisher = HandedOver(own, 'turned', [own])
-    assert publisher.is_heard
+    publisher = InProcessPublisher(own, 'turned', [own])
+    assert publisher.has_subscribers
     publisher.publish(JointState(name=['one']))
     assert names(taken) == [['one']]
     other = graph.listen(JointState, 'turned')
@@ -119,7 +119,7 @@ def test_a_change_of_the_geometry_reaches_all_three(graph, nodes):
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_them_quietly(number):
-    process = Process('together', CONFIG / 'all.yaml')
+    process = Process('scene_process', CONFIG / 'all.yaml')
     said = [process.line() for _ in range(3)]
     assert [re.search(r'\[(\w+)\]: ready: .*water_drop', line)[1] for line in said] == [
         'kinematics', 'servo_inverse', 'crank_driver']
@@ -128,11 +128,11 @@ def test_a_signal_ends_them_quietly(number):
 
 
 def test_one_name_for_all_is_refused(capfd):
-    assert together.main(['scene', '--ros-args', '-r', '__node:=robot']) == 1
+    assert scene_process.main(['scene', '--ros-args', '-r', '__node:=robot']) == 1
     assert re.search(r'\[FATAL\].*two nodes would be called robot', capfd.readouterr().err)
 
 
 def test_a_bad_scene_ends_them_all_in_one_sentence(capfd):
-    assert together.main(['scene', '--ros-args', '-p', 'mechanisms:=[leg]']) == 1
+    assert scene_process.main(['scene', '--ros-args', '-p', 'mechanisms:=[leg]']) == 1
     printed = capfd.readouterr().err
     assert printed.count('[FATAL]') == 1 and 'leg.type must be one of' in printed

@@ -4,25 +4,27 @@
 """The three nodes of a scene in one process: the same names, topics, parameters and services."""
 
 import sys
+from typing import Any, Iterator
 
 from . import scene_node
 from .crank_driver import CrankDriver
 from .kinematics import Kinematics
+from .scene_node import SceneNode
 from .servo_inverse import ServoInverse
 
 NAME = 'scene'
 
 
-def nodes():
+def nodes() -> Iterator[SceneNode]:
     """Make the nodes, the owner of the geometry first, who turns the cranks last."""
     kinematics = Kinematics()
     yield kinematics
     inverse = ServoInverse()
     yield inverse
-    yield CrankDriver(beside=[kinematics, inverse])
+    yield CrankDriver(in_process=[kinematics, inverse])
 
 
-def main(args=None):
+def main(args: Any = None) -> int:
     """Run the nodes; return the exit code."""
     return scene_node.run_together(nodes, NAME, args)
 

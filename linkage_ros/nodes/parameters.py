@@ -1,0 +1,202 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The parameters of a node that acts on a scene, by the public hooks of the client library."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from copy import copy
+from shlex import quote
+from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
+
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from .. import scene
+from ..scene import slider
+from ..words import elided, quoted
+
+
+class SceneParameters:
+    """
+    Declares what a node acts on, and turns every change into a scene or a refusal.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        Whose parameters they are; made with `automatically_declare_parameters_from_overrides`.
+    role : str
+        One of scene.ALL: which parameters it acts on.
+    check : callable
+        Raises SceneError for a scene that the node cannot act on; quick.
+    changed : callable
+        Called with the parameters that have changed, after `scene` has.
+
+    Attributes
+    ----------
+    scene : Scene
+        What the parameters say now.
+    fields : dict
+        The Field of each parameter.
+
+    Raises
+    ------
+    SceneError
+        If the values that the node was started with make no scene.
+
+    """
+
+    def __init__(self, node: Node, role: str, check: Callable[[scene.Scene], None],
+                 changed: Callable[[List[scene.Parameter]], None]):
+        self._node, self._role, self._check, self._changed = node, role, check, changed
+        # Whose value counts instead of an own one, and whether that is being followed.
+        self.owner_of: Callable[[str], Optional[str]] = lambda name: None
+        self._is_followed = self._is_derived = False
+        given = {name: one.value for name, one in node.get_parameters_by_prefix('').items()}
+        self.scene = scene.read({name: scene.plain(value) for name, value in given.items()})
+        own = [one for one in self.scene.parameters if role in one.field.readers]
+        self.fields = {one.name: one.field for one in own}
+        for name in given.keys() & self.fields.keys():
+            node.undeclare_parameter(name)
+        self._declare(own)
+        self._candidate = self.scene
+        self._ends: Dict[str, Tuple[scene.Machine, Any, Any]] = {}
+        node.add_pre_set_parameters_callback(self._typed_alike)
+        node.add_on_set_parameters_callback(self._validate)
+        node.add_post_set_parameters_callback(self._adopt)
+
+    def follow(self, values: Mapping[str, Any]) -> str:
+        """Set values that another node owns; return why not, or nothing."""
+        parameters = [Parameter(name, value=value) for name, value in values.items()]
+        self._is_followed = True
+        try:
+            return str(self._node.set_parameters_atomically(parameters).reason)
+        finally:
+            self._is_followed = False
+
+    def ranged(self, name: str, descriptor: ParameterDescriptor) -> ParameterDescriptor:
+        """Return a parameter's descriptor with the range of its slider about its value."""
+        descriptor = copy(descriptor)
+        ends = self._slider_ends(name) if name in self.fields else None
+        if ends and self.fields[name].kind == 'integer':
+            descriptor.integer_range = [IntegerRange(from_value=ends[0], to_value=ends[1], step=1)]
+        elif ends:
+            # A step other than 0 refuses values that are stops up to rounding.
+            descriptor.floating_point_range = [
+                FloatingPointRange(from_value=ends[0], to_value=ends[1], step=0.0)]
+        return descriptor
+
+    def renew_ranges(self) -> None:
+        """Find again the ranges that somebody has asked for; it may run in another thread."""
+        for name in list(self._ends):
+            self._slider_ends(name)
+
+    def _slider_ends(self, name: str) -> Any:
+        value = scene.plain(self._node.get_parameter(name).value)
+        machine, made_of, ends = self._ends.get(name, (None, None, None))
+        present = self.scene.machines.get(name.partition('.')[0])
+        if name not in self._ends or machine is not present or made_of != value:
+            ends = slider.ends(self.scene, scene.Parameter(name, self.fields[name], value))
+            self._ends[name] = present, value, ends
+        return ends
+
+    def _declare(self, own: Sequence[scene.Parameter]) -> None:
+        descriptors = {field: _descriptor(field) for field in set(self.fields.values())}
+        self._node.declare_parameters('', [
+            (one.name, one.value, copy(descriptors[one.field])) if one.value != () else
+            (one.name, _kind(one.field), _descriptor(one.field, dynamic=False))
+            for one in own], ignore_override=True)
+        # The type of an empty list does not follow from its value.
+        empty = [_parameter(one) for one in own if one.value == () and not one.field.read_only]
+        if empty:
+            self._node.set_parameters(empty)
+
+    def _typed_alike(self, parameters: List[Parameter]) -> List[Parameter]:
+        """Return parameters in their own types: 3 for 3.0, and lists that are empty."""
+        return [self._typed(one) for one in parameters]
+
+    def _typed(self, parameter: Parameter) -> Parameter:
+        field = self.fields.get(parameter.name)
+        try:
+            return parameter if not field or parameter.type_ == Parameter.Type.NOT_SET else (
+                Parameter(parameter.name, _kind(field), field.checked(
+                    parameter.name, parameter.value)))
+        except scene.SceneError:
+            # It is refused in words by what comes next.
+            return parameter
+
+    def _validate(self, parameters: List[Parameter]) -> SetParametersResult:
+        if self._is_derived:
+            return SetParametersResult(successful=True)
+        try:
+            values = {one.name: self._value(one) for one in parameters
+                      if one.name in self.fields}
+            strict = not self._is_followed and self._role in scene.START.readers
+            candidate = scene.changed(self.scene, values, strict) if values else self.scene
+            self._check(candidate)
+        except scene.SceneError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        except Exception as error:
+            self._node.get_logger().error(f'internal error: {error!r}')
+            return SetParametersResult(
+                successful=False, reason=elided(f'internal error: {error!r}', 299))
+        self._candidate = candidate
+        return SetParametersResult(successful=True)
+
+    def _value(self, parameter: Parameter) -> Any:
+        name, field = parameter.name, self.fields[parameter.name]
+        if parameter.type_ == Parameter.Type.NOT_SET:
+            raise scene.SceneError(f'{name} cannot be removed; it must be {field.allowed}')
+        value = field.checked(name, parameter.value)
+        owner = None if self._is_followed else self.owner_of(name)
+        if owner:
+            raise scene.SceneError(
+                f'{name} belongs to {owner} while it runs: ros2 param set {owner} {name} '
+                + quote(quoted(list(value) if isinstance(value, tuple) else value)))
+        return value
+
+    def _adopt(self, parameters: List[Parameter]) -> None:
+        if self._is_derived or self._candidate is self.scene:
+            return
+        before, self.scene = self.scene, self._candidate
+        changed = self.scene.changed_from(before)
+        given = {one.name for one in parameters}
+        # Values that nobody set may follow from others.
+        derived = [_parameter(one) for one in changed if one.name in self.fields
+                   and one.name not in given and not one.field.read_only]
+        if derived:
+            with self._deriving():
+                self._node.set_parameters_atomically(derived)
+        self._changed(changed)
+
+    @contextmanager
+    def _deriving(self) -> Iterator[None]:
+        self._is_derived = True
+        try:
+            yield
+        finally:
+            self._is_derived = False
+
+
+def _kind(field: Any) -> Parameter.Type:
+    return Parameter.Type[field.kind.upper()]
+
+
+def _parameter(parameter: scene.Parameter) -> Parameter:
+    """Return a parameter whose type does not depend on its value."""
+    return Parameter(parameter.name, _kind(parameter.field), parameter.value)
+
+
+def _descriptor(field: Any, dynamic: bool = True) -> ParameterDescriptor:
+    """Return how a kind of parameter is described, whatever its name."""
+    # A wrong type is refused by the sentence of its field, not by the client library's.
+    return ParameterDescriptor(
+        description=field.meaning, read_only=field.read_only, type=_kind(field).value,
+        additional_constraints=field.allowed, dynamic_typing=dynamic)

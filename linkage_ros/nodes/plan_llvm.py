@@ -1,0 +1,147 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Plans in machine code: one call from the bytes of a message to the bytes of all others."""
+
+from __future__ import annotations
+
+import math
+from typing import AbstractSet, Any, Iterator, Union
+
+import numpy as np
+
+from ..formula import llvm_pipeline as native
+from ..linkage.walker import Solution
+
+
+def llvm_executor(plan: Any) -> Any:
+    """Return the executor of a plan in machine code; None while that is not compiled."""
+    ready = plan.source and plan.source.size and native.code().done() and all(
+        solution.batch.code for _, solution in plan.solved)
+    return LlvmExecutor(plan) if ready else None
+
+
+class LlvmExecutor:
+    """
+    Takes the steps of a plan in one call, from tables of addresses.
+
+    Parameters
+    ----------
+    plan : Plan
+        What is to be done.
+
+    """
+
+    def __init__(self, plan: Any):
+        self._plan = plan
+        source = plan.source
+        self._stamp = np.zeros(2, np.int64)
+        readings = [row for reading in plan.readings for row in _readings(plan, reading)]
+        loops = [(*solution.batch.code, solution.values.size - solution.layout.efforts)
+                 for _, solution in plan.solved]
+        limits = [row for i, (mechanism, solution) in enumerate(plan.solved)
+                  for row in _limits(i, mechanism, solution)]
+        self._pipeline = native.Pipeline(
+            *(number.to_bytes(source.size, 'little') for number in (source.same, source.mask)),
+            self._stamp, plan, takes=readings, loops=loops, limits=limits)
+        self._solved = [mechanism for mechanism, _ in plan.solved]
+        at = native.address(self._stamp)
+        self._stamps = np.array([(at, native.address(one)) for one in (
+            plan.stamp, *(mechanism.stamp for mechanism in plan.mechanisms))], native.PUT)
+        conversions = [_conversion(mechanism, solution) for mechanism, solution in plan.solved]
+        self._changes = np.concatenate([np.zeros(0, native.CHANGE), *conversions])
+
+    def run(self, text: bytes, output: Any) -> Union[None, bool, AbstractSet]:
+        """See `PythonExecutor.run`."""
+        ending = self._ending(output) if output else None
+        failed = self._pipeline.run(text, ending)
+        if failed == native.UNSTAMPED:
+            self._stamp[1:] = np.frombuffer(self._plan.now(), np.int64)
+            failed = self._pipeline.run(text, ending)
+            self._stamp[1] = 0
+        if failed < 0:
+            return None
+        if not failed and ending:
+            ending.publish()
+            return True
+        return {mechanism for mechanism, wrong in zip(self._solved, self._pipeline.failed)
+                if wrong} if failed else frozenset()
+
+    def publish(self, output: Any) -> None:
+        """See `PythonExecutor.publish`."""
+        ending = self._ending(output)
+        ending.run()
+        ending.publish()
+
+    def _ending(self, output: Any) -> _Ending:
+        if output.compiled is None:
+            output.compiled = _Ending(self._plan, output, self._stamps, self._changes)
+        return output.compiled
+
+
+class _Ending(native.Ending):
+    """What publishes the messages of one output."""
+
+    def __init__(self, plan: Any, output: Any, stamps: np.ndarray, changes: np.ndarray):
+        puts = [_puts(message) for message in output.messages if message.publisher.template]
+        super().__init__((plan, output), changes, np.concatenate([stamps, *puts]))
+        self._patched = [(one.publisher.publisher.publish, one.publisher.template.message)
+                         for one in output.messages if one.publisher.template]
+        self._built = [one for one in output.messages if not one.publisher.template]
+
+    def publish(self) -> None:
+        """Publish the messages as they have been patched."""
+        for publish, message in self._patched:
+            publish(message.tobytes())
+        for publisher, values, stamp in self._built:
+            publisher.publish(stamp.tobytes(), values)
+
+
+def _readings(plan: Any, reading: Any) -> Iterator[tuple]:
+    """Yield what is taken of a message: an input goes to each leg, and into the state."""
+    mechanism, i, place = reading
+    factor, plus = reading.conversion
+    solution = dict(plan.solved).get(mechanism)
+    rows = [(plan.source.positions, 0, i, plus)]
+    if plan.is_moving:
+        rows.append((plan.source.velocities, 1, mechanism.inputs.shape[1] + i, -0.0))
+    for start, row, k, added in rows:
+        to = [native.addresses(mechanism.inputs)[row, i]]
+        if solution and k < solution.layout.inputs + solution.layout.speeds:
+            driven = native.addresses(solution.layout.driven(solution.values))
+            to += [*native.addresses(solution.batch.given)[k], driven[k]]
+        for at in to:
+            yield start + 8 * place, at, factor, added
+
+
+def _limits(loop: int, mechanism: Any, solution: Solution) -> Iterator[tuple]:
+    """Yield for each leg between what it can be assembled, well within its widest reach."""
+    assembly = mechanism.model.assembly
+    if not assembly.is_limited:
+        return
+    first, (low, high) = assembly.linkage.inputs[0], max(
+        assembly.reach, key=lambda arc: arc[1] - arc[0])
+    for at, (factor, plus) in zip(native.addresses(solution.batch.given)[0],
+                                  assembly.own_inputs()):
+        yield (loop, at, factor, plus, 0.5 * (low + high), 0.5 * (high - low),
+               math.tau if first.turns else 0.0)
+
+
+def _conversion(mechanism: Any, solution: Solution) -> np.ndarray:
+    conversion = mechanism.model.conversion(solution.layout)
+    rows = np.zeros(solution.values.size if conversion else 0, native.CHANGE)
+    if conversion:
+        rows['at'] = native.addresses(solution.values)
+        rows['factor'], rows['plus'], wrapped = conversion
+        rows['turn'][wrapped] = math.tau
+    return rows
+
+
+def _puts(message: Any) -> np.ndarray:
+    """Return what is put into the bytes of a message."""
+    numbers, sources, stamps = message.publisher.template.places()
+    values = np.concatenate([native.addresses(values) for values in message.values])
+    rows = np.empty(len(numbers) + len(stamps), native.PUT)
+    rows['from'] = np.append(values[sources], np.full(len(stamps), native.address(message.stamp)))
+    rows['to'] = np.append(numbers, stamps)
+    return rows

@@ -1,0 +1,88 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Topics of the whole scene, for one robot_state_publisher: all joints, and a robot model."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from typing import Any, Callable, Iterable, List, Optional, Sequence, Tuple
+
+import numpy as np
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from .mechanism_model import MechanismModel, Pose
+from .message_layout import PatchedPublisher
+from .messages import JointStates
+from .publishers import LATCHED, TrackedPublisher
+
+# Arrangements of the message that are cached.
+ARRANGEMENTS = 16
+
+
+class SceneJointStates:
+    """
+    Publishes `joint_states` and `robot_description`.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        Whose topics they are.
+    sources : iterable of str
+        The joints that it receives on `crank_states`: where that is the same topic, they are not
+        published again.
+    changed : callable
+        Called when subscribers come or go.
+
+    """
+
+    def __init__(self, node: Any, sources: Iterable[str], changed: Callable[[], None]):
+        same = node.resolve_topic_name('joint_states') == node.resolve_topic_name('crank_states')
+        # The node subscribes to its own joints there.
+        self._joint_states = TrackedPublisher(
+            node, JointState, 'joint_states', 10, changed, int(same))
+        self._descriptions = node.create_publisher(String, 'robot_description', LATCHED)
+        self._received = frozenset(sources if same else ())
+        self._logger, self._message = node.get_logger(), JointStates()
+        self._publishers: OrderedDict[tuple, PatchedPublisher] = OrderedDict()
+        self._description = ''
+
+    @property
+    def has_subscribers(self) -> bool:
+        """Whether anybody but the node itself subscribes to the joints."""
+        return self._joint_states.has_subscribers
+
+    def describe(self, text: str) -> None:
+        """Publish a robot model, if there is one and it is another."""
+        if text not in ('', self._description):
+            self._description = text
+            self._descriptions.publish(String(data=text))
+
+    def message(self, members: Iterable[Any]) -> Optional[Tuple[PatchedPublisher, List]]:
+        """Return what publishes the joints of mechanisms, and the arrays of their values."""
+        poses = tuple((member.model, member.pose) for member in members
+                      if member.pose and member.pose.exists)
+        if not poses:
+            return None
+        if poses not in self._publishers:
+            self._publishers[poses] = PatchedPublisher(
+                self._joint_states.publisher, lambda stamp, values: self._built(
+                    poses, values, stamp),
+                sum(pose.solution.layout.size for _, pose in poses), self._logger)
+            if len(self._publishers) > ARRANGEMENTS:
+                self._publishers.popitem(last=False)
+        return self._publishers[poses], [pose.solution.values for _, pose in poses]
+
+    def _built(self, poses: Sequence[Tuple[MechanismModel, Pose]], values: np.ndarray,
+               stamp: Any) -> JointState:
+        ends = np.cumsum([pose.solution.layout.size for _, pose in poses])
+        names, positions, velocities, efforts = map(np.concatenate, zip(
+            *(model.joints(pose, part)
+              for (model, pose), part in zip(poses, np.split(values, ends)))))
+        chosen = [name not in self._received for name in names]
+        loaded = {pose.loaded for _, pose in poses if pose.solution.layout.efforts} == {True}
+        moving = all(pose.moving for _, pose in poses)
+        return self._message.message(
+            stamp, names[chosen].tolist(), positions[chosen], velocities[chosen] if moving else (),
+            efforts[chosen] if loaded else ())

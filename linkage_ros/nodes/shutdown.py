@@ -1,0 +1,72 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""How the executables end: at SIGINT or SIGTERM within a second, whatever they are doing."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import sys
+from threading import Event, Thread
+from typing import Any, Callable, Optional
+
+# How long what is being done may go on after a signal, until the process ends all the same [s].
+PATIENCE = 0.6
+
+
+class ShutdownHandler:
+    """
+    Catches SIGINT and SIGTERM in a thread, so that none interrupts a callback.
+
+    The first one sets `is_over` and calls `wake`; whoever spins then stops. Where that takes longer
+    than PATIENCE, the process says its last words and ends with exit code 0.
+
+    Attributes
+    ----------
+    wake : callable, optional
+        Ends the executor's waiting.
+    last_words : callable, optional
+        Called before the process ends amid a callback.
+    is_over : bool
+        Whether there was a signal.
+
+    """
+
+    def __init__(self) -> None:
+        self.wake: Optional[Callable[[], Any]] = None
+        self.last_words: Optional[Callable[[], Any]] = None
+        self.is_over = False
+        self._left = Event()
+
+    def __enter__(self) -> ShutdownHandler:
+        self._received, self._sent = socket.socketpair()
+        self._sent.setblocking(False)
+        Thread(target=self._wait, name='linkage_ros signals', daemon=True).start()
+        # Python's own handler would raise KeyboardInterrupt amid a callback.
+        self._before = {number: signal.signal(number, lambda *_: None)
+                        for number in (signal.SIGINT, signal.SIGTERM)}
+        signal.set_wakeup_fd(self._sent.fileno(), warn_on_full_buffer=False)
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        signal.set_wakeup_fd(-1)
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        self._left.set()
+        self._sent.close()
+
+    def _wait(self) -> None:
+        with self._received:
+            if not self._received.recv(1):
+                return
+        self.is_over = True
+        if self.wake:
+            self.wake()
+        if not self._left.wait(PATIENCE):
+            if self.last_words:
+                self.last_words()
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(0)
