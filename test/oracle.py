@@ -27,6 +27,7 @@ What the kinematics node has to publish after any history, worked out by the lib
 from dataclasses import dataclass, field
 from itertools import combinations
 import math
+import re
 import threading
 import time
 from typing import NamedTuple
@@ -41,7 +42,7 @@ from rclpy.executors import TimeoutException
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
-from ros_harness import DEADLINE
+from ros_harness import DEADLINE, Graph
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from test_reading import big_endian
@@ -131,7 +132,7 @@ class Solver:
         return Pose(legs, moving) if legs else None
 
     def _leg(self, leg, values, speeds):
-        linkage, inputs = self.machine.linkage, self.machine.linkage.inputs
+        inputs = self.machine.linkage.inputs
         own = [leg.start + leg.side * (value - leg.lag) if input_.turns else value / leg.size
                for value, input_ in zip(values, inputs)]
         xy = self._places(*own)
@@ -140,7 +141,8 @@ class Solver:
         if speeds is None:
             return places, angles, []
         rates = self._rates(*own)
-        own = [speed if input_.turns else speed / leg.size for speed, input_ in zip(speeds, inputs)]
+        own = [speed if input_.turns else speed / leg.size
+               for speed, input_ in zip(speeds, inputs)]
         by = [rates[i * len(angles):(i + 1) * len(angles)] for i in range(len(inputs))]
         return places, angles, [
             sum((row[j] * speed for row, speed in zip(by, own)), 0.0) * self._sizes[j]
@@ -385,11 +387,13 @@ class Bench:
         Where it lives.
     parameters : dict
         What it is started with.
+    patience : float
+        How long what has to be published is waited for [s].
 
     """
 
-    def __init__(self, graph, parameters, **kwargs):
-        self._graph, self.model = graph, Model(parameters)
+    def __init__(self, graph, parameters, patience=DEADLINE, **kwargs):
+        self._graph, self.model, self._patience = graph, Model(parameters), patience
         self.node = graph.start(Kinematics, parameters, **kwargs)
         self._executor, self._handled = graph._executor, 0
         self._crank = graph.node.create_publisher(JointState, 'crank_states', 100)
@@ -421,8 +425,8 @@ class Bench:
                 getattr(self, act)(*arguments)
             except Exception as error:
                 # A node that raises ends.
-                raise Mismatch(f'step {number}, {act} {shortened(arguments)}: '
-                               f'{type(error).__name__}: {error}') from error
+                raise Mismatch(f'{type(error).__name__}: {error}; at step {number}, {act} '
+                               f'{shortened(arguments)}') from error
 
     def _subscribe(self, topic, kind, qos):
         return Listener(self._graph.node.create_subscription(
@@ -442,7 +446,7 @@ class Bench:
     def _until(self, predicate):
         """Let the nodes work until something holds."""
         self._drain()
-        deadline = time.monotonic() + DEADLINE
+        deadline = time.monotonic() + self._patience
         while not predicate():
             if time.monotonic() > deadline:
                 return False
@@ -540,8 +544,8 @@ class Bench:
         met = self._until(complete)
         shown, listener.arrived[:] = self._shown(topic, listener, content), []
         if not met:
-            raise Mismatch(f'{topic}: expected {content}; {shown} of {count} arrived; drawn '
-                           f'{sorted(listener.drawn)}')
+            raise Mismatch(f'{topic}: {shown} messages arrived, drawn are '
+                           f'{sorted(listener.drawn)}, instead of {shortened(content)}')
         if count is not None and shown != count:
             raise Mismatch(f'{topic}: {shown} messages instead of {count}')
 
@@ -673,8 +677,8 @@ def differences(found, expected):
         if one != other:
             if isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
                 i = next(i for i in range(len(one)) if one[i] != other[i])
-                return (f'part {which} at {i} of {shortened(found[0], 200)}: {one[i]!r} instead of '
-                        f'{other[i]!r}')
+                return (f'part {which} at {i} of {shortened(found[0], 200)}: {one[i]!r} instead '
+                        f'of {other[i]!r}')
             return f'part {which}: {shortened(one)} instead of {shortened(other)}'
     return 'nothing'
 
@@ -710,9 +714,10 @@ class Generator:
         while len(steps) < length:
             kind = self._random.random()
             if kind < 0.06:
-                steps.append(('listen', self._pick(self.topics), bool(self._pick([True, False]))))
+                steps.append(('listen', self._pick(self.topics), self._random.random() < 0.5))
             elif kind < 0.12:
-                steps.append(('set', dict(self._change() for _ in range(self._pick([1, 1, 1, 2])))))
+                count = self._pick([1, 1, 1, 2])
+                steps.append(('set', dict(self._change() for _ in range(count))))
             elif kind < 0.15:
                 steps.append(('compiled',))
             elif kind < 0.25:
@@ -810,7 +815,9 @@ class Generator:
         if kind == 6:
             return text[:self._random.integers(1, len(text))]
         if kind == 7:
-            return big_endian(deserialize_message(text, JointState))
+            message = deserialize_message(text, JointState)
+            message.header.stamp.sec = abs(message.header.stamp.sec)
+            return big_endian(message)
         if kind == 8:
             return self._pick([b'\0', b'\7\7' + text[2:], self._random.bytes(200)])
         return text
@@ -923,7 +930,35 @@ SCENES = {
         'mechanisms': ['a', 'b'], 'a.type': 'water_drop', 'a.crank.source': 'shaft',
         'b.type': 'four_bar', 'b.crank.source': 'shaft', 'b.crank.ratio': 2.0,
         'b.points': ['O', 'Q'], 'b.loads': ['B=0 -1']},
+    'more legs than are solved one by one': {
+        'mechanisms': ['m'], 'm.type': 'jansen', 'm.leg_pairs': 20,
+        'm.points': ['G'], 'm.joint_names': ['left3_EF=ankle'], 'm.only_named': True},
     'tiny and huge': {
         'mechanisms': ['m', 'n'], 'm.type': 'jansen', 'm.scale': 1e-30, 'n.type': 'peaucellier',
         'n.scale': 1e27},
 }
+
+
+def failure(parameters, steps, **kwargs):
+    """Return what is otherwise in a history of a new node, '' if nothing is."""
+    with Graph() as graph:
+        try:
+            Bench(graph, parameters, **kwargs).run(steps)
+        except Mismatch as error:
+            return str(error)
+    return ''
+
+
+def shortest(parameters, steps, **kwargs):
+    """Return a history without the steps that a failure does not need."""
+    kind, size = _kind(failure(parameters, steps, **kwargs)), len(steps)
+    while size := size // 2:
+        for end in range(len(steps), 0, -size):
+            fewer = steps[:max(end - size, 0)] + steps[end:]
+            if _kind(failure(parameters, fewer, **kwargs)) == kind:
+                steps = fewer
+    return steps
+
+
+def _kind(text):
+    return re.sub(r'[^a-z/ ]', '', text)[:40]
