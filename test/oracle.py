@@ -1,0 +1,979 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+What the kinematics node has to publish after any history, worked out by the library alone.
+
+`Model` is the specification, `history` draws a random one, `Bench` lets a real node live it.
+
+- A message sets the inputs whose source it names, of a name that comes twice the last; a name
+  without a position is not said. Bytes that are no joint states are dropped.
+- A source says `ratio * position + offset`, of the input or of what it measures. A measured value
+  that cannot be leaves the input as it was.
+- A speed is known while the last message of its input had a velocity for every name.
+- After a message each mechanism that it names is published, once all its inputs are known; then
+  the joints of the scene, if any input was named. Nobody gets what he did not subscribe to before.
+- A leg is assembled if its input is in reach and all its joints and angles are finite; others are
+  left out. This does not depend on who listens. If none is assembled, the mechanism is not in any
+  joint states, and its markers are deleted.
+- Velocities are published if all speeds are known and all velocities finite, in the scene's joint
+  states of all mechanisms; efforts likewise, where there are loads.
+- The stamp is that of the last message which named an input of the mechanism, of the scene's
+  joints that of the last which named any; of a message without a stamp the time of its arrival.
+- A change that the library accepts is accepted, any other refused. What it changes is published
+  anew, with the stamp that it had.
+"""
+
+from dataclasses import dataclass, field
+from itertools import combinations
+import math
+import re
+import threading
+import time
+from typing import NamedTuple
+
+from linkage_ros import scene
+from linkage_ros.linkage.quantities import Spot
+from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.robot_model import bodies, shapes, urdf
+import numpy as np
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.executors import TimeoutException
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.serialization import deserialize_message, serialize_message
+from ros_harness import DEADLINE, Graph
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from test_reading import big_endian
+from visualization_msgs.msg import Marker, MarkerArray
+
+# Of fewer bytes no message is made.
+SHORTEST = 8
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+# Types of markers by their ids, as docs/nodes-and-topics.md has them.
+KINDS = {0: Marker.LINE_LIST, 1: Marker.SPHERE_LIST, 3: Marker.LINE_LIST, 4: Marker.LINE_LIST,
+         5: Marker.LINE_LIST, 6: Marker.LINE_LIST, 7: Marker.TRIANGLE_LIST,
+         8: Marker.TRIANGLE_LIST}
+GROUND = 8
+LAYERS = range(-3, 5)
+
+
+class Mismatch(AssertionError):
+    """A node published something else than the library says."""
+
+
+# --- the specification ---------------------------------------------------------------------
+
+
+class Joints(NamedTuple):
+    """Joint states: a stamp (low, high) [ns], names, and as many numbers or none."""
+
+    stamp: tuple
+    names: list
+    positions: list
+    velocities: list
+    efforts: list
+
+
+class Drawing(NamedTuple):
+    """Markers: a stamp (low, high) [ns], and the points of each by its id."""
+
+    stamp: tuple
+    points: dict
+
+
+class Leg(NamedTuple):
+    """An assembled leg: its prefix, its number, joint angles and velocities."""
+
+    prefix: str
+    number: int
+    places: list
+    angles: list
+    rates: list
+
+
+class Pose(NamedTuple):
+    """The assembled legs of a mechanism, and whether all velocities are known and finite."""
+
+    legs: list
+    moving: bool
+
+
+class Solver:
+    """A mechanism of a scene, solved by the library's public functions."""
+
+    def __init__(self, machine):
+        self.machine, self.assembly = machine, machine.assembly()
+        linkage, self._joints = machine.linkage, self.assembly.joints
+        # At an end of the reach rates divide by zero, and then all that comes with them is worked
+        # out by arrays, whose last digits differ.
+        self._places, self._angles, self._rates = (linkage.function(*wanted) for wanted in (
+            (linkage.points,), ((), self._joints), ((), (), self._joints)))
+        slides = {link.name for link in linkage.links if link.kind == 'prismatic'}
+        self._sizes = [machine.scale if name in slides else 1.0 for name in self._joints]
+        self.shown = _shown(machine)
+        spots = [spot for pieces in self.shown.values() for piece in pieces for spot in piece
+                 if isinstance(spot, Spot)]
+        self._spots = tuple(dict.fromkeys(spots))
+
+    def pose(self, values, speeds):
+        """Return the pose at inputs and, if they are known, their speeds; None if it is none."""
+        near, legs = True, []
+        if self.assembly.is_limited:
+            near = self.assembly.within_reach(values[0])
+        moving = speeds is not None and bool(np.isfinite(speeds).all())
+        for number, (prefix, leg) in enumerate(self.assembly.legs.items()):
+            places, angles, rates = self._leg(leg, values, speeds if moving else None)
+            if (np.isfinite([*values, *angles]).all() and np.isfinite(places).all()
+                    and np.broadcast_to(near, len(self.assembly.legs))[number]):
+                legs.append(Leg(prefix, number, places, angles, rates))
+        moving = moving and all(math.isfinite(rate) for leg in legs for rate in leg.rates)
+        return Pose(legs, moving) if legs else None
+
+    def _leg(self, leg, values, speeds):
+        inputs = self.machine.linkage.inputs
+        own = [leg.start + leg.side * (value - leg.lag) if input_.turns else value / leg.size
+               for value, input_ in zip(values, inputs)]
+        xy = self._places(*own)
+        places = [(x * (leg.side * leg.size), y * leg.size) for x, y in zip(xy[::2], xy[1::2])]
+        angles = [leg.side * angle * size for angle, size in zip(self._angles(*own), self._sizes)]
+        if speeds is None:
+            return places, angles, []
+        rates = self._rates(*own)
+        own = [speed if input_.turns else speed / leg.size
+               for speed, input_ in zip(speeds, inputs)]
+        by = [rates[i * len(angles):(i + 1) * len(angles)] for i in range(len(inputs))]
+        return places, angles, [
+            sum((row[j] * speed for row, speed in zip(by, own)), 0.0) * self._sizes[j]
+            for j in range(len(angles))]
+
+    def points(self, pose, values):
+        """Return the points of each marker by its id, leg by leg."""
+        spots = self._placed(values)
+        found = {}
+        for id_, pieces in self.shown.items():
+            legs = _on_each_side(pose.legs) if id_ == GROUND else pose.legs
+            found[id_] = [
+                spots[leg.number][point] if isinstance(point, Spot)
+                else leg.places[self.machine.linkage.points.index(point)]
+                for leg in legs for piece in pieces for point in piece]
+        return found
+
+    def _placed(self, values):
+        """Return where the spots are, by leg; no other public function places them."""
+        legs = list(self.assembly.legs.values())
+        rows = np.empty((len(legs), 2 * len(self._spots)))
+        if self._spots:
+            batch = self.machine.linkage.legs(self._spots, (), (), rows)
+            for given, value in zip(batch.given, values):
+                given.fill(value)
+            batch.given[2 * len(values):].T[:] = legs
+            batch.solve()
+        return [dict(zip(self._spots, row.reshape(-1, 2).tolist())) for row in rows]
+
+
+def _on_each_side(legs):
+    """Return the first leg on the left and on the right: each side's stand on one ground."""
+    return list({leg.prefix[:1]: leg for leg in reversed(legs)}.values())
+
+
+def _shown(machine):
+    """Return what each marker shows, by its id: joints, ends of lines or corners."""
+    linkage, wanted = machine.linkage, machine.points
+    cranks, plates = shapes.cranks(linkage), shapes.plates(linkage, wanted)
+    edges = {frozenset(edge) for plate in plates for edge in combinations(plate, 2)}
+    bars = [bar for bar in linkage.bars if bar not in cranks and frozenset(bar) not in edges]
+    pieces = {0: [*bars, *linkage.cylinders], 1: [(name,) for name in wanted], 3: [], 4: [],
+              5: cranks, 6: [], 7: plates, 8: shapes.marks(linkage, wanted)}
+    for shape in shapes.drawn(machine, wanted):
+        id_ = 3 if shape.kind == shapes.GUIDE else 6 if shape.slide.name in machine.inputs else 4
+        pieces[id_].append((shape.start, shape.end))
+    drawn = {id_: [piece for piece in several if all(
+        isinstance(point, Spot) or point in wanted for point in piece)]
+        for id_, several in pieces.items()}
+    return {id_: several for id_, several in drawn.items() if several}
+
+
+@dataclass
+class State:
+    """What is known of a mechanism: its inputs, which of their speeds, and its last stamp."""
+
+    values: list
+    speeds: list
+    stamp: tuple = (0, 0)
+
+
+class Model:
+    """What a node with these parameters has to publish."""
+
+    def __init__(self, parameters):
+        self._given = {name: scene.plain(value) for name, value in parameters.items()}
+        self.stamp = (0, 0)
+        self._take(scene.read(self._given))
+        self.states = {name: State([None] * len(machine.inputs), [None] * len(machine.inputs))
+                       for name, machine in self.scene.machines.items()}
+
+    def _take(self, new):
+        frames = {name: machine.frame_id or new.frame_id for name, machine in new.machines.items()}
+        robots = {name: bodies.robot([machine], frames[name])
+                  for name, machine in new.machines.items()}
+        self.descriptions = {name: urdf.write(robot) for name, robot in robots.items()}
+        own = [robots[name] for name, machine in new.machines.items() if not machine.only_named]
+        try:
+            whole = urdf.write(bodies.together(own)) if own else ''
+        except scene.SceneError:
+            whole = ''
+        # What is latched stays where a change leaves no robot of one root.
+        self.description = whole or getattr(self, 'description', '')
+        self.scene, self.frames = new, {name: new.frame_prefix + f for name, f in frames.items()}
+        self.solvers = {name: Solver(machine) for name, machine in new.machines.items()}
+        for name in new.machines:
+            bodies.size(new.machines[name])
+
+    def said(self, message, now):
+        """Take over joint states that came at a time (low, high) [ns]; return what they move."""
+        where = dict(zip(message.name, range(len(message.position))))
+        known = len(message.velocity) == len(message.name)
+        stamp = message.header.stamp
+        at = (stamp.sec * 10 ** 9 + stamp.nanosec,) * 2 if stamp.sec or stamp.nanosec else now
+        moved = []
+        for name, machine in self.scene.machines.items():
+            for i, drive in enumerate(machine.inputs.values()):
+                if drive.source in where:
+                    place = where[drive.source]
+                    self._source(self.states[name], machine, i, drive, message.position[place],
+                                 message.velocity[place] if known else None)
+                    moved.append(name)
+        for name in moved:
+            self.states[name].stamp = at
+        if moved:
+            self.stamp = at
+        return set(moved)
+
+    def _source(self, state, machine, i, drive, position, speed):
+        value, speed = machine.understood(drive, position, speed, state.values[i])
+        if math.isfinite(value) or not drive.measures:
+            state.values[i], state.speeds[i] = value, speed
+
+    def change(self, values):
+        """Return the reason to refuse a change, '' if it is accepted, and what it changes."""
+        declared = {p.name: p.field for p in self.scene.parameters
+                    if scene.KINEMATICS in p.field.readers}
+        for name in values:
+            if name not in declared:
+                return 'unknown', set()
+            if declared[name].read_only:
+                return 'read-only', set()
+        given = {**self._given, **{name: scene.plain(v) for name, v in values.items()}}
+        before = self._signatures()
+        try:
+            self._take(scene.read(given, strict=False))
+        except scene.SceneError as error:
+            return str(error), set()
+        self._given = given
+        return '', {name for name, signature in self._signatures().items()
+                    if signature != before[name]}
+
+    def _signatures(self):
+        return {name: ([(p.name, p.value) for p in machine.parameters], self.frames[name])
+                for name, machine in self.scene.machines.items()}
+
+    def _pose(self, name):
+        state = self.states[name]
+        if None in state.values:
+            return None
+        return self.solvers[name].pose(state.values,
+                                       None if None in state.speeds else state.speeds)
+
+    def joints(self, name):
+        """Return the joint states of a mechanism, None if there are none to be published."""
+        pose = self._pose(name)
+        return self._joint_states(self.states[name].stamp, {name: pose} if pose else {})
+
+    def all_joints(self, sources=()):
+        """Return the joint states of the scene, without what sources say on the same topic."""
+        poses = {name: pose for name in self.scene.machines if (pose := self._pose(name))}
+        return self._joint_states(self.stamp, poses, sources)
+
+    def _joint_states(self, stamp, poses, sources=()):
+        rows = [row for name, pose in poses.items() for row in self._rows(name, pose)
+                if row[0] not in sources]
+        if not rows:
+            return None
+        names, positions, velocities, efforts = map(list, zip(*rows))
+        moving = all(pose.moving for pose in poses.values())
+        loaded = any(self.scene.machines[name].loads for name in poses) and all(
+            effort is None or math.isfinite(effort)
+            for name, pose in poses.items() for effort in self._efforts(name))
+        return Joints(stamp, names, positions, velocities if moving else [],
+                      efforts if loaded else [])
+
+    def _efforts(self, name):
+        machine, state = self.scene.machines[name], self.states[name]
+        return machine.efforts(state.values) if machine.loads else [0.0] * len(state.values)
+
+    def _rows(self, name, pose):
+        """Yield name, position, velocity and effort of each joint that is published."""
+        machine, state = self.scene.machines[name], self.states[name]
+        n, names = len(machine.inputs), list(machine.joints)
+        each = [*zip(names[:n], state.values, state.speeds, self._efforts(name))]
+        per_leg = len(self.solvers[name].assembly.joints)
+        for leg in pose.legs:
+            first = n + leg.number * per_leg
+            each += zip(names[first:first + per_leg], leg.angles, leg.rates or [0.0] * per_leg,
+                        [0.0] * per_leg)
+        for joint, position, velocity, effort in each:
+            called = machine.joints[joint]
+            if called.published:
+                yield (called.name, float(called.of(position)), called.sign * (velocity or 0.0),
+                       called.sign * effort)
+
+    def drawing(self, name):
+        """Return the markers of a mechanism, None if there are to be none."""
+        pose, state = self._pose(name), self.states[name]
+        return pose and Drawing(state.stamp, self.solvers[name].points(pose, state.values))
+
+    def locus(self, name):
+        """Return the points of a mechanism's curve."""
+        machine = self.scene.machines[name]
+        curve = machine.assembly().locus(machine.tracer)
+        return curve.tolist() if len(curve) > 1 else []
+
+    def seen(self, before, stamp):
+        """Take note of the time [ns] that a node took for that of a message without a stamp."""
+        for state in (self, *self.states.values()):
+            if state.stamp == before:
+                state.stamp = (stamp, stamp)
+
+
+# --- a real node -----------------------------------------------------------------------------
+
+
+class NotExecuted(MutuallyExclusiveCallbackGroup):
+    """Entities that an executor passes over."""
+
+    def can_execute(self, entity):
+        """Return that it cannot."""
+        return False
+
+
+@dataclass
+class Listener:
+    """A subscription, and the ids of the markers that are in its picture."""
+
+    subscription: object
+    kind: type
+    drawn: set = field(default_factory=set)
+    arrived: list = field(default_factory=list)
+
+    def take(self):
+        """Gather what has arrived."""
+        while True:
+            with self.subscription.handle:
+                taken = self.subscription.handle.take_message(self.kind, False)
+            if taken is None:
+                return
+            self.arrived.append(taken[0])
+
+
+class Bench:
+    """
+    A kinematics node that lives histories, compared with the model after every step.
+
+    Parameters
+    ----------
+    graph : Graph
+        Where it lives.
+    parameters : dict
+        What it is started with.
+    patience : float
+        How long what has to be published is waited for [s].
+
+    """
+
+    def __init__(self, graph, parameters, patience=DEADLINE, **kwargs):
+        self._graph, self.model, self._patience = graph, Model(parameters), patience
+        self.node = graph.start(Kinematics, parameters, **kwargs)
+        self._executor, self._handled = graph._executor, 0
+        self._crank = graph.node.create_publisher(JointState, 'crank_states', 100)
+        self.listeners = {}
+        self._latched = {topic: self._subscribe(topic, kind, LATCHED) for topic, kind in [
+            ('robot_description', String), *((f'{name}/{topic}', kind)
+                                             for name in self.model.scene.machines
+                                             for topic, kind in [('locus', Marker),
+                                                                 ('robot_description', String)])]}
+        self._said = {topic: None for topic in self._latched}
+        (subscription,) = [s for s in self.node.subscriptions
+                           if s.topic_name == self._crank.topic_name]
+        callback = subscription.callback
+
+        def counted(message):
+            try:
+                callback(message)
+            finally:
+                self._handled += 1
+
+        subscription.callback = counted
+        graph.until(self._crank.get_subscription_count)
+        self._check_latched()
+
+    def run(self, steps):
+        """Live a history; raise Mismatch, with the number of the step, where it is otherwise."""
+        for number, (act, *arguments) in enumerate(steps):
+            try:
+                getattr(self, act)(*arguments)
+            except Exception as error:
+                # A node that raises ends.
+                raise Mismatch(f'{type(error).__name__}: {error}; at step {number}, {act} '
+                               f'{shortened(arguments)}') from error
+
+    def _subscribe(self, topic, kind, qos):
+        return Listener(self._graph.node.create_subscription(
+            kind, topic, lambda _: None, qos, callback_group=NotExecuted()), kind)
+
+    def _drain(self):
+        """Let the nodes work until there is nothing left to do."""
+        while True:
+            try:
+                handler, *_ = self._executor.wait_for_ready_callbacks(timeout_sec=0.0)
+            except TimeoutException:
+                return
+            handler()
+            if handler.exception() is not None:
+                raise handler.exception()
+
+    def _until(self, predicate):
+        """Let the nodes work until something holds."""
+        self._drain()
+        deadline = time.monotonic() + self._patience
+        while not predicate():
+            if time.monotonic() > deadline:
+                return False
+            self._executor.spin_once(timeout_sec=0.005)
+        return True
+
+    def listen(self, topic, wanted):
+        """Begin or end to listen to a topic."""
+        if (topic in self.listeners) == wanted:
+            return
+        if wanted:
+            kind = MarkerArray if topic.endswith('/markers') else JointState
+            self.listeners[topic] = self._subscribe(topic, kind, 1000)
+        else:
+            self._graph.node.destroy_subscription(self.listeners.pop(topic).subscription)
+        publisher = next(p for p in self.node.publishers
+                         if p.topic_name == self._graph.node.resolve_topic_name(topic))
+        if not self._until(lambda: publisher.get_subscription_count() == int(wanted)):
+            raise Mismatch('its listeners are not counted')
+        self._drain()
+
+    def compiled(self):
+        """Wait until what is being compiled is there."""
+        self._until(lambda: not any(thread.name == 'linkage_ros compiler'
+                                    for thread in threading.enumerate()))
+
+    def send(self, text):
+        """Publish a crank message, or bytes that are none."""
+        before, handled = self._now(), self._handled
+        self._crank.publish(text)
+        if not self._until(lambda: self._handled > handled):
+            raise Mismatch('the message was not handled')
+        self._drain()
+        try:
+            message = deserialize_message(text, JointState) if len(text) >= SHORTEST else None
+        except Exception:
+            # Each middleware has errors of its own.
+            message = None
+        moved = self.model.said(message, (before, self._now())) if message else set()
+        self._check(moved, bool(moved))
+
+    def _now(self):
+        return self.node.get_clock().now().nanoseconds
+
+    def set(self, values):
+        """Set parameters together."""
+        before = self._contents()
+        reason, changed = self.model.change(values)
+        result = self._graph.set(self.node, **{name: Parameter(name, value=value)
+                                               for name, value in values.items()})
+        if result.successful != (not reason):
+            raise Mismatch(f'answer {result}, where the library says: {reason or "accepted"}')
+        if not result.successful and not result.reason:
+            raise Mismatch('refused without a reason')
+        after = self._contents()
+        self._check_changed({topic for topic in after if after[topic] != before[topic]}
+                            if not reason else set(), changed)
+        self._check_latched()
+
+    def _contents(self):
+        return {topic: self._content(topic) for topic in self.listeners}
+
+    def _content(self, topic):
+        if topic == 'joint_states':
+            return self.model.all_joints()
+        name, _, kind = topic.partition('/')
+        return self.model.drawing(name) if kind == 'markers' else self.model.joints(name)
+
+    def _check(self, moved, any_moved):
+        """Compare what arrived after a message with what has to be there."""
+        for topic, listener in self.listeners.items():
+            concerned = any_moved if topic == 'joint_states' else topic.partition('/')[0] in moved
+            content = self._content(topic) if concerned else None
+            self._compare(topic, listener, content, int(content is not None), concerned)
+
+    def _check_changed(self, required, changed):
+        """Compare what arrived after a change: what is there, once or more often, if required."""
+        for topic, listener in self.listeners.items():
+            content = self._content(topic)
+            self._compare(topic, listener, content, None if content else 0,
+                          topic == 'joint_states' or topic.partition('/')[0] in changed,
+                          topic in required)
+
+    def _compare(self, topic, listener, content, count, concerned, required=True):
+        drawing = listener.kind is MarkerArray
+        goal = {*content.points} if drawing and content else set()
+
+        def complete():
+            listener.take()
+            shown = self._shown(topic, listener, content)
+            # After a change that moves nothing, a new listener's picture may still be empty.
+            is_old = content is not None and not shown
+            return (shown >= (count if count is not None else int(required))
+                    and (not concerned or not drawing or is_old or listener.drawn == goal))
+
+        met = self._until(complete)
+        shown, listener.arrived[:] = self._shown(topic, listener, content), []
+        if not met:
+            raise Mismatch(f'{topic}: {shown} messages arrived, drawn are '
+                           f'{sorted(listener.drawn)}, instead of {shortened(content)}')
+        if count is not None and shown != count:
+            raise Mismatch(f'{topic}: {shown} messages instead of {count}')
+
+    def _shown(self, topic, listener, content):
+        """Compare each message with what has to be said; return how many there are of those."""
+        shown, name = 0, topic.partition('/')[0]
+        for message in listener.arrived:
+            if listener.kind is JointState:
+                if message.name:
+                    shown += 1
+                    self._same_joints(topic, message, content)
+                continue
+            added = [m for m in message.markers if m.action == Marker.ADD]
+            for marker in message.markers:
+                if marker.ns != name:
+                    raise Mismatch(f'{topic}: a marker of {marker.ns}')
+                if marker.action == Marker.DELETEALL:
+                    listener.drawn.clear()
+                elif marker.action == Marker.DELETE:
+                    listener.drawn.discard(marker.id)
+                else:
+                    listener.drawn.add(marker.id)
+            if added:
+                shown += 1
+                self._same_drawing(topic, added, content)
+        return shown
+
+    def _same_joints(self, topic, message, content):
+        told = (list(message.name), *map(list, (message.position, message.velocity,
+                                                message.effort)))
+        if content is None or told != (*content[1:],):
+            raise Mismatch(f'{topic}: {differences(told, content and content[1:])}')
+        self._same_stamp(topic, message.header.stamp, content.stamp)
+
+    def _same_stamp(self, topic, stamp, expected):
+        at = stamp.sec * 10 ** 9 + stamp.nanosec
+        if expected[0] < expected[1] and expected[0] <= at <= expected[1]:
+            self.model.seen(expected, at)
+        elif not expected[0] <= at <= expected[1]:
+            # A time that was seen on another topic of the same message is that of all.
+            if at not in (self.model.stamp[0], *(s.stamp[0] for s in self.model.states.values())):
+                raise Mismatch(f'{topic}: the stamp {at} instead of {expected}')
+
+    def _same_drawing(self, topic, markers, content):
+        if content is None:
+            raise Mismatch(f'{topic}: drawn where it cannot be assembled')
+        found = {marker.id: [(p.x, p.y) for p in marker.points] for marker in markers}
+        wanted = {id_: [tuple(point) for point in points]
+                  for id_, points in content.points.items()}
+        for id_ in {*found} | {*wanted}:
+            own, other = found.get(id_), wanted.get(id_)
+            if own and other and id_ == GROUND:
+                own, other = ({*zip(*[iter(points)] * 3)} for points in (own, other))
+            if own != other:
+                raise Mismatch(f'{topic}: marker {id_}: {differences([own], [other])}')
+        machine = self.model.scene.machines[topic.partition('/')[0]]
+        for marker in markers:
+            self._same_look(topic, marker, machine)
+            self._same_stamp(topic, marker.header.stamp, content.stamp)
+
+    def _same_look(self, topic, marker, machine):
+        frame = self.model.frames[machine.name]
+        if (marker.type, marker.header.frame_id) != (KINDS[marker.id], frame):
+            raise Mismatch(f'{topic}: marker {marker.id} is a {marker.type} in '
+                           f'{marker.header.frame_id!r} instead of {frame!r}')
+        if any(p.z for p in marker.points):
+            raise Mismatch(f'{topic}: marker {marker.id} leaves its plane')
+        x, y, z, roll, pitch, yaw = machine.pose
+        turned = rotation(roll, pitch, yaw)
+        q = marker.pose.orientation
+        if not np.allclose(turned, matrix(q.x, q.y, q.z, q.w), atol=1e-12):
+            raise Mismatch(f'{topic}: marker {marker.id} is turned')
+        at, step = marker.pose.position, bodies.size(machine) / 250.0
+        heights = [(x, y, z) + step * layer * turned[:, 2] for layer in LAYERS]
+        near = 1e-9 * (step + max(map(abs, (x, y, z))))
+        if np.abs(np.array(heights) - (at.x, at.y, at.z)).max(axis=1).min() > near:
+            raise Mismatch(f'{topic}: marker {marker.id} is in no layer')
+
+    def _check_latched(self):
+        """Compare loci and robot models with what has to be there."""
+        for topic, listener in self._latched.items():
+            def complete(topic=topic, listener=listener):
+                listener.take()
+                for message in listener.arrived:
+                    self._said[topic] = message
+                listener.arrived.clear()
+                return self._is_latched(topic, self._said[topic])
+
+            if not self._until(complete):
+                raise Mismatch(f'{topic}: {str(self._said[topic])[:300]}')
+
+    def _is_latched(self, topic, message):
+        name, _, kind = topic.rpartition('/')
+        if kind == 'robot_description':
+            text = self.model.descriptions[name] if name else self.model.description
+            return (message.data if message else '') == text
+        curve = self.model.locus(name)
+        if message is None or message.action == Marker.DELETE:
+            return not curve
+        return ([[p.x, p.y] for p in message.points] == curve
+                and message.header.frame_id == self.model.frames[name])
+
+
+def rotation(roll, pitch, yaw):
+    """Return the rotation about the fixed axes x, y, z in turn."""
+    def about(i, j, angle):
+        turn = np.eye(3)
+        turn[[i, j], [i, j]] = math.cos(angle)
+        turn[j, i] = math.sin(angle)
+        turn[i, j] = -turn[j, i]
+        return turn
+
+    return about(0, 1, yaw) @ about(2, 0, pitch) @ about(1, 2, roll)
+
+
+def matrix(x, y, z, w):
+    """Return the rotation of a quaternion."""
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+
+
+def differences(found, expected):
+    """Return in words where lists differ."""
+    if expected is None:
+        return f'{shortened(found)} where nothing is to be said'
+    for which, (one, other) in enumerate(zip(found, expected)):
+        if one != other:
+            if isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
+                i = next(i for i in range(len(one)) if one[i] != other[i])
+                return (f'part {which} at {i} of {shortened(found[0], 200)}: {one[i]!r} instead '
+                        f'of {other[i]!r}')
+            return f'part {which}: {shortened(one)} instead of {shortened(other)}'
+    return 'nothing'
+
+
+def shortened(thing, most=600):
+    """Return a text that is not too long."""
+    text = repr(thing)
+    return text if len(text) <= most else text[:most] + '...'
+
+
+# --- histories -------------------------------------------------------------------------------
+
+SPECIAL = [math.nan, math.inf, -math.inf, 1e300, -1e300, 0.0, 5e-324, 1e17]
+
+
+class Generator:
+    """Draws histories of a scene."""
+
+    def __init__(self, parameters, random):
+        self._random, self._scene = random, scene.read(parameters)
+        self._drives = [(machine, drive) for machine in self._scene.machines.values()
+                        for drive in machine.inputs.values()]
+        self.topics = ['joint_states', *(f'{name}/{kind}' for name in self._scene.machines
+                                         for kind in ('joint_states', 'markers'))]
+        self._settable = [p for p in self._scene.parameters
+                          if scene.KINEMATICS in p.field.readers]
+
+    def history(self, length):
+        """Return some steps."""
+        sources = [self._arrangement() for _ in range(self._random.integers(1, 4))]
+        moving = self._random.random() < 0.7
+        steps = [('listen', topic, bool(self._random.random() < 0.6)) for topic in self.topics]
+        while len(steps) < length:
+            kind = self._random.random()
+            if kind < 0.06:
+                steps.append(('listen', self._pick(self.topics), self._random.random() < 0.5))
+            elif kind < 0.12:
+                count = self._pick([1, 1, 1, 2])
+                steps.append(('set', dict(self._change() for _ in range(count))))
+            elif kind < 0.15:
+                steps.append(('compiled',))
+            elif kind < 0.25:
+                steps.append(('send', self._odd()))
+            elif kind < 0.32:
+                steps += self._along_an_end(self._pick(sources), moving)
+            else:
+                for _ in range(self._random.integers(1, 6)):
+                    steps.append(('send', self._message(self._pick(sources), moving)))
+        return steps
+
+    def _along_an_end(self, drives, moving):
+        """Yield messages of inputs that go in and out of their reach, and then stay outside."""
+        ends = {drive.source: drive.reach[0][1] for _, drive in drives}
+        by_name = {drive.source: drive for _, drive in drives}
+        inside = self._random.integers(1, 12)
+        for i in range(inside + 3):
+            values = [end + (2e-3 * self._random.normal() if i < inside else 4e-3)
+                      for end in ends.values()]
+            positions = [(value - drive.offset) / drive.ratio
+                         for value, drive in zip(values, by_name.values())]
+            yield 'send', self._text(list(ends), positions, [1.0] * len(ends) * moving)
+
+    def _pick(self, several):
+        return several[self._random.integers(len(several))]
+
+    def _arrangement(self):
+        """Return the inputs that a source tells of."""
+        kind = self._random.integers(4)
+        if kind == 0:
+            return self._drives
+        if kind == 1:
+            name = self._pick(list(self._scene.machines))
+            return [(m, d) for m, d in self._drives if m.name == name]
+        if kind == 2:
+            return [self._pick(self._drives)]
+        chosen = [drive for drive in self._drives if self._random.random() < 0.6]
+        return chosen or [self._pick(self._drives)]
+
+    def _message(self, drives, moving):
+        names = list(dict.fromkeys(drive.source for _, drive in drives))
+        by_name = {drive.source: (machine, drive) for machine, drive in drives}
+        positions = [self._position(*by_name[name]) for name in names]
+        velocities = [self._speed() for _ in names] if moving else []
+        if self._random.random() < 0.05:
+            velocities = [] if moving else [self._speed() for _ in names]
+        return self._text(names, positions, velocities)
+
+    def _text(self, names, positions, velocities):
+        message = JointState(name=names, position=positions, velocity=velocities)
+        random = self._random.random()
+        if random > 0.1:
+            message.header.stamp.sec = int(self._random.integers(2 ** 31))
+            message.header.stamp.nanosec = int(self._random.integers(10 ** 9))
+        elif random > 0.08:
+            message.header.stamp.sec = -5
+            message.header.stamp.nanosec = 2 ** 32 - 1
+        return serialize_message(message)
+
+    def _speed(self):
+        random = self._random.random()
+        if random < 0.06:
+            return float(self._pick([*SPECIAL, 1e308]))
+        return float(self._random.normal())
+
+    def _position(self, machine, drive):
+        if self._random.random() < 0.05:
+            return float(self._pick(SPECIAL))
+        value = self._input(drive)
+        if drive.measures:
+            value = float(machine.told(drive, value, 0.0)[0])
+            return value if math.isfinite(value) else float(self._random.normal())
+        return (value - drive.offset) / drive.ratio
+
+    def _input(self, drive):
+        low, high = drive.reach[self._random.integers(len(drive.reach))]
+        kind = self._random.random()
+        if kind < 0.2:
+            # Next to an end, where a sensor's noise goes in and out.
+            size = self._pick([0.0, 1e-15, 1e-9, 2e-3])
+            return float(self._pick([low, high]) + size * self._random.normal())
+        if kind < 0.35:
+            wide = 0.3 * (high - low)
+            return float(self._random.uniform(low - wide, high + wide))
+        turns = math.tau * self._random.integers(-2, 3) if drive.input.turns else 0.0
+        return float(self._random.uniform(low, high) + turns)
+
+    def _odd(self):
+        """Return bytes that are another message than usual, or none."""
+        names = [self._pick(self._drives)[1].source for _ in range(self._random.integers(1, 4))]
+        positions = [self._position(*next((m, d) for m, d in self._drives if d.source == name))
+                     for name in names]
+        velocities = [self._speed() for _ in names]
+        kind = self._random.integers(10)
+        if kind == 0:
+            names.insert(0, 'wheel')
+            positions.insert(0, 7.0)
+        elif kind == 1:
+            positions = positions[:-1]
+        elif kind == 2:
+            velocities = velocities[:-1]
+        elif kind == 3:
+            positions, velocities = [*positions, 1.0], [*velocities, 2.0]
+        elif kind == 4:
+            names.append('x' * 70000)
+        elif kind == 5:
+            names, positions = (['nobody'], [1.0]) if self._random.random() < 0.5 else ([], [3.0])
+        text = self._text(names, positions, velocities)
+        if kind == 6:
+            return text[:self._random.integers(1, len(text))]
+        if kind == 7:
+            message = deserialize_message(text, JointState)
+            message.header.stamp.sec = abs(message.header.stamp.sec)
+            return big_endian(message)
+        if kind == 8:
+            return self._pick([b'\0', b'\7\7' + text[2:], self._random.bytes(200)])
+        return text
+
+    def _change(self):
+        parameter = self._pick(self._settable)
+        name, value, kind = parameter.name, parameter.value, parameter.field.kind
+        machine = self._scene.machines.get(name.partition('.')[0])
+        what = name.rpartition('.')[2]
+        if self._random.random() < 0.15:
+            return name, self._pick([-1.0, 'nonsense', 1e308, 77, ['Zed=1'], [1.0], True, 0])
+        if self._random.random() < 0.1:
+            return name, list(value) if isinstance(value, tuple) else value
+        if what in ('points', 'joint_names', 'loads'):
+            return name, self._lines(what, machine)
+        if what == 'sweep':
+            low, high = sorted(map(float, self._random.uniform(*machine.first.reach[0], 2)))
+            return name, self._pick([[], [low, high]])
+        if what == 'pose':
+            return name, self._random.normal(size=6).tolist()
+        if 'frame' in what:
+            return name, self._pick(['world', 'base', 'left/', ''])
+        if kind == 'bool':
+            return name, bool(self._random.integers(2))
+        if kind == 'integer':
+            return name, int(self._random.integers(-1, 4))
+        if what in ('ratio', 'offset'):
+            return name, float(self._random.normal())
+        if kind == 'double':
+            return name, float(value * self._random.uniform(0.8, 1.25))
+        return name, value
+
+    def _lines(self, what, machine):
+        linkage = machine.linkage
+        if what == 'points':
+            chosen = [name for name in linkage.points if self._random.random() < 0.6]
+            self._random.shuffle(chosen)
+            return chosen or list(linkage.points)
+        if what == 'joint_names':
+            sign, offset = self._pick(['', '-']), self._pick(['', '+0.35', '-7.5'])
+            return [f'{joint}={sign}{machine.name}_my_{joint}{offset}' for joint in machine.joints
+                    if self._random.random() < 0.4]
+        return [*(f'{name}={self._random.normal():.4f} -9.81' for name in linkage.points
+                  if self._random.random() < 0.3),
+                *(f'{name}=2.5' for name in linkage.joints if self._random.random() < 0.1)]
+
+
+def history(parameters, seed, length=60):
+    """Return a random history of a scene: steps as `Bench.run` takes them."""
+    return Generator(parameters, np.random.default_rng(seed)).history(length)
+
+
+def listing(steps):
+    """Return a history in words, for a report."""
+    lines = []
+    for act, *arguments in steps:
+        if act == 'send':
+            try:
+                message = deserialize_message(arguments[0], JointState)
+                lines.append(f'send {message.header.stamp.sec}.{message.header.stamp.nanosec} '
+                             f'{shortened(message.name)} {list(message.position)} '
+                             f'{list(message.velocity)}')
+            except Exception:
+                lines.append(f'send {shortened(arguments[0])}')
+        else:
+            lines.append(f'{act} {shortened(arguments)}')
+    return '\n'.join(lines)
+
+
+FOUR_BAR = ['O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'B dyad A Q 2 1.5 left']
+SCENES = {
+    'the catalogue': {},
+    'a walker': {'mechanisms': ['m'], 'm.type': 'jansen', 'm.leg_pairs': 3, 'm.scale': 0.01},
+    'legs that are left out now and then': {
+        'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': FOUR_BAR, 'm.leg_pairs': 2},
+    'a reach that ends': {
+        'mechanisms': ['cell', 'leg'], 'cell.type': 'peaucellier', 'leg.type': 'klann',
+        'leg.mirrored': True, 'leg.scale': 1e-3},
+    'loads beside others': {
+        'mechanisms': ['lever', 'leg'], 'lever.type': 'slotted_lever',
+        'lever.loads': ['L=0 -9.81'], 'leg.type': 'jansen'},
+    'a cylinder with loads': {
+        'mechanisms': ['m', 'n'], 'm.type': 'custom', 'm.scale': 2.0, 'm.joints': [
+            'O ground 0 0', 'Q ground 3 0', 'A cylinder O Q 1.5 left'], 'm.loads': ['A=1 -2'],
+        'n.type': 'slider_crank', 'n.loads': ['AB=2']},
+    'several inputs': {
+        'mechanisms': ['five_bar', 'm'], 'm.type': 'five_bar', 'm.scale': 2.0,
+        'm.loads': ['C=0 -1'], 'm.crank.source': 'motor', 'five_bar.crank2.source': 'motor'},
+    'an excavator': {
+        'mechanisms': ['excavator'], 'excavator.type': 'custom', 'excavator.joints': [
+            'O ground 0 0', 'P ground 0.30 -0.3964', 'B cylinder P O 1.04858 right',
+            'A rigid O B 2.4 1.5 right', 'C rigid O A 1.45 1.12156 left',
+            'D cylinder C A 0.41031 left', 'H rigid A D 1.3 1.66 right',
+            'E line H A 0.25639', 'F rigid A E 0.28 1.04039 left',
+            'G cylinder F E 0.36 left', 'J dyad G H 0.3098 0.26344 left',
+            'T rigid H J 0.6 0.75 right'], 'excavator.tracer': 'T'},
+    'sensors': {
+        'mechanisms': ['lever', 'bars'], 'lever.type': 'slotted_lever',
+        'lever.crank.measures': 'lever', 'lever.crank.ratio': 0.5, 'lever.crank.offset': 0.05,
+        'bars.type': 'four_bar', 'bars.crank.measures': 'QB', 'bars.crank.ratio': -1.0,
+        'bars.scale': 3.0},
+    'geared motors, names and signs': {
+        'mechanisms': ['m', 'klann', 'gears'], 'm.type': 'jansen', 'm.crank.ratio': -2.5,
+        'm.crank.offset': 0.125, 'klann.type': 'klann', 'klann.crank.ratio': 0.3,
+        'm.joint_names': ['BC=left_shin', 'EF=-left_ankle+0.35', 'crank=-shaft-7.5'],
+        'klann.only_named': True, 'klann.joint_names': ['crank=hip'], 'gears.type': 'custom',
+        'gears.joints': ['O ground 0 0', 'Q ground 4 0', 'A crank O 1',
+                         'D crank Q 2 geared crank -2 0.1', 'B dyad A D 3 4 left']},
+    'one source for two': {
+        'mechanisms': ['a', 'b'], 'a.type': 'water_drop', 'a.crank.source': 'shaft',
+        'b.type': 'four_bar', 'b.crank.source': 'shaft', 'b.crank.ratio': 2.0,
+        'b.points': ['O', 'Q'], 'b.loads': ['B=0 -1']},
+    'more legs than are solved one by one': {
+        'mechanisms': ['m'], 'm.type': 'jansen', 'm.leg_pairs': 20,
+        'm.points': ['G'], 'm.joint_names': ['left3_EF=ankle'], 'm.only_named': True},
+    'tiny and huge': {
+        'mechanisms': ['m', 'n'], 'm.type': 'jansen', 'm.scale': 1e-30, 'n.type': 'peaucellier',
+        'n.scale': 1e27},
+}
+
+
+def failure(parameters, steps, **kwargs):
+    """Return what is otherwise in a history of a new node, '' if nothing is."""
+    with Graph() as graph:
+        try:
+            Bench(graph, parameters, **kwargs).run(steps)
+        except Mismatch as error:
+            return str(error)
+    return ''
+
+
+def shortest(parameters, steps, **kwargs):
+    """Return a history without the steps that a failure does not need."""
+    kind, size = _kind(failure(parameters, steps, **kwargs)), len(steps)
+    while size := size // 2:
+        for end in range(len(steps), 0, -size):
+            fewer = steps[:max(end - size, 0)] + steps[end:]
+            if _kind(failure(parameters, fewer, **kwargs)) == kind:
+                steps = fewer
+    return steps
+
+
+def _kind(text):
+    return re.sub(r'[^a-z/ ]', '', text)[:40]
