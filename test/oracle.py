@@ -501,6 +501,9 @@ class Bench:
             raise Mismatch(f'answer {result}, where the library says: {reason or "accepted"}')
         if not result.successful and not result.reason:
             raise Mismatch('refused without a reason')
+        # An accepted scene is prepared beside the messages.
+        if not self._until(lambda: self.node.is_settled):
+            raise Mismatch('an accepted change is never adopted')
         after = self._contents()
         self._check_changed({topic for topic in after if after[topic] != before[topic]}
                             if not reason else set(), changed)

@@ -40,7 +40,7 @@ CHANGE = np.dtype([('at', 'i8'), ('factor', 'f8'), ('plus', 'f8'), ('turn', 'f8'
 # Eight bytes that are copied.
 PUT = np.dtype([('from', 'i8'), ('to', 'i8')])
 # The tables of a pipeline, and those of what ends it.
-TABLES = {'takes': TAKE, 'loops': LOOP, 'limits': LIMIT}
+TABLES = {'takes': TAKE, 'copies': PUT, 'loops': LOOP, 'limits': LIMIT}
 ENDING = {'changes': CHANGE, 'puts': PUT}
 # What the code is called with: the length of the known message, its bytes and which of them count;
 # the stamp; which loops failed; then the size and the address of each table.
@@ -68,8 +68,8 @@ class Pipeline:
         stamp of a message that has none, or zero.
     owner
         Whatever the arrays belong to that the tables' addresses lie in.
-    takes, loops, limits : structured arrays
-        What is taken and run, of the types in TABLES.
+    takes, copies, loops, limits : structured arrays
+        What is taken from the message, copied, and run, of the types in TABLES.
 
     Attributes
     ----------
@@ -79,10 +79,10 @@ class Pipeline:
     """
 
     def __init__(self, same: bytes, mask: bytes, stamp: np.ndarray, owner: Any, takes: Any,
-                 loops: Any, limits: Any):
+                 copies: Any, loops: Any, limits: Any):
         self.failed = np.zeros(len(loops), np.int64)
         known = [np.frombuffer(text, np.uint8) for text in (same, mask)]
-        tables = _Tables(TABLES, (takes, loops, limits))
+        tables = _Tables(TABLES, (takes, copies, loops, limits))
         self._table = np.array([
             len(same), *map(address, (*known, stamp, self.failed)), *tables.head])
         run, _, engine = code().result()
@@ -156,8 +156,7 @@ def _module() -> ir.Module:
     write = _Writer(end)
     tables = _read(write, write.place(end.args[0], COUNT), (), ENDING)[1]
     _change(write, tables['changes'])
-    with write.rows(tables['puts'], PUT) as row:
-        write.store(write.load(write.place(row['from'], COUNT)), write.place(row['to'], COUNT))
+    _copy(write, tables['puts'])
     write.builder.ret_void()
 
     run = ir.Function(module, ir.FunctionType(
@@ -169,6 +168,7 @@ def _module() -> ir.Module:
     write.leave(_differs(write, known, text), OTHER)
     write.leave(_stamp(write, known, text), UNSTAMPED)
     _take(write, tables['takes'], text)
+    _copy(write, tables['copies'])
     _run_loops(write, tables['loops'], known['failed'])
     _check_limits(write, tables['limits'], known['failed'])
     failed = _total(write, tables['loops'][0], known['failed'])
@@ -285,6 +285,11 @@ def _take(write: _Writer, takes: Any, text: ir.Value) -> None:
         number = write.load(builder.bitcast(write.step(text, row['offset']), NUMBER.as_pointer()))
         number = builder.fadd(builder.fmul(row['factor'], number), row['plus'])
         write.store(number, write.place(row['to'], NUMBER))
+
+
+def _copy(write: _Writer, puts: Any) -> None:
+    with write.rows(puts, PUT) as row:
+        write.store(write.load(write.place(row['from'], COUNT)), write.place(row['to'], COUNT))
 
 
 def _run_loops(write: _Writer, loops: Any, failed: ir.Value) -> None:

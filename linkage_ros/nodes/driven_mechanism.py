@@ -91,6 +91,12 @@ class DrivenMechanism:
         return model.solution(self._joint_states.has_subscribers or in_scene,
                               self._markers.has_subscribers, bool(self.known[1].all()))
 
+    def conversion(self, i: int) -> Tuple[float, float]:
+        """Return the factor of a source's position, and what is added: the input."""
+        source = self.model.inputs[i]
+        # Of all numbers only -0.0 leaves every other as it is.
+        return source.ratio, -0.0 if source.is_plain else source.offset
+
     def receive(self, i: int, value: float, speed: Optional[float]) -> None:
         """Set an input [rad or m], and its speed [per second] if it is known."""
         self.inputs[:, i] = value, 0.0 if speed is None else speed

@@ -46,13 +46,6 @@ class Route(NamedTuple):
         """Whether the source measures something from which the input follows."""
         return bool(self.mechanism.model.inputs[self.input].measures)
 
-    @property
-    def conversion(self) -> Tuple[float, float]:
-        """The factor of the source's position, and what is added: the input."""
-        source = self.mechanism.model.inputs[self.input]
-        # Of all numbers only -0.0 leaves every other as it is.
-        return source.ratio, -0.0 if source.is_plain else source.offset
-
 
 class Message(NamedTuple):
     """A message of a plan: its publisher, where its values are, and its stamp."""
@@ -121,7 +114,7 @@ class Plan:
                 one.refresh(one.solution(in_scene))
         self._outputs: Dict[tuple, Output] = {}
         self._output: Optional[Output] = None
-        self._version, self._runs = -1, 0
+        self._version, self._runs, self._is_interpreted = -1, 0, True
         self._executor: Any = PythonExecutor(self)
 
     def run(self, text: bytes) -> bool:
@@ -143,10 +136,12 @@ class Plan:
         if self._version != self._planner.version:
             self._version, self._output = self._planner.version, self._find_output()
         self._executor.publish(self._output)
-        self._runs += 1
-        # Looked for ever more rarely: while subscribers come one by one no plan lasts.
-        if llvm_executor and self._runs > 1 and self._runs & (self._runs - 1) == 0:
-            self._executor = llvm_executor(self) or self._executor
+        if self._is_interpreted and llvm_executor:
+            self._runs += 1
+            # Tried ever more rarely: while subscribers come one by one no plan lasts.
+            if self._runs > 1 and self._runs & (self._runs - 1) == 0 and (
+                    executor := llvm_executor(self)):
+                self._executor, self._is_interpreted = executor, False
 
     def _find_output(self) -> Output:
         poses = tuple(one.pose for one in (*(one for one, _ in self.solved), *self._members))

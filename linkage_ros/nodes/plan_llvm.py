@@ -36,14 +36,14 @@ class LlvmExecutor:
         self._plan = plan
         source = plan.source
         self._stamp = np.zeros(2, np.int64)
-        readings = [row for reading in plan.readings for row in _readings(plan, reading)]
+        copies = [row for moved in plan.solved for row in _copies(*moved)]
         loops = [(*solution.batch.code, solution.values.size - solution.layout.efforts)
                  for _, solution in plan.solved]
         limits = [row for i, (mechanism, solution) in enumerate(plan.solved)
                   for row in _limits(i, mechanism, solution)]
         self._pipeline = native.Pipeline(
             *(number.to_bytes(source.size, 'little') for number in (source.same, source.mask)),
-            self._stamp, plan, takes=readings, loops=loops, limits=limits)
+            self._stamp, plan, takes=[*_readings(plan)], copies=copies, loops=loops, limits=limits)
         self._solved = [mechanism for mechanism, _ in plan.solved]
         at = native.address(self._stamp)
         self._stamps = np.array([(at, native.address(one)) for one in (
@@ -97,21 +97,22 @@ class _Ending(native.Ending):
             publisher.publish(stamp.tobytes(), values)
 
 
-def _readings(plan: Any, reading: Any) -> Iterator[tuple]:
-    """Yield what is taken of a message: an input goes to each leg, and into the state."""
-    mechanism, i, place = reading
-    factor, plus = reading.conversion
-    solution = dict(plan.solved).get(mechanism)
-    rows = [(plan.source.positions, 0, i, plus)]
-    if plan.is_moving:
-        rows.append((plan.source.velocities, 1, mechanism.inputs.shape[1] + i, -0.0))
-    for start, row, k, added in rows:
-        to = [native.addresses(mechanism.inputs)[row, i]]
-        if solution and k < solution.layout.inputs + solution.layout.speeds:
-            driven = native.addresses(solution.layout.driven(solution.values))
-            to += [*native.addresses(solution.batch.given)[k], driven[k]]
-        for at in to:
-            yield start + 8 * place, at, factor, added
+def _readings(plan: Any) -> Iterator[tuple]:
+    """Yield what is taken of a message: where it lies, where it goes, factor and what is added."""
+    for mechanism, i, place in plan.readings:
+        state, (factor, plus) = native.addresses(mechanism.inputs), mechanism.conversion(i)
+        yield plan.source.positions + 8 * place, state[0, i], factor, plus
+        if plan.is_moving:
+            yield plan.source.velocities + 8 * place, state[1, i], factor, -0.0
+
+
+def _copies(mechanism: Any, solution: Solution) -> Iterator[tuple]:
+    """Yield from where to where inputs and speeds are copied: to every leg that is solved."""
+    driven = native.addresses(solution.layout.driven(solution.values))
+    state = native.addresses(mechanism.inputs).ravel()
+    for start, given, own in zip(state, native.addresses(solution.batch.given), driven):
+        for end in (*given, own):
+            yield start, end
 
 
 def _limits(loop: int, mechanism: Any, solution: Solution) -> Iterator[tuple]:

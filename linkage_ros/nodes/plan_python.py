@@ -25,7 +25,8 @@ class PythonExecutor:
 
     def __init__(self, plan: Any):
         self._plan, self._solved = plan, frozenset(mechanism for mechanism, _ in plan.solved)
-        self._readings = [(one.mechanism, one.input, one.place, *one.conversion)
+        self._readings = [(one.mechanism, one.input, one.place,
+                           *one.mechanism.conversion(one.input))
                           for one in plan.readings]
 
     def run(self, text: bytes, _: Any) -> Optional[AbstractSet]:

@@ -65,9 +65,11 @@ class SceneNode(Node):
         self.guarded = incidents.guarded
         self._worker = Worker(self, incidents.report)
         self._announcer: Optional[Announcer] = None
+        self._adopted: Optional[scene.Scene] = None
         with self._or_destroyed():
             self._parameters_of_scene = SceneParameters(self, name, self.check, self._changed)
-        self._role, self._later = name, [*()]
+        self._role = name
+        self._later: List[Job] = []
         self._first_spin = self.create_timer(
             0.0, self.guarded('the first spin', self._start_later),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -77,12 +79,17 @@ class SceneNode(Node):
         """What the parameters say."""
         return self._parameters_of_scene.scene
 
+    @property
+    def is_settled(self) -> bool:
+        """Whether the newest scene has been adopted."""
+        return self._adopted is self.scene
+
     def begin(self) -> None:
         """Adopt the first scene, and follow or announce what several nodes act on."""
         with self._or_destroyed():
             self.check(self.scene)
             prepared = self.prepare(self.scene)
-        self.adopt(prepared)
+        self._adopt(self.scene, prepared)
         if self._role == scene.OWNER:
             self._announcer = Announcer(self)
             self.later([self._announcer.first])
@@ -130,10 +137,13 @@ class SceneNode(Node):
         if self._announcer:
             self._announcer.announce(changed)
 
-    def _prepared(self, new: scene.Scene) -> Optional[Callable[[], None]]:
-        """Return what adopts a scene, if it is still the newest."""
-        prepared = self.prepare(new)
-        return partial(self.adopt, prepared)
+    def _prepared(self, new: scene.Scene) -> Callable[[], None]:
+        """Return what adopts a scene."""
+        return partial(self._adopt, new, self.prepare(new))
+
+    def _adopt(self, new: scene.Scene, prepared: Any) -> None:
+        self._adopted = new
+        self.adopt(prepared)
 
     def _start_later(self) -> None:
         self._first_spin.cancel()
