@@ -15,6 +15,7 @@ import resource
 import casadi as ca
 from linkage_ros import mechanisms
 from linkage_ros.formula import program
+from linkage_ros.linkage import quantities
 import numba
 import numpy as np
 
@@ -32,7 +33,7 @@ class Plain(Ours):
 
     def prepare(self, kind, dimensions):
         """Read the joint lines and make the code, nothing of which is kept from before."""
-        mechanisms.structure_of.cache_clear()
+        quantities.structure_of.cache.clear()
         vars(mechanisms.design(kind)).pop('lines', None)
         super().prepare(kind, dimensions)
         self.solve_one = self._mechanism.function(POINTS)

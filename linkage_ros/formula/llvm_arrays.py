@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 import ctypes
-from functools import lru_cache
 import os
 from typing import Callable, Dict, List, Sequence, Tuple
 
@@ -23,6 +22,7 @@ from .elementary import arctangent, sine_and_cosine
 from .expression import argument
 from .llvm_code import address, append, compiled, COUNT, count, function, load, NUMBER, operators
 from .program import Program
+from ..cache import cached
 
 # One register of AVX-512; with AVX2 and SSE2, too, eight are about as fast as any.
 LANES = 8
@@ -71,7 +71,7 @@ def _cores() -> int:
     return len(own(0)) if own else os.cpu_count() or 1
 
 
-@lru_cache(maxsize=1)
+@cached(1)
 def _threads(_: int, cores: int) -> ThreadPoolExecutor:
     """Return the threads of a process; another that is forked from it has none of them."""
     return ThreadPoolExecutor(cores, 'linkage_ros arrays')
@@ -148,7 +148,7 @@ def _by_lane(builder: ir.IRBuilder, name: str) -> Callable[[ir.Value, ir.Value],
 def _approximated(builder: ir.IRBuilder, spell: Dict[str, Callable], approximation: Callable,
                   library: Sequence[Callable]) -> Callable:
     """Return what appends functions of `elementary`, and the library's where they do not hold."""
-    @lru_cache(maxsize=None)
+    @cached()
     def appended(*operands: ir.Value) -> List[ir.Value]:
         operations, outputs = _listed(approximation, len(operands))
         known: Dict[int, ir.Value] = {}
@@ -172,7 +172,7 @@ def _either(builder: ir.IRBuilder, *ways: Tuple[ir.Value, ir.Block]) -> ir.Value
     return value
 
 
-@lru_cache(maxsize=None)
+@cached()
 def _listed(approximation: Callable, arguments: int) -> Tuple[Sequence, Sequence[int]]:
     outputs = approximation(*map(argument, range(arguments)))
     operations, _, numbers = Program(outputs).bind({}, {}).variant.listing.operations()

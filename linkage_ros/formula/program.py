@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from concurrent.futures import Future, wait
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import chain
 import math
 from struct import Struct
@@ -37,6 +37,7 @@ import warnings
 import numpy as np
 
 from .expression import in_order, Real
+from ..cache import Cache
 
 # A block of this many poses stays in the second-level cache; measured in benchmark/.
 BLOCK = 4096
@@ -44,16 +45,6 @@ BLOCK = 4096
 FEW = 32
 # Python's parser bounds how deep parentheses may nest.
 DEEPEST = 16
-# Programs and results that are kept for the next time they are asked for.
-KEPT = 128
-
-
-def keep(found: dict, key: Any, value: Any) -> Any:
-    """Keep a value and return it; what was kept first is dropped where there are too many."""
-    found[key] = value
-    while len(found) > KEPT:
-        found.pop(next(iter(found)), None)
-    return value
 
 
 def beside(make: Callable[[], Any]) -> Future:
@@ -314,13 +305,8 @@ class _Variant:
         self.listing = _Listing(outputs, decided, replaced)
         self.arguments, self.outputs = arguments, len(outputs)
         self.constants = [self.listing.entries[n][0] for n in self.listing.constants]
-        self._placing: Dict[tuple, Callable] = {}
-
-    def placing(self, names: tuple) -> Callable:
-        """Return the code for one pose that returns the outputs in pairs, by name."""
-        if names not in self._placing:
-            self._placing[names] = _python(self.listing, FLOAT, self.arguments, names)
-        return self._placing[names]
+        # The code for one pose that returns the outputs in pairs, by name.
+        self.placing = Cache(partial(_python, self.listing, FLOAT, arguments))
 
     @cached_property
     def float(self) -> Callable:
@@ -369,7 +355,7 @@ class Program:
         self._arguments = arguments
         self._replaced = replaced or {}
         self._conditions = _conditions(self._outputs)
-        self._variants: Dict[tuple, _Variant] = {}
+        self._variants = Cache()
 
     def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False) -> Pose:
         """Return the outputs as functions of the arguments; dimensions are floats or arrays."""
@@ -377,7 +363,8 @@ class Program:
         with np.errstate(all='ignore'):
             decisions = () if swept else tuple(
                 bool(evaluate(c, dimensions, known)) for c in self._conditions)
-            variant = self._variant(decisions)
+            variant = self._variants.get_or_make(
+                decisions, lambda: self._variant(decisions))
             constants = [evaluate(c, dimensions, known) for c in variant.constants]
         if not swept:
             constants = list(map(float, constants))
@@ -385,11 +372,8 @@ class Program:
         return Pose(variant, constants, shape, accelerate)
 
     def _variant(self, decisions: tuple) -> _Variant:
-        if decisions not in self._variants:
-            decided = dict(zip(self._conditions, decisions))
-            keep(self._variants, decisions, _Variant(
-                self._outputs, decided, self._replaced, self._arguments))
-        return self._variants[decisions]
+        decided = dict(zip(self._conditions, decisions))
+        return _Variant(self._outputs, decided, self._replaced, self._arguments)
 
 
 def _conditions(outputs: Iterable[Real]) -> list:
@@ -447,7 +431,7 @@ class Pose:
         def by_arrays(theta: float) -> Dict[str, np.ndarray]:
             return dict(zip(names, np.reshape(self._by_arrays(theta), (-1, 2))))
 
-        return self.variant.placing(names)(*self.constants, by_arrays)
+        return self.variant.placing[names](*self.constants, by_arrays)
 
     def __call__(self, *arguments: Any) -> Any:
         """Return the outputs at floats, as floats, or over arrays that are broadcast together."""

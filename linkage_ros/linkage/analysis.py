@@ -221,7 +221,7 @@ class Analysed(Driven):
                 self._curve('closures', (), others), arc, self.inputs[0].counted(), rounding,
                 np.array([x in folds for x in closures]))]
 
-        return self.remembered('near zeros', others, find)
+        return self.cache.get_or_make(('near zeros', *others), find)
 
     def follow(self, output: str, value: float, near: float) -> Tuple[float, float]:
         """
@@ -243,7 +243,7 @@ class Analysed(Driven):
             between, and d output / d input there; NaN if the output has no such value there.
 
         """
-        branches, pose = self.remembered('follow', (output,), lambda: (
+        branches, pose = self.cache.get_or_make(('follow', output), lambda: (
             self._inverse(output, ()), self._bound('output', output).at))
         first = self.inputs[0]
         turns = first.turns_of(near)
@@ -279,8 +279,8 @@ class Analysed(Driven):
         """Return the branches of an output."""
         if not isinstance(output, str):
             self.check_output(output)
-        return self.remembered('inverse', (output, *others),
-                                lambda: self._branches(output, others))
+        return self.cache.get_or_make(('inverse', output, *others),
+                                      lambda: self._branches(output, others))
 
     def _branches(self, output: str, others: Tuple[float, ...]) -> MonotoneBranches:
         self.check_output(output)

@@ -22,14 +22,17 @@ from .design import Design
 from .input_range import arcs
 from .inputs import Arc
 from .quantities import Points, Spot, Structure
+from ..cache import Cache
 from ..formula.expression import Real
-from ..formula.program import Batch, evaluate, keep, Pose
+from ..formula.program import Batch, evaluate, Pose
 from ..words import listed, quoted
 
 # Lengths beyond these are counted in a power of two of their own, which changes no bit of a
 # result and keeps squares and products of lengths inside the range of float64.
 SMALL, LARGE = 1e-30, 1e30
 MOST_TURNS = 1000
+# Values of expressions of dimensions that are held: some twenty times those of Jansen's leg.
+MOST_VALUES = 10000
 
 # One input, or a sequence of several; each a number or an array [rad or m].
 Inputs = Union[ArrayLike, Sequence[ArrayLike]]
@@ -77,9 +80,9 @@ class Mechanism:
         self._accelerate = accelerate
         self._lengths = _in_own_unit(self.dimensions, design.has_literal_lengths)
         self._evaluated: dict = {}
-        self._poses: dict = {}
-        self._placers: dict = {}
-        self._found: dict = {}
+        self._poses, self._placers = Cache(), Cache()
+        # What was worked out of it: reach, inverses, travels.
+        self.cache = Cache()
         self.inputs = tuple(input_._replace(low=self._metres(input_.low),
                                             high=self._metres(input_.high))
                             if not input_.turns else input_ for input_ in built.inputs)
@@ -158,7 +161,7 @@ class Mechanism:
         """
         if not find_spec('llvmlite'):
             raise ImportError('accelerated() needs llvmlite: pip install llvmlite')
-        return self.remembered('accelerated', (), lambda: type(self)(
+        return self.cache.get_or_make('accelerated', lambda: type(self)(
             self._design, self._structure, self.dimensions, self.branches, True))
 
     def solve(self, theta: Inputs, points: Optional[Sequence[str]] = None) -> dict:
@@ -196,7 +199,7 @@ class Mechanism:
         names, pose = self._ready('points', wanted)
         if pose.shape:
             return lambda theta: self._vectors('points', theta, wanted)
-        return keep(self._placers, wanted, pose.placer(names))
+        return self._placers.get_or_make(wanted, lambda: pose.placer(names))
 
     def velocity(self, theta: Inputs, points: Optional[Sequence[str]] = None, by: int = 0) -> dict:
         """
@@ -284,7 +287,8 @@ class Mechanism:
             If not every other input is given, or a dimension is an array.
 
         """
-        return list(self.remembered('reach', others, lambda: self._arcs(others)))
+        return list(self.cache.get_or_make(
+            ('reach', *others), lambda: self._arcs(others)))
 
     def _arcs(self, others: Tuple[float, ...]) -> List[Arc]:
         _, margins = self._ready('margins', ())
@@ -299,11 +303,6 @@ class Mechanism:
             lambda value: margins.searched(value * first.size, *others), first.counted(),
             self._structure.built.limits, self._value,
             lambda theta: self._ready('points', None)[1].searched(theta, *others))]
-
-    def remembered(self, what: str, about: tuple, find: Callable) -> Any:
-        """Return what was found before, or find it."""
-        key = what, *about
-        return self._found[key] if key in self._found else keep(self._found, key, find())
 
     def function(self, points: Optional[Sequence[str]] = None, joints: Sequence[str] = (),
                  rates: Sequence[str] = ()) -> Callable:
@@ -357,7 +356,7 @@ class Mechanism:
             [rad/s or m/s], and the numbers of its `Leg`.
 
         """
-        pose = self.remembered('legs', (points, joints, moving), lambda: self._legs(
+        pose = self.cache.get_or_make(('legs', points, joints, moving), lambda: self._legs(
             points, joints, moving))
         return pose.batch(rows)
 
@@ -394,13 +393,17 @@ class Mechanism:
     def _ready(self, kind: str, wanted: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
         """Return the names that are wanted and the function that computes them."""
         key = kind, _hashable(wanted), *by
-        if key not in self._poses:
-            names = self._names(kind, key[1])
-            keep(self._poses, key, (names, self._bound(kind, names, *by)))
-        return self._poses[key]
+        return self._poses.get(key) or self._poses.get_or_make(key, lambda: self._pose(*key))
+
+    def _pose(self, kind: str, wanted: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
+        names = self._names(kind, wanted)
+        return names, self._bound(kind, names, *by)
 
     def _bound(self, kind: str, names: Any, *by: int) -> Pose:
         program = self._structure.program(kind, names, *by)
+        if len(self._evaluated) > MOST_VALUES:
+            # Another dictionary: a thread may be reading this one.
+            self._evaluated = {}
         return program.bind(self._lengths, self._evaluated, self._accelerate)
 
     def _names(self, kind: str, wanted: Any) -> Tuple[str, ...]:

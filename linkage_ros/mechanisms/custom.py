@@ -10,16 +10,16 @@ from typing import Any, Iterable, List, Optional, Tuple
 
 import numpy as np
 
+from ..cache import cached
 from ..linkage import joint_lines
 from ..linkage.design import Design
 from ..linkage.mechanism import check_bars, Mechanism
-from ..linkage.shared import Shared
 from ..words import listed, quoted
 
 MOST_LINES = 2000
 
 
-@partial(Shared, latest=64)
+@cached(64, shared=True)
 def design(joints: Tuple[str, ...], tracer: Optional[str], names: Tuple[str, ...]) -> Design:
     """
     Return the design that lines of joints make.
