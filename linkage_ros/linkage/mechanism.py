@@ -21,7 +21,7 @@ from .builder import in_metres, UNIT
 from .design import Design
 from .input_range import arcs
 from .inputs import Arc
-from .quantities import Points, Spot, Structure
+from .quantities import Points, Spot, structure_of
 from ..cache import Cache
 from ..formula.expression import Real
 from ..formula.program import Batch, evaluate, Pose
@@ -62,13 +62,15 @@ def _hashable(names: Any) -> Any:
 class Mechanism:
     """A linkage whose dimensions are set: its poses, velocities, joint angles and reach."""
 
-    def __init__(self, design: Design, structure: Structure, dimensions: Mapping,
-                 branches: Mapping[str, int], accelerate: bool = False):
+    def __init__(self, design: Design, dimensions: Mapping, branches: Mapping[str, int],
+                 accelerate: bool = False):
         self.type = design.name
         self.dimensions = dict(dimensions)
         self.branches = dict(branches)
         self.tracer = design.tracer
-        built = structure.built
+        # Equal linkages share it, those that were pickled too.
+        self._structure = structure_of(design, tuple(self.branches.items()))
+        built = self._structure.built
         self.points = tuple(built.points)
         self.grounded = built.grounded
         self.joints = tuple(built.joint_values)
@@ -76,7 +78,6 @@ class Mechanism:
         self.cylinders = tuple(built.cylinders)
         self.yokes = dict(built.yokes)
         self._design = design
-        self._structure = structure
         self._accelerate = accelerate
         self._lengths = _in_own_unit(self.dimensions, design.has_literal_lengths)
         self._evaluated: dict = {}
@@ -89,6 +90,9 @@ class Mechanism:
         self.geared = tuple(built.driven.keys() - {input_.name for input_ in self.inputs})
         self.links = tuple(link._replace(zero=np.asarray(self._value(link.zero)).tolist())
                            for link in built.links)
+
+    def __reduce__(self) -> tuple:
+        return type(self), (self._design, self.dimensions, self.branches, self._accelerate)
 
     def __repr__(self) -> str:
         lengths = ', '.join(f'{k}={v}' for k, v in self.dimensions.items())
@@ -134,15 +138,18 @@ class Mechanism:
 
     def with_dimensions(self, /, **changed: ArrayLike) -> Mechanism:
         """Return the same mechanism with other dimensions [m]; raises ValueError like create."""
-        made = type(self)(self._design, self._structure,
-                          checked_dimensions(self._design, {**self.dimensions, **changed}),
-                          self.branches, self._accelerate)
+        made = type(self)(
+            self._design, checked_dimensions(self._design, {**self.dimensions, **changed}),
+            self.branches, self._accelerate)
         made.check()
         return made
 
     def check(self) -> None:
         """Raise ValueError, with the line, if its dimensions cannot be."""
-        (self._design.check or check_bars)(self)
+        if check := self._design.check:
+            check(self._design.lines, self)
+        else:
+            check_bars(self)
 
     def accelerated(self) -> Mechanism:
         """
@@ -162,7 +169,7 @@ class Mechanism:
         if not find_spec('llvmlite'):
             raise ImportError('accelerated() needs llvmlite: pip install llvmlite')
         return self.cache.get_or_make('accelerated', lambda: type(self)(
-            self._design, self._structure, self.dimensions, self.branches, True))
+            self._design, self.dimensions, self.branches, True))
 
     def solve(self, theta: Inputs, points: Optional[Sequence[str]] = None) -> dict:
         """

@@ -24,7 +24,6 @@ from numpy.typing import ArrayLike
 from . import custom
 from ..linkage.arguments import checked_branches, checked_dimensions
 from ..linkage.design import Design
-from ..linkage.quantities import structure_of
 from ..linkage.servo import Mechanism
 from ..words import quoted
 
@@ -119,8 +118,7 @@ def create(type_: str, /, *, branches: Optional[Mapping[str, int]] = None,
     chosen = design(type_, joints, tracer, dimensions)
     lengths = checked_dimensions(chosen, dimensions)
     signs = checked_branches(chosen, branches)
-    structure = structure_of(chosen, tuple(signs.items()))
     kind = getattr(TYPES.get(type_), 'Mechanism', Mechanism)
-    made = kind(chosen, structure, lengths, signs)
+    made = kind(chosen, lengths, signs)
     made.check()
     return made

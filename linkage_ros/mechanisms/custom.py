@@ -4,7 +4,6 @@
 """Linkages that users write down themselves; see `linkage.joint_lines` for the words."""
 
 from collections.abc import Mapping, Set
-from functools import partial
 from itertools import islice
 from typing import Any, Iterable, List, Optional, Tuple
 
@@ -44,8 +43,7 @@ def design(joints: Tuple[str, ...], tracer: Optional[str], names: Tuple[str, ...
     if tracer is not None and tracer not in placed:
         raise ValueError(f'tracer {quoted(tracer)} is no joint; allowed: {listed(placed)}')
     signed = frozenset(name for name, length in used.items() if not length)
-    return Design('custom', dict.fromkeys(used, 1.0), joints, tracer or placed[-1], signed,
-                  partial(check, lines))
+    return Design('custom', dict.fromkeys(used, 1.0), joints, tracer or placed[-1], signed, check)
 
 
 def check(lines: List[joint_lines.Line], linkage: Mechanism) -> None:
