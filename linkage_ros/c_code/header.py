@@ -19,6 +19,7 @@ import numpy as np
 from ..formula.program import Dialect, OPERATORS, Pose
 from ..linkage.inputs import Input
 from ..scene import Machine
+from ..words import plain_text
 
 # The largest change of an output [rad] or part of its range in one piece of its inverse.
 PIECE = 1.0
@@ -91,7 +92,7 @@ def written(machine: Machine, outputs: Sequence[str] = (), single: bool = False)
         If an output does not exist, or there are several inputs to invert.
 
     """
-    return _Header(machine, single).text(outputs)
+    return _Header(machine, single).text([plain_text(output) for output in outputs])
 
 
 class _Header:

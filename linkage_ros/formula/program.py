@@ -15,7 +15,8 @@ from __future__ import annotations
 from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from functools import cached_property, partial
-from itertools import chain
+from itertools import chain, count
+import linecache
 import math
 from struct import Struct
 from threading import Thread
@@ -33,6 +34,7 @@ from typing import (
     Tuple,
 )
 import warnings
+from weakref import finalize
 
 import numpy as np
 
@@ -45,6 +47,7 @@ BLOCK = 4096
 FEW = 32
 # Python's parser bounds how deep parentheses may nest.
 DEEPEST = 16
+_NUMBERS = count()
 
 
 def beside(make: Callable[[], Any]) -> Future:
@@ -275,7 +278,8 @@ def _python(listing: _Listing, dialect: Dialect, arguments: int,
     lines, outputs, kept = listing.statements(dialect)
     body = (list(_with_releases(lines, kept)) if dialect.frees
             else [f'{name} = {code}' for name, code, _ in lines])
-    rows = ', '.join(f'{name!r}: pairs[{i}]' for i, name in enumerate(names))
+    # Text of any class, an enum's or numpy's, is written as plain text is.
+    rows = ', '.join(f'{str.__repr__(name)}: pairs[{i}]' for i, name in enumerate(names))
     # Packing floats as bytes takes a quarter of the time numpy needs to convert them.
     ending = [
         f'pairs = empty(({len(names)}, 2))',
@@ -293,7 +297,11 @@ def _python(listing: _Listing, dialect: Dialect, arguments: int,
         '    return pose'])
     scope: Dict[str, Any] = {
         **dialect.names, 'empty': np.empty, 'pack': Struct(f'{len(outputs)}d').pack_into}
-    exec(compile(source, '<linkage>', 'exec'), scope)
+    file = f'<linkage_ros formula {next(_NUMBERS)}>'
+    exec(compile(source, file, 'exec'), scope)
+    # For tracebacks and debuggers, as long as the code lives.
+    linecache.cache[file] = len(source), None, source.splitlines(True), file
+    finalize(scope['bind'], linecache.cache.pop, file, None).atexit = False
     return scope['bind']
 
 

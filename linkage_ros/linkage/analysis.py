@@ -24,7 +24,7 @@ from .inverse import distinct, in_order, MonotoneBranches, nearest
 from .mechanism import Inputs
 from .planar import GRAZE
 from ..formula.program import Pose
-from ..words import listed, quoted
+from ..words import listed, plain_text, quoted
 
 # Dead points nearer to an end of the reach than this [rad] are that end.
 ONE = 1e-9
@@ -295,7 +295,7 @@ class Analysed(Driven):
         """Raise ValueError if there is no such output, or it stands still."""
         self.check_there(output)
         if not self._structure.moves(output):
-            raise ValueError(f'{output} of {self.type} does not move with the '
+            raise ValueError(f'{plain_text(output)} of {self.type} does not move with the '
                              f'{self.inputs[0].name}')
 
     def check_there(self, output: str) -> None:

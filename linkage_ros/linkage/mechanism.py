@@ -25,7 +25,7 @@ from .quantities import Points, Spot, structure_of
 from ..cache import Cache
 from ..formula.expression import Real
 from ..formula.program import Batch, evaluate, Pose
-from ..words import listed, quoted
+from ..words import listed, plain_text, quoted
 
 # Lengths beyond these are counted in a power of two of their own, which changes no bit of a
 # result and keeps squares and products of lengths inside the range of float64.
@@ -57,6 +57,11 @@ def _hashable(names: Any) -> Any:
     except TypeError:
         raise ValueError('points and joints must be a name or a list of names, '
                          f'got {quoted(names)}') from None
+
+
+def _plain(names: Any) -> Any:
+    """Return names that are hashable as plain text, as they are to be held for others."""
+    return tuple(map(plain_text, names)) if isinstance(names, tuple) else plain_text(names)
 
 
 class Mechanism:
@@ -206,7 +211,7 @@ class Mechanism:
         names, pose = self._ready('points', wanted)
         if pose.shape:
             return lambda theta: self._vectors('points', theta, wanted)
-        return self._placers.get_or_make(wanted, lambda: pose.placer(names))
+        return self._placers.get_or_make(_plain(wanted), lambda: pose.placer(names))
 
     def velocity(self, theta: Inputs, points: Optional[Sequence[str]] = None, by: int = 0) -> dict:
         """
@@ -334,7 +339,7 @@ class Mechanism:
     def posed(self, points: Optional[Sequence[str]] = None, joints: Sequence[str] = (),
               rates: Sequence[str] = ()) -> Pose:
         """Return the code behind `function`."""
-        wanted = tuple(self._names(kind, _hashable(names))
+        wanted = tuple(self._names(kind, _plain(_hashable(names)))
                        for kind, names in (('points', points), ('angles', joints),
                                            ('rates', rates)))
         return self._bound('parts', wanted)
@@ -400,11 +405,12 @@ class Mechanism:
     def _ready(self, kind: str, wanted: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
         """Return the names that are wanted and the function that computes them."""
         key = kind, _hashable(wanted), *by
-        return self._poses.get(key) or self._poses.get_or_make(key, lambda: self._pose(*key))
+        return self._poses.get(key) or self._pose(kind, _plain(key[1]), *by)
 
     def _pose(self, kind: str, wanted: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
         names = self._names(kind, wanted)
-        return names, self._bound(kind, names, *by)
+        return self._poses.get_or_make(
+            (kind, wanted, *by), lambda: (names, self._bound(kind, names, *by)))
 
     def _bound(self, kind: str, names: Any, *by: int) -> Pose:
         program = self._structure.program(kind, names, *by)

@@ -118,7 +118,7 @@ def create(type_: str, /, *, branches: Optional[Mapping[str, int]] = None,
     chosen = design(type_, joints, tracer, dimensions)
     lengths = checked_dimensions(chosen, dimensions)
     signs = checked_branches(chosen, branches)
-    kind = getattr(TYPES.get(type_), 'Mechanism', Mechanism)
+    kind = getattr(TYPES.get(chosen.name), 'Mechanism', Mechanism)
     made = kind(chosen, lengths, signs)
     made.check()
     return made

@@ -13,7 +13,7 @@ from ..cache import cached
 from ..linkage import joint_lines
 from ..linkage.design import Design
 from ..linkage.mechanism import check_bars, Mechanism
-from ..words import listed, quoted
+from ..words import listed, plain_text, quoted
 
 MOST_LINES = 2000
 
@@ -68,13 +68,13 @@ def given(joints: Optional[Iterable[str]], tracer: Optional[str],
         raise ValueError(f'tracer must be the name of a joint, got {quoted(tracer)}')
     lines = given_lines(joints)
     try:
-        names = tuple(dimensions)
+        names = tuple(map(plain_text, dimensions))
     except TypeError:
         raise ValueError('dimensions must be a list of names, '
                          f'got {quoted(dimensions)}') from None
     for name in names:
         joint_lines.check_name(name)
-    return design(lines, tracer, names)
+    return design(lines, plain_text(tracer), names)
 
 
 def given_lines(joints: Any) -> Tuple[str, ...]:
@@ -92,4 +92,4 @@ def given_lines(joints: Any) -> Tuple[str, ...]:
     for number, line in enumerate(lines, 1):
         if not isinstance(line, str):
             raise ValueError(f'joints must be lines of text, but line {number} is {quoted(line)}')
-    return tuple(map(str, lines))
+    return tuple(map(plain_text, lines))
