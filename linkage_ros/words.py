@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Values of others, short enough to be repeated in a message."""
+"""Texts of others: plain, and short enough to be repeated in a message."""
 
 import reprlib
 from typing import Any, Iterable
@@ -13,6 +13,11 @@ _short = reprlib.Repr()
 _short.maxstring = _short.maxother = _short.maxlong = LONGEST
 _short.maxlevel = 3
 _short.maxlist = _short.maxtuple = _short.maxdict = LONGEST // 3
+
+
+def plain_text(value: Any) -> Any:
+    """Return a text of any class (numpy's, an enum's) as plain text, all else as it is."""
+    return str.__str__(value) if isinstance(value, str) else value
 
 
 def elided(text: str, most: int = LONGEST) -> str:

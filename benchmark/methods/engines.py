@@ -15,6 +15,7 @@ import resource
 import casadi as ca
 from linkage_ros import mechanisms
 from linkage_ros.formula import program
+from linkage_ros.linkage import quantities
 import numba
 import numpy as np
 
@@ -32,7 +33,7 @@ class Plain(Ours):
 
     def prepare(self, kind, dimensions):
         """Read the joint lines and make the code, nothing of which is kept from before."""
-        mechanisms.structure_of.cache_clear()
+        quantities.structure_of.cache.clear()
         vars(mechanisms.design(kind)).pop('lines', None)
         super().prepare(kind, dimensions)
         self.solve_one = self._mechanism.function(POINTS)
@@ -145,8 +146,8 @@ class Numba(OnOurs):
 
     def make(self, listing, constants):
         """Compile the text of the Python code."""
-        lines, outputs, _ = listing.statements(program.FLOAT)
-        body = [f'{name} = {code}' for name, code, _ in lines]
+        lines, outputs = listing.statements(program.FLOATS)
+        body = [f'{name} = {code}' for name, code in lines]
         source = '\n'.join([
             'def pose(x0):', *(f'    {line}' for line in body),
             f'    return ({", ".join(outputs)})',
@@ -154,7 +155,7 @@ class Numba(OnOurs):
             *(f'        {line}' for line in body),
             *(f'        rows[n, {k}] = {code}' for k, code in enumerate(outputs))])
         # With the constants as globals they are part of the machine code.
-        scope = {**program.FLOAT.names, 'grazed': numba.njit(program.grazed),
+        scope = {**program.FLOATS.names,
                  **{f'k{number}': value for number, value in zip(listing.constants, constants)}}
         exec(compile(source, '<linkage>', 'exec'), scope)
         # Without numba's check of every division, which raises.

@@ -41,9 +41,9 @@ static inline int lever_solve(float crank, lever_pose *p)
     const float k26 = 0.04f;
     const float k31 = 0.025f;
     const float k43 = 0.081f;
-    const float k55 = 0.000625f;
-    const float k58 = 0.0036f;
-    const float k66 = 0.0f;
+    const float k62 = 0.000625f;
+    const float k65 = 0.0036f;
+    const float k73 = 0.0f;
     const float x0 = crank;
     const float v14 = (0.5f * x0);
     const float v15 = sinf(v14);
@@ -64,7 +64,7 @@ static inline int lever_solve(float crank, lever_pose *p)
     p->L_y = (k7 + (v45 * k43));
     p->angle_crank = x0;
     p->angle_lever = atan2f((-v38), v45);
-    p->slide_slide = lever_root((k55 + (k58 * v32)), k66);
+    p->slide_slide = lever_root((k62 + (k65 * v32)), k73);
     return isfinite(p->O_x)
         && isfinite(p->O_y)
         && isfinite(p->Q_x)
@@ -89,8 +89,8 @@ static inline void lever_rates(float crank, lever_pose *by_crank)
     const float k29 = 0.0036f;
     const float k34 = 0.04f;
     const float k50 = 0.081f;
-    const float k67 = 0.000625f;
-    const float k74 = 0.0f;
+    const float k74 = 0.000625f;
+    const float k81 = 0.0f;
     const float x0 = crank;
     const float v5 = (0.5f * x0);
     const float v6 = sinf(v5);
@@ -111,7 +111,7 @@ static inline void lever_rates(float crank, lever_pose *by_crank)
     by_crank->L_y = ((v33 * (v39 / v43)) * k50);
     by_crank->angle_crank = lever_gated(1.0f, fabsf(x0), 0.0f);
     by_crank->angle_lever = v33;
-    by_crank->slide_slide = (-(((((v6 * 0.5f) * v14) * 2.0f) * k29) / (2.0f * lever_root((k67 + v30), k74))));
+    by_crank->slide_slide = (-(((((v6 * 0.5f) * v14) * 2.0f) * k29) / (2.0f * lever_root((k74 + v30), k81))));
 }
 
 /* Whether it can be assembled: [-3.14159, 3.14159] rad. */

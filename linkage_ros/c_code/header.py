@@ -16,9 +16,11 @@ from typing import Callable, List, Sequence
 
 import numpy as np
 
-from ..formula.program import Dialect, OPERATORS, Pose
+from ..formula.operations import OPERATIONS
+from ..formula.program import Dialect, Pose
 from ..linkage.inputs import Input
 from ..scene import Machine
+from ..words import plain_text
 
 # The largest change of an output [rad] or part of its range in one piece of its inverse.
 PIECE = 1.0
@@ -91,7 +93,7 @@ def written(machine: Machine, outputs: Sequence[str] = (), single: bool = False)
         If an output does not exist, or there are several inputs to invert.
 
     """
-    return _Header(machine, single).text(outputs)
+    return _Header(machine, single).text([plain_text(output) for output in outputs])
 
 
 class _Header:
@@ -305,11 +307,8 @@ def _dialect(single: bool, name: str) -> Dialect:
         text = _shortest(value) if single else repr(value)
         return f'({text}{f})' if value < 0.0 else text + f
 
-    return Dialect(
-        {**OPERATORS, **{key: f'{key}{f}({{}})' for key in ('sin', 'cos', 'sqrt')},
-         'atan2': f'atan2{f}({{}}, {{}})', 'absolute': f'fabs{f}({{}})',
-         'where': '({} ? {} : {})', 'root': f'{name}_root({{}}, {{}})',
-         'gated': f'{name}_gated({{}}, {{}}, {{}})'}, frozenset(), {}, number=literal)
+    return Dialect({operation: row.c.replace('{f}', f).replace('{name}', name)
+                    for operation, row in OPERATIONS.items()}, {}, literal)
 
 
 def _shortest(value: float) -> str:

@@ -13,8 +13,10 @@ operations is kept exactly as written, because the accuracy of a stable form liv
 from __future__ import annotations
 
 from functools import reduce
-from math import cos, sin
-from typing import Any, Callable, Iterable, Iterator, Mapping, NamedTuple, Optional, Tuple, Union
+import operator
+from typing import Callable, Iterable, Iterator, List, NamedTuple, Optional, Tuple, Union
+
+from .operations import OPERATIONS, STEPS
 
 
 class Real:
@@ -22,25 +24,22 @@ class Real:
     One operation on real numbers, or a leaf: a constant, a dimension or an argument.
 
     `varies` tells whether the value depends on an argument, such as a crank angle; what does not
-    is computed once for each change of dimensions. `positive` marks what is known to be above
+    is computed once for each change of dimensions. `operands` are the expressions that the
+    operation is done on: a leaf has none. `positive` marks what is known to be above
     zero. `rate` is the rate where geometry knows it in fewer operations than differentiating the
     expression takes.
     """
 
-    __slots__ = ('op', 'args', 'varies', 'positive', 'rate')
+    __slots__ = ('op', 'args', 'operands', 'varies', 'positive', 'rate')
 
     def __init__(self, op: str, args: tuple, varies: Optional[bool] = None,
                  positive: bool = False, rate: Optional[Rate] = None):
         self.op = op
         self.args = args
-        self.varies = any(a.varies for a in args) if varies is None else varies
+        self.operands = () if op in _LEAVES else args
+        self.varies = True in [a.varies for a in args] if varies is None else varies
         self.positive = positive
         self.rate = rate
-
-    @property
-    def operands(self) -> tuple:
-        """The expressions that the operation is done on."""
-        return () if self.op in _LEAVES else self.args
 
     @property
     def value(self) -> Optional[float]:
@@ -55,7 +54,7 @@ class Real:
             return self
         if other.op == 'negative':
             return self - other.args[0]
-        return _node('add', self, other, positive=self.positive and other.positive)
+        return operation('add', self, other)
 
     def __sub__(self, other: Number) -> Real:
         other = real(other)
@@ -67,7 +66,7 @@ class Real:
             return -other
         if other.op == 'negative':
             return self + other.args[0]
-        return _node('subtract', self, other)
+        return operation('subtract', self, other)
 
     def __mul__(self, other: Number) -> Real:
         other = real(other)
@@ -81,7 +80,7 @@ class Real:
         for one, rest in ((self, other), (other, self)):
             if one.op == 'negative':
                 return -(one.args[0] * rest)
-        return _node('multiply', self, other, positive=self.positive and other.positive)
+        return operation('multiply', self, other)
 
     def __truediv__(self, other: Number) -> Real:
         other = real(other)
@@ -91,25 +90,25 @@ class Real:
             return real(1.0)
         if self.op == 'negative':
             return -(self.args[0] / other)
-        return _node('divide', self, other, positive=self.positive and other.positive)
+        return operation('divide', self, other)
 
     def __neg__(self) -> Real:
         if self.op == 'negative':
             return self.args[0]
-        return _node('negative', self)
+        return operation('negative', self)
 
     def __abs__(self) -> Real:
         if self.positive:
             return self
         if self.op == 'negative':
             return abs(self.args[0])
-        return _node('absolute', self)
+        return operation('absolute', self)
 
     def __lt__(self, other: Number) -> Real:
-        return _node('less', self, real(other))
+        return operation('less', self, real(other))
 
     def __le__(self, other: Number) -> Real:
-        return _node('less_equal', self, real(other))
+        return operation('less_equal', self, real(other))
 
     def __gt__(self, other: Number) -> Real:
         return real(other) < self
@@ -134,22 +133,14 @@ Number = Union[Real, float, int]
 
 _LEAVES = frozenset({'constant', 'dimension', 'argument'})
 
-_FOLDED: Mapping[str, Callable] = {
-    'add': lambda x, y: x + y,
-    'subtract': lambda x, y: x - y,
-    'multiply': lambda x, y: x * y,
-    'negative': lambda x: -x,
-    'absolute': abs,
-    'sin': sin,
-    'cos': cos,
-}
 
-
-def _node(op: str, *args: Real, positive: bool = False) -> Real:
-    """Join an operation to its operands; arithmetic on constants is done at once."""
-    if op in _FOLDED and all(a.op == 'constant' for a in args):
-        return real(_FOLDED[op](*(a.value for a in args)))
-    return Real(op, args, positive=positive)
+def operation(name: str, *operands: Real) -> Real:
+    """Return an operation of `operations` on some operands; what can be is done at once."""
+    row = OPERATIONS[name]
+    if row.folded and (found := row.folded(*operands)) is not None:
+        return real(found)
+    return Real(name, operands, positive=bool(row.positive) and False not in [
+        operands[i].positive for i in row.positive])
 
 
 def real(value: Number) -> Real:
@@ -171,12 +162,12 @@ def argument(index: int) -> Real:
 
 def sine(x: Real) -> Real:
     """Return sin x."""
-    return _node('sin', x)
+    return operation('sin', x)
 
 
 def cosine(x: Real) -> Real:
     """Return cos x."""
-    return _node('cos', x)
+    return operation('cos', x)
 
 
 def square(x: Real) -> Real:
@@ -189,7 +180,7 @@ def square_root(x: Number) -> Real:
     x = real(x)
     if x.op == 'multiply' and x.args[0] is x.args[1]:
         return abs(x.args[0])
-    return _node('sqrt', x, positive=x.positive)
+    return operation('sqrt', x)
 
 
 def root(x: Real, tolerance: Real) -> Real:
@@ -198,30 +189,45 @@ def root(x: Real, tolerance: Real) -> Real:
 
     Zero within the tolerance (a limit that is hit up to rounding counts as reached), NaN below.
     """
-    return _node('root', x, real(tolerance))
+    return operation('root', x, real(tolerance))
 
 
 def gated(x: Real, margin: Real, tolerance: Number) -> Real:
     """Return x where the margin is not below zero by more than the tolerance, else NaN."""
-    return _node('gated', x, margin, real(tolerance))
+    return operation('gated', x, margin, real(tolerance))
 
 
 def arctangent(y: Real, x: Real) -> Real:
     """Return the angle of (x, y) in rad, in (-pi, pi]."""
-    return _node('atan2', y, x)
+    return operation('atan2', y, x)
 
 
 def nearest_integer(x: Real) -> Real:
     """Return x rounded to an integer, halves to the even one."""
-    return _node('rint', x)
+    return operation('rint', x)
 
 
 def exact_sum(*terms: Number) -> Real:
-    """Return the exactly rounded sum of dimensions and sums of them, however much cancels."""
-    kept = [t for term in terms for t in _summands(real(term)) if t.value != 0.0]
-    if len(kept) < 3:
-        return reduce(lambda x, y: x + y, kept, real(0.0))
-    return _node('fsum', *kept)
+    """
+    Return a sum that has lost no digit, however much cancels.
+
+    Terms that are sums themselves are taken apart. Source: Ogita, Rump and Oishi, "Accurate sum
+    and dot product", SIAM J. Sci. Comput. 26 (2005), algorithm SumK.
+    """
+    parts = [t for term in terms for t in _summands(real(term)) if t.value != 0.0]
+    for _ in parts[2:]:
+        parts = _distilled(parts)
+    return reduce(operator.add, parts, real(0.0))
+
+
+def _distilled(terms: List[Real]) -> List[Real]:
+    """Return what each addition of a sum has lost to rounding, and the sum at last."""
+    total, *rest = terms
+    lost = []
+    for term in rest:
+        lost.append(operation('lost', total, term))
+        total += term
+    return [*lost, total]
 
 
 def _summands(x: Real) -> list:
@@ -241,11 +247,7 @@ def _summands(x: Real) -> list:
 
 def where(condition: Real, chosen: Number, otherwise: Number) -> Real:
     """Return chosen where the condition holds, else otherwise."""
-    chosen, otherwise = real(chosen), real(otherwise)
-    if chosen is otherwise or (chosen.value is not None and chosen.value == otherwise.value):
-        return chosen
-    return _node('where', condition, chosen, otherwise,
-                 positive=chosen.positive and otherwise.positive)
+    return operation('where', condition, real(chosen), real(otherwise))
 
 
 class Complex:
@@ -319,20 +321,16 @@ def dot(p: Complex, q: Complex) -> Real:
     return p.x * q.x + p.y * q.y
 
 
-def in_order(outputs: Iterable[Real], needed: Callable) -> Iterator[Real]:
-    """Yield expressions and all that they need, a sequence for each, every one after its own."""
-    done, waiting = set(), list(reversed(list(outputs)))
+def unknown(node: Real, needed: Callable, known: dict) -> Iterator[Real]:
+    """Yield an expression after all that it needs; each is known when the next is asked for."""
+    waiting = [node]
     while waiting:
-        node = waiting[-1]
-        if node in done:
+        if waiting[-1] in known:
             waiting.pop()
-            continue
-        missing = [x for x in needed(node) if x not in done]
-        if missing:
+        elif missing := [x for x in needed(waiting[-1]) if x not in known]:
             waiting += reversed(missing)
         else:
-            done.add(waiting.pop())
-            yield node
+            yield waiting.pop()
 
 
 def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
@@ -350,19 +348,19 @@ def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
 
     """
     def needed(x: Real) -> Iterable[Real]:
-        if x in known or not x.varies or x.op in _STEPS:
+        if not x.varies or x.op in STEPS:
             return ()
         return x.rate.of if x.rate else x.operands
 
-    for x in in_order([node], needed):
-        if x in known:
-            continue
-        if not x.varies or x.op in _STEPS:
+    for x in unknown(node, needed, known):
+        if not x.varies or x.op in STEPS:
             known[x] = real(0.0)
+        elif x.op == 'argument':
+            known[x] = real(rates.get(x.args[0], 0.0))
         elif x.rate:
             known[x] = x.rate.formula(*map(known.get, x.rate.of))
         else:
-            known[x] = _RULES[x.op](x, rates, *map(known.get, x.operands))
+            known[x] = OPERATIONS[x.op].rate(operation, x, *map(known.get, x.operands))
     return known[node]
 
 
@@ -396,30 +394,3 @@ def spin(vector: Complex) -> Rate:
     """Return the angular velocity of a vector."""
     return vector.spin or Rate((vector.x, vector.y), lambda dx, dy: cross(
         vector, Complex(dx, dy)) / vector.squared())
-
-
-def _sqrt_rule(node: Real, _: Any, dx: Real, *__: Any) -> Real:
-    return dx / (2.0 * node)
-
-
-def _product_rule(node: Real, _: Any, dx: Real, dy: Real) -> Real:
-    x, y = node.args
-    return 2.0 * (dx * x) if x is y else dx * y + x * dy
-
-
-_RULES: Mapping[str, Callable] = {
-    'argument': lambda n, rates: real(rates.get(n.args[0], 0.0)),
-    'sin': lambda n, _, dx: cosine(n.args[0]) * dx,
-    'cos': lambda n, _, dx: -(sine(n.args[0]) * dx),
-    'add': lambda n, _, dx, dy: dx + dy,
-    'subtract': lambda n, _, dx, dy: dx - dy,
-    'multiply': _product_rule,
-    'divide': lambda n, _, dx, dy: (dx - n * dy) / n.args[1],
-    'negative': lambda n, _, dx: -dx,
-    'absolute': lambda n, _, dx: where(n.args[0] < 0.0, -dx, dx),
-    'sqrt': _sqrt_rule,
-    'root': _sqrt_rule,
-    'where': lambda n, _, dc, dx, dy: where(n.args[0], dx, dy),
-    'gated': lambda n, _, dx, *__: gated(dx, *n.args[1:]),
-}
-_STEPS = frozenset({'less', 'less_equal'})

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 import ctypes
-from functools import lru_cache
+from functools import partial
 import os
 from typing import Callable, Dict, List, Sequence, Tuple
 
@@ -21,8 +21,9 @@ import numpy as np
 
 from .elementary import arctangent, sine_and_cosine
 from .expression import argument
-from .llvm_code import address, append, compiled, COUNT, count, function, load, NUMBER, operators
+from .llvm_code import address, append, Builder, compiled, COUNT, count, load, NUMBER
 from .program import Program
+from ..cache import cached
 
 # One register of AVX-512; with AVX2 and SSE2, too, eight are about as fast as any.
 LANES = 8
@@ -71,7 +72,7 @@ def _cores() -> int:
     return len(own(0)) if own else os.cpu_count() or 1
 
 
-@lru_cache(maxsize=1)
+@cached(1)
 def _threads(_: int, cores: int) -> ThreadPoolExecutor:
     """Return the threads of a process; another that is forked from it has none of them."""
     return ThreadPoolExecutor(cores, 'linkage_ros arrays')
@@ -86,7 +87,7 @@ def _module(operations: Sequence, constants: Sequence[int],
     first, last, size, arguments, given, out = poses.args
     start, body, end = (poses.append_basic_block(name) for name in ('start', 'body', 'end'))
 
-    builder = ir.IRBuilder(start)
+    builder = Builder(start)
     known = {number: _in_all_lanes(builder, load(builder, given, count(i)))
              for i, number in enumerate(constants)}
     builder.branch(body)
@@ -115,40 +116,35 @@ def _module(operations: Sequence, constants: Sequence[int],
     return module
 
 
-def _in_all_lanes(builder: ir.IRBuilder, number: ir.Value) -> ir.Value:
+def _in_all_lanes(builder: Builder, number: ir.Value) -> ir.Value:
     none = ir.Constant(VECTOR, ir.Undefined)
     return builder.shuffle_vector(
         builder.insert_element(none, number, count(0)), none,
         ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
 
 
-def _operators(builder: ir.IRBuilder) -> Dict[str, Callable]:
+def _operators(builder: Builder) -> Dict[str, Callable]:
     """Return what each operation on eight poses appends to the code."""
-    spell = operators(builder, VECTOR)
+    spell = builder.operations()
     turned = _approximated(builder, spell, sine_and_cosine, (spell['sin'], spell['cos']))
-    angle = _approximated(builder, spell, arctangent, (_by_lane(builder, 'atan2'),))
+    angle = _approximated(builder, spell, arctangent, (partial(_by_lane, builder, 'atan2'),))
     return {**spell, 'sin': lambda x: turned(x)[0], 'cos': lambda x: turned(x)[1],
             'atan2': lambda y, x: angle(y, x)[0]}
 
 
-def _by_lane(builder: ir.IRBuilder, name: str) -> Callable[[ir.Value, ir.Value], ir.Value]:
-    """Return what calls a function of two numbers for each lane."""
-    one = function(builder, name, NUMBER, 2)
-
-    def all_(x: ir.Value, y: ir.Value) -> ir.Value:
-        result = ir.Constant(VECTOR, ir.Undefined)
-        for lane in map(count, range(LANES)):
-            value = one(builder.extract_element(x, lane), builder.extract_element(y, lane))
-            result = builder.insert_element(result, value, lane)
-        return result
-
-    return all_
+def _by_lane(builder: Builder, name: str, *operands: ir.Value) -> ir.Value:
+    """Append a call of a function of numbers for each lane."""
+    result = ir.Constant(VECTOR, ir.Undefined)
+    for lane in map(count, range(LANES)):
+        value = builder.called(name, *(builder.extract_element(x, lane) for x in operands))
+        result = builder.insert_element(result, value, lane)
+    return result
 
 
-def _approximated(builder: ir.IRBuilder, spell: Dict[str, Callable], approximation: Callable,
+def _approximated(builder: Builder, spell: Dict[str, Callable], approximation: Callable,
                   library: Sequence[Callable]) -> Callable:
     """Return what appends functions of `elementary`, and the library's where they do not hold."""
-    @lru_cache(maxsize=None)
+    @cached()
     def appended(*operands: ir.Value) -> List[ir.Value]:
         operations, outputs = _listed(approximation, len(operands))
         known: Dict[int, ir.Value] = {}
@@ -165,14 +161,14 @@ def _approximated(builder: ir.IRBuilder, spell: Dict[str, Callable], approximati
     return appended
 
 
-def _either(builder: ir.IRBuilder, *ways: Tuple[ir.Value, ir.Block]) -> ir.Value:
+def _either(builder: Builder, *ways: Tuple[ir.Value, ir.Block]) -> ir.Value:
     value = builder.phi(VECTOR)
     for way in ways:
         value.add_incoming(*way)
     return value
 
 
-@lru_cache(maxsize=None)
+@cached()
 def _listed(approximation: Callable, arguments: int) -> Tuple[Sequence, Sequence[int]]:
     outputs = approximation(*map(argument, range(arguments)))
     operations, _, numbers = Program(outputs).bind({}, {}).variant.listing.operations()

@@ -11,11 +11,14 @@ the results are the same to the last bit.
 from __future__ import annotations
 
 import ctypes
-from typing import Callable, Sequence
+from functools import partial
+from typing import Callable, Dict, Sequence
 
 import llvmlite
 from llvmlite import binding as llvm, ir
 import numpy as np
+
+from .operations import OPERATIONS
 
 if not hasattr(llvm, 'create_pass_builder'):
     raise ImportError(f'llvmlite 0.44 or newer is needed, this is {llvmlite.__version__}')
@@ -41,6 +44,23 @@ def compiled(module: ir.Module) -> llvm.ExecutionEngine:
     engine = llvm.create_mcjit_compiler(code, target)
     engine.finalize_object()
     return engine
+
+
+class Builder(ir.IRBuilder):
+    """Appends operations on numbers, or on vectors of them, to the code of a function."""
+
+    def operations(self) -> Dict[str, Callable]:
+        """Return what appends each operation, by name."""
+        return {name: partial(row.llvm, self) for name, row in OPERATIONS.items()}
+
+    def called(self, name: str, *operands: ir.Value) -> ir.Value:
+        """Append a call of a function of LLVM or the C library, all numbers of one kind."""
+        kind = operands[0].type
+        if name.startswith('llvm.'):
+            name += '.f64' if kind == NUMBER else f'.v{kind.count}f64'
+        function = self.module.globals.get(name) or ir.Function(
+            self.module, ir.FunctionType(kind, len(operands) * [kind]), name)
+        return self.call(function, operands)
 
 
 class Loop:
@@ -91,14 +111,13 @@ def _module(operations: Sequence, constants: Sequence[int],
         array.add_attribute('noalias')
     start, body, end = (loop.append_basic_block(name) for name in ('start', 'body', 'end'))
 
-    builder = ir.IRBuilder(start)
+    builder = Builder(start)
     known = {number: load(builder, given, count(i)) for i, number in enumerate(constants)}
     builder.cbranch(builder.icmp_signed('>', poses, count(0)), body, end)
 
     builder.position_at_end(body)
     pose = builder.phi(COUNT)
-    spell = {**operators(builder, NUMBER), 'atan2': function(builder, 'atan2', NUMBER, 2)}
-    append(operations, known, spell, NUMBER, lambda index: load(
+    append(operations, known, builder.operations(), NUMBER, lambda index: load(
         builder, arguments, builder.add(builder.mul(count(index), poses), pose)))
     for column, number in enumerate(outputs):
         place = builder.add(builder.mul(pose, by_pose), builder.mul(count(column), by_output))
@@ -131,39 +150,3 @@ def count(value: int) -> ir.Constant:
 
 def load(builder: ir.IRBuilder, array: ir.Value, place: ir.Value) -> ir.Value:
     return builder.load(builder.gep(array, [place]))
-
-
-def function(builder: ir.IRBuilder, name: str, kind: ir.Type, arity: int) -> Callable:
-    """Return what appends a call of a function of so many numbers of one kind."""
-    called = builder.module.globals.get(name) or ir.Function(
-        builder.module, ir.FunctionType(kind, [kind] * arity), name)
-    return lambda *operands: builder.call(called, operands)
-
-
-def operators(builder: ir.IRBuilder, kind: ir.Type) -> dict[str, Callable]:
-    """Return what each operation on a kind of number, or on vectors, appends to the code."""
-    def intrinsic(name: str) -> Callable:
-        return function(
-            builder, f'llvm.{name}.{"f64" if kind == NUMBER else f"v{kind.count}f64"}', kind, 1)
-
-    def compare(sign: str) -> Callable:
-        return lambda x, y: builder.fcmp_ordered(sign, x, y)
-
-    def reaches(margin: ir.Value, tolerance: ir.Value) -> ir.Value:
-        return compare('>=')(margin, builder.fneg(tolerance))
-
-    def root(x: ir.Value, tolerance: ir.Value) -> ir.Value:
-        grazed = builder.select(reaches(x, tolerance), zero, nan)
-        return builder.select(compare('>')(x, zero), sqrt(x), grazed)
-
-    def gated(x: ir.Value, margin: ir.Value, tolerance: ir.Value) -> ir.Value:
-        return builder.select(reaches(margin, tolerance), x, nan)
-
-    zero, nan, sqrt = kind(0.0), kind(float('nan')), intrinsic('sqrt')
-    return {
-        'add': builder.fadd, 'subtract': builder.fsub, 'multiply': builder.fmul,
-        'divide': builder.fdiv, 'negative': builder.fneg, 'absolute': intrinsic('fabs'),
-        'less': compare('<'), 'less_equal': compare('<='), 'where': builder.select,
-        'sin': intrinsic('sin'), 'cos': intrinsic('cos'), 'sqrt': sqrt,
-        'rint': intrinsic('rint'), 'root': root, 'gated': gated,
-    }

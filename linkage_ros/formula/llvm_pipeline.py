@@ -22,7 +22,7 @@ from llvmlite import ir
 import numpy as np
 
 from .llvm_code import address, compiled, COUNT, count, NUMBER
-from .program import beside
+from .program import compile_in_background
 
 BYTE = ir.IntType(8)
 TYPES = {'i': COUNT, 'f': NUMBER}
@@ -137,7 +137,7 @@ def addresses(array: np.ndarray) -> np.ndarray:
 @lru_cache(maxsize=None)
 def code() -> Future:
     """Return the machine code, which is compiled once, in the background."""
-    return beside(_compiled)
+    return compile_in_background(_compiled)
 
 
 def _compiled() -> Tuple[Callable[[int, bytes, int, int], int], Callable[[int], None], Any]:

@@ -14,29 +14,23 @@ from __future__ import annotations
 
 from concurrent.futures import Future, wait
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import chain
+from functools import cached_property, partial
+from itertools import chain, count
+import linecache
 import math
+from operator import attrgetter
+import re
 from struct import Struct
 from threading import Thread
-from typing import (
-    Any,
-    Callable,
-    Dict,
-    Iterable,
-    Iterator,
-    List,
-    Mapping,
-    Optional,
-    Sequence,
-    Set,
-    Tuple,
-)
+from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple
 import warnings
+from weakref import finalize
 
 import numpy as np
 
-from .expression import in_order, Real
+from .expression import Real, unknown
+from .operations import COMMUTING, OPERATIONS
+from ..cache import Cache
 
 # A block of this many poses stays in the second-level cache; measured in benchmark/.
 BLOCK = 4096
@@ -44,20 +38,11 @@ BLOCK = 4096
 FEW = 32
 # Python's parser bounds how deep parentheses may nest.
 DEEPEST = 16
-# Programs and results that are kept for the next time they are asked for.
-KEPT = 128
+_NUMBERS, _NAMED, _OPERANDS = count(), re.compile(r'\bv\d+'), attrgetter('operands')
 
 
-def keep(found: dict, key: Any, value: Any) -> Any:
-    """Keep a value and return it; what was kept first is dropped where there are too many."""
-    found[key] = value
-    while len(found) > KEPT:
-        found.pop(next(iter(found)), None)
-    return value
-
-
-def beside(make: Callable[[], Any]) -> Future:
-    """Let something be made in a thread of its own; return where it will be."""
+def compile_in_background(make: Callable[[], Any]) -> Future:
+    """Return what will be made, in a thread of its own."""
     made: Future = Future()
 
     def run() -> None:
@@ -70,94 +55,29 @@ def beside(make: Callable[[], Any]) -> Future:
     return made
 
 
-def grazed(x: float, tolerance: float) -> float:
-    """Return the root of a radicand that is not above zero."""
-    return 0.0 if x >= -tolerance else math.nan
-
-
-def _root(x: Any, tolerance: Any) -> Any:
-    if _all_at_least(x, 0.0):
-        return np.sqrt(x)
-    return np.sqrt(_gated(np.maximum(x, 0.0), x, tolerance))
-
-
-def _gated(x: Any, margin: Any, tolerance: Any) -> Any:
-    """Return x where the margin is not below zero by more than the tolerance, else NaN."""
-    if _all_at_least(margin, -tolerance):
-        return x
-    return np.where(margin >= -tolerance, x, np.nan)
-
-
-def _all_at_least(x: Any, bound: Any) -> np.bool_:
-    """Return whether nothing is below a bound, or no number; for one bound in one quick pass."""
-    if isinstance(bound, float) and np.size(x):
-        return np.minimum.reduce(x, axis=None) >= bound
-    return np.all(x >= bound)
-
-
-@np.vectorize
-def _fsum(*terms: float) -> float:
-    try:
-        return math.fsum(terms)
-    except OverflowError:
-        return math.nan
-
-
-OPERATORS = {
-    'add': '({} + {})', 'subtract': '({} - {})', 'multiply': '({} * {})', 'divide': '({} / {})',
-    'negative': '(-{})', 'less': '({} < {})', 'less_equal': '({} <= {})',
-    'sin': 'sin({})', 'cos': 'cos({})', 'sqrt': 'sqrt({})', 'atan2': 'atan2({}, {})',
-    'absolute': 'abs({})',
-}
-
-
 @dataclass(frozen=True)
 class Dialect:
-    """How operations are spelt, which of them repeat their first operand, and their names."""
+    """How operations and numbers are spelt, and what their code refers to by name."""
 
     templates: Mapping[str, str]
-    repeating: frozenset
     names: Mapping[str, Any]
-    frees: bool = False
     number: Callable[[float], str] = repr
 
 
-FLOAT = Dialect(
-    {**OPERATORS, 'where': '({1} if {0} else {2})',
-     'rint': 'round({})',
-     'root': '(sqrt({0}) if {0} > 0.0 else grazed({0}, {1}))',
-     'gated': '({0} if {1} >= -{2} else nan)'},
-    frozenset({'root'}),
-    {'sin': math.sin, 'cos': math.cos, 'sqrt': math.sqrt, 'atan2': math.atan2,
-     'grazed': grazed, 'nan': math.nan, 'inf': math.inf})
-
-_ARRAY = Dialect(
-    {**OPERATORS, 'where': 'where({}, {}, {})', 'root': 'root({}, {})',
-     'gated': 'gated({}, {}, {})', 'rint': 'rint({})'},
-    frozenset(),
-    {'sin': np.sin, 'cos': np.cos, 'sqrt': np.sqrt, 'atan2': np.arctan2, 'where': np.where,
-     'root': _root, 'gated': _gated, 'rint': np.rint, 'nan': np.nan,
-     'inf': np.inf}, frees=True)
-
-_EVALUATED: Mapping[str, Callable] = {
-    'add': np.add, 'subtract': np.subtract, 'multiply': np.multiply, 'divide': np.divide,
-    'negative': np.negative, 'absolute': np.absolute, 'less': np.less,
-    'less_equal': np.less_equal, 'sin': np.sin, 'cos': np.cos, 'sqrt': np.sqrt,
-    'atan2': np.arctan2, 'where': np.where, 'root': _root, 'gated': _gated, 'fsum': _fsum,
-}
+FLOATS = Dialect({name: row.python for name, row in OPERATIONS.items()}, {
+    name: value for name, value in vars(math).items() if not name.startswith('_')})
+ARRAYS = Dialect({name: row.array for name, row in OPERATIONS.items()}, {
+    **{name: row.numpy for name, row in OPERATIONS.items()}, 'nan': np.nan, 'inf': np.inf})
 
 
 def evaluate(node: Real, dimensions: Mapping, known: dict) -> Any:
     """Return the value of an expression of dimensions alone; known is shared between calls."""
-    for x in in_order([node], lambda x: () if x in known else x.operands):
-        if x in known:
-            continue
-        if x.op == 'constant':
-            known[x] = np.float64(x.value)
-        elif x.op == 'dimension':
-            known[x] = np.asarray(dimensions[x.args[0]], float)[()]
+    for x in unknown(node, _OPERANDS, known):
+        if x.operands:
+            known[x] = OPERATIONS[x.op].numpy(*map(known.get, x.operands))[()]
         else:
-            known[x] = _EVALUATED[x.op](*map(known.get, x.operands))[()]
+            value, = x.args
+            known[x] = np.asarray(dimensions[value] if x.op == 'dimension' else value, float)[()]
     return known[node]
 
 
@@ -173,18 +93,17 @@ class _Listing:
         for leaf, expression in replaced.items():
             self._known[leaf] = self._number(expression)
         self.outputs = [self._number(node) for node in outputs]
-        self.constants = self._boundary()
         self._uses = self._count_uses()
+        # The values of dimensions alone that the varying operations start from.
+        self.constants = [n for n in self._uses if not self.entries[n][0].varies
+                          and self.entries[n][0].op != 'constant']
 
     def _number(self, node: Real) -> int:
-        for x in in_order([node], self._needed):
-            if x not in self._known:
-                self._known[x] = self._enter(x)
+        for x in unknown(node, self._needed, self._known):
+            self._known[x] = self._enter(x)
         return self._known[node]
 
     def _needed(self, node: Real) -> tuple:
-        if node in self._known:
-            return ()
         if node.op == 'where' and node.args[0] in self._decided:
             return (node.args[1 if self._decided[node.args[0]] else 2],)
         return node.operands
@@ -194,83 +113,66 @@ class _Listing:
         if len(needed) == 1 and node.op in ('where', 'rated'):
             return self._known[needed[0]]
         args = tuple(self._known[a] for a in needed) or node.args
-        key = (node.op, tuple(sorted(args)) if node.op in ('add', 'multiply') else args)
+        key = (node.op, tuple(sorted(args)) if node.op in COMMUTING else args)
         if key not in self._numbers:
             self._numbers[key] = len(self.entries)
             self.entries.append((node, args))
         return self._numbers[key]
 
-    def _operands(self, number: int) -> tuple:
-        node, args = self.entries[number]
-        return args if node.varies and node.op != 'argument' else ()
-
-    def _live(self) -> list:
-        live, waiting = set(), list(self.outputs)
+    def _count_uses(self) -> Dict[int, int]:
+        """Return how often each value is needed, in the order in which they can be worked out."""
+        uses: Dict[int, int] = {}
+        waiting = list(self.outputs)
         while waiting:
             number = waiting.pop()
-            if number not in live:
-                live.add(number)
-                waiting.extend(self._operands(number))
-        return sorted(live)
-
-    def _boundary(self) -> list:
-        """Return the values of dimensions alone that the varying operations start from."""
-        return [n for n in self._live()
-                if not self.entries[n][0].varies and self.entries[n][0].op != 'constant']
-
-    def _count_uses(self) -> dict:
-        uses = dict.fromkeys(self._live(), 0)
-        for number in list(uses):
-            for operand in self._operands(number):
-                uses[operand] += 1
-        for number in self.outputs:
-            uses[number] += 1
-        return uses
+            uses[number] = uses.get(number, 0) + 1
+            node, args = self.entries[number]
+            if uses[number] == 1 and node.varies and node.op != 'argument':
+                waiting.extend(args)
+        return dict(sorted(uses.items()))
 
     def operations(self) -> tuple:
         """Return the operations as (number, name, operands), the constants and the outputs."""
         needed = [(number, *self.entries[number])
                   for number in self._uses if number not in self.constants]
-        return [(number, node.op, (float(node.value),) if node.op == 'constant' else args)
+        return [(number, node.op, node.args if node.op == 'constant' else args)
                 for number, node, args in needed], self.constants, self.outputs
 
-    def statements(self, dialect: Dialect) -> tuple:
-        """Return the assignments as (name, code, names used) and the code of each output."""
-        text, depth, lines = {}, {}, []
-        reads: Dict[int, Set[str]] = {}
-        repeated = {args[0] for node, args in map(self.entries.__getitem__, self._uses)
-                    if node.op in dialect.repeating}
+    def statements(self, dialect: Dialect) -> Tuple[List[Tuple[str, str]], List[str]]:
+        """Return the assignments as (name, code) and the code of each output."""
+        # What a template has more than once is worked out before.
+        repeating = {name: [i for i in range(2) if code.count(f'{{{i}}}') > 1]
+                     for name, code in dialect.templates.items()}
+        repeated = {args[i] for node, args in map(self.entries.__getitem__, self._uses)
+                    for i in repeating.get(node.op, ())}
+        text: Dict[int, str] = {}
+        depth = dict.fromkeys(self._uses, 0)
+        lines = []
         for number, uses in self._uses.items():
             node, args = self.entries[number]
             if number in self.constants:
-                text[number], depth[number], reads[number] = f'k{number}', 0, set()
+                text[number] = f'k{number}'
             elif node.op == 'constant':
-                text[number], depth[number], reads[number] = (
-                    dialect.number(node.value), 0, set())
+                text[number] = dialect.number(*node.args)
             elif node.op == 'argument':
-                text[number], depth[number], reads[number] = f'x{args[0]}', 0, set()
+                text[number] = f'x{args[0]}'
             else:
                 text[number] = dialect.templates[node.op].format(*(text[a] for a in args))
                 depth[number] = 1 + max(depth[a] for a in args)
-                reads[number] = set().union(*(reads[a] for a in args))
                 if uses > 1 or number in repeated or depth[number] > DEEPEST:
-                    name = f'v{number}'
-                    lines.append((name, text[number], reads[number]))
-                    text[number], depth[number], reads[number] = name, 0, {name}
-        kept = set().union(*(reads[n] for n in self.outputs))
-        return lines, [text[n] for n in self.outputs], kept
+                    lines.append((f'v{number}', text[number]))
+                    text[number], depth[number] = f'v{number}', 0
+        return lines, [text[n] for n in self.outputs]
 
 
-def _with_releases(lines: Sequence[Tuple[str, str, Set[str]]], kept: Set[str]) -> Iterator[str]:
+def _with_releases(lines: Sequence[Tuple[str, str]], outputs: Sequence[str]) -> List[str]:
     """Drop each array after its last use, so that the next one takes over its warm memory."""
-    last = {}
-    for index, (_, _, reads) in enumerate(lines):
-        last.update(dict.fromkeys(reads, index))
-    for index, (name, code, reads) in enumerate(lines):
-        yield f'{name} = {code}'
-        done = sorted(n for n in reads if last[n] == index and n not in kept)
-        if done:
-            yield 'del ' + ', '.join(done)
+    reads = [set(_NAMED.findall(code)) for _, code in lines]
+    last = {name: index for index, names in enumerate(reads) for name in names}
+    kept = set(_NAMED.findall(' '.join(outputs)))
+    done = [sorted(n for n in names - kept if last[n] == i) for i, names in enumerate(reads)]
+    return [text for (name, code), rest in zip(lines, done)
+            for text in (f'{name} = {code}', *([f'del {", ".join(rest)}'] if rest else []))]
 
 
 def _python(listing: _Listing, dialect: Dialect, arguments: int,
@@ -281,16 +183,16 @@ def _python(listing: _Listing, dialect: Dialect, arguments: int,
     That returns the outputs as a tuple or, where there are names, in pairs: an array (2,) each.
     What Python's floats raise for is left to `instead`.
     """
-    lines, outputs, kept = listing.statements(dialect)
-    body = (list(_with_releases(lines, kept)) if dialect.frees
-            else [f'{name} = {code}' for name, code, _ in lines])
-    rows = ', '.join(f'{name!r}: pairs[{i}]' for i, name in enumerate(names))
-    # Packing floats as bytes takes a quarter of the time numpy needs to convert them.
-    ending = [
-        f'pairs = empty(({len(names)}, 2))',
-        f'pack(pairs, 0, {", ".join(outputs)})',
-        f'return {{{rows}}}',
-    ] if names else [f'return ({"".join(code + ", " for code in outputs)})']
+    lines, outputs = listing.statements(dialect)
+    ending = [f'return ({"".join(code + ", " for code in outputs)})']
+    if names:
+        # Names of any class, an enum's or numpy's, are written as plain text is.
+        rows = ', '.join(f'{str.__repr__(name)}: pairs[{i}]' for i, name in enumerate(names))
+        # Packing floats as bytes takes a quarter of the time numpy needs to convert them.
+        ending = [f'pairs = empty(({len(names)}, 2))', f'pack(pairs, 0, {", ".join(outputs)})',
+                  f'return {{{rows}}}']
+    body = (_with_releases(lines, outputs) if dialect is ARRAYS
+            else [f'{name} = {code}' for name, code in lines])
     given = ', '.join(f'x{i}' for i in range(arguments))
     source = '\n'.join([
         f'def bind({"".join(f"k{n}, " for n in listing.constants)}instead=None):',
@@ -302,7 +204,11 @@ def _python(listing: _Listing, dialect: Dialect, arguments: int,
         '    return pose'])
     scope: Dict[str, Any] = {
         **dialect.names, 'empty': np.empty, 'pack': Struct(f'{len(outputs)}d').pack_into}
-    exec(compile(source, '<linkage>', 'exec'), scope)
+    file = f'<linkage_ros formula {next(_NUMBERS)}>'
+    exec(compile(source, file, 'exec'), scope)
+    # For tracebacks and debuggers, as long as the code lives.
+    linecache.cache[file] = len(source), None, source.splitlines(True), file
+    finalize(scope['bind'], linecache.cache.pop, file, None).atexit = False
     return scope['bind']
 
 
@@ -314,21 +220,16 @@ class _Variant:
         self.listing = _Listing(outputs, decided, replaced)
         self.arguments, self.outputs = arguments, len(outputs)
         self.constants = [self.listing.entries[n][0] for n in self.listing.constants]
-        self._placing: Dict[tuple, Callable] = {}
-
-    def placing(self, names: tuple) -> Callable:
-        """Return the code for one pose that returns the outputs in pairs, by name."""
-        if names not in self._placing:
-            self._placing[names] = _python(self.listing, FLOAT, self.arguments, names)
-        return self._placing[names]
+        # The code for one pose that returns the outputs in pairs, by name.
+        self.placing = Cache(partial(_python, self.listing, FLOATS, arguments))
 
     @cached_property
     def float(self) -> Callable:
-        return _python(self.listing, FLOAT, self.arguments)
+        return _python(self.listing, FLOATS, self.arguments)
 
     @cached_property
     def array(self) -> Callable:
-        return _python(self.listing, _ARRAY, self.arguments)
+        return _python(self.listing, ARRAYS, self.arguments)
 
     @cached_property
     def loop(self) -> Future:
@@ -338,7 +239,7 @@ class _Variant:
 
             return Loop(*self.listing.operations())
 
-        return beside(make)
+        return compile_in_background(make)
 
     @cached_property
     def arrays(self) -> Any:
@@ -369,7 +270,7 @@ class Program:
         self._arguments = arguments
         self._replaced = replaced or {}
         self._conditions = _conditions(self._outputs)
-        self._variants: Dict[tuple, _Variant] = {}
+        self._variants = Cache()
 
     def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False) -> Pose:
         """Return the outputs as functions of the arguments; dimensions are floats or arrays."""
@@ -377,7 +278,8 @@ class Program:
         with np.errstate(all='ignore'):
             decisions = () if swept else tuple(
                 bool(evaluate(c, dimensions, known)) for c in self._conditions)
-            variant = self._variant(decisions)
+            variant = self._variants.get_or_make(
+                decisions, lambda: self._variant(decisions))
             constants = [evaluate(c, dimensions, known) for c in variant.constants]
         if not swept:
             constants = list(map(float, constants))
@@ -385,11 +287,8 @@ class Program:
         return Pose(variant, constants, shape, accelerate)
 
     def _variant(self, decisions: tuple) -> _Variant:
-        if decisions not in self._variants:
-            decided = dict(zip(self._conditions, decisions))
-            keep(self._variants, decisions, _Variant(
-                self._outputs, decided, self._replaced, self._arguments))
-        return self._variants[decisions]
+        decided = dict(zip(self._conditions, decisions))
+        return _Variant(self._outputs, decided, self._replaced, self._arguments)
 
 
 def _conditions(outputs: Iterable[Real]) -> list:
@@ -438,16 +337,15 @@ class Pose:
                                                     List[str]]:
         """Return constants by name, assignments (name, code) and the code of each output."""
         listing = self.variant.listing
-        lines, outputs, _ = listing.statements(dialect)
-        return (dict(zip((f'k{n}' for n in listing.constants), self.constants)),
-                [(name, code) for name, code, _ in lines], outputs)
+        constants = dict(zip((f'k{n}' for n in listing.constants), self.constants))
+        return constants, *listing.statements(dialect)
 
     def placer(self, names: tuple) -> Callable:
         """Return the function from one argument, a float, to an array (2,) for each name."""
         def by_arrays(theta: float) -> Dict[str, np.ndarray]:
             return dict(zip(names, np.reshape(self._by_arrays(theta), (-1, 2))))
 
-        return self.variant.placing(names)(*self.constants, by_arrays)
+        return self.variant.placing[names](*self.constants, by_arrays)
 
     def __call__(self, *arguments: Any) -> Any:
         """Return the outputs at floats, as floats, or over arrays that are broadcast together."""

@@ -24,7 +24,7 @@ from .inverse import distinct, in_order, MonotoneBranches, nearest
 from .mechanism import Inputs
 from .planar import GRAZE
 from ..formula.program import Pose
-from ..words import listed, quoted
+from ..words import listed, plain_text, quoted
 
 # Dead points nearer to an end of the reach than this [rad] are that end.
 ONE = 1e-9
@@ -221,7 +221,7 @@ class Analysed(Driven):
                 self._curve('closures', (), others), arc, self.inputs[0].counted(), rounding,
                 np.array([x in folds for x in closures]))]
 
-        return self.remembered('near zeros', others, find)
+        return self.cache.get_or_make(('near zeros', *others), find)
 
     def follow(self, output: str, value: float, near: float) -> Tuple[float, float]:
         """
@@ -243,7 +243,7 @@ class Analysed(Driven):
             between, and d output / d input there; NaN if the output has no such value there.
 
         """
-        branches, pose = self.remembered('follow', (output,), lambda: (
+        branches, pose = self.cache.get_or_make(('follow', output), lambda: (
             self._inverse(output, ()), self._bound('output', output).at))
         first = self.inputs[0]
         turns = first.turns_of(near)
@@ -279,8 +279,8 @@ class Analysed(Driven):
         """Return the branches of an output."""
         if not isinstance(output, str):
             self.check_output(output)
-        return self.remembered('inverse', (output, *others),
-                                lambda: self._branches(output, others))
+        return self.cache.get_or_make(('inverse', output, *others),
+                                      lambda: self._branches(output, others))
 
     def _branches(self, output: str, others: Tuple[float, ...]) -> MonotoneBranches:
         self.check_output(output)
@@ -295,7 +295,7 @@ class Analysed(Driven):
         """Raise ValueError if there is no such output, or it stands still."""
         self.check_there(output)
         if not self._structure.moves(output):
-            raise ValueError(f'{output} of {self.type} does not move with the '
+            raise ValueError(f'{plain_text(output)} of {self.type} does not move with the '
                              f'{self.inputs[0].name}')
 
     def check_there(self, output: str) -> None:

@@ -5,14 +5,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Callable, FrozenSet, List, Mapping, Optional, Tuple
 
 from . import joint_lines
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Design:
     """
     What a type of mechanism is.
@@ -30,13 +30,13 @@ class Design:
     signed : frozenset
         Dimensions that may be zero or negative.
     check : callable, optional
-        From a mechanism of this type; raises ValueError for dimensions that cannot be. Default:
-        every bar must have a length.
+        From the lines and a mechanism of this type; raises ValueError for dimensions that cannot
+        be. Default: every bar must have a length.
 
     """
 
     name: str
-    dimensions: Mapping[str, float]
+    dimensions: Mapping[str, float] = field(hash=False)
     joints: Tuple[str, ...]
     tracer: str
     signed: FrozenSet[str] = frozenset()

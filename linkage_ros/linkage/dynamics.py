@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from .arguments import numbers
 from .mechanism import Inputs, Mechanism
-from ..words import listed, quoted
+from ..words import listed, plain_text, quoted
 
 
 class Driven(Mechanism):
@@ -98,6 +98,7 @@ class Driven(Mechanism):
                 by: int) -> Iterator[np.ndarray]:
         """Yield what each load gives for each unit that an input moves."""
         for name, load in loads.items():
+            name = plain_text(name)
             force = numbers(f'the load on {name}', load)
             if name in self.points:
                 if force.shape[-1:] != (2,):

@@ -44,7 +44,6 @@ after two turns: its crank angle counts beyond a turn.
 
 from __future__ import annotations
 
-from functools import lru_cache
 import re
 from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple, Union
 
@@ -53,6 +52,7 @@ import numpy as np
 from .arithmetic import Formula, IN_RANGE, in_range, WORDS
 from .builder import Builder, ConstructionError, Gear
 from .planar import LEFT, RIGHT
+from ..cache import cached
 from ..formula.expression import dimension, Real
 from ..words import elided, listed, quoted
 
@@ -94,7 +94,7 @@ _LONGEST, _SAID = 10000, 220
 # An angle [rad] beyond this was meant in degrees, unless it is written with `deg` or `pi`.
 _TURN = 6.2832
 
-formula = lru_cache(maxsize=1024)(Formula)
+formula = cached(1024)(Formula)
 
 
 class Argument(NamedTuple):

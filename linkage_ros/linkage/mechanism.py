@@ -21,15 +21,18 @@ from .builder import in_metres, UNIT
 from .design import Design
 from .input_range import arcs
 from .inputs import Arc
-from .quantities import Points, Spot, Structure
+from .quantities import Points, Spot, structure_of
+from ..cache import Cache
 from ..formula.expression import Real
-from ..formula.program import Batch, evaluate, keep, Pose
-from ..words import listed, quoted
+from ..formula.program import Batch, evaluate, Pose
+from ..words import listed, plain_text, quoted
 
 # Lengths beyond these are counted in a power of two of their own, which changes no bit of a
 # result and keeps squares and products of lengths inside the range of float64.
 SMALL, LARGE = 1e-30, 1e30
 MOST_TURNS = 1000
+# Values of expressions of dimensions that are held: some twenty times those of Jansen's leg.
+MOST_VALUES = 10000
 
 # One input, or a sequence of several; each a number or an array [rad or m].
 Inputs = Union[ArrayLike, Sequence[ArrayLike]]
@@ -56,16 +59,23 @@ def _hashable(names: Any) -> Any:
                          f'got {quoted(names)}') from None
 
 
+def _plain(names: Any) -> Any:
+    """Return names that are hashable as plain text, as they are to be held for others."""
+    return tuple(map(plain_text, names)) if isinstance(names, tuple) else plain_text(names)
+
+
 class Mechanism:
     """A linkage whose dimensions are set: its poses, velocities, joint angles and reach."""
 
-    def __init__(self, design: Design, structure: Structure, dimensions: Mapping,
-                 branches: Mapping[str, int], accelerate: bool = False):
+    def __init__(self, design: Design, dimensions: Mapping, branches: Mapping[str, int],
+                 accelerate: bool = False):
         self.type = design.name
         self.dimensions = dict(dimensions)
         self.branches = dict(branches)
         self.tracer = design.tracer
-        built = structure.built
+        # Equal linkages share it, those that were pickled too.
+        self._structure = structure_of(design, tuple(self.branches.items()))
+        built = self._structure.built
         self.points = tuple(built.points)
         self.grounded = built.grounded
         self.joints = tuple(built.joint_values)
@@ -73,19 +83,21 @@ class Mechanism:
         self.cylinders = tuple(built.cylinders)
         self.yokes = dict(built.yokes)
         self._design = design
-        self._structure = structure
         self._accelerate = accelerate
         self._lengths = _in_own_unit(self.dimensions, design.has_literal_lengths)
         self._evaluated: dict = {}
-        self._poses: dict = {}
-        self._placers: dict = {}
-        self._found: dict = {}
+        self._poses, self._placers = Cache(), Cache()
+        # What was worked out of it: reach, inverses, travels.
+        self.cache = Cache()
         self.inputs = tuple(input_._replace(low=self._metres(input_.low),
                                             high=self._metres(input_.high))
                             if not input_.turns else input_ for input_ in built.inputs)
         self.geared = tuple(built.driven.keys() - {input_.name for input_ in self.inputs})
         self.links = tuple(link._replace(zero=np.asarray(self._value(link.zero)).tolist())
                            for link in built.links)
+
+    def __reduce__(self) -> tuple:
+        return type(self), (self._design, self.dimensions, self.branches, self._accelerate)
 
     def __repr__(self) -> str:
         lengths = ', '.join(f'{k}={v}' for k, v in self.dimensions.items())
@@ -131,15 +143,18 @@ class Mechanism:
 
     def with_dimensions(self, /, **changed: ArrayLike) -> Mechanism:
         """Return the same mechanism with other dimensions [m]; raises ValueError like create."""
-        made = type(self)(self._design, self._structure,
-                          checked_dimensions(self._design, {**self.dimensions, **changed}),
-                          self.branches, self._accelerate)
+        made = type(self)(
+            self._design, checked_dimensions(self._design, {**self.dimensions, **changed}),
+            self.branches, self._accelerate)
         made.check()
         return made
 
     def check(self) -> None:
         """Raise ValueError, with the line, if its dimensions cannot be."""
-        (self._design.check or check_bars)(self)
+        if check := self._design.check:
+            check(self._design.lines, self)
+        else:
+            check_bars(self)
 
     def accelerated(self) -> Mechanism:
         """
@@ -158,8 +173,8 @@ class Mechanism:
         """
         if not find_spec('llvmlite'):
             raise ImportError('accelerated() needs llvmlite: pip install llvmlite')
-        return self.remembered('accelerated', (), lambda: type(self)(
-            self._design, self._structure, self.dimensions, self.branches, True))
+        return self.cache.get_or_make('accelerated', lambda: type(self)(
+            self._design, self.dimensions, self.branches, True))
 
     def solve(self, theta: Inputs, points: Optional[Sequence[str]] = None) -> dict:
         """
@@ -196,7 +211,7 @@ class Mechanism:
         names, pose = self._ready('points', wanted)
         if pose.shape:
             return lambda theta: self._vectors('points', theta, wanted)
-        return keep(self._placers, wanted, pose.placer(names))
+        return self._placers.get_or_make(_plain(wanted), lambda: pose.placer(names))
 
     def velocity(self, theta: Inputs, points: Optional[Sequence[str]] = None, by: int = 0) -> dict:
         """
@@ -284,7 +299,8 @@ class Mechanism:
             If not every other input is given, or a dimension is an array.
 
         """
-        return list(self.remembered('reach', others, lambda: self._arcs(others)))
+        return list(self.cache.get_or_make(
+            ('reach', *others), lambda: self._arcs(others)))
 
     def _arcs(self, others: Tuple[float, ...]) -> List[Arc]:
         _, margins = self._ready('margins', ())
@@ -299,11 +315,6 @@ class Mechanism:
             lambda value: margins.searched(value * first.size, *others), first.counted(),
             self._structure.built.limits, self._value,
             lambda theta: self._ready('points', None)[1].searched(theta, *others))]
-
-    def remembered(self, what: str, about: tuple, find: Callable) -> Any:
-        """Return what was found before, or find it."""
-        key = what, *about
-        return self._found[key] if key in self._found else keep(self._found, key, find())
 
     def function(self, points: Optional[Sequence[str]] = None, joints: Sequence[str] = (),
                  rates: Sequence[str] = ()) -> Callable:
@@ -328,7 +339,7 @@ class Mechanism:
     def posed(self, points: Optional[Sequence[str]] = None, joints: Sequence[str] = (),
               rates: Sequence[str] = ()) -> Pose:
         """Return the code behind `function`."""
-        wanted = tuple(self._names(kind, _hashable(names))
+        wanted = tuple(self._names(kind, _plain(_hashable(names)))
                        for kind, names in (('points', points), ('angles', joints),
                                            ('rates', rates)))
         return self._bound('parts', wanted)
@@ -357,7 +368,7 @@ class Mechanism:
             [rad/s or m/s], and the numbers of its `Leg`.
 
         """
-        pose = self.remembered('legs', (points, joints, moving), lambda: self._legs(
+        pose = self.cache.get_or_make(('legs', points, joints, moving), lambda: self._legs(
             points, joints, moving))
         return pose.batch(rows)
 
@@ -394,13 +405,18 @@ class Mechanism:
     def _ready(self, kind: str, wanted: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
         """Return the names that are wanted and the function that computes them."""
         key = kind, _hashable(wanted), *by
-        if key not in self._poses:
-            names = self._names(kind, key[1])
-            keep(self._poses, key, (names, self._bound(kind, names, *by)))
-        return self._poses[key]
+        return self._poses.get(key) or self._pose(kind, _plain(key[1]), *by)
+
+    def _pose(self, kind: str, wanted: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
+        names = self._names(kind, wanted)
+        return self._poses.get_or_make(
+            (kind, wanted, *by), lambda: (names, self._bound(kind, names, *by)))
 
     def _bound(self, kind: str, names: Any, *by: int) -> Pose:
         program = self._structure.program(kind, names, *by)
+        if len(self._evaluated) > MOST_VALUES:
+            # Another dictionary: a thread may be reading this one.
+            self._evaluated = {}
         return program.bind(self._lengths, self._evaluated, self._accelerate)
 
     def _names(self, kind: str, wanted: Any) -> Tuple[str, ...]:

@@ -33,7 +33,7 @@ def common_reach(assembly: Assembly) -> Sequence[Arc]:
 
 def ground_frame(linkage: Mechanism) -> Dict[str, Tuple[float, float]]:
     """Return where the joints on the ground lie [m]."""
-    return linkage.remembered('ground', (), lambda: {
+    return linkage.cache.get_or_make('ground', lambda: {
         name: tuple(place.ravel().tolist()) for name, place in linkage.solve(
             [0.0] * len(linkage.inputs), linkage.grounded).items()})
 
@@ -67,7 +67,7 @@ def travels(linkage: Mechanism, reach: Sequence[Arc]) -> Dict[str, Optional[Trav
     if not slides:
         return {}
     names, turning = list(slides), ~np.array(list(slides.values()), bool)
-    found = linkage.remembered('travels', tuple(reach), lambda: np.array([extremes(
+    found = linkage.cache.get_or_make(('travels', *reach), lambda: np.array([extremes(
         lambda theta: np.stack([*linkage.joint_angles(theta, names).values()]), *arc, turning)
         for arc in reach]))
     slack = np.where(turning, SLACK, SLACK * float(linkage.longest))

@@ -17,6 +17,7 @@ from . import joint_lines
 from .builder import Builder, in_metres
 from .design import Design
 from .planar import Arm, Limit
+from ..cache import Cache, cached
 from ..formula.expression import (
     arctangent,
     argument,
@@ -30,7 +31,7 @@ from ..formula.expression import (
     spin,
     square_root,
 )
-from ..formula.program import keep, Program
+from ..formula.program import Program
 
 Names = Tuple[str, ...]
 # Of two joints: how far they are apart, and where the second is seen from the first.
@@ -71,7 +72,7 @@ class Structure:
         joint_lines.draw(self.built, design.lines, joint_lines.symbols_of(
             design.dimensions, design.signed), branches)
         self.branches = dict(branches)
-        self._programs: Dict[tuple, Program] = {}
+        self._programs = Cache()
         self._outputs: Mapping[str, Callable] = {
             'points': self._points, 'velocities': self._velocities, 'angles': self._angles,
             'rates': self._rates, 'parts': self._parts, 'margins': self._margins,
@@ -81,20 +82,15 @@ class Structure:
 
     def program(self, kind: str, names: Any, *by: int) -> Program:
         """Return the code for outputs of one kind; what they do not depend on is left out."""
-        key = (kind, names, *by)
-        if key not in self._programs:
-            outputs = self._outputs[kind](names, *by)
-            # An acceleration also depends on the inputs' speeds, and on how these change.
-            given = 3 if kind.endswith('accelerations') else 1
-            keep(self._programs, key, Program(outputs, given * len(self.built.inputs)))
-        return self._programs[key]
+        # An acceleration also depends on the inputs' speeds, and on how these change.
+        given = (3 if kind.endswith('accelerations') else 1) * len(self.built.inputs)
+        return self._programs.get_or_make(
+            (kind, names, *by), lambda: Program(self._outputs[kind](names, *by), given))
 
     def legs(self, points: Points, joints: Names, moving: Names) -> Program:
         """Return the code for a leg of several; see `Mechanism.legs`."""
-        key = points, joints, moving
-        if key not in self._programs:
-            keep(self._programs, key, self._legs(points, joints, moving))
-        return self._programs[key]
+        return self._programs.get_or_make(
+            (points, joints, moving), lambda: self._legs(points, joints, moving))
 
     def _points(self, names: Points) -> List[Real]:
         return [in_metres(part) for place in map(self._place, names)
@@ -254,3 +250,9 @@ class Structure:
         rate, = self._rates((output,), by)
         bare: Real = rate.args[0] if rate.op == 'gated' else rate
         return bare.value != 0.0
+
+
+@cached(32, shared=True)
+def structure_of(design: Design, branches: Tuple[Tuple[str, int], ...]) -> Structure:
+    """Return what mechanisms of a design and its branches share, made once."""
+    return Structure(design, dict(branches))

@@ -18,7 +18,7 @@ Of W and -W those are answers that leave the pin on the lever's half of its slot
 
 from __future__ import annotations
 
-from functools import lru_cache, reduce
+from functools import reduce
 import math
 from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
@@ -32,6 +32,7 @@ from .inverse import in_order
 from .planar import Crank, GRAZE
 from .quantities import Structure
 from .several import Several
+from ..cache import cached
 from ..formula.expression import (
     arctangent,
     argument,
@@ -199,7 +200,7 @@ class Mechanism(Several):
 
     def _solved_by(self, draw: Callable, *args: Any) -> Pose:
         """Return the code that solves for a lever in some way."""
-        return self.remembered(draw.__name__, args, lambda: draw(
+        return self.cache.get_or_make((draw, *args), lambda: draw(
             self._structure, *args).bind(self._lengths, self._evaluated, self._accelerate))
 
     def _rates_at(self, output: str, theta: np.ndarray) -> np.ndarray:
@@ -207,7 +208,7 @@ class Mechanism(Several):
         return self.joint_rates(theta, (output,))[output]
 
 
-@lru_cache(maxsize=32)
+@cached(32)
 def _levers(structure: Structure) -> Dict[str, List[Answer]]:
     """Return for each lever that an input crank's pin moves both answers to its angle."""
     built = structure.built
@@ -243,14 +244,14 @@ def _lever(built: Builder, crank: Crank, slide: Link, half: int) -> Iterator[Ans
                      least <= slide_)
 
 
-@lru_cache(maxsize=32)
+@cached(32)
 def _lever_all(structure: Structure, name: str) -> Program:
     """Return the code for both crank angles for a lever's angle, each with its rate."""
     return Program([gated(part, where(answer.held, 1.0, -1.0), 0.0)
                     for answer in _levers(structure)[name] for part in answer[:2]])
 
 
-@lru_cache(maxsize=64)
+@cached(64)
 def _lever_taken(structure: Structure, name: str, follows: bool, ended: bool) -> Program:
     """Return the code for the crank angle that is taken for a lever's angle, and its rate."""
     if not (follows or ended):
@@ -264,7 +265,7 @@ def _lever_taken(structure: Structure, name: str, follows: bool, ended: bool) ->
     return _taken(_levers(structure)[name], True, True, real(GRAZE * math.pi), follows, ended, 1)
 
 
-@lru_cache(maxsize=256)
+@cached(256)
 def _choice(count: int, working: bool, turns: bool, follows: bool, ended: bool) -> Pose:
     """Return the code that takes one of some answers: from these, their rates, rounding."""
     theta, rates = ([argument(start + i) for i in range(count)] for start in (0, count))

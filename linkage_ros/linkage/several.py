@@ -194,8 +194,8 @@ class Several(Analysed):
             raise ValueError(f'{self.type} has {len(self.inputs)} inputs: as many outputs are '
                              f'needed, got {listed(outputs)}')
         names = tuple(outputs)
-        return self._each('values', values), self.remembered(
-            'equations', names, lambda: self._equations(names))
+        return self._each('values', values), self.cache.get_or_make(
+            ('equations', *names), lambda: self._equations(names))
 
     def _equations(self, names: Names) -> _Equations:
         for name in names:

@@ -14,20 +14,17 @@ The catalogue: mechanisms by the names that users type.
         'O ground 0 0', 'Q ground d 0', 'A crank O 0.03', 'B dyad A Q 0.07 0.05 left'))
 """
 
-from functools import partial
 from importlib import import_module
 import pkgutil
 from types import MappingProxyType, ModuleType
-from typing import Dict, Iterable, Mapping, Optional, Sequence, Tuple
+from typing import Dict, Iterable, Mapping, Optional, Sequence
 
 from numpy.typing import ArrayLike
 
 from . import custom
 from ..linkage.arguments import checked_branches, checked_dimensions
 from ..linkage.design import Design
-from ..linkage.quantities import Structure
 from ..linkage.servo import Mechanism
-from ..linkage.shared import Shared
 from ..words import quoted
 
 # What a scene shows when it names no mechanism, and its scale: from 0.5 m to 1.5 m in size.
@@ -55,12 +52,6 @@ def _module(name: str) -> ModuleType:
 
 
 TYPES = MappingProxyType(_found())
-
-
-@partial(Shared, latest=32)
-def structure_of(design: Design, branches: Tuple[Tuple[str, int], ...]) -> Structure:
-    """Return what mechanisms of a design and its branches share, made once."""
-    return Structure(design, dict(branches))
 
 
 def design(type_: str, /, joints: Optional[Sequence[str]] = None, tracer: Optional[str] = None,
@@ -127,8 +118,7 @@ def create(type_: str, /, *, branches: Optional[Mapping[str, int]] = None,
     chosen = design(type_, joints, tracer, dimensions)
     lengths = checked_dimensions(chosen, dimensions)
     signs = checked_branches(chosen, branches)
-    structure = structure_of(chosen, tuple(signs.items()))
-    kind = getattr(TYPES.get(type_), 'Mechanism', Mechanism)
-    made = kind(chosen, structure, lengths, signs)
+    kind = getattr(TYPES.get(chosen.name), 'Mechanism', Mechanism)
+    made = kind(chosen, lengths, signs)
     made.check()
     return made

@@ -4,22 +4,21 @@
 """Linkages that users write down themselves; see `linkage.joint_lines` for the words."""
 
 from collections.abc import Mapping, Set
-from functools import partial
 from itertools import islice
 from typing import Any, Iterable, List, Optional, Tuple
 
 import numpy as np
 
+from ..cache import cached
 from ..linkage import joint_lines
 from ..linkage.design import Design
 from ..linkage.mechanism import check_bars, Mechanism
-from ..linkage.shared import Shared
-from ..words import listed, quoted
+from ..words import listed, plain_text, quoted
 
 MOST_LINES = 2000
 
 
-@partial(Shared, latest=64)
+@cached(64, shared=True)
 def design(joints: Tuple[str, ...], tracer: Optional[str], names: Tuple[str, ...]) -> Design:
     """
     Return the design that lines of joints make.
@@ -44,8 +43,7 @@ def design(joints: Tuple[str, ...], tracer: Optional[str], names: Tuple[str, ...
     if tracer is not None and tracer not in placed:
         raise ValueError(f'tracer {quoted(tracer)} is no joint; allowed: {listed(placed)}')
     signed = frozenset(name for name, length in used.items() if not length)
-    return Design('custom', dict.fromkeys(used, 1.0), joints, tracer or placed[-1], signed,
-                  partial(check, lines))
+    return Design('custom', dict.fromkeys(used, 1.0), joints, tracer or placed[-1], signed, check)
 
 
 def check(lines: List[joint_lines.Line], linkage: Mechanism) -> None:
@@ -70,13 +68,13 @@ def given(joints: Optional[Iterable[str]], tracer: Optional[str],
         raise ValueError(f'tracer must be the name of a joint, got {quoted(tracer)}')
     lines = given_lines(joints)
     try:
-        names = tuple(dimensions)
+        names = tuple(map(plain_text, dimensions))
     except TypeError:
         raise ValueError('dimensions must be a list of names, '
                          f'got {quoted(dimensions)}') from None
     for name in names:
         joint_lines.check_name(name)
-    return design(lines, tracer, names)
+    return design(lines, plain_text(tracer), names)
 
 
 def given_lines(joints: Any) -> Tuple[str, ...]:
@@ -94,4 +92,4 @@ def given_lines(joints: Any) -> Tuple[str, ...]:
     for number, line in enumerate(lines, 1):
         if not isinstance(line, str):
             raise ValueError(f'joints must be lines of text, but line {number} is {quoted(line)}')
-    return tuple(map(str, lines))
+    return tuple(map(plain_text, lines))

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field as some
-from functools import partial
 import re
 from typing import Any, Dict, Mapping, Optional, Sequence, Tuple
 
@@ -24,10 +23,10 @@ from .parameters import (
     Values,
 )
 from .. import mechanisms
+from ..cache import cached
 from ..linkage.design import Design
 from ..linkage.inputs import Arc
 from ..linkage.servo import Mechanism
-from ..linkage.shared import Shared
 from ..linkage.walker import Assembly
 from ..words import listed, quoted
 
@@ -237,7 +236,7 @@ def _branches(name: str, design: Design, values: Values) -> Dict[str, int]:
     return taken
 
 
-@partial(Shared, latest=16)
+@cached(16, shared=True)
 def _built(design: Design, dimensions: tuple, branches: tuple) -> Mechanism:
     """Return a linkage; the same one for the same dimensions."""
     own: Dict[str, Any] = {} if design.name in mechanisms.TYPES else {

@@ -8,11 +8,11 @@ from __future__ import annotations
 from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
 import math
 import re
 from typing import Any, Iterable, List, Optional, Tuple, Type
 
+from ..cache import cached
 from ..words import elided, listed, MESSAGE, quoted
 
 # Which nodes act on a parameter, and whose value counts where several do.
@@ -83,7 +83,7 @@ class Field:
 
     def about(self, *words: str, **other: Any) -> Field:
         """Return the same with these words in its meaning, and what else is other."""
-        return _with(self, meaning=self.meaning.format(*words), **other)
+        return _with(self, ('meaning', self.meaning.format(*words)), *other.items())
 
     @property
     def shared(self) -> bool:
@@ -144,10 +144,10 @@ class Field:
             math.isclose(value, end, rel_tol=ROUNDED) for end in (self.low, self.high))
 
 
-@lru_cache(maxsize=2048)
-def _with(field: Field, **other: Any) -> Field:
+@cached(2048)
+def _with(field: Field, *other: Tuple[str, Any]) -> Field:
     """Return a field in which something is other; the same one for all mechanisms of a type."""
-    return replace(field, **other)
+    return replace(field, **dict(other))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ hundred, counted from zero. No ROS is needed.
 
 from __future__ import annotations
 
-from functools import lru_cache
 import math
 from typing import Optional, Tuple
 
@@ -18,6 +17,7 @@ import numpy as np
 
 from . import Machine, Scene
 from .parameters import Parameter
+from ..cache import cached
 from ..linkage.inputs import Arc
 from ..linkage.mechanism import Mechanism
 
@@ -57,7 +57,7 @@ def _used(machine: Machine) -> Optional[Tuple[float, float]]:
     return first.sweep or first.reach[0]
 
 
-@lru_cache(maxsize=16)
+@cached(16)
 def _length(linkage: Mechanism, key: str, positive: bool, used: Optional[Arc]) -> Arc:
     """Return how far a length may be moved with the linkage still assembled."""
     value = float(linkage.dimensions[key])

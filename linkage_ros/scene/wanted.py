@@ -13,7 +13,7 @@ import numpy as np
 
 from .drive import Drive, in_words
 from .machine import Machine
-from ..formula.program import beside
+from ..formula.program import compile_in_background
 from ..linkage.inputs import Arc
 from ..linkage.servo import CLOSE
 from ..linkage.several import Answer
@@ -104,7 +104,7 @@ class Wanted:
 
         solver = self._solvers[many, follows] = made_of(self._linkage)
         if many:
-            beside(hasten)
+            compile_in_background(hasten)
         return solver
 
     def commanded(self, values: Sequence[float], speeds: Optional[Sequence[float]],

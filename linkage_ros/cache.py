@@ -1,0 +1,101 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Results by key: bounded, and safe to use from several threads.
+
+A function of hashable arguments is decorated; an object with results of its own has a `Cache`::
+
+    @cached(64)
+    def design(joints, tracer): ...
+
+    self._sources = Cache(read_source)    # self._sources[text] is read_source(text)
+    self._found = Cache()                 # self._found.get_or_make(key, make) is make()
+
+A `make` that is a method of whatever has the cache is a cycle, which only the garbage collector
+frees; `get_or_make` with a lambda is none.
+"""
+
+from __future__ import annotations
+
+from functools import update_wrapper
+from threading import RLock
+from typing import Any, Callable, cast, Dict, Hashable, Optional, TypeVar
+from weakref import WeakValueDictionary
+
+Function = TypeVar('Function', bound=Callable)
+# Unless said otherwise: a few times what nodes, pages and services ask one mechanism for.
+SIZE = 128
+_MISSING = object()
+
+
+class Cache(Dict[Any, Any]):
+    """
+    A dictionary that makes what it lacks, and drops its oldest entry where it grows too large.
+
+    A look-up costs what it costs in a dictionary. Nothing is locked while a value is made, so no
+    thread waits for another's: where two make the same, both get the one that was first.
+
+    Parameters
+    ----------
+    make : callable, optional
+        From a key to its value, for `cache[key]`.
+    size : int
+        How many entries it has at most.
+    shared : bool
+        Whether an entry that was dropped is found again as long as its value is in use elsewhere.
+        Such values have to be objects that weak references can be made to.
+
+    """
+
+    def __init__(self, make: Optional[Callable] = None, size: int = SIZE, shared: bool = False):
+        super().__init__()
+        self._make, self._size = make, size
+        # A finalizer may look up what is being put in, in the same thread.
+        self._lock = RLock()
+        self._in_use: Any = WeakValueDictionary() if shared else {}
+        self._shared = shared
+
+    def __missing__(self, key: Hashable) -> Any:
+        make = self._make
+        if make is None:
+            raise KeyError(key)
+        return self._put(key, lambda: make(key))
+
+    def get_or_make(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        """Return the value of a key, made if there is none."""
+        value = self.get(key, _MISSING)
+        return self._put(key, make) if value is _MISSING else value
+
+    def clear(self) -> None:
+        """Forget all, so that everything is made anew."""
+        with self._lock:
+            super().clear()
+            self._in_use.clear()
+
+    def _put(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        with self._lock:
+            value = self._in_use.get(key, _MISSING)
+        if value is _MISSING:
+            value = make()
+        with self._lock:
+            if self._shared:
+                value = self._in_use.setdefault(key, value)
+            value = self.setdefault(key, value)
+            while len(self) > self._size:
+                del self[next(iter(self))]
+        return value
+
+
+def cached(size: int = SIZE, shared: bool = False) -> Callable[[Function], Function]:
+    """Return a decorator for a function of hashable arguments, with a `Cache` of its results."""
+    def decorated(function: Function) -> Function:
+        cache = Cache(lambda arguments: function(*arguments), size, shared)
+
+        def look_up(*arguments: Hashable) -> Any:
+            return cache[arguments]
+
+        look_up.cache = cache  # type: ignore[attr-defined]
+        return cast(Function, update_wrapper(look_up, function))
+
+    return decorated

@@ -1,0 +1,189 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Operations on real numbers: one row each, with all that expressions and back ends know of it.
+
+All back ends do the same in float64. Elementary functions are those of the C library, of numpy
+over arrays, and of `elementary` over arrays in machine code.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from typing import Any, Callable, NamedTuple, Optional, Tuple
+
+import numpy as np
+
+
+class Operation(NamedTuple):
+    """
+    An operation.
+
+    Attributes
+    ----------
+    name : str
+        What it is called in expressions; `numpy` over arrays is called by it, too.
+    python : str
+        Code on floats, with its operands in braces. It may raise where IEEE 754 has inf or nan.
+    numpy : callable
+        The same on arrays.
+    llvm : callable
+        Appends it to a function: from a `llvm_code.Builder` and its operands, numbers or vectors.
+    c : str
+        C99: {f} is how functions of its kind of number end, {name} the mechanism's. What is the
+        same in Python is an operator, of arrays too.
+    rate : callable, optional
+        What it differentiates to: from `expression.operation`, the expression and the rates of its
+        operands. None: it stands still but for steps.
+    folded : callable, optional
+        From its operands to what it comes to at once; None where it has to be done.
+    positive : tuple of int
+        The operands that make the result positive if all of them are.
+    commutes : bool
+        Whether its operands may change places.
+
+    """
+
+    name: str
+    python: str
+    numpy: Callable
+    llvm: Callable
+    c: str
+    rate: Any = None
+    folded: Optional[Callable] = None
+    positive: Tuple[int, ...] = ()
+    commutes: bool = False
+
+    @property
+    def array(self) -> str:
+        """Code on arrays, as `python`; numpy's operators take over memory that is free again."""
+        operands = ', '.join(f'{{{i}}}' for i in range(self.operands))
+        return self.python if self.c == self.python else f'{self.name}({operands})'
+
+    @property
+    def operands(self) -> int:
+        """How many operands it has."""
+        return sum(f'{{{i}}}' in self.python for i in range(3)) or self.python.count('{}')
+
+
+# Its operands x and y, x + y, and what that has of y.
+LOST = '(({0} - (({0} + {1}) - (({0} + {1}) - {0}))) + ({1} - (({0} + {1}) - {0})))'
+
+
+def _root(x: Any, tolerance: Any) -> Any:
+    if _least(x) > 0.0:
+        return np.sqrt(x)
+    # The root of a negative zero is zero, as elsewhere.
+    return np.where((x > 0.0) | (x >= -tolerance), np.sqrt(np.maximum(x, 0.0)) + 0.0, np.nan)
+
+
+def _gated(x: Any, margin: Any, tolerance: Any) -> Any:
+    if not np.ndim(tolerance) and _least(margin) >= -tolerance:
+        return x
+    return np.where(margin >= -tolerance, x, np.nan)
+
+
+def _least(x: Any) -> Any:
+    """Return the least of some numbers, NaN if any is none, in one quick pass."""
+    return np.minimum.reduce(x, axis=None, initial=math.inf)
+
+
+def _lost(x: Any, y: Any) -> Any:
+    total = x + y
+    added = total - x
+    return (x - (total - added)) + (y - added)
+
+
+def _lost_in_llvm(b: Any, x: Any, y: Any) -> Any:
+    total = b.fadd(x, y)
+    added = b.fsub(total, x)
+    return b.fadd(b.fsub(x, b.fsub(total, added)), b.fsub(y, added))
+
+
+def _root_in_llvm(b: Any, x: Any, tolerance: Any) -> Any:
+    reached = _gated_in_llvm(b, x.type(0.0), x, tolerance)
+    return b.select(b.fcmp_ordered('>', x, x.type(0.0)), b.called('llvm.sqrt', x), reached)
+
+
+def _gated_in_llvm(b: Any, x: Any, margin: Any, tolerance: Any) -> Any:
+    return b.select(b.fcmp_ordered('>=', margin, b.fneg(tolerance)), x, x.type(math.nan))
+
+
+def _constants(function: Callable) -> Callable:
+    """Return what does a function of constants at once."""
+    def folded(*operands: Any) -> Optional[float]:
+        for x in operands:
+            if x.op != 'constant':
+                return None
+        return function(*(x.value for x in operands))
+
+    return folded
+
+
+def _alike(_: Any, x: Any, y: Any) -> Any:
+    """Return either of two that are the same."""
+    return x if x is y or x.value is not None and x.value == y.value else None
+
+
+def _product_rule(do: Callable, n: Any, dx: Any, dy: Any) -> Any:
+    x, y = n.args
+    return 2.0 * (dx * x) if x is y else dx * y + x * dy
+
+
+def _angle_rule(do: Callable, n: Any, dy: Any, dx: Any) -> Any:
+    y, x = n.args
+    return (x * dy - y * dx) / (x * x + y * y)
+
+
+def _root_rule(do: Callable, n: Any, dx: Any, *_: Any) -> Any:
+    return dx / (2.0 * n)
+
+
+# In rules n is the expression that is differentiated, dx, dy, ... are the rates of its operands.
+OPERATIONS = {row.name: row for row in (
+    Operation('add', '({} + {})', operator.add, lambda b, x, y: b.fadd(x, y), '({} + {})',
+              lambda do, n, dx, dy: dx + dy, _constants(operator.add), (0, 1), True),
+    Operation('subtract', '({} - {})', operator.sub, lambda b, x, y: b.fsub(x, y), '({} - {})',
+              lambda do, n, dx, dy: dx - dy, _constants(operator.sub)),
+    Operation('multiply', '({} * {})', operator.mul, lambda b, x, y: b.fmul(x, y), '({} * {})',
+              _product_rule, _constants(operator.mul), (0, 1), True),
+    # What a sum has lost to rounding, exactly. Source: Knuth, TAOCP 2, sec. 4.2.2, theorem B.
+    Operation('lost', LOST, _lost, _lost_in_llvm, LOST, folded=_constants(_lost)),
+    Operation('divide', '({} / {})', operator.truediv, lambda b, x, y: b.fdiv(x, y), '({} / {})',
+              lambda do, n, dx, dy: (dx - n * dy) / n.args[1], None, (0, 1)),
+    Operation('negative', '(-{})', operator.neg, lambda b, x: b.fneg(x), '(-{})',
+              lambda do, n, dx: -dx, _constants(operator.neg)),
+    Operation('absolute', 'abs({})', np.absolute, lambda b, x: b.called('llvm.fabs', x),
+              'fabs{f}({})', lambda do, n, dx: do('where', n.args[0] < 0.0, -dx, dx),
+              _constants(abs)),
+    Operation('sqrt', 'sqrt({})', np.sqrt, lambda b, x: b.called('llvm.sqrt', x), 'sqrt{f}({})',
+              _root_rule, None, (0,)),
+    Operation('sin', 'sin({})', np.sin, lambda b, x: b.called('llvm.sin', x), 'sin{f}({})',
+              lambda do, n, dx: do('cos', *n.args) * dx, _constants(math.sin)),
+    Operation('cos', 'cos({})', np.cos, lambda b, x: b.called('llvm.cos', x), 'cos{f}({})',
+              lambda do, n, dx: -(do('sin', *n.args) * dx), _constants(math.cos)),
+    Operation('atan2', 'atan2({}, {})', np.arctan2, lambda b, y, x: b.called('atan2', y, x),
+              'atan2{f}({}, {})', _angle_rule),
+    # To the nearest integer, halves to the even one.
+    Operation('rint', 'copysign({0} - remainder({0}, 1.0), {0})', np.rint,
+              lambda b, x: b.called('llvm.rint', x), 'rint{f}({})'),
+    Operation('less', '({} < {})', operator.lt, lambda b, x, y: b.fcmp_ordered('<', x, y),
+              '({} < {})'),
+    Operation('less_equal', '({} <= {})', operator.le,
+              lambda b, x, y: b.fcmp_ordered('<=', x, y), '({} <= {})'),
+    # One value where a condition holds, else another.
+    Operation('where', '({1} if {0} else {2})', np.where, lambda b, c, x, y: b.select(c, x, y),
+              '({} ? {} : {})', lambda do, n, _, dx, dy: do('where', n.args[0], dx, dy),
+              _alike, (1, 2)),
+    # The root of x, zero where x is down to -tolerance, NaN below.
+    Operation('root', '(sqrt({0}) if {0} > 0.0 else 0.0 if {0} >= -{1} else nan)', _root,
+              _root_in_llvm, '{name}_root({}, {})', _root_rule),
+    # A value where a margin is not below -tolerance, else NaN.
+    Operation('gated', '({0} if {1} >= -{2} else nan)', _gated, _gated_in_llvm,
+              '{name}_gated({}, {}, {})', lambda do, n, dx, *_: do('gated', dx, *n.args[1:])),
+)}
+# What changes in steps alone.
+STEPS = frozenset(row.name for row in OPERATIONS.values() if row.rate is None)
+COMMUTING = frozenset(row.name for row in OPERATIONS.values() if row.commutes)

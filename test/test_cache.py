@@ -1,0 +1,149 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A cache: what it lacks is made, its size is bounded, and threads may do what they like."""
+
+from functools import partial
+from itertools import combinations
+import random
+import sys
+import threading
+
+from linkage_ros import mechanisms
+from linkage_ros.cache import Cache, cached
+import numpy as np
+import pytest
+
+THREADS = 6
+
+
+class Value:
+    """Something that can be told from its equals."""
+
+    def __init__(self, key):
+        self.key = key
+
+
+def at_once(*tasks):
+    """Do tasks in threads that change hands as often as Python lets them; return what they do."""
+    results, errors = [None] * len(tasks), []
+    start = threading.Barrier(len(tasks))
+
+    def do(index, task):
+        try:
+            start.wait(20.0)
+            results[index] = task()
+        except Exception as error:
+            errors.append(error)
+
+    threads = [threading.Thread(target=do, args=each, daemon=True) for each in enumerate(tasks)]
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(100.0)
+    finally:
+        sys.setswitchinterval(before)
+    assert not errors and not any(thread.is_alive() for thread in threads), errors
+    return results
+
+
+def test_what_is_there_is_not_made_again():
+    cache = Cache(Value)
+    assert cache['a'] is cache['a'] is cache.get_or_make('a', Value) and cache['b'].key == 'b'
+    assert cache.get_or_make(None, lambda: None) is cache.get_or_make(None, Value) is None
+
+
+def test_a_cache_that_makes_nothing_says_what_it_lacks():
+    with pytest.raises(KeyError, match='a'):
+        Cache()['a']
+
+
+def test_the_oldest_go_first():
+    cache = Cache(Value, size=2)
+    first, second = cache[1], cache[2]
+    assert cache[3] and cache[2] is second and list(cache) == [2, 3]
+    assert cache[1] is not first
+
+
+def test_what_fails_is_tried_again():
+    cache = Cache(lambda key: 1 / key)
+    for _ in range(2):
+        with pytest.raises(ZeroDivisionError):
+            cache[0]
+    assert not cache
+
+
+def test_what_is_in_use_is_shared_though_it_was_dropped():
+    @cached(1, shared=True)
+    def shared(key):
+        return Value(key)
+
+    held = shared('held')
+    gone = id(shared('gone')), shared('last')
+    assert len(shared.cache) == 1 and shared('held') is held and gone
+    shared.cache.clear()
+    assert shared('held') is not held
+
+
+def test_two_threads_that_make_the_same_get_one_and_wait_for_nobody():
+    both = threading.Barrier(2)
+
+    def make(key):
+        both.wait(20.0)
+        return Value(key)
+
+    cache = Cache(make)
+    one, other = at_once(*2 * [lambda: cache['a']])
+    assert one is other is cache['a']
+
+
+def test_what_is_put_in_may_be_looked_for_by_what_is_dropped():
+    class Last(Value):
+        def __del__(self):
+            cache[self.key + 1000]
+
+    cache = Cache(Value, size=1)
+    cache.get_or_make(0, lambda: Last(0))
+    at_once(lambda: cache[1])
+    assert len(cache) == 1
+
+
+@pytest.mark.parametrize('shared', [False, True])
+def test_threads_hammer_it(shared):
+    cache = Cache(Value, size=4, shared=shared)
+
+    def hammer(seed):
+        pick, held = random.Random(seed), {}
+        for turn in range(2000):
+            key = pick.randrange(12)
+            value = cache[key] if turn % 2 else cache.get_or_make(key, partial(Value, key))
+            assert value.key == key
+            assert not shared or held.setdefault(key, value) is value
+            if turn % 100 == 0:
+                held.clear()
+
+    at_once(*(lambda seed=seed: hammer(seed) for seed in range(THREADS)))
+    assert len(cache) <= 4
+
+
+def test_threads_ask_one_mechanism_for_more_than_it_caches():
+    leg = mechanisms.create('jansen')
+    outputs = [f'distance({p},{q})' for p, q in combinations(leg.points, 2)]
+    theta = np.linspace(-3.0, 3.0, 7)
+    asked = [(names, theta) for names in combinations(outputs, 2)][:160]
+    expected = [mechanisms.create('jansen').joint_angles(at, names) for names, at in asked]
+
+    def ask(seed):
+        order = list(range(len(asked)))
+        random.Random(seed).shuffle(order)
+        for index in order[:80]:
+            names, at = asked[index]
+            for name, values in leg.joint_angles(at, names).items():
+                assert np.array_equal(values, expected[index][name]), name
+            leg.solve(0.3, names[0][9:-1].split(','))
+            leg.function(names[0][9:-1].split(','))
+
+    at_once(*(lambda seed=seed: ask(seed) for seed in range(THREADS)))

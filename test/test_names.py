@@ -1,0 +1,173 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Names of any class of text are names, whoever asks first; generated code shows in tracebacks."""
+
+from enum import Enum
+import gc
+import inspect
+from itertools import count
+import linecache
+import traceback
+
+from linkage_ros import mechanisms, scene
+from linkage_ros.c_code import header
+from linkage_ros.linkage.walker import Assembly
+import numpy as np
+import pytest
+
+NUMBERS = count()
+THETA = np.linspace(-3.0, 3.0, 40)
+
+
+class Code(str):
+    """A text that writes itself as code."""
+
+    def __repr__(self):
+        return '__import__("sys").exit(7)'
+
+    __str__ = __repr__
+
+    def __format__(self, _):
+        return repr(self)
+
+
+class Broken(str):
+    """A text that cannot write itself."""
+
+    def __repr__(self):
+        raise RuntimeError('nobody may ask')
+
+    __str__ = __repr__
+
+    def __format__(self, _):
+        raise RuntimeError('nobody may ask')
+
+
+def member(text):
+    """Return a text as a member of an enum."""
+    return Enum('Joint', {'ONE': text}, type=str).ONE
+
+
+CLASSES = {'numpy': np.str_, 'enum': member, 'code': Code, 'broken': Broken}
+
+
+def fresh(kind=str):
+    """Return a lever nobody has asked for anything, its texts of a class, and its last joint."""
+    last = f'Z{next(NUMBERS)}'
+    lines = ('O ground 0 0', 'Q ground 3 0', 'A crank O r', 'B dyad A Q 2.5 2.5 left',
+             f'{last} line A B 1.1')
+    return mechanisms.create(kind('custom'), r=1.0, joints=tuple(map(kind, lines)),
+                             tracer=kind(last), branches={kind('B'): -1}), last
+
+
+def answers(linkage, points, links, output):
+    """Return what a linkage is asked by names, in every way it can be."""
+    near = linkage.joint_angles(0.7)['QB']
+    yield linkage.solve(0.5, points)
+    yield linkage.solve(0.5, list(points))
+    yield linkage.solve(0.5, points[0])
+    yield linkage.solve(THETA, points)
+    yield linkage.velocity(THETA, points)
+    yield linkage.acceleration(THETA, THETA, THETA, points)
+    yield linkage.joint_angles(0.5, links)
+    yield linkage.joint_angles(THETA, [*links, output])
+    yield linkage.joint_rates(THETA, links)
+    yield linkage.joint_accelerations(THETA, THETA, THETA, links)
+    yield linkage.transmission_angles(THETA, points[:1])
+    yield {'function': linkage.function(points, links, links)(0.5)}
+    yield {'input_for': linkage.input_for(links[0], near)}
+    yield {'output': linkage.input_for(output, linkage.joint_angles(0.7, [output])[output])}
+    yield {'extremes': linkage.extremes(links[0])}
+    yield {'is_angle': linkage.is_angle(output), 'has_output': linkage.has_output(output)}
+    yield {'effort': linkage.effort(0.5, {points[0]: (1.0, 2.0), links[0]: 3.0})}
+    yield {'output_effort': linkage.output_effort(links[0], 0.5, 1.0)}
+    solution = Assembly(linkage).solution(points, links, links)
+    solution.solve([0.5], [1.0])
+    yield {'walker': solution.values}
+
+
+def same(found, expected):
+    """Hold that answers are the same, and have names that are plain text."""
+    for one, other in zip(found, expected, strict=True):
+        assert list(one) == list(other) and {type(name) for name in one} == {str}
+        for name, values in other.items():
+            assert np.array_equal(one[name], values, equal_nan=True), name
+
+
+@pytest.mark.parametrize('kind', CLASSES)
+def test_text_of_any_class_is_a_name_and_later_callers_are_not_harmed(kind):
+    known, last = fresh()
+    names = ('B', last), ('QB', 'AB'), f'{last}.x'
+    expected = list(answers(known, *names))
+    for made in (str, CLASSES[kind]):
+        linkage, last = fresh(made)
+        assert type(linkage.tracer) is type(linkage.type) is str
+        assert (linkage.type, linkage.tracer, linkage.branches) == ('custom', last, {'B': -1})
+        points, links, output = ('B', last), ('QB', 'AB'), f'{last}.x'
+        odd = [tuple(map(CLASSES[kind], each)) for each in (points, links)]
+        found = list(answers(linkage, *odd, CLASSES[kind](output)))
+        assert found[0].keys() == {'B', last}
+        renamed = [{last if name == names[0][1] else f'{last}.x' if name == names[2] else name:
+                    values for name, values in each.items()} for each in expected]
+        same(found, renamed)
+        same(answers(linkage, points, links, output), renamed)
+        again, _ = fresh()
+        assert again.solve(0.5, 'B')['B'].tolist() == known.solve(0.5, 'B')['B'].tolist()
+
+
+@pytest.mark.parametrize('kind', CLASSES)
+def test_dimensions_and_types_have_such_names_too(kind):
+    made = CLASSES[kind]
+    leg = mechanisms.create(made('jansen'), **{made('m'): 14.0})
+    assert type(leg.type) is str and set(map(type, leg.dimensions)) == {str}
+    other = mechanisms.create('jansen').with_dimensions(**{made('m'): 14.0})
+    assert leg.dimensions == other.dimensions == {**mechanisms.defaults(made('jansen')), 'm': 14.0}
+
+
+@pytest.mark.parametrize('kind', CLASSES)
+def test_a_header_is_the_same_for_outputs_of_any_class(kind):
+    given = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}
+    machine = scene.read(given).machines['lever']
+    assert header.written(machine, [CLASSES[kind]('lever')]) == header.written(machine, ['lever'])
+
+
+@pytest.mark.parametrize('kind', CLASSES)
+def test_what_is_no_name_is_refused_as_ever(kind):
+    linkage, _ = fresh()
+    for ask in (linkage.solve, linkage.joint_angles, linkage.velocity):
+        with pytest.raises(ValueError, match='custom has no (point|joint).*; allowed: '):
+            ask(0.5, (CLASSES[kind]('none'),))
+    with pytest.raises(ValueError, match='has no output .*; allowed: '):
+        linkage.input_for(CLASSES[kind]('none'), 0.5)
+    with pytest.raises(ValueError, match='^O.x of custom does not move with the crank$'):
+        linkage.input_for(CLASSES[kind]('O.x'), 0.5)
+
+
+def test_a_traceback_shows_generated_code():
+    linkage, _ = fresh()
+    with pytest.raises(TypeError) as failed:
+        linkage.function()('text')
+    shown = ''.join(traceback.format_exception(failed.value))
+    assert 'linkage_ros formula' in shown and '0.5 * x0' in shown
+    assert 'def pose(x0):' in inspect.getsource(linkage.function())
+
+
+def test_the_text_of_code_is_gone_with_the_code():
+    linkage, _ = fresh()
+    file = linkage.function().__code__.co_filename
+    assert linecache.getline(file, 2).strip() == 'def pose(x0):'
+    del linkage
+    fresh_ones = [fresh()[0] for _ in range(70)]  # more than are held though nobody uses them
+    gc.collect()
+    assert fresh_ones and not linecache.getline(file, 2)
+
+
+@pytest.mark.parametrize('kind', CLASSES)
+def test_several_outputs_have_such_names_too(kind):
+    linkage, outputs = mechanisms.create('five_bar'), ('P.x', 'P.y')
+    wanted = [linkage.solve((0.5, 2.0), 'P')['P'][axis] for axis in (0, 1)]
+    odd = list(map(CLASSES[kind], outputs))
+    assert linkage.inputs_for(odd, wanted) == linkage.inputs_for(outputs, wanted) != []
+    with pytest.raises(ValueError, match='five_bar has no output'):
+        linkage.inputs_for([CLASSES[kind]('none'), 'C.x'], wanted)

@@ -1,0 +1,108 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Mechanisms, and those of scenes, are copied and sent to processes, and answer the same there."""
+
+from copy import copy, deepcopy
+from multiprocessing import get_context
+from operator import methodcaller
+from pathlib import Path
+import pickle
+
+from linkage_ros import mechanisms, scene
+import numpy as np
+import pytest
+
+CONFIG = Path(__file__).parents[1] / 'config'
+FIVE = np.array([-3.0, 0.0, 0.4, 1.3, 1e6])
+CRANK = mechanisms.create('custom', tracer='A', r=1.2, joints=(
+    'O ground 0 0', 'Q ground 3 0', 'A crank O r', 'B dyad A Q 2.5 2.5 left'))
+LINKAGES = {
+    **{kind: mechanisms.create(kind) for kind in mechanisms.TYPES}, 'custom': CRANK,
+    'other dimensions': CRANK.with_dimensions(r=0.1 + 0.2),
+    'another branch': mechanisms.create('water_drop', branches={
+        name: -1 for name in mechanisms.design('water_drop').branches}),
+    'many at once': mechanisms.create('four_bar', a=np.linspace(0.5, 1.0, 5)),
+    'a cylinder': mechanisms.create('custom', joints=(
+        'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right'))}
+WAYS = {'copy': copy, 'deepcopy': deepcopy, **{
+    f'protocol {protocol}': lambda linkage, protocol=protocol: pickle.loads(
+        pickle.dumps(linkage, protocol)) for protocol in range(pickle.HIGHEST_PROTOCOL + 1)}}
+
+
+def bits(value):
+    """Return the bits of numbers, those of NaN aside: it may have either sign."""
+    value = np.asarray(value, float)
+    return np.where(np.isnan(value), np.nan, value).tobytes()
+
+
+def inputs(linkage):
+    """Return values of the inputs, as a linkage takes them."""
+    several = [FIVE + shift for shift in range(len(linkage.inputs))]
+    return several if len(several) > 1 else FIVE
+
+
+def answers(linkage):
+    """Return bits of what a linkage is asked for."""
+    theta = inputs(linkage)
+    values = [*linkage.solve(theta).values(), *linkage.joint_angles(theta).values(),
+              *linkage.joint_rates(theta).values(), *linkage.velocity(theta).values()]
+    if len(linkage.inputs) == 1 and not any(
+            map(np.ndim, linkage.dimensions.values())):
+        values += [linkage.reach(), linkage.dead_points(), linkage.function()(0.4)]
+    return b''.join(map(bits, values))
+
+
+@pytest.mark.parametrize('way', WAYS)
+@pytest.mark.parametrize('name', LINKAGES)
+def test_a_copy_answers_the_same(name, way):
+    linkage = LINKAGES[name]
+    other = WAYS[way](linkage)
+    assert other is not linkage and type(other) is type(linkage) and repr(other) == repr(linkage)
+    assert (other.branches, other.tracer) == (linkage.branches, linkage.tracer)
+    assert answers(other) == answers(linkage)
+
+
+@pytest.mark.parametrize('name', LINKAGES)
+def test_a_copy_has_the_code_of_what_it_was_copied_from(name):
+    linkage = LINKAGES[name]
+    other = pickle.loads(pickle.dumps(linkage))
+    assert other.posed().variant is linkage.posed().variant
+
+
+def test_a_copy_is_as_picky_as_what_it_was_copied_from():
+    with pytest.raises(ValueError, match='dimension r must be positive'):
+        deepcopy(CRANK).with_dimensions(r=-1.0)
+
+
+def test_a_copy_of_an_accelerated_one_is_accelerated():
+    pytest.importorskip('llvmlite')
+    quick = mechanisms.create('jansen').accelerated()
+    theta = np.linspace(-3.0, 3.0, 1000)
+    assert np.array_equal(pickle.loads(pickle.dumps(quick)).solve(theta)['G'],
+                          quick.solve(theta)['G'])
+
+
+@pytest.mark.parametrize('file', sorted(CONFIG.glob('*.yaml')), ids=lambda file: file.stem)
+def test_scenes_and_what_is_in_them_can_be_sent(file):
+    sent = scene.load(str(file))
+    for way in WAYS.values():
+        got = way(sent)
+        assert got.parameters == sent.parameters and list(got.machines) == list(sent.machines)
+        for machine, other in zip(sent.machines.values(), got.machines.values()):
+            assert answers(other.linkage) == answers(machine.linkage)
+            assert (other.inputs, other.joints) == (machine.inputs, machine.joints)
+
+
+def test_processes_that_share_nothing_answer_the_same():
+    linkages = list(LINKAGES.values())
+    with get_context('spawn').Pool(1) as pool:
+        sent = [pool.apply_async(methodcaller('solve', inputs(linkage)), (linkage,))
+                for linkage in linkages]
+        for linkage, result in zip(linkages, sent):
+            there = result.get(100.0)
+            for name, places in linkage.solve(inputs(linkage)).items():
+                assert bits(there[name]) == bits(places)
+        machine = next(iter(scene.load(str(CONFIG / 'excavator.yaml')).machines.values()))
+        assert pool.apply(methodcaller('efforts', [1.0] * len(machine.inputs)), (
+            machine,)) == machine.efforts([1.0] * len(machine.inputs))
