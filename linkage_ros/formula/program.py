@@ -66,6 +66,24 @@ class Dialect:
 
 FLOATS = Dialect({name: row.python for name, row in OPERATIONS.items()}, {
     name: value for name, value in vars(math).items() if not name.startswith('_')})
+
+
+def _quiet(function: Any) -> Any:
+    """Return a function of `math` that has NaN where IEEE 754 does, instead of an error."""
+    def quiet(*operands: float) -> np.float64:
+        try:
+            return np.float64(function(*operands))
+        except ValueError:
+            return np.float64(math.nan)
+
+    return quiet if callable(function) else function
+
+
+# To the same bits as FLOATS, on numpy's floats: they divide by zero.
+QUIET = Dialect(
+    {name: f'float64({code})' for name, code in FLOATS.templates.items()},
+    {'float64': np.float64, **{name: _quiet(value) for name, value in FLOATS.names.items()}},
+    'float64({!r})'.format)
 ARRAYS = Dialect({name: row.array for name, row in OPERATIONS.items()}, {
     **{name: row.numpy for name, row in OPERATIONS.items()}, 'nan': np.nan, 'inf': np.inf})
 
@@ -228,6 +246,10 @@ class _Variant:
         return _python(self.listing, FLOATS, self.arguments)
 
     @cached_property
+    def quiet(self) -> Callable:
+        return _python(self.listing, QUIET, self.arguments)
+
+    @cached_property
     def array(self) -> Callable:
         return _python(self.listing, ARRAYS, self.arguments)
 
@@ -317,15 +339,20 @@ class Pose:
     @cached_property
     def at(self) -> Callable:
         """The function from the arguments, floats, to the outputs of one set of dimensions."""
-        return self.variant.float(*self.constants, self._by_arrays)
+        return self.variant.float(*self.constants, self._quietly)
 
     @cached_property
     def _given(self) -> np.ndarray:
         return np.array(self.constants)
 
-    def _by_arrays(self, *arguments: float) -> tuple:
+    @cached_property
+    def _quiet(self) -> Callable:
+        return self.variant.quiet(*map(np.float64, self.constants))
+
+    def _quietly(self, *arguments: float) -> tuple:
         """Return the outputs at one pose with inf or nan where Python's floats raise."""
-        return tuple(self._blocks([np.array([a]) for a in arguments], 1)[:, 0].tolist())
+        with np.errstate(all='ignore'):
+            return tuple(map(float, self._quiet(*map(np.float64, arguments))))
 
     def rounded(self, argument: np.ndarray) -> np.ndarray:
         """Return the outputs over one argument, worked out in the precision of that array."""
@@ -342,10 +369,10 @@ class Pose:
 
     def placer(self, names: tuple) -> Callable:
         """Return the function from one argument, a float, to an array (2,) for each name."""
-        def by_arrays(theta: float) -> Dict[str, np.ndarray]:
-            return dict(zip(names, np.reshape(self._by_arrays(theta), (-1, 2))))
+        def quietly(theta: float) -> Dict[str, np.ndarray]:
+            return dict(zip(names, np.reshape(self._quietly(theta), (-1, 2))))
 
-        return self.variant.placing[names](*self.constants, by_arrays)
+        return self.variant.placing[names](*self.constants, quietly)
 
     def __call__(self, *arguments: Any) -> Any:
         """Return the outputs at floats, as floats, or over arrays that are broadcast together."""
@@ -377,7 +404,8 @@ class Pose:
 
     def batch(self, rows: np.ndarray) -> Batch:
         """Return poses to be solved again and again, into rows (poses, outputs)."""
-        return Batch(self._plainly, self.variant.loop if self._accelerate else None,
+        # One by one, however many: what a message says has the bits of machine code.
+        return Batch(self._one_by_one, self.variant.loop if self._accelerate else None,
                      self._given, self.variant.arguments, rows)
 
     def _plainly(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
