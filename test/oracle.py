@@ -470,8 +470,12 @@ class Bench:
 
     def compiled(self):
         """Wait until what is being compiled is there."""
-        self._until(lambda: not any(thread.name == 'linkage_ros compiler'
-                                    for thread in threading.enumerate()))
+        self._until_idle('linkage_ros compiler')
+
+    def _until_idle(self, name):
+        if not self._until(lambda: name not in {t.name for t in threading.enumerate()}):
+            raise Mismatch(f'the thread {name} does not end')
+        self._drain()
 
     def send(self, text):
         """Publish a crank message, or bytes that are none."""
@@ -501,6 +505,8 @@ class Bench:
             raise Mismatch(f'answer {result}, where the library says: {reason or "accepted"}')
         if not result.successful and not result.reason:
             raise Mismatch('refused without a reason')
+        # It is accepted at once, and acts when it is prepared.
+        self._until_idle('linkage_ros worker')
         after = self._contents()
         self._check_changed({topic for topic in after if after[topic] != before[topic]}
                             if not reason else set(), changed)
