@@ -470,8 +470,12 @@ class Bench:
 
     def compiled(self):
         """Wait until what is being compiled is there."""
-        self._until(lambda: not any(thread.name == 'linkage_ros compiler'
-                                    for thread in threading.enumerate()))
+        self._until_idle('linkage_ros compiler')
+
+    def _until_idle(self, name):
+        if not self._until(lambda: name not in {t.name for t in threading.enumerate()}):
+            raise Mismatch(f'the thread {name} does not end')
+        self._drain()
 
     def send(self, text):
         """Publish a crank message, or bytes that are none."""
@@ -501,9 +505,8 @@ class Bench:
             raise Mismatch(f'answer {result}, where the library says: {reason or "accepted"}')
         if not result.successful and not result.reason:
             raise Mismatch('refused without a reason')
-        # An accepted scene is prepared beside the messages.
-        if not self._until(lambda: self.node.is_settled):
-            raise Mismatch('an accepted change is never adopted')
+        # It is accepted at once, and acts when it is prepared.
+        self._until_idle('linkage_ros worker')
         after = self._contents()
         self._check_changed({topic for topic in after if after[topic] != before[topic]}
                             if not reason else set(), changed)
@@ -881,6 +884,19 @@ class Generator:
         return [*(f'{name}={self._random.normal():.4f} -9.81' for name in linkage.points
                   if self._random.random() < 0.3),
                 *(f'{name}=2.5' for name in linkage.joints if self._random.random() < 0.1)]
+
+
+def everything(parameters):
+    """Return the steps after which every topic of a scene is listened to."""
+    return [('listen', topic, True) for topic in Generator(parameters, None).topics]
+
+
+def message(positions, velocities=(), sec=1):
+    """Return the step that sends values by the names of their sources."""
+    sent = JointState(name=list(positions), position=list(positions.values()),
+                      velocity=velocities)
+    sent.header.stamp.sec = sec
+    return 'send', serialize_message(sent)
 
 
 def history(parameters, seed, length=60):
