@@ -75,6 +75,7 @@ class Markers:
     shown : mapping
         What each marker shows, by its id: joints, ends of lines or corners, by their place among
         the points.
+
     Attributes
     ----------
     ids : frozenset of int

@@ -104,7 +104,7 @@ class SceneNode(Node):
         """Raise SceneError for a scene that the node cannot act on; quick."""
 
     def prepare(self, new: scene.Scene) -> Any:
-        """Return all that a scene needs, and change nothing in the node; in the worker's thread."""
+        """Return all that a scene needs, changing nothing in the node; on the worker's thread."""
         return new
 
     def adopt(self, prepared: Any) -> None:

@@ -20,8 +20,8 @@ class ShutdownHandler:
     """
     Catches SIGINT and SIGTERM in a thread, so that none interrupts a callback.
 
-    The first one sets `is_over` and calls `wake`; whoever spins then stops. Where that takes longer
-    than PATIENCE, the process says its last words and ends with exit code 0.
+    The first one sets `is_over` and calls `wake`; whoever spins then stops. Where that takes
+    longer than PATIENCE, the process says its last words and ends with exit code 0.
 
     Attributes
     ----------
