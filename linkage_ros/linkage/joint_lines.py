@@ -126,6 +126,12 @@ class Line(NamedTuple):
         """Whether it adds an input."""
         return self.word in INPUTS and not any(arg.option == 'geared' for arg in self.arguments)
 
+    @property
+    def sides(self) -> Tuple[str, ...]:
+        """The words for its branches of +1 and -1, if it has two."""
+        return next((('left', 'right') if kind == 'left|right' else ('out', 'in')
+                     for kind, _, _ in self.arguments if '|' in kind), ())
+
     def numbers(self) -> Iterable[Tuple[str, Formula]]:
         """Yield its numbers, each with its kind; raise ValueError for what is none."""
         for kind, text, _ in self.arguments:

@@ -75,6 +75,19 @@ class Sweep:
         return {name: value * factor * size(name) for name, value in found.items()}
 
 
+    def poles(self, kind: str, name: str) -> np.ndarray:
+        """Return inputs [rad or m] across which a quantity is not followed: it may be infinite."""
+        if kind in (POSITION, TRANSMISSION):
+            return np.empty(0)
+        rate = self.of(VELOCITY, (name,))[name]
+        with np.errstate(all='ignore'):
+            part = rate[:-1] / (rate[:-1] - rate[1:])
+            turned = (rate[:-1] * rate[1:] < 0.0) & np.isfinite(part) & (kind == FORCE)
+        x = self.values
+        at = (x[:-1] + part * np.diff(x))[turned]
+        return np.sort([*at, *(dead for dead in self.dead if x[0] < dead < x[-1])])
+
+
 def curve(machine: Machine, present: Sequence[float], kind: str = POSITION,
           output: Optional[str] = None) -> dict[str, Any]:
     """Return one of KINDS over the first input: x and y in `units`, y None where it has none."""
@@ -85,12 +98,15 @@ def curve(machine: Machine, present: Sequence[float], kind: str = POSITION,
     output = names[0] if names and output is None else output or ''
     if not (output in names or kind != TRANSMISSION and sweep.linkage.has_output(output)):
         raise Refused(f'there is no {kind} of {quoted(output)}; there is of {listed(names)}')
-    y, unit = sweep.of(kind, (output,))[output], sweep.unit(kind, output)
+    x, y, unit = sweep.values, sweep.of(kind, (output,))[output], sweep.unit(kind, output)
+    poles = sweep.poles(kind, output)
+    after = np.searchsorted(x, poles)
+    x, y = np.insert(x, after, poles), np.insert(y, after, np.nan)
     if (kind, unit) == (POSITION, 'rad'):
         known = np.isfinite(y)
         y[known] = np.unwrap(y[known])
     return {'input': sweep.input.name, 'output': output, 'names': names,
-            'units': [sweep.input.unit, unit], 'x': sweep.values.tolist(),
+            'units': [sweep.input.unit, unit], 'x': x.tolist(),
             'y': list(map(shown, y.tolist())), 'reach': sweep.reach.tolist(),
             'dead': sweep.dead.tolist()}
 

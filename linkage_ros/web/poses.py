@@ -8,6 +8,7 @@ import math
 from typing import Any, Mapping, Sequence
 
 from .settings import is_number, shown
+from ..linkage.arithmetic import Formula
 from ..linkage.inputs import Arc
 from ..linkage.mechanism import Mechanism
 from ..linkage.nearest_pose import nearest_inputs
@@ -15,6 +16,8 @@ from ..linkage.output_range import ground_frame
 from ..scene import Drive, in_words, Machine, Scene, slider
 from ..words import listed, quoted
 
+ARROWS = {'velocity': 'm/s', 'acceleration': 'm/s²', 'force': 'N'}
+_, ACCELERATION, FORCE = ARROWS
 # By how much a dimension is changed to see which bars follow, as a part of the longest bar.
 NUDGE = 1e-6
 # How far beyond its end an input is by rounding alone.
@@ -47,6 +50,47 @@ def described(machine: Machine, present: Sequence[float]) -> dict[str, Any]:
             'unit': 'rad' if linkage.is_angle(name) else 'm',
             'rates': [shown(float(by[name]) * machine.scale_of(name) / size)
                       for by, size in zip(rates, own)]} for name in names}}
+
+
+def arrows(machine: Machine, present: Sequence[float], kind: str,
+           speeds: Mapping[str, float]) -> dict[str, Any]:
+    """
+    Return one of ARROWS at each joint of the first leg: `unit`, and x, y in its plane by joint.
+
+    Speeds [rad/s or m/s] are by input; what is not given stands still. Forces are the loads, and
+    `efforts` by input what holds them [N m or N].
+    """
+    if kind not in ARROWS:
+        raise ValueError(f'arrows must be one of {", ".join(ARROWS)}, not {quoted(kind)}')
+    given = {name: speeds.get(name, 0.0) for name in machine.inputs}
+    if not all(map(is_number, given.values())):
+        raise ValueError(f'speeds must be finite numbers, not {quoted(speeds)}')
+    linkage, own = machine.linkage, [machine.scale_of(name) for name in machine.inputs]
+    theta = theta_of([value / size for value, size in zip(present, own)])
+    rates = [speed / size for speed, size in zip(given.values(), own)]
+    if kind == FORCE:
+        efforts = machine.efforts(present) if machine.loads else ()
+        return {'unit': 'N', 'at': {
+            name: load for name, load in machine.loads.items() if not isinstance(load, float)},
+            'efforts': {name: [shown(effort), 'N·m' if drive.input.turns else 'N']
+                        for (name, drive), effort in zip(machine.inputs.items(), efforts)}}
+    if kind == ACCELERATION:
+        found = linkage.acceleration(theta, theta_of(rates), theta_of([0.0] * len(rates)))
+    else:
+        each = [linkage.velocity(theta, None, by) for by in range(len(rates))]
+        found = {name: sum(rate * one[name] for rate, one in zip(rates, each))
+                 for name in linkage.points}
+    return {'unit': ARROWS[kind], 'at': {
+        name: [shown(float(part) * machine.scale) for part in vector]
+        for name, vector in found.items() if name not in linkage.grounded}}
+
+
+def number(text: str) -> dict[str, Any]:
+    """Return the `value` of arithmetic such as pi/2, and whether it `turns`: is in rad."""
+    formula = Formula(text)
+    if formula.names:
+        raise Refused(f'{quoted(text)} is no number: there is no {listed(formula.names)}')
+    return {'value': float(formula.value({})), 'turns': bool({'pi', 'deg'} & formula.words.keys())}
 
 
 def reached(machine: Machine, present: Sequence[float],
@@ -154,13 +198,15 @@ def tunable(scene_: Scene, name: str) -> dict[str, Any]:
     Return between what each dimension of a mechanism may be moved, and which bars follow.
 
     `travel` holds [low, high] by parameter, `bars` pairs of joints, `fixed` the joints that do not
-    move.
+    move, `sides` the words for a branch of +1 and of -1.
     """
     machine = scene_.machines[name]
     start = f'{name}.dimensions.'
     travel = {parameter.name[len(name) + 1:]: slider.ends(scene_, parameter)
               for parameter in machine.parameters if parameter.name.startswith(start)}
     return {'travel': travel, 'fixed': list(ground_frame(machine.linkage)),
+            'sides': {name: machine.linkage.line_of(name).sides
+                      for name in machine.linkage.branches},
             'bars': {key: _bars(machine.linkage, key.partition('.')[2]) for key in travel}}
 
 

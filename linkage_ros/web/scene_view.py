@@ -10,6 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 import math
+import re
 from typing import (
     Any,
     Callable,
@@ -49,6 +50,7 @@ SECONDS_BETWEEN_LOOKS = 1.0
 SECONDS_TO_LINGER = 1.0
 SECONDS_TO_ARRIVE, ARRIVED = 1.0, 1e-6
 # What a scene has beside its mechanisms.
+DEFINES = re.compile(r'mechanisms|[^.]+\.(type|scale|dimensions\..+)')
 GENERAL = 'mechanisms', 'frame_id', 'frame_prefix', 'rate'
 SCENE = 'scene'
 
@@ -208,19 +210,23 @@ class SceneView:
         if reason:
             raise Refused(reason)
 
-    async def pose(self, key: str, want: Optional[Mapping[str, Any]] = None) -> Answer:
+    async def pose(self, key: str, want: Optional[Mapping[str, Any]] = None, arrows: str = '',
+                   speeds: Any = ()) -> Answer:
         """
         Return where a mechanism is; if something is wanted, bring it there first and hold it.
 
-        Takes what `poses.reached` does, returns what `poses.described` does, and the reason if
-        that is not all that was wanted.
+        Takes what `poses.reached` and `poses.arrows` do, returns what `poses.described` does, the
+        arrows if any are asked for, and the reason if that is not all that was wanted.
         """
         mechanism = self._find(key)
         (machine, inputs), reason = self._state(mechanism), ''
         if want is not None:
             inputs, reason = poses.reached(machine, inputs, dict(want))
             await self._hold(mechanism, machine, inputs)
-        return {**poses.described(machine, inputs), 'reason': reason}
+        found = {**poses.described(machine, inputs), 'reason': reason}
+        if arrows:
+            found['arrows'] = poses.arrows(machine, inputs, arrows, dict(speeds))
+        return found
 
     async def _hold(self, mechanism: ShownMechanism, machine: scene.Machine,
                     inputs: Sequence[float]) -> None:
@@ -256,7 +262,7 @@ class SceneView:
             lambda: curves.exported(machine, inputs, form, frame_id))}
 
     async def save(self, key: str, values: Any = ()) -> Answer:
-        """Return the parameter file of a mechanism's scene, some values replaced."""
+        """Return a parameter file of a mechanism's scene: what defines it, and what is set."""
         mechanism, space = self._find(key), _space(key)
         given = dict(self._general.get(space, {}))
         for other in self._mechanisms.values():
@@ -264,7 +270,7 @@ class SceneView:
                 given.update(other.values())
         given.update((f'{mechanism.name}.{name}', value) for name, value in dict(values).items())
         return {'text': await self._aside(
-            lambda: writing.in_yaml(writing.without_defaults(_read(given))))}
+            lambda: writing.in_yaml(writing.without_defaults(_read(given), DEFINES)))}
 
     async def _aside(self, work: Callable[[], Result]) -> Result:
         """Return what takes longer than others should wait."""

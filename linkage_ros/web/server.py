@@ -22,7 +22,7 @@ from aiohttp import web, WSCloseCode
 
 from .bridge import Bridge
 from .feed import Feed
-from .poses import Refused
+from .poses import number, Refused
 from .scene_view import SCENE, SceneView
 from .. import palette
 from ..words import quoted
@@ -283,6 +283,8 @@ class Client:
             if op == 'set':
                 await self._view.set(said['mechanism'], dict(said['values']))
                 return {}
+            if op == 'read':
+                return number(str(said['text']))
             if op in ('pose', 'tune', 'curve', 'save', 'export'):
                 about = {name: value for name, value in said.items()
                          if name not in ('op', 'id', 'mechanism')}
@@ -320,10 +322,10 @@ class Client:
         offered, self._offered = self._offered, set()
         drawn = [feed.drawn() for feed in self._view.feeds() if feed.topic in offered]
         for looks, _ in drawn:
-            for number, look in looks.items():
-                if self._looks.get(number) != look:
-                    self._looks[number] = look
-                    await self._say({'op': 'look', 'number': number, **look})
+            for id_, look in looks.items():
+                if self._looks.get(id_) != look:
+                    self._looks[id_] = look
+                    await self._say({'op': 'look', 'number': id_, **look})
         self._ready = False
         await self._within(self._socket.send_bytes(b''.join(records for _, records in drawn)))
 
