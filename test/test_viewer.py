@@ -529,8 +529,11 @@ def test_velocity_and_acceleration_are_the_slopes_of_the_curves(name, output):
                                    atol=2e-3 * np.abs(slope).max())
     if len(present) == 1:
         own, unit = machine.scale_of(position['input']), machine.scale_of(output)
-        effort = machine.linkage.output_effort(output, np.array(x) / own, own) / unit
-        np.testing.assert_allclose(np.array(force['y'], float)[inner], effort[inner], rtol=1e-12)
+        ratio = np.array(force['y'], float)
+        effort = machine.linkage.output_effort(output, np.array(force['x']) / own, own) / unit
+        known = np.isfinite(ratio) & np.isin(force['x'], x[inner])
+        assert known.sum() > 250
+        np.testing.assert_allclose(ratio[known], effort[known], rtol=1e-12)
 
 
 def test_a_node_that_is_silent_at_first_is_waited_for_and_not_guessed(show, monkeypatch):
@@ -617,8 +620,9 @@ def test_no_line_goes_through_a_pole():
     curve = curves.curve(machine, [0.3], 'force ratio', 'lever')
     x, y = np.array(curve['x']), np.array(curve['y'], float)
     turns = math.pi - math.acos(80.0 / 150.0)
-    gaps = x[np.isnan(y)]
-    np.testing.assert_allclose(gaps, [-turns, turns], atol=1e-3)
+    gaps = x[np.isnan(y)].reshape(2, 3)
+    np.testing.assert_allclose(gaps[:, 1], [-turns, turns], atol=1e-3)
+    assert np.ptp(gaps, axis=1).max() < 0.02
     assert (np.diff(x) >= 0.0).all()
     # Wherever two neighbours are joined, the ratio is of one sign.
     assert (y[:-1] * y[1:] < 0.0).sum() == 0
@@ -649,7 +653,8 @@ def test_a_saved_scene_names_all_that_defines_it_and_is_the_running_one(show, pa
     ('90deg', {'value': math.pi / 2.0, 'turns': True}),
     ('pi/2', {'value': math.pi / 2.0, 'turns': True}),
     ('2*(3+4)', {'value': 14.0, 'turns': False}),
-    ('1/0', 'divides by zero'), ('a+1', 'there is no a'), ('__import__', 'no number'), ('', 'no number')])
+    ('1/0', 'divides by zero'), ('a+1', 'there is no a'), ('__import__', 'no number'),
+    ('', 'no number')])
 def test_arithmetic_is_read_by_the_library(lever, text, answer):
     async def use(url):
         async with Page(url) as page:

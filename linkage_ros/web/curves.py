@@ -101,6 +101,8 @@ def curve(machine: Machine, present: Sequence[float], kind: str = POSITION,
     x, y, unit = sweep.values, sweep.of(kind, (output,))[output], sweep.unit(kind, output)
     poles = sweep.poles(kind, output)
     after = np.searchsorted(x, poles)
+    # A gap as wide as can be seen.
+    y[after - 1] = y[after] = np.nan
     x, y = np.insert(x, after, poles), np.insert(y, after, np.nan)
     if (kind, unit) == (POSITION, 'rad'):
         known = np.isfinite(y)
