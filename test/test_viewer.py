@@ -1047,7 +1047,8 @@ def test_a_signal_ends_the_viewer_while_somebody_looks(tmp_path, stop):
 
 
 @pytest.mark.long
-def test_make_view_says_where_to_look_and_ends_all_that_it_started():
+@pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_make_view_says_where_to_look_and_ends_all_that_it_started(stop):
     environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)}
     environment.pop('ROS_DOMAIN_ID', None)
     process = subprocess.Popen(
@@ -1062,7 +1063,7 @@ def test_make_view_says_where_to_look_and_ends_all_that_it_started():
                 await page.cast('/jansen')
 
         asyncio.run(look())
-        process.send_signal(signal.SIGINT)
+        process.send_signal(stop)
         # The output ends when the last of those who have it does.
         printed, _ = process.communicate(timeout=browser.DEADLINE)
         assert process.returncode == 0 and 'Traceback' not in printed
@@ -1073,7 +1074,8 @@ def test_make_view_says_where_to_look_and_ends_all_that_it_started():
 
 @pytest.mark.long
 @pytest.mark.parametrize('parameters, named', [
-    ({'port': 'taken'}, 'address already in use'), ({'port': 70000}, 'port'),
+    ({'port': 'taken'}, 'address already in use'), ({'port': 'taken'}, 'by PORT=8021'),
+    ({'port': 70000}, 'port'),
     ({'port': 'eighty'}, 'port'), ({'host': '192.0.2.1'}, '192.0.2.1'),
 ])
 def test_a_viewer_that_cannot_listen_ends_in_one_sentence(tmp_path, parameters, named):

@@ -24,7 +24,7 @@ from .inputs import Arc
 from .quantities import Points, Spot, Structure
 from ..formula.expression import Real
 from ..formula.program import Batch, evaluate, keep, Pose
-from ..words import listed, quoted
+from ..words import listed, meant, quoted
 
 # Lengths beyond these are counted in a power of two of their own, which changes no bit of a
 # result and keeps squares and products of lengths inside the range of float64.
@@ -416,7 +416,7 @@ class Mechanism:
         for name in names:
             if name not in allowed and not (what == 'joint' and self.has_output(name)):
                 raise ValueError(f'{self.type} has no {what} {quoted(name)}; '
-                                 f'allowed: {listed(allowed)}')
+                                 f'allowed: {listed(allowed)}{meant(name, allowed)}')
         return names
 
 

@@ -13,7 +13,7 @@ from .settings import shown
 from ..c_code import header
 from ..robot_model import urdf
 from ..scene import Machine
-from ..words import listed, quoted
+from ..words import listed, meant, quoted
 
 SAMPLES = 361
 KINDS = POSITION, VELOCITY, ACCELERATION, TRANSMISSION, FORCE = (
@@ -97,7 +97,8 @@ def curve(machine: Machine, present: Sequence[float], kind: str = POSITION,
     names = sweep.names(kind)
     output = names[0] if names and output is None else output or ''
     if not (output in names or kind != TRANSMISSION and sweep.linkage.has_output(output)):
-        raise Refused(f'there is no {kind} of {quoted(output)}; there is of {listed(names)}')
+        raise Refused(f'there is no {kind} of {quoted(output)}; there is of {listed(names)}'
+                      f'{meant(output, names)}')
     x, y, unit = sweep.values, sweep.of(kind, (output,))[output], sweep.unit(kind, output)
     poles = sweep.poles(kind, output)
     after = np.searchsorted(x, poles)

@@ -3,6 +3,7 @@
 
 """Node that shows the running scene on a page in the browser, with sliders to change it."""
 
+from errno import EADDRINUSE
 import sys
 from typing import Any, Optional
 
@@ -42,7 +43,10 @@ class Viewer(Node):
             self._server = self._served()
         except (OSError, ParameterException) as error:
             super().destroy_node()
-            raise scene.SceneError(f'the viewer cannot be started: {error}') from None
+            taken = getattr(error, 'errno', None) == EADDRINUSE
+            raise scene.SceneError(f'the viewer cannot be started: {error}' + taken * (
+                '; another is chosen by -p port:=8021, with ros2 launch by port:=8021, with make '
+                'view by PORT=8021, and any that is free by 0')) from None
         self.url = self._server.url
         self.get_logger().info(f'Look at {self.url}')
 
