@@ -28,6 +28,9 @@ def main(scene_file, port=PORT) -> int:
     """Run the nodes; return the exit code of the process."""
     # However it ends, no node is left behind.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
+        # The terminal is closed. With nohup it may be.
+        signal.signal(signal.SIGHUP, signal.default_int_handler)
     try:
         scene.load(scene_file)
         with Domain() as domain:

@@ -4,10 +4,12 @@
 """What the commands that are no nodes share: whatever is wrong is one sentence."""
 
 import argparse
+import os
 import sys
 from typing import Callable, List, Mapping, NoReturn, Optional, Sequence
 
 from .scene import Machine, SceneError
+from .words import meant
 
 
 class RequestError(Exception):
@@ -40,6 +42,11 @@ def run(name: str, work: Callable, args: Optional[Sequence[str]], needs: str) ->
     """
     try:
         work(args)
+        sys.stdout.flush()
+        return 0
+    except BrokenPipeError:
+        # Who reads has enough; what is left is written nowhere, when Python ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except (RequestError, SceneError) as error:
         why: object = error
@@ -57,5 +64,6 @@ def chosen(machines: Mapping[str, Machine], names: Sequence[str]) -> List[Machin
     """Return the machines that are named, or all; raise RequestError for one that is not there."""
     for name in names:
         if name not in machines:
-            raise RequestError(f'there is no mechanism {name!r}; allowed: {", ".join(machines)}')
+            raise RequestError(f'there is no mechanism {name!r}; allowed: {", ".join(machines)}'
+                               f'{meant(name, machines)}')
     return [machines[name] for name in names or machines]

@@ -3,6 +3,7 @@
 
 """Texts of others: plain, and short enough to be repeated in a message."""
 
+from difflib import get_close_matches
 import reprlib
 from typing import Any, Iterable
 
@@ -33,6 +34,14 @@ def quoted(value: Any) -> str:
     except Exception:
         # An integer of more digits than Python writes, or a class that cannot write itself.
         return f'a {elided(type(value).__name__, LONGEST - 2)}'
+
+
+def meant(word: Any, names: Iterable[str]) -> str:
+    """Return the end of a sentence that suggests the name that is nearly a word, if one is."""
+    by_case = {name.lower(): name for name in names}
+    text = word[:LONGEST].lower() if isinstance(word, str) else ''
+    near = get_close_matches(text, by_case, 1, 0.7)
+    return ''.join(f'; did you mean {elided(by_case[name])}?' for name in near)
 
 
 def listed(names: Iterable[str], most: int = LONGEST) -> str:

@@ -11,6 +11,7 @@ import subprocess
 import sys
 
 from linkage_ros import mechanisms
+from linkage_ros.linkage.walker import Assembly
 from linkage_ros.mechanisms.four_bar import grashof
 import numpy as np
 import pytest
@@ -223,3 +224,38 @@ def _reached(base, target, elbow):
     """Return the angle of an arm of two bars of 0.09 whose end is at the target."""
     way = complex(target[0] - base[0], target[1] - base[1])
     return math.atan2(way.imag, way.real) + elbow * math.acos(abs(way) / 0.18)
+
+
+def _near_a_change_point(seed):
+    """Return a four-bar that folds flat but for a little, or a leg with other bars."""
+    rng = np.random.default_rng(seed)
+    if seed % 2:
+        return mechanisms.create('jansen', **{
+            name: length * rng.uniform(0.7, 1.3)
+            for name, length in mechanisms.defaults('jansen').items()})
+    a, d, b = *rng.uniform(0.3, 1.0, 2), rng.uniform(1.0, 2.0)
+    nearly = a + b - d + rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-9.0, -1.0)
+    return mechanisms.create('four_bar', a=a, b=b, c=nearly, d=d, p=rng.uniform(0.1, 2.0))
+
+
+def _from_line(points, line):
+    """Return how far points are from the pieces of a line, all complex."""
+    start, along = line[:-1], np.diff(line)
+    from_start = points[:, None] - start
+    part = (from_start * along.conj()).real / np.maximum(abs(along) ** 2, 1e-300)
+    return abs(from_start - part.clip(0.0, 1.0) * along).min(axis=1)
+
+
+@pytest.mark.parametrize('linkage', [
+    *(mechanisms.create(type_) for type_ in mechanisms.TYPES if type_ != 'five_bar'),
+    mechanisms.create('jansen', a=10.0, m=22.0),
+    *(linkage for linkage in map(_near_a_change_point, range(60)) if linkage.reach())],
+    ids=lambda linkage: linkage.type)
+def test_a_drawn_curve_is_within_a_five_hundredth_of_its_size(linkage):
+    assembly = Assembly(linkage, scale=0.01)
+    low, high = max(assembly.reach, key=lambda arc: arc[1] - arc[0])
+    drawn = assembly.locus(linkage.tracer) @ (1, 1j)
+    true = linkage.solve(np.linspace(low, high, 4001), (linkage.tracer,))[linkage.tracer] @ (1, 1j)
+    true = 0.01 * true[np.isfinite(true)]
+    size = max(np.ptp(true.real), np.ptp(true.imag))
+    assert len(drawn) < 400 and _from_line(true, drawn).max() < size / 500

@@ -4,7 +4,10 @@
 """Robot models, read and moved by libraries that know nothing of this package. No ROS."""
 
 import math
+from pathlib import Path
 import re
+import subprocess
+import sys
 from xml.etree import ElementTree
 
 from linkage_ros import mechanisms, scene
@@ -17,6 +20,7 @@ import pytest
 from robots import LIBRARIES, Pinocchio, Yourdfpy
 from truth.cases import CASES
 
+ROOT = Path(__file__).parents[1]
 TOLERANCE = 1e-12
 SLIDES = {'slide', 'block', 'cylinder', 'left0_block', 'left1_block', 'right0_block',
           'right1_block'}
@@ -331,3 +335,14 @@ def test_a_limit_leaves_a_millionth_to_spare(kind):
         low, high = found[name]
         assert angles[name].min() - low == pytest.approx(spare, rel=0.01)
         assert high - angles[name].max() == pytest.approx(spare, rel=0.01)
+
+
+@pytest.mark.parametrize('arguments', [
+    ['robot_model'], ['robot_model', '--format', 'mjcf'], ['c_code', ROOT / 'config/all.yaml']],
+    ids=str)
+def test_who_reads_the_first_line_alone_hears_of_no_broken_pipe(arguments):
+    module, *others = arguments
+    command = subprocess.Popen([sys.executable, '-m', f'linkage_ros.{module}', *others],
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT)
+    command.stdout.close()
+    assert command.stderr.read() == b'' and command.wait() == 0

@@ -24,7 +24,7 @@ from .inverse import distinct, in_order, MonotoneBranches, nearest
 from .mechanism import Inputs
 from .planar import GRAZE
 from ..formula.program import Pose
-from ..words import listed, plain_text, quoted
+from ..words import listed, meant, plain_text, quoted
 
 # Dead points nearer to an end of the reach than this [rad] are that end.
 ONE = 1e-9
@@ -304,4 +304,4 @@ class Analysed(Driven):
             allowed = (*self.joints, *(f'{name}.{axis}' for name in self.points for axis in 'xy'),
                        'distance(A,B)', 'angle(A,B)')
             raise ValueError(f'{self.type} has no output {quoted(output)}; '
-                             f'allowed: {listed(allowed)}')
+                             f'allowed: {listed(allowed)}{meant(output, allowed)}')

@@ -21,6 +21,10 @@ SAMPLES, HALVINGS = 360, 48
 EVEN, KEPT, AROUND, ZOOMS = 385, 4, 17, 10
 # Where a bracket is cut; an odd number of places, so that one is its middle.
 CUTS = np.arange(1, 16) / 16
+# Of a drawn curve: even samples to begin with, how often its pieces are halved, most samples.
+DRAWN, ROUNDS, MOST = 181, 30, 4000
+# How far a drawn curve may be from the true one, as a part of its size and of its coordinates.
+CHORD, NOISE = 1 / 600, 1e-12
 # Angles below this [rad] are zero: the rounding of any other angle is coarser.
 LEAST = 1e-18
 
@@ -31,6 +35,51 @@ def sampled(lo: float, hi: float, samples: int = SAMPLES, fewest: int = 9) -> np
     steps = (hi - lo) * 0.5 ** np.arange(2, HALVINGS)
     theta = np.concatenate([even, lo + steps, hi - steps])
     return np.unique(np.clip(theta, lo, hi))
+
+
+def drawn(curve: Callable, lo: float, hi: float) -> np.ndarray:
+    """
+    Return points of a plane curve, the closer together the more it bends.
+
+    Parameters
+    ----------
+    curve : callable
+        From values of an input, shape (n,), to points, shape (n, 2); NaN where there is none.
+    lo, hi : float
+        The ends of the arc.
+
+    Returns
+    -------
+    float array (n, 2)
+        Between neighbours no point is farther from their chord than CHORD of the curve's size.
+
+    """
+    at = sampled(lo, hi, 0, DRAWN)
+    places = curve(at)
+    parts = np.array([0.25, 0.5, 0.75])
+    for _ in range(ROUNDS):
+        known = np.isfinite(places).all(axis=1)
+        size = np.ptp(places[known], axis=0).max(initial=0.0)
+        most = max(CHORD * size, NOISE * abs(places[known]).max(initial=0.0))
+        first = np.flatnonzero(known[:-1] & known[1:] & (at[1:] - at[:-1] > LEAST))
+        inner = at[first, None] + (at[first + 1] - at[first])[:, None] * parts
+        between = curve(inner.ravel()).reshape(-1, 3, 2)
+        bent = np.nanmax(_from_chord(places[first], places[first + 1], between), axis=1)
+        halved = bent > most
+        if not halved.any() or len(at) > MOST:
+            break
+        # All that is known of a piece that bends too much.
+        at = np.insert(at, first[halved].repeat(3) + 1, inner[halved].ravel())
+        places = np.insert(places, first[halved].repeat(3) + 1, between[halved].reshape(-1, 2), 0)
+    return places[np.isfinite(places).all(axis=1)]
+
+
+def _from_chord(start: np.ndarray, end: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return how far points (n, m, 2) are from chords (n, 2)."""
+    along = (end - start)[:, None]
+    away = points - start[:, None]
+    part = (away * along).sum(axis=-1) / np.maximum((along ** 2).sum(axis=-1), 1e-300)
+    return np.hypot(*np.moveaxis(away - part.clip(0.0, 1.0)[..., None] * along, -1, 0))
 
 
 def refined(test: Callable, lo: np.ndarray, hi: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:

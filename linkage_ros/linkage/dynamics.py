@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from .arguments import numbers
 from .mechanism import Inputs, Mechanism
-from ..words import listed, plain_text, quoted
+from ..words import listed, meant, plain_text, quoted
 
 
 class Driven(Mechanism):
@@ -113,8 +113,9 @@ class Driven(Mechanism):
                 turning = sum((rates[link] for link in chain), np.zeros(()))
                 yield np.where(force == 0.0, 0.0, force * turning)
             else:
+                allowed = *self.points, *self.joints
                 raise ValueError(f'{self.type} has no joint or link {quoted(name)} to load; '
-                                 f'allowed: {listed((*self.points, *self.joints))}')
+                                 f'allowed: {listed(allowed)}{meant(name, allowed)}')
 
     def _chain(self, name: str) -> Iterator[str]:
         """Yield the links that turn a link, itself first, down to the ground."""

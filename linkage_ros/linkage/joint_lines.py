@@ -54,7 +54,7 @@ from .builder import Builder, ConstructionError, Gear
 from .planar import LEFT, RIGHT
 from ..cache import cached
 from ..formula.expression import dimension, Real
-from ..words import elided, listed, quoted
+from ..words import elided, listed, meant, quoted
 
 _WORDS = {'left': LEFT, 'right': RIGHT, 'out': 1.0, 'in': -1.0}
 _JOINTS = ('CENTRE', 'BASE', 'FIRST', 'SECOND', 'POINT', 'CORNER', 'POLE', 'PIN', 'PIVOT',
@@ -125,6 +125,12 @@ class Line(NamedTuple):
     def drives(self) -> bool:
         """Whether it adds an input."""
         return self.word in INPUTS and not any(arg.option == 'geared' for arg in self.arguments)
+
+    @property
+    def sides(self) -> Tuple[str, ...]:
+        """The words for its branches of +1 and -1, if it has two."""
+        return next((('left', 'right') if kind == 'left|right' else ('out', 'in')
+                     for kind, _, _ in self.arguments if '|' in kind), ())
 
     def numbers(self) -> Iterable[Tuple[str, Formula]]:
         """Yield its numbers, each with its kind; raise ValueError for what is none."""
@@ -212,6 +218,9 @@ def _parsed(text: str) -> Line:
     parts = text.split()
     found = [i for i, part in enumerate(parts) if part in FORMS and i > 0]
     if not found:
+        for part in parts[1:]:
+            if near := meant(part, FORMS):
+                raise _error(text, f'{quoted(part)} is no construction{near}')
         raise _error(text, f'expected NAME and one of the constructions {", ".join(FORMS)}')
     at = found[0]
     line = Line(text, tuple(parts[:at]), parts[at], tuple(parts[at + 1:]))
@@ -280,7 +289,8 @@ def _missing(lines: List[Line], line: Line, joint: str, placed: Mapping[str, Lin
     """Return why a line cannot stand on a joint that is not placed before it."""
     places = {name: each for each in lines for name in each.names}
     if joint not in places or joint in line.names:
-        return f'joint {elided(joint)} is not placed before; there are: {listed(placed)}'
+        return (f'joint {elided(joint)} is not placed before; there are: {listed(placed)}'
+                f'{meant(joint, placed)}')
     after: Dict[str, Optional[str]] = {joint: None}
     waiting = [joint]
     for name in waiting:

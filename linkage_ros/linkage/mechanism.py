@@ -25,7 +25,7 @@ from .quantities import Points, Spot, structure_of
 from ..cache import Cache
 from ..formula.expression import Real
 from ..formula.program import Batch, evaluate, Pose
-from ..words import listed, plain_text, quoted
+from ..words import listed, meant, plain_text, quoted
 
 # Lengths beyond these are counted in a power of two of their own, which changes no bit of a
 # result and keeps squares and products of lengths inside the range of float64.
@@ -432,7 +432,7 @@ class Mechanism:
         for name in names:
             if name not in allowed and not (what == 'joint' and self.has_output(name)):
                 raise ValueError(f'{self.type} has no {what} {quoted(name)}; '
-                                 f'allowed: {listed(allowed)}')
+                                 f'allowed: {listed(allowed)}{meant(name, allowed)}')
         return names
 
 

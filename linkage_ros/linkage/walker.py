@@ -15,11 +15,10 @@ from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
+from .curves import drawn
 from .mechanism import Mechanism
 from .quantities import Leg, Spot
 from ..formula.program import Batch
-
-LOCUS_POINTS = 361
 
 
 class Layout(NamedTuple):
@@ -200,5 +199,5 @@ class Assembly:
         if len(self.linkage.inputs) > 1:
             return np.empty((0, 2))
         low, high = max(self.reach, key=lambda arc: arc[1] - arc[0])
-        places = self.linkage.solve(np.linspace(low, high, LOCUS_POINTS), (name,))[name]
-        return places[np.isfinite(places).all(axis=1)] * self._scale
+        return self._scale * drawn(
+            lambda theta: self.linkage.solve(theta, (name,))[name], low, high)

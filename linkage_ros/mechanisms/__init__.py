@@ -25,7 +25,7 @@ from . import custom
 from ..linkage.arguments import checked_branches, checked_dimensions
 from ..linkage.design import Design
 from ..linkage.servo import Mechanism
-from ..words import quoted
+from ..words import meant, quoted
 
 # What a scene shows when it names no mechanism, and its scale: from 0.5 m to 1.5 m in size.
 CATALOGUE = {'water_drop': 0.1, 'jansen': 0.005, 'peaucellier': 0.1, 'slotted_lever': 0.002}
@@ -69,7 +69,7 @@ def design(type_: str, /, joints: Optional[Sequence[str]] = None, tracer: Option
     """
     if not isinstance(type_, str) or type_ not in (*TYPES, CUSTOM):
         raise ValueError(f'unknown mechanism type {quoted(type_)}; '
-                         f'allowed: {", ".join((*TYPES, CUSTOM))}')
+                         f'allowed: {", ".join((*TYPES, CUSTOM))}{meant(type_, (*TYPES, CUSTOM))}')
     if type_ == CUSTOM:
         return custom.given(joints, tracer, dimensions)
     if joints is not None or tracer is not None:

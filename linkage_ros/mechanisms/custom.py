@@ -13,7 +13,7 @@ from ..cache import cached
 from ..linkage import joint_lines
 from ..linkage.design import Design
 from ..linkage.mechanism import check_bars, Mechanism
-from ..words import listed, plain_text, quoted
+from ..words import listed, meant, plain_text, quoted
 
 MOST_LINES = 2000
 
@@ -37,11 +37,13 @@ def design(joints: Tuple[str, ...], tracer: Optional[str], names: Tuple[str, ...
         for name in joint_lines.lengths([line]):
             joint_lines.check_name(name)
             if name not in names:
-                raise line.error(f'dimension {name} has no value; given: {listed(names)}')
+                raise line.error(f'dimension {name} has no value; given: {listed(names)}'
+                                 f'{meant(name, names)}')
     used = joint_lines.lengths(lines)
     placed = [name for line in lines for name in line.names]
     if tracer is not None and tracer not in placed:
-        raise ValueError(f'tracer {quoted(tracer)} is no joint; allowed: {listed(placed)}')
+        raise ValueError(f'tracer {quoted(tracer)} is no joint; allowed: {listed(placed)}'
+                         f'{meant(tracer, placed)}')
     signed = frozenset(name for name, length in used.items() if not length)
     return Design('custom', dict.fromkeys(used, 1.0), joints, tracer or placed[-1], signed, check)
 

@@ -11,6 +11,7 @@ import shutil
 from . import parts
 from .. import scene
 from ..command import chosen, Parser, RequestError, run
+from ..words import meant
 
 STILL, MOVING = ('.png', '.svg'), ('.gif', '.mp4')
 FPS, FASTEST_GIF, FASTEST = 25.0, 50.0, 240.0
@@ -194,7 +195,7 @@ def parts_of_a_picture(text):
     for word in words(text):
         if word not in parts.PARTS:
             raise argparse.ArgumentTypeError(f'{word} is no part of a picture; allowed: '
-                                             f'{", ".join(parts.PARTS)}')
+                                             f'{", ".join(parts.PARTS)}{meant(word, parts.PARTS)}')
     return frozenset(words(text))
 
 

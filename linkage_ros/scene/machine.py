@@ -28,7 +28,7 @@ from ..linkage.design import Design
 from ..linkage.inputs import Arc
 from ..linkage.servo import Mechanism
 from ..linkage.walker import Assembly
-from ..words import listed, quoted
+from ..words import listed, meant, quoted
 
 TYPES = (*mechanisms.TYPES, mechanisms.CUSTOM)
 
@@ -162,7 +162,8 @@ def read_machine(name: str, given: Mapping[str, Any], old: Optional[Machine],
     values = Values(given)
     type_ = values.take(f'{name}.type', TYPE, name)
     if type_ not in TYPES:
-        raise SceneError(f'{name}.type must be {TYPE.rule}, not {quoted(type_)}')
+        raise SceneError(f'{name}.type must be {TYPE.rule}, not {quoted(type_)}'
+                         f'{meant(type_, TYPES)}')
     linkage, reach = _linkage(name, type_, values)
     scale = values.take(f'{name}.scale', SCALE, 1.0)
     leg_pairs, mirrored = _legs(name, linkage, values)

@@ -13,7 +13,7 @@ import re
 from typing import Any, Iterable, List, Optional, Tuple, Type
 
 from ..cache import cached
-from ..words import elided, listed, MESSAGE, quoted
+from ..words import elided, listed, meant, MESSAGE, quoted
 
 # Which nodes act on a parameter, and whose value counts where several do.
 DRIVER, KINEMATICS, INVERSE = ALL = 'crank_driver', 'kinematics', 'servo_inverse'
@@ -183,7 +183,7 @@ def refuse_unknown(names: Iterable[str], known: List[str]) -> None:
         known = [f'{name}.type', *known] if f'{name}.*' in known else known
         if not _ROS.match(name):
             raise SceneError(f'{elided(name)} is not a parameter of the scene; allowed: '
-                             f'{listed(known, 180)}')
+                             f'{listed(known, 120)}{meant(name, known)}')
 
 
 def plain(value: Any) -> Any:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import re
 from textwrap import indent
 from typing import Any, Dict, Mapping
 
@@ -24,9 +25,14 @@ def in_yaml(given: Mapping[str, Any]) -> str:
     return '\n'.join(texts) + '\n'
 
 
-def without_defaults(scene: Scene) -> Dict[str, Any]:
+NOTHING = re.compile(r'(?!)')
+
+
+def without_defaults(scene: Scene, always: re.Pattern = NOTHING) -> Dict[str, Any]:
     """
     Return the values that tell a scene from what it is without them.
+
+    Values whose whole name matches `always` are returned even so.
 
     Raises
     ------
@@ -37,6 +43,8 @@ def without_defaults(scene: Scene) -> Dict[str, Any]:
     kept = {parameter.name: parameter.value for parameter in scene.parameters}
     whole = dict(kept)
     for name in whole:
+        if always.fullmatch(name):
+            continue
         fewer = {key: value for key, value in kept.items() if key != name}
         try:
             same = read(fewer, scene, strict=False).parameters

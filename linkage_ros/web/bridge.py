@@ -4,6 +4,9 @@
 """Calls from the web server's thread to the node, which only the executor's thread may touch."""
 
 import asyncio
+from typing import Any, Callable, Optional
+
+from rclpy.node import Node
 
 SECONDS_TO_ANSWER = 3.0
 SECONDS_BETWEEN_TRIES = 0.02
@@ -26,15 +29,15 @@ class Bridge:
     Attributes
     ----------
     loop : asyncio.AbstractEventLoop
-        The web's event loop, once there is one.
+        The web's event loop, which its server sets.
 
     """
 
-    def __init__(self, node):
+    def __init__(self, node: Node) -> None:
         self.node = node
-        self.loop = None
+        self.loop: asyncio.AbstractEventLoop
 
-    def ask(self, function, *args):
+    def ask(self, function: Callable[..., Any], *args: Any) -> asyncio.Future[Any]:
         """
         Have a function called in the executor's thread, after those that were asked for before.
 
@@ -46,7 +49,7 @@ class Bridge:
         """
         future = self.loop.create_future()
 
-        def work():
+        def work() -> None:
             try:
                 self.hand_over(_settle, future, function(*args))
             except Exception as error:
@@ -56,7 +59,7 @@ class Bridge:
         self._start(work)
         return future
 
-    def _start(self, work):
+    def _start(self, work: Callable[[], None]) -> None:
         # Unlike a guard condition, a task works with every executor.
         executor = self.node.executor
         if executor is not None:
@@ -64,25 +67,25 @@ class Bridge:
         else:
             self.loop.call_later(SECONDS_BETWEEN_TRIES, self._start, work)
 
-    async def call(self, client, request):
+    async def call(self, client: Any, request: Any) -> Any:
         """Return a service's response; raise NoAnswer if there is none in time."""
         try:
             return await asyncio.wait_for(self._called(client, request), SECONDS_TO_ANSWER)
         except asyncio.TimeoutError:
             raise NoAnswer(f'{client.srv_name} does not answer') from None
 
-    def warn(self, text: str):
+    def warn(self, text: str) -> None:
         """Say what went wrong, not too often."""
         self.node.get_logger().warning(text, throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
 
-    def hand_over(self, function, *args):
+    def hand_over(self, function: Callable[..., Any], *args: Any) -> None:
         """Let a function run in the web's thread, if that is still there."""
         try:
             self.loop.call_soon_threadsafe(function, *args)
         except RuntimeError:
             pass
 
-    async def _called(self, client, request):
+    async def _called(self, client: Any, request: Any) -> Any:
         while not await self.ask(client.service_is_ready):
             await asyncio.sleep(SECONDS_BETWEEN_TRIES)
         future = self.loop.create_future()
@@ -94,7 +97,7 @@ class Bridge:
             self.ask(client.remove_pending_request, asked)
 
 
-def _settle(future, result, error=None):
+def _settle(future: asyncio.Future[Any], result: Any, error: Optional[Exception] = None) -> None:
     if future.done():
         return
     if error is None:

@@ -4,6 +4,7 @@
 """Curves for the page: what outputs do over a turn or a stroke; a mechanism as a file."""
 
 import io
+from typing import Any, Optional, Sequence
 
 import numpy as np
 
@@ -11,7 +12,8 @@ from .poses import Refused, theta_of
 from .settings import shown
 from ..c_code import header
 from ..robot_model import urdf
-from ..words import listed, quoted
+from ..scene import Machine
+from ..words import listed, meant, quoted
 
 SAMPLES = 361
 KINDS = POSITION, VELOCITY, ACCELERATION, TRANSMISSION, FORCE = (
@@ -23,23 +25,24 @@ FORCES = {('rad', 'm'): 'N·m/N', ('m', 'rad'): 'N/(N·m)'}
 class Sweep:
     """The first input through its reach at 1 rad/s or 1 m/s, the others held [rad or m]."""
 
-    def __init__(self, machine, present):
+    def __init__(self, machine: Machine, present: Sequence[float]) -> None:
         self.linkage, self.input, self._machine = machine.linkage, machine.first.input, machine
         sizes = [machine.scale_of(name) for name in machine.inputs]
         others = [value / size for value, size in zip(present, sizes)][1:]
         reach, dead = self.linkage.reach(*others), self.linkage.dead_points(*others)
         if not reach:
             raise Refused(f'{machine.name} cannot be assembled where its other inputs are')
+        lows, highs = zip(*reach)
         # Between two arcs there is a place without values.
-        own = np.unique([*np.linspace(*np.transpose(reach), SAMPLES).ravel(), *(
+        own = np.unique([*np.linspace(lows, highs, SAMPLES).ravel(), *(
             0.5 * (before + after) for (_, before), (after, _) in zip(reach, reach[1:]))])
         self._size, still = sizes[0], [0.0] * len(others)
-        self._inputs, self._speeds, self._still = map(theta_of, (
+        self._inputs, self._speeds, self._still = (theta_of(values) for values in (
             [own, *others], [1.0 / sizes[0], *still], [0.0, *still]))
         self.values, self.reach, self.dead = (
             np.multiply(each, sizes[0]) for each in (own, reach, dead))
 
-    def names(self, kind):
+    def names(self, kind: str) -> list[str]:
         """Return the joints with a transmission angle, or the outputs."""
         linkage = self.linkage
         if kind == TRANSMISSION:
@@ -48,7 +51,7 @@ class Sweep:
                 *(f'{joint}.{axis}' for joint in linkage.points if joint not in linkage.grounded
                   for axis in 'xy')]
 
-    def unit(self, kind, name):
+    def unit(self, kind: str, name: str) -> str:
         """Return what a quantity is counted in; nothing: a number."""
         own = 'rad' if kind == TRANSMISSION or self.linkage.is_angle(name) else 'm'
         if kind == FORCE:
@@ -56,7 +59,7 @@ class Sweep:
         return own + {VELOCITY: '/s', ACCELERATION: '/s²'}.get(kind, '')
 
     @np.errstate(all='ignore')
-    def of(self, kind, names):
+    def of(self, kind: str, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Return a quantity of each name in the scene's size; not finite where there is none."""
         linkage, inputs, size = self.linkage, self._inputs, self._machine.scale_of
         if kind == TRANSMISSION:
@@ -72,26 +75,46 @@ class Sweep:
         return {name: value * factor * size(name) for name, value in found.items()}
 
 
-def curve(machine, present, kind=POSITION, output=None) -> dict:
+    def poles(self, kind: str, name: str) -> np.ndarray:
+        """Return inputs [rad or m] across which a quantity is not followed: it may be infinite."""
+        if kind in (POSITION, TRANSMISSION):
+            return np.empty(0)
+        rate = self.of(VELOCITY, (name,))[name]
+        with np.errstate(all='ignore'):
+            part = rate[:-1] / (rate[:-1] - rate[1:])
+            turned = (rate[:-1] * rate[1:] < 0.0) & np.isfinite(part) & (kind == FORCE)
+        x = self.values
+        at = (x[:-1] + part * np.diff(x))[turned]
+        return np.sort([*at, *(dead for dead in self.dead if x[0] < dead < x[-1])])
+
+
+def curve(machine: Machine, present: Sequence[float], kind: str = POSITION,
+          output: Optional[str] = None) -> dict[str, Any]:
     """Return one of KINDS over the first input: x and y in `units`, y None where it has none."""
     if kind not in KINDS:
         raise ValueError(f'kind must be one of {", ".join(KINDS)}, not {quoted(kind)}')
     sweep = Sweep(machine, present)
     names = sweep.names(kind)
-    output = names[0] if names and output is None else output
+    output = names[0] if names and output is None else output or ''
     if not (output in names or kind != TRANSMISSION and sweep.linkage.has_output(output)):
-        raise Refused(f'there is no {kind} of {quoted(output)}; there is of {listed(names)}')
-    y, unit = sweep.of(kind, (output,))[output], sweep.unit(kind, output)
+        raise Refused(f'there is no {kind} of {quoted(output)}; there is of {listed(names)}'
+                      f'{meant(output, names)}')
+    x, y, unit = sweep.values, sweep.of(kind, (output,))[output], sweep.unit(kind, output)
+    poles = sweep.poles(kind, output)
+    after = np.searchsorted(x, poles)
+    # A gap as wide as can be seen.
+    y[after - 1] = y[after] = np.nan
+    x, y = np.insert(x, after, poles), np.insert(y, after, np.nan)
     if (kind, unit) == (POSITION, 'rad'):
         known = np.isfinite(y)
         y[known] = np.unwrap(y[known])
     return {'input': sweep.input.name, 'output': output, 'names': names,
-            'units': [sweep.input.unit, unit], 'x': sweep.values.tolist(),
+            'units': [sweep.input.unit, unit], 'x': x.tolist(),
             'y': list(map(shown, y.tolist())), 'reach': sweep.reach.tolist(),
             'dead': sweep.dead.tolist()}
 
 
-def exported(machine, present, form, frame_id) -> str:
+def exported(machine: Machine, present: Sequence[float], form: str, frame_id: str) -> str:
     """Return as text: 'csv', all kinds of all outputs in rad and m; 'urdf'; or 'c'."""
     if form == 'urdf':
         return urdf.describe([machine], machine.frame_id or frame_id)

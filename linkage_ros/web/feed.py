@@ -4,8 +4,10 @@
 """Markers for the page: from messages to how they look, which seldom changes, and points."""
 
 import struct
+from typing import Any, Callable, Mapping, Optional, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 from visualization_msgs.msg import Marker
 
 from .bridge import SECONDS_BETWEEN_WARNINGS
@@ -38,20 +40,22 @@ class Feed:
 
     """
 
-    def __init__(self, topic: str, mechanism: str, type_, number, logger):
-        self.newest = None
+    def __init__(self, topic: str, mechanism: str, type_: type, number: Callable[[int], int],
+                 logger: Any) -> None:
+        self.newest: Optional[bytes] = None
         self.topic = topic
         self._mechanism = mechanism
         self._type = type_
         self._number = number
         self._logger = logger
-        self._drawn = None
-        self._layout = None
+        self._drawn: Optional[bytes] = None
+        self._layout: Optional[MessageLayout] = None
         # By the markers' numbers; the places are those of the markers in the message.
-        self._looks, self._places = {}, {}
+        self._looks: dict[int, dict[str, Any]] = {}
+        self._places: dict[int, Optional[int]] = {}
         self._records = b''
 
-    def drawn(self):
+    def drawn(self) -> tuple[dict[int, dict[str, Any]], bytes]:
         """
         Return what the newest message looks like and where it is.
 
@@ -64,10 +68,10 @@ class Feed:
             x, y, z; all little-endian.
 
         """
-        if self.newest is not self._drawn:
+        if self.newest is not None and self.newest is not self._drawn:
             self._drawn = self.newest
             try:
-                self._draw(self._drawn)
+                self._draw(self.newest)
             except Exception as error:
                 # What the middleware raises is its own affair, and the bytes are anybody's.
                 self._logger.warning(f'a message on {self.topic} is dropped: {error}',
@@ -75,7 +79,7 @@ class Feed:
         return self._looks, self._records
 
     @np.errstate(over='ignore')
-    def _draw(self, text):
+    def _draw(self, text: bytes) -> None:
         if self._layout and self._layout.fits(text):
             self._records = _records(self._places, self._layout.read(text))
             return
@@ -94,7 +98,8 @@ class Feed:
         self._looks, self._places, self._records = looks, places, records
 
 
-def _layout(text, message, places, records):
+def _layout(text: bytes, message: Any, places: Mapping[int, Optional[int]],
+            records: bytes) -> Optional[MessageLayout]:
     """Return the layout of a message that was drawn, or None if it has none."""
     try:
         layout = MessageLayout(text, message)
@@ -103,7 +108,7 @@ def _layout(text, message, places, records):
     return layout if _records(places, layout.read(text)) == records else None
 
 
-def _records(places, points):
+def _records(places: Mapping[int, Optional[int]], points: Sequence[np.ndarray]) -> bytes:
     """Return the points of markers, by the markers' numbers and places, as the page reads them."""
     records = []
     for number, place in places.items():
@@ -112,7 +117,7 @@ def _records(places, points):
     return b''.join(records)
 
 
-def _shown(numbers):
+def _shown(numbers: ArrayLike) -> np.ndarray:
     """Return numbers as they are drawn; raise ValueError if that cannot be."""
     shown = np.asarray(numbers).astype('<f4')
     if not np.isfinite(shown).all():
@@ -120,7 +125,7 @@ def _shown(numbers):
     return shown
 
 
-def _look(mechanism, marker):
+def _look(mechanism: str, marker: Marker) -> dict[str, Any]:
     place, turn, colour = marker.pose.position, marker.pose.orientation, marker.color
     pose = [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]
     colours = [colour.r, colour.g, colour.b, colour.a]

@@ -5,13 +5,19 @@
 
 from itertools import combinations
 import math
+from typing import Any, Mapping, Sequence
 
 from .settings import is_number, shown
+from ..linkage.arithmetic import Formula
+from ..linkage.inputs import Arc
+from ..linkage.mechanism import Mechanism
 from ..linkage.nearest_pose import nearest_inputs
 from ..linkage.output_range import ground_frame
-from ..scene import in_words, slider
+from ..scene import Drive, in_words, Machine, Scene, slider
 from ..words import listed, quoted
 
+ARROWS = {'velocity': 'm/s', 'acceleration': 'm/s²', 'force': 'N'}
+_, ACCELERATION, FORCE = ARROWS
 # By how much a dimension is changed to see which bars follow, as a part of the longest bar.
 NUDGE = 1e-6
 # How far beyond its end an input is by rounding alone.
@@ -22,7 +28,7 @@ class Refused(Exception):
     """What cannot be done, with the reason."""
 
 
-def described(machine, present) -> dict:
+def described(machine: Machine, present: Sequence[float]) -> dict[str, Any]:
     """
     Return where a mechanism is, in its scene's size, with its inputs at `present` [rad or m].
 
@@ -46,7 +52,49 @@ def described(machine, present) -> dict:
                       for by, size in zip(rates, own)]} for name in names}}
 
 
-def reached(machine, present, want):
+def arrows(machine: Machine, present: Sequence[float], kind: str,
+           speeds: Mapping[str, float]) -> dict[str, Any]:
+    """
+    Return one of ARROWS at each joint of the first leg: `unit`, and x, y in its plane by joint.
+
+    Speeds [rad/s or m/s] are by input; what is not given stands still. Forces are the loads, and
+    `efforts` by input what holds them [N m or N].
+    """
+    if kind not in ARROWS:
+        raise ValueError(f'arrows must be one of {", ".join(ARROWS)}, not {quoted(kind)}')
+    given = {name: speeds.get(name, 0.0) for name in machine.inputs}
+    if not all(map(is_number, given.values())):
+        raise ValueError(f'speeds must be finite numbers, not {quoted(speeds)}')
+    linkage, own = machine.linkage, [machine.scale_of(name) for name in machine.inputs]
+    theta = theta_of([value / size for value, size in zip(present, own)])
+    rates = [speed / size for speed, size in zip(given.values(), own)]
+    if kind == FORCE:
+        efforts = machine.efforts(present) if machine.loads else ()
+        return {'unit': 'N', 'at': {
+            name: load for name, load in machine.loads.items() if not isinstance(load, float)},
+            'efforts': {name: [shown(effort), 'N·m' if drive.input.turns else 'N']
+                        for (name, drive), effort in zip(machine.inputs.items(), efforts)}}
+    if kind == ACCELERATION:
+        found = linkage.acceleration(theta, theta_of(rates), theta_of([0.0] * len(rates)))
+    else:
+        each = [linkage.velocity(theta, None, by) for by in range(len(rates))]
+        found = {name: sum(rate * one[name] for rate, one in zip(rates, each))
+                 for name in linkage.points}
+    return {'unit': ARROWS[kind], 'at': {
+        name: [shown(float(part) * machine.scale) for part in vector]
+        for name, vector in found.items() if name not in linkage.grounded}}
+
+
+def number(text: str) -> dict[str, Any]:
+    """Return the `value` of arithmetic such as pi/2, and whether it `turns`: is in rad."""
+    formula = Formula(text)
+    if formula.names:
+        raise Refused(f'{quoted(text)} is no number: there is no {listed(formula.names)}')
+    return {'value': float(formula.value({})), 'turns': bool({'pi', 'deg'} & formula.words.keys())}
+
+
+def reached(machine: Machine, present: Sequence[float],
+            want: Mapping[str, Any]) -> tuple[list[float], str]:
     """
     Return the inputs [rad or m] that do what is wanted as nearly as can be, and what is short.
 
@@ -80,7 +128,8 @@ def reached(machine, present, want):
     return _output_at(machine, present[0], name, value)
 
 
-def _input_at(machine, present, name, value):
+def _input_at(machine: Machine, present: Sequence[float], name: str,
+              value: float) -> tuple[list[float], str]:
     drive, ends = machine.inputs[name], arcs(machine.inputs[name])
     near = min((min(max(float(drive.input.beside(value, (low + high) / 2.0)), low), high)
                 for low, high in ends), key=lambda end: drive.input.apart(end, value))
@@ -95,10 +144,11 @@ def _input_at(machine, present, name, value):
     return inputs, f'{name} reaches {in_words(ends)} {drive.input.unit}' if missed else ''
 
 
-def _output_at(machine, present, name, value):
+def _output_at(machine: Machine, present: float, name: str,
+               value: float) -> tuple[list[float], str]:
     linkage, drive = machine.linkage, machine.first
     own, unit = machine.scale_of(drive.input.name), machine.scale_of(name)
-    ends = drive.ends and tuple(end / own for end in drive.ends)
+    ends = drive.ends and (drive.ends[0] / own, drive.ends[1] / own)
     found = float(linkage.servo_for(name, value / unit, present / own, ends)[0])
     if math.isfinite(found):
         return [found * own], ''
@@ -111,7 +161,8 @@ def _output_at(machine, present, name, value):
                              f'{"rad" if linkage.is_angle(name) else "m"}')
 
 
-def _joint_at(machine, present, joint, place, leg=0):
+def _joint_at(machine: Machine, present: Sequence[float], joint: str, place: Any,
+              leg: int = 0) -> list[float]:
     if not (isinstance(place, list) and len(place) == 2 and all(map(is_number, place))):
         raise ValueError(f'place must be two finite numbers, not {quoted(place)}')
     legs = list(machine.assembly().legs.values())
@@ -120,44 +171,46 @@ def _joint_at(machine, present, joint, place, leg=0):
     if joint not in machine.linkage.points:
         raise ValueError(f'joint must be one of {listed(machine.linkage.points)}, '
                          f'not {quoted(joint)}')
-    leg, own = legs[leg], [machine.scale_of(name) for name in machine.inputs]
+    one, own = legs[leg], [machine.scale_of(name) for name in machine.inputs]
     # A leg's own input, and back: of a lone leg they are the same.
-    ways = [[sorted(leg.start + leg.side * (end - leg.lag) for end in arc) for arc in arcs(drive)]
+    ways = [[sorted(one.start + one.side * (end - one.lag) for end in arc) for arc in arcs(drive)]
             for drive in machine.inputs.values()]
     found = nearest_inputs(
-        machine.linkage, joint, [leg.side * place[0] / machine.scale, place[1] / machine.scale],
-        [leg.start + leg.side * (value - leg.lag) / size for value, size in zip(present, own)],
+        machine.linkage, joint, [one.side * place[0] / machine.scale, place[1] / machine.scale],
+        [one.start + one.side * (value - one.lag) / size for value, size in zip(present, own)],
         [[(low / size, high / size) for low, high in way] for way, size in zip(ways, own)])
-    return [float(leg.lag + leg.side * (value - leg.start)) * size
+    return [float(one.lag + one.side * (value - one.start)) * size
             for value, size in zip(found, own)]
 
 
-def arcs(drive):
+def arcs(drive: Drive) -> list[Arc]:
     """Return where an input may be put [rad or m]."""
     return [drive.ends] if drive.ends else list(drive.reach)
 
 
-def theta_of(values):
+def theta_of(values: Sequence[Any]) -> Any:
     """Return the inputs as a linkage takes them: a sequence only of several."""
     return values if len(values) > 1 else values[0]
 
 
-def tunable(scene_, name) -> dict:
+def tunable(scene_: Scene, name: str) -> dict[str, Any]:
     """
     Return between what each dimension of a mechanism may be moved, and which bars follow.
 
     `travel` holds [low, high] by parameter, `bars` pairs of joints, `fixed` the joints that do not
-    move.
+    move, `sides` the words for a branch of +1 and of -1.
     """
     machine = scene_.machines[name]
     start = f'{name}.dimensions.'
     travel = {parameter.name[len(name) + 1:]: slider.ends(scene_, parameter)
               for parameter in machine.parameters if parameter.name.startswith(start)}
     return {'travel': travel, 'fixed': list(ground_frame(machine.linkage)),
+            'sides': {name: machine.linkage.line_of(name).sides
+                      for name in machine.linkage.branches},
             'bars': {key: _bars(machine.linkage, key.partition('.')[2]) for key in travel}}
 
 
-def _bars(linkage, key):
+def _bars(linkage: Mechanism, key: str) -> list[tuple[str, str]]:
     """Return the pairs of joints whose distance follows a dimension."""
     size = NUDGE * float(linkage.longest)
     for step in (size, -size):
@@ -171,7 +224,7 @@ def _bars(linkage, key):
     return []
 
 
-def _distances(linkage):
+def _distances(linkage: Mechanism) -> dict[tuple[str, str], float]:
     frames = [ground_frame(linkage), *linkage.frames.values()]
     return {(a, b): math.dist(frame[a], frame[b])
             for frame in frames for a, b in combinations(frame, 2)}

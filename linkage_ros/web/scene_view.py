@@ -3,11 +3,24 @@
 
 """The running scene for the page: found in the ROS graph, drawn, and changed by services."""
 
+from __future__ import annotations
+
 import asyncio
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 import math
+import re
+from typing import (
+    Any,
+    Callable,
+    Collection,
+    Mapping,
+    Optional,
+    Protocol,
+    Sequence,
+    TypeVar,
+)
 
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.node import NodeNameNonExistentError
@@ -21,10 +34,10 @@ from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
 from . import curves, poses
-from .bridge import NoAnswer
+from .bridge import Bridge, NoAnswer
 from .feed import Feed
 from .poses import Refused
-from .settings import RemoteNode, Setting
+from .settings import Described, RemoteNode, Setting
 from .. import scene
 from ..scene import writing
 from ..words import quoted
@@ -37,11 +50,28 @@ SECONDS_BETWEEN_LOOKS = 1.0
 SECONDS_TO_LINGER = 1.0
 SECONDS_TO_ARRIVE, ARRIVED = 1.0, 1e-6
 # What a scene has beside its mechanisms.
+DEFINES = re.compile(r'mechanisms|[^.]+\.(type|scale|dimensions\..+)')
 GENERAL = 'mechanisms', 'frame_id', 'frame_prefix', 'rate'
 SCENE = 'scene'
 
+Answer = dict[str, Any]
+Result = TypeVar('Result')
+# Marker topics with their publishers, nodes with parameters, and from which topics each hears.
+Marked = tuple[tuple[str, tuple[tuple[str, bytes], ...]], ...]
+Graph = tuple[Marked, tuple[str, ...], dict[str, list[str]]]
+
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class OpenPage(Protocol):
+    """What is shown the scene."""
+
+    def tell(self, key: Any, message: dict[str, Any]) -> None:
+        """Send a message; of those with one key the last is enough."""
+
+    def offer(self, feed: Feed) -> None:
+        """Send what a feed has, when it is ready to draw it."""
 
 
 @dataclass
@@ -54,28 +84,28 @@ class ShownMechanism:
     """
 
     key: str
-    settings: dict
-    sources: tuple = ()
-    machine: object = None
-    held: dict = field(default_factory=dict)
+    settings: dict[str, Setting]
+    sources: tuple[str, ...] = ()
+    machine: Optional[scene.Machine] = None
+    held: dict[str, float] = field(default_factory=dict)
     until: float = 0.0
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Its name in its scene."""
         return self.key.rsplit('/', 1)[1]
 
-    def values(self) -> dict:
+    def values(self) -> dict[str, Any]:
         """Return its parameters by full name."""
         return {f'{self.name}.{name}': setting.value for name, setting in self.settings.items()}
 
-    def scene(self):
+    def scene(self) -> scene.Scene:
         """Return the scene of it alone; raise Refused if its parameters tell none."""
         if 'type' not in self.settings:
             raise Refused(f'the nodes of {self.name} have not told its parameters yet')
         return _read({'mechanisms': [self.name], **self.values()})
 
-    def described(self) -> dict:
+    def described(self) -> dict[str, Any]:
         """Return what the page needs to draw it."""
         return {'key': self.key, 'name': self.name,
                 'settings': [setting.described() for setting in self.settings.values()]}
@@ -99,52 +129,53 @@ class SceneView:
 
     """
 
-    def __init__(self, bridge):
-        self.clients = []
+    def __init__(self, bridge: Bridge) -> None:
+        self.clients: list[OpenPage] = []
         self._bridge = bridge
         self._setting = asyncio.Lock()
-        self._seen = None
-        self._mechanisms = {}
-        self._general = {}
-        self._found = {}
-        self._watching = None
-        self._stopping = None
+        self._seen: Optional[Graph] = None
+        self._mechanisms: dict[str, ShownMechanism] = {}
+        self._general: dict[str, dict[str, Any]] = {}
+        self._found: dict[str, Optional[Described]] = {}
+        self._watching: Optional[asyncio.Task[None]] = None
+        self._stopping: Optional[asyncio.TimerHandle] = None
         # What follows is changed in the executor's thread alone.
-        self._nodes = {}
-        self._sources = {}
-        self._told = {}
-        self._feeds = {}
-        self._numbers = {}
-        self._events = None
+        self._nodes: dict[str, RemoteNode] = {}
+        self._sources: dict[str, Any] = {}
+        self._told: dict[str, dict[str, float]] = {}
+        self._feeds: dict[str, tuple[Feed, Any]] = {}
+        self._numbers: dict[tuple[str, int], int] = {}
+        self._events: Any = None
 
-    def add(self, client):
+    def add(self, client: OpenPage) -> None:
         """Show a client the scene, which is watched from the first client on."""
         self.clients.append(client)
         if self._stopping:
             self._stopping.cancel()
         if self._watching is None:
-            self._watching = asyncio.ensure_future(self._watch())
+            self._watching = asyncio.create_task(self._watch())
             return
         self._show(client)
 
-    def remove(self, client):
+    def remove(self, client: OpenPage) -> None:
         """Forget a client; after the last one watching ends, unless it was only a reload."""
         self.clients.remove(client)
         if not self.clients:
             # A node that is still to answer would wait for a client that is gone.
             self._stopping = self._bridge.loop.call_later(SECONDS_TO_LINGER, self._stop)
 
-    def _stop(self):
-        self._watching.cancel()
+    def _stop(self) -> None:
+        if self._watching:
+            self._watching.cancel()
         self._watching = self._stopping = None
         self._seen, self._mechanisms, self._found = None, {}, {}
         self._bridge.ask(self._close)
 
-    def feeds(self):
+    def feeds(self) -> list[Feed]:
         """Return the feeds that have something to draw."""
         return [feed for feed, _ in list(self._feeds.values()) if feed.newest is not None]
 
-    async def set(self, key: str, values: dict):
+    async def set(self, key: str, values: Mapping[str, Any]) -> None:
         """
         Set parameters of a mechanism, those of one node all or none.
 
@@ -156,7 +187,7 @@ class SceneView:
         """
         async with self._setting:
             mechanism = self._find(key)
-            asked = {}
+            asked: dict[str, list[Any]] = {}
             for name, value in values.items():
                 if name not in mechanism.settings:
                     raise Refused(f'{mechanism.name} has no parameter {quoted(name)}')
@@ -169,7 +200,7 @@ class SceneView:
             for node, parameters in asked.items():
                 await self._set(node, parameters)
 
-    async def _set(self, node, parameters):
+    async def _set(self, node: str, parameters: list[Any]) -> None:
         if node not in self._nodes:
             raise Refused(f'{node} is gone')
         try:
@@ -179,21 +210,26 @@ class SceneView:
         if reason:
             raise Refused(reason)
 
-    async def pose(self, key: str, want=None) -> dict:
+    async def pose(self, key: str, want: Optional[Mapping[str, Any]] = None, arrows: str = '',
+                   speeds: Any = ()) -> Answer:
         """
         Return where a mechanism is; if something is wanted, bring it there first and hold it.
 
-        Takes what `poses.reached` does, returns what `poses.described` does, and the reason if
-        that is not all that was wanted.
+        Takes what `poses.reached` and `poses.arrows` do, returns what `poses.described` does, the
+        arrows if any are asked for, and the reason if that is not all that was wanted.
         """
         mechanism = self._find(key)
         (machine, inputs), reason = self._state(mechanism), ''
         if want is not None:
             inputs, reason = poses.reached(machine, inputs, dict(want))
             await self._hold(mechanism, machine, inputs)
-        return {**poses.described(machine, inputs), 'reason': reason}
+        found = {**poses.described(machine, inputs), 'reason': reason}
+        if arrows:
+            found['arrows'] = poses.arrows(machine, inputs, arrows, dict(speeds))
+        return found
 
-    async def _hold(self, mechanism, machine, inputs):
+    async def _hold(self, mechanism: ShownMechanism, machine: scene.Machine,
+                    inputs: Sequence[float]) -> None:
         """Stop the inputs where they are wanted."""
         values = {}
         for (name, drive), value in zip(machine.inputs.items(), inputs):
@@ -208,25 +244,25 @@ class SceneView:
         mechanism.held = dict(zip(machine.inputs, inputs))
         mechanism.until = self._bridge.loop.time() + SECONDS_TO_ARRIVE
 
-    async def tune(self, key: str) -> dict:
+    async def tune(self, key: str) -> Answer:
         """Return what `poses.tunable` does."""
         mechanism = self._find(key)
         return await self._aside(lambda: poses.tunable(mechanism.scene(), mechanism.name))
 
-    async def curve(self, key: str, **about) -> dict:
+    async def curve(self, key: str, **about: Any) -> Answer:
         """Return what `curves.curve` does."""
         machine, inputs = self._state(self._find(key))
         return await self._aside(lambda: curves.curve(machine, inputs, **about))
 
-    async def export(self, key: str, form: str) -> dict:
+    async def export(self, key: str, form: str) -> Answer:
         """Return what `curves.exported` does."""
         machine, inputs = self._state(self._find(key))
         frame_id = self._general.get(_space(key), {}).get('frame_id', 'world')
         return {'text': await self._aside(
             lambda: curves.exported(machine, inputs, form, frame_id))}
 
-    async def save(self, key: str, values=()) -> dict:
-        """Return the parameter file of a mechanism's scene, some values replaced."""
+    async def save(self, key: str, values: Any = ()) -> Answer:
+        """Return a parameter file of a mechanism's scene: what defines it, and what is set."""
         mechanism, space = self._find(key), _space(key)
         given = dict(self._general.get(space, {}))
         for other in self._mechanisms.values():
@@ -234,16 +270,17 @@ class SceneView:
                 given.update(other.values())
         given.update((f'{mechanism.name}.{name}', value) for name, value in dict(values).items())
         return {'text': await self._aside(
-            lambda: writing.in_yaml(writing.without_defaults(_read(given))))}
+            lambda: writing.in_yaml(writing.without_defaults(_read(given), DEFINES)))}
 
-    async def _aside(self, work):
+    async def _aside(self, work: Callable[[], Result]) -> Result:
         """Return what takes longer than others should wait."""
         try:
-            return await self._bridge.loop.run_in_executor(None, work)
+            found: Result = await self._bridge.loop.run_in_executor(None, work)
+            return found
         except scene.SceneError as error:
             raise Refused(str(error)) from None
 
-    def _state(self, mechanism):
+    def _state(self, mechanism: ShownMechanism) -> tuple[scene.Machine, list[float]]:
         """Return a machine and its inputs [rad or m] as they were told last, or as they start."""
         if mechanism.machine is None:
             mechanism.machine = mechanism.scene().machines[mechanism.name]
@@ -261,19 +298,19 @@ class SceneView:
             inputs.append(mechanism.held.get(name, now))
         return machine, inputs
 
-    def _find(self, key):
+    def _find(self, key: str) -> ShownMechanism:
         if key not in self._mechanisms:
             raise Refused(f'there is no mechanism {quoted(key)}; '
                           f'there are: {", ".join(self._mechanisms)}')
         return self._mechanisms[key]
 
-    def _show(self, client):
+    def _show(self, client: OpenPage) -> None:
         client.tell(SCENE, {'op': 'scene', 'mechanisms': [
             mechanism.described() for mechanism in self._mechanisms.values()]})
         for feed in self.feeds():
             client.offer(feed)
 
-    async def _watch(self):
+    async def _watch(self) -> None:
         await self._bridge.ask(self._listen)
         while True:
             try:
@@ -284,13 +321,13 @@ class SceneView:
                 self._bridge.warn(f'the scene cannot be read: {error!r}')
             await asyncio.sleep(SECONDS_BETWEEN_LOOKS)
 
-    async def _look(self):
+    async def _look(self) -> None:
         seen = await self._bridge.ask(self._graph)
         if seen != self._seen:
             self._seen = seen
             await self._change(*seen)
 
-    def _graph(self):
+    def _graph(self) -> Graph:
         """Return what there is in the graph: marker topics, nodes with parameters, services."""
         node = self._bridge.node
         topics = dict(node.get_topic_names_and_types())
@@ -306,7 +343,7 @@ class SceneView:
                              if name.endswith(LIST) and LIST_TYPE in types))
         return tuple(shown for shown in marked if shown[1]), nodes, heard
 
-    def _heard_by(self, name):
+    def _heard_by(self, name: str) -> list[str]:
         """Return the topics from which a node hears where its inputs are."""
         space, own = name.rsplit('/', 1)
         with suppress(NodeNameNonExistentError):
@@ -315,7 +352,8 @@ class SceneView:
                     if INPUTS_TYPE in types]
         return []
 
-    async def _change(self, marked, nodes, heard):
+    async def _change(self, marked: Marked, nodes: Sequence[str],
+                      heard: Mapping[str, Sequence[str]]) -> None:
         owners = {key: [name for name, _ in publishers] for key, publishers in marked}
         spaces = {_space(node) for names in owners.values() for node in names}
         nodes = [node for node in nodes if _space(node) in spaces]
@@ -323,7 +361,7 @@ class SceneView:
         await self._bridge.ask(self._open, list(owners), nodes, sources)
         names = sorted({*GENERAL, *(key.rsplit('/', 1)[1] for key in owners)})
         # What the nodes that draw have is theirs, and asked of no other.
-        found = {}
+        found: dict[str, Optional[Described]] = {}
         for part in ([node for node in nodes if node in heard],
                      [node for node in nodes if node not in heard]):
             known = {space: {name for node, own in found.items() if _space(node) == space
@@ -334,8 +372,9 @@ class SceneView:
         self._mechanisms = {key: self._mechanism(key, own_nodes, found, heard)
                             for key, own_nodes in owners.items()}
         self._general = {}
-        for node, own in found.items():
-            for name in (own or {}).keys() & set(GENERAL):
+        for node, given in found.items():
+            own = given or {}
+            for name in own.keys() & set(GENERAL):
                 descriptor, value = own[name]
                 with suppress(ValueError):
                     self._general.setdefault(_space(node), {}).setdefault(
@@ -343,7 +382,8 @@ class SceneView:
         for client in self.clients:
             self._show(client)
 
-    async def _parameters(self, node, prefixes, known):
+    async def _parameters(self, node: str, prefixes: list[str],
+                          known: Collection[str]) -> Optional[Described]:
         try:
             return await self._nodes[node].parameters(prefixes, known)
         except NoAnswer:
@@ -351,7 +391,9 @@ class SceneView:
             self._seen = None
             return self._found.get(node)
 
-    def _mechanism(self, key, own_nodes, found, heard) -> ShownMechanism:
+    def _mechanism(self, key: str, own_nodes: Sequence[str],
+                   found: Mapping[str, Optional[Described]],
+                   heard: Mapping[str, Sequence[str]]) -> ShownMechanism:
         """Return a mechanism with what the nodes of its namespace say of it, its own first."""
         mechanism = ShownMechanism(key, {}, tuple(
             topic for node in own_nodes for topic in heard.get(node, ())))
@@ -367,28 +409,30 @@ class SceneView:
                         mechanism.settings[name] = Setting(name, node, descriptor, value)
         return mechanism
 
-    def _listen(self):
+    def _listen(self) -> None:
         self._events = self._bridge.node.create_subscription(
             ParameterEvent, '/parameter_events',
             lambda event: self._bridge.hand_over(self._notice, event),
             qos_profile_parameter_events)
 
-    def _open(self, keys, nodes, sources):
+    def _open(self, keys: Collection[str], nodes: Collection[str],
+              sources: Collection[str]) -> None:
         """Make what these need that is not there yet, and destroy what nobody needs."""
-        topics = {f'{key}{ending}': (key, type_, qos) for key in keys for ending, type_, qos in (
-            (MARKERS, MarkerArray, NEWEST), (LOCUS, Marker, LATCHED))}
+        topics: dict[str, Any] = {
+            f'{key}{ending}': (key, type_, qos) for key in keys for ending, type_, qos in (
+                (MARKERS, MarkerArray, NEWEST), (LOCUS, Marker, LATCHED))}
         self._drop_others(nodes, sources, topics)
         for name in set(nodes) - set(self._nodes):
             self._nodes[name] = RemoteNode(self._bridge, name)
-        for topic in sources - set(self._sources):
+        for topic in set(sources) - set(self._sources):
             self._told[topic] = {}
             self._sources[topic] = self._bridge.node.create_subscription(
                 JointState, topic, partial(_hear, self._told[topic]), NEWEST)
         for name in set(topics) - set(self._feeds):
             self._feeds[name] = self._feed(name, *topics[name])
 
-    def _feed(self, name, key, type_, qos):
-        def number(i):
+    def _feed(self, name: str, key: str, type_: type, qos: QoSProfile) -> tuple[Feed, Any]:
+        def number(i: int) -> int:
             return self._numbers.setdefault((name, i), len(self._numbers))
 
         # A logger of its own: what is throttled is the warnings of this topic alone.
@@ -397,7 +441,8 @@ class SceneView:
         return feed, self._bridge.node.create_subscription(
             type_, name, lambda raw: self._receive(feed, raw), qos, raw=True)
 
-    def _drop_others(self, nodes, sources, topics):
+    def _drop_others(self, nodes: Collection[str], sources: Collection[str],
+                     topics: Collection[str]) -> None:
         """Destroy all but these."""
         node = self._bridge.node
         for name in set(self._nodes) - set(nodes):
@@ -408,22 +453,22 @@ class SceneView:
         for name in set(self._feeds) - set(topics):
             node.destroy_subscription(self._feeds.pop(name)[1])
 
-    def _close(self):
+    def _close(self) -> None:
         self._drop_others((), (), ())
         self._numbers = {}
         if self._events is not None:
             self._bridge.node.destroy_subscription(self._events)
             self._events = None
 
-    def _receive(self, feed, raw):
+    def _receive(self, feed: Feed, raw: bytes) -> None:
         feed.newest = raw
         self._bridge.hand_over(self._offer, feed)
 
-    def _offer(self, feed):
+    def _offer(self, feed: Feed) -> None:
         for client in self.clients:
             client.offer(feed)
 
-    def _notice(self, event):
+    def _notice(self, event: ParameterEvent) -> None:
         """Pass on a change that anybody made."""
         for mechanism in self._mechanisms.values():
             prefix = f'{mechanism.name}.'
@@ -432,7 +477,8 @@ class SceneView:
                 if parameter.name.startswith(prefix):
                     self._notice_one(mechanism, event.node, name, parameter)
 
-    def _notice_one(self, mechanism, node, name, parameter):
+    def _notice_one(self, mechanism: ShownMechanism, node: str, name: str,
+                    parameter: Any) -> None:
         setting = mechanism.settings.get(name)
         if setting is None or parameter.value.type != setting.message.type:
             if node in self._nodes:
@@ -447,7 +493,7 @@ class SceneView:
                                             'name': name, 'value': setting.value})
 
 
-def _read(given):
+def _read(given: Mapping[str, Any]) -> scene.Scene:
     """Return the scene that others' parameters tell; raise Refused if they tell none."""
     try:
         return scene.read(given, strict=False)
@@ -455,14 +501,14 @@ def _read(given):
         raise Refused(str(error)) from None
 
 
-def _hear(told, message):
+def _hear(told: dict[str, float], message: JointState) -> None:
     told.update((name, position) for name, position in zip(message.name, message.position)
                 if math.isfinite(position))
 
 
-def _joined(space, name):
+def _joined(space: str, name: str) -> str:
     return f'{space.rstrip("/")}/{name}'
 
 
-def _space(name):
+def _space(name: str) -> str:
     return name.rsplit('/', 1)[0]

@@ -3,6 +3,8 @@
 
 """The web server of the viewer's page: its files and a WebSocket for each open page."""
 
+from __future__ import annotations
+
 import asyncio
 from concurrent.futures import Future
 from contextlib import suppress
@@ -13,14 +15,19 @@ import logging
 import socket
 from string import Template
 from threading import Thread
-from urllib.parse import urlsplit
+from typing import Any, Callable
+from urllib.parse import SplitResult, urlsplit
 
 from aiohttp import web, WSCloseCode
 
-from .poses import Refused
-from .scene_view import SCENE
+from .bridge import Bridge
+from .feed import Feed
+from .poses import number, Refused
+from .scene_view import SCENE, SceneView
 from .. import palette
 from ..words import quoted
+
+Said = dict[str, Any]
 
 PAGE = files(__package__) / 'page'
 FOLDERS = {'': PAGE, 'vendor/': PAGE / 'vendor'}
@@ -71,12 +78,12 @@ class Server:
 
     """
 
-    def __init__(self, view, bridge, host: str, port: int):
+    def __init__(self, view: SceneView, bridge: Bridge, host: str, port: int) -> None:
         self._view = view
         self._bridge = bridge
         self._host = host
-        self._clients = set()
-        started = Future()
+        self._clients: set[Client] = set()
+        started: Future[Any] = Future()
         self._thread = Thread(target=lambda: asyncio.run(self._serve(port, started)),
                               name='web', daemon=True)
         self._thread.start()
@@ -88,13 +95,13 @@ class Server:
         host = {'0.0.0.0': '127.0.0.1', '::': '::1', '': '127.0.0.1'}.get(self._host, self._host)
         return f'http://{f"[{host}]" if ":" in host else host}:{self.port}/'
 
-    def stop(self):
+    def stop(self) -> None:
         """Close all connections and end the thread."""
         if self._thread.is_alive():
             self._loop.call_soon_threadsafe(self._stopping.set)
             self._thread.join()
 
-    async def _serve(self, port, started):
+    async def _serve(self, port: int, started: Future[Any]) -> None:
         self._bridge.loop = asyncio.get_running_loop()
         app = web.Application(middlewares=[self._guard])
         app.add_routes([web.get('/', _file), web.get('/socket', self._connect),
@@ -117,7 +124,7 @@ class Server:
         await runner.cleanup()
 
     @web.middleware
-    async def _guard(self, request, handler):
+    async def _guard(self, request: web.Request, handler: Callable[..., Any]) -> Any:
         """
         Let nobody in but this page itself.
 
@@ -135,7 +142,7 @@ class Server:
             response.headers.update(HEADERS)
         return response
 
-    def _is_own(self, host) -> bool:
+    def _is_own(self, host: str) -> bool:
         name = _parts(f'//{host}').hostname or ''
         if name in ('localhost', self._host.lower(), socket.gethostname().lower()):
             return True
@@ -146,7 +153,7 @@ class Server:
         # An address in figures cannot be made to lead elsewhere.
         return address.is_loopback or self._host in ('', '0.0.0.0', '::')
 
-    async def _connect(self, request):
+    async def _connect(self, request: web.Request) -> Any:
         socket_ = Socket(
             timeout=SECONDS_TO_CLOSE, max_msg_size=MOST_BYTES, heartbeat=20.0, compress=False)
         await socket_.prepare(request)
@@ -169,11 +176,11 @@ class Server:
 class OneLineHandler(logging.Handler):
     """Says in one sentence what is logged, for what others send is no traceback of ours."""
 
-    def __init__(self, say):
+    def __init__(self, say: Callable[[str], None]) -> None:
         super().__init__()
         self._say = say
 
-    def emit(self, record):
+    def emit(self, record: logging.LogRecord) -> None:
         """Say it."""
         error = record.exc_info[1] if record.exc_info else ''
         self._say(f'{record.getMessage()}: {error!r}')
@@ -182,7 +189,8 @@ class OneLineHandler(logging.Handler):
 class Socket(web.WebSocketResponse):
     """A WebSocket that says why it is closed."""
 
-    async def close(self, *, code=WSCloseCode.OK, message=b'', **kwargs):
+    async def close(self, *, code: int = WSCloseCode.OK, message: bytes = b'',
+                    **kwargs: Any) -> bool:
         """Close it; raise TimeoutError if nothing is read at the other end."""
         closing = super().close(
             code=code, message=message or CLOSED_FOR.get(code, b''), **kwargs)
@@ -197,28 +205,28 @@ class Client:
     request is answered. Nothing is gathered for one that does not read: it is disconnected.
     """
 
-    def __init__(self, view, socket_, warn):
+    def __init__(self, view: SceneView, socket_: Socket, warn: Callable[[str], None]) -> None:
         self._view = view
         self._socket = socket_
         self._warn = warn
-        self._texts = {}
-        self._offered = set()
-        self._looks = {}
+        self._texts: dict[Any, Said] = {}
+        self._offered: set[str] = set()
+        self._looks: dict[int, Said] = {}
         self._ready = True
         self._news = asyncio.Event()
-        self._requests = asyncio.Queue(MOST_WAITING)
+        self._requests: asyncio.Queue[Said] = asyncio.Queue(MOST_WAITING)
 
-    def tell(self, key, message: dict):
+    def tell(self, key: Any, message: Said) -> None:
         """Send a message; of those with one key the last is enough."""
         self._texts[key] = message
         self._news.set()
 
-    def offer(self, feed):
+    def offer(self, feed: Feed) -> None:
         """Send what a feed has, when the browser is ready to draw it."""
         self._offered.add(feed.topic)
         self._news.set()
 
-    async def serve(self):
+    async def serve(self) -> None:
         """
         Serve the browser until it leaves.
 
@@ -241,17 +249,17 @@ class Client:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
 
-    async def close(self):
+    async def close(self) -> None:
         """Tell the browser that the viewer ends."""
         with suppress(asyncio.TimeoutError):
             await self._socket.close(
                 code=WSCloseCode.GOING_AWAY, message=b'the viewer ended')
 
-    async def _hear(self):
+    async def _hear(self) -> None:
         async for message in self._socket:
             # Others have their turn, however much comes.
             await asyncio.sleep(0)
-            said = {}
+            said: Said = {}
             try:
                 said = _parsed(message.data)
                 if said['op'] == 'drawn':
@@ -264,21 +272,24 @@ class Client:
             except asyncio.QueueFull:
                 await self._say(_answer(said, f'{MOST_WAITING} requests wait already'))
 
-    async def _answer(self):
+    async def _answer(self) -> None:
         while True:
             said = await self._requests.get()
             await self._say(_answer(said, **await self._done(said)))
 
-    async def _done(self, said) -> dict:
+    async def _done(self, said: Said) -> Said:
         op = said['op']
         try:
             if op == 'set':
                 await self._view.set(said['mechanism'], dict(said['values']))
                 return {}
+            if op == 'read':
+                return number(str(said['text']))
             if op in ('pose', 'tune', 'curve', 'save', 'export'):
                 about = {name: value for name, value in said.items()
                          if name not in ('op', 'id', 'mechanism')}
-                return await getattr(self._view, op)(said['mechanism'], **about)
+                answer: Said = await getattr(self._view, op)(said['mechanism'], **about)
+                return answer
             return {'reason': f'unknown request {quoted(op)}'}
         except Refused as reason:
             return {'reason': str(reason)}
@@ -291,7 +302,7 @@ class Client:
             self._warn(f'{op}: {error!r}')
             return {'reason': f'internal error: {error!r}'}
 
-    async def _send(self):
+    async def _send(self) -> None:
         while True:
             await self._news.wait()
             self._news.clear()
@@ -299,7 +310,7 @@ class Client:
             if self._ready and self._offered:
                 await self._send_picture()
 
-    async def _send_texts(self):
+    async def _send_texts(self) -> None:
         while self._texts:
             key = next(iter(self._texts))
             if key == SCENE:
@@ -307,25 +318,25 @@ class Client:
                 self._looks = {}
             await self._say(self._texts.pop(key))
 
-    async def _send_picture(self):
+    async def _send_picture(self) -> None:
         offered, self._offered = self._offered, set()
         drawn = [feed.drawn() for feed in self._view.feeds() if feed.topic in offered]
         for looks, _ in drawn:
-            for number, look in looks.items():
-                if self._looks.get(number) != look:
-                    self._looks[number] = look
-                    await self._say({'op': 'look', 'number': number, **look})
+            for id_, look in looks.items():
+                if self._looks.get(id_) != look:
+                    self._looks[id_] = look
+                    await self._say({'op': 'look', 'number': id_, **look})
         self._ready = False
         await self._within(self._socket.send_bytes(b''.join(records for _, records in drawn)))
 
-    async def _say(self, message):
+    async def _say(self, message: Said) -> None:
         await self._within(self._socket.send_json(message))
 
-    async def _within(self, sending):
+    async def _within(self, sending: Any) -> None:
         await asyncio.wait_for(sending, SECONDS_TO_READ)
 
 
-def _parsed(text) -> dict:
+def _parsed(text: Any) -> Said:
     """Return a request; raise ValueError if it is none."""
     if not isinstance(text, str):
         raise ValueError('it must be a text')
@@ -338,17 +349,17 @@ def _parsed(text) -> dict:
     return said
 
 
-def _number(text):
+def _number(text: str) -> float:
     return int(text) if len(text) <= MOST_FIGURES else float(text)
 
 
-def _answer(said, reason='', **more) -> dict:
+def _answer(said: Said, reason: str = '', **more: Any) -> Said:
     id_ = said.get('id')
     return {'op': 'answer', 'id': id_ if isinstance(id_, (int, str)) else None,
             'reason': reason, **more}
 
 
-def _parts(url):
+def _parts(url: str) -> SplitResult:
     """Return the parts of an address, nothing of one that is none."""
     try:
         return urlsplit(url)
@@ -356,7 +367,7 @@ def _parts(url):
         return urlsplit('')
 
 
-async def _file(request):
+async def _file(request: web.Request) -> web.Response:
     name = request.match_info.get('name', 'index.html')
     path = {start + file.name: file for start, folder in FOLDERS.items()
             for file in folder.iterdir() if file.is_file()}.get(name)

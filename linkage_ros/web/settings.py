@@ -7,6 +7,7 @@ import asyncio
 from dataclasses import dataclass
 import math
 import sys
+from typing import Any, Collection
 
 from rcl_interfaces.srv import (
     DescribeParameters,
@@ -16,7 +17,11 @@ from rcl_interfaces.srv import (
 )
 from rclpy.parameter import Parameter, parameter_value_to_python
 
+from .bridge import Bridge
 from ..words import quoted
+
+# Descriptor and value message by name.
+Described = dict[str, tuple[Any, Any]]
 
 SERVICES = {'list_parameters': ListParameters, 'describe_parameters': DescribeParameters,
             'get_parameters': GetParameters, 'set_parameters_atomically': SetParametersAtomically}
@@ -27,18 +32,18 @@ NAMES_AT_ONCE = 20
 class RemoteNode:
     """The parameter services of one node; made and closed in the executor's thread."""
 
-    def __init__(self, bridge, name: str):
+    def __init__(self, bridge: Bridge, name: str) -> None:
         self.name = name
         self._bridge = bridge
         self._clients = {service: bridge.node.create_client(type_, f'{name}/{service}')
                          for service, type_ in SERVICES.items()}
 
-    def close(self):
+    def close(self) -> None:
         """Destroy the clients."""
         for client in self._clients.values():
             self._bridge.node.destroy_client(client)
 
-    async def parameters(self, prefixes, known=()) -> dict:
+    async def parameters(self, prefixes: list[str], known: Collection[str] = ()) -> Described:
         """
         Return descriptor and value message by name, but for names that are known.
 
@@ -48,7 +53,8 @@ class RemoteNode:
             If the node is silent.
 
         """
-        listed, found = await self._call('list_parameters', prefixes=prefixes), {}
+        found: Described = {}
+        listed = await self._call('list_parameters', prefixes=prefixes)
         names = [name for name in listed.result.names if name not in known]
         for start in range(0, len(names), NAMES_AT_ONCE):
             part = names[start:start + NAMES_AT_ONCE]
@@ -58,13 +64,13 @@ class RemoteNode:
             found.update(zip(part, zip(described.descriptors, got.values)))
         return found
 
-    async def set(self, parameters) -> str:
+    async def set(self, parameters: list[Any]) -> str:
         """Set all parameters or none; return the reason of a refusal, or nothing."""
         response = await self._call('set_parameters_atomically', parameters=parameters)
         result = response.result
         return '' if result.successful else result.reason or f'{self.name} gives no reason'
 
-    async def _call(self, service, **request):
+    async def _call(self, service: str, **request: Any) -> Any:
         return await self._bridge.call(
             self._clients[service], SERVICES[service].Request(**request))
 
@@ -83,19 +89,19 @@ class Setting:
 
     name: str
     node: str
-    descriptor: object
-    message: object
+    descriptor: Any
+    message: Any
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         self._type = Parameter.Type(self.message.type)
 
     @property
-    def value(self):
+    def value(self) -> Any:
         """Its value, as JSON has it."""
         value = parameter_value_to_python(self.message)
         return list(map(shown, value)) if isinstance(value, list) else shown(value)
 
-    def described(self) -> dict:
+    def described(self) -> dict[str, Any]:
         """Return what the page needs to draw it."""
         about = self.descriptor
         ranges = [*about.floating_point_range, *about.integer_range]
@@ -106,7 +112,7 @@ class Setting:
                 'fixed': about.read_only, 'low': shown(low), 'high': shown(high),
                 'step': shown(step)}
 
-    def asked(self, full_name: str, value):
+    def asked(self, full_name: str, value: Any) -> Any:
         """Return a parameter message with a value from JSON; ValueError if it cannot hold it."""
         if not HOLDS.get(self._type, lambda _: False)(value):
             allowed = self.descriptor.additional_constraints or f'a {self._type.name.lower()}'
@@ -116,7 +122,7 @@ class Setting:
         return Parameter(full_name, self._type, value).to_parameter_msg()
 
 
-def is_number(value) -> bool:
+def is_number(value: Any) -> bool:
     """Return whether a value from JSON is a finite number that a double can hold."""
     return type(value) in (int, float) and abs(value) <= sys.float_info.max
 
@@ -128,7 +134,7 @@ HOLDS = {
 }
 
 
-def shown(value):
+def shown(value: Any) -> Any:
     """Return a value as JSON can say it: None for a number that is not finite."""
     if isinstance(value, bytes):
         return value[0]

@@ -3,7 +3,9 @@
 
 """Node that shows the running scene on a page in the browser, with sliders to change it."""
 
+from errno import EADDRINUSE
 import sys
+from typing import Any, Optional
 
 from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 from rclpy.exceptions import ParameterException
@@ -35,22 +37,25 @@ class Viewer(Node):
 
     """
 
-    def __init__(self, **kwargs):
+    def __init__(self, **kwargs: Any) -> None:
         super().__init__(VIEWER, **kwargs)
         try:
             self._server = self._served()
         except (OSError, ParameterException) as error:
             super().destroy_node()
-            raise scene.SceneError(f'the viewer cannot be started: {error}') from None
+            taken = getattr(error, 'errno', None) == EADDRINUSE
+            raise scene.SceneError(f'the viewer cannot be started: {error}' + taken * (
+                '; another is chosen by -p port:=8021, with ros2 launch by port:=8021, with make '
+                'view by PORT=8021, and any that is free by 0')) from None
         self.url = self._server.url
         self.get_logger().info(f'Look at {self.url}')
 
-    def destroy_node(self):
+    def destroy_node(self) -> None:
         """Stop the server, then end."""
         self._server.stop()
         super().destroy_node()
 
-    def _served(self):
+    def _served(self) -> Server:
         host = self._declared('host', '127.0.0.1', 'Address to listen at; 127.0.0.1: for browsers '
                               'on this machine alone. Whoever reaches it can move the scene.')
         port = self._declared('port', PORT, 'Port to listen at; 0: any that is free.',
@@ -58,12 +63,12 @@ class Viewer(Node):
         bridge = Bridge(self)
         return Server(SceneView(bridge), bridge, host, port)
 
-    def _declared(self, name, default, description, **ranges):
+    def _declared(self, name: str, default: Any, description: str, **ranges: Any) -> Any:
         return self.declare_parameter(name, default, ParameterDescriptor(
             description=description, read_only=True, **ranges)).value
 
 
-def main(args=None):
+def main(args: Optional[list[str]] = None) -> int:
     """Run the node; return the exit code."""
     return scene_node.run(Viewer, VIEWER, args)
 

@@ -26,8 +26,15 @@ export const FINE_ABOUT_ZERO = {
 
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
-/** The number that a text says, a decimal comma taken as a point; NaN if it says none. */
-export const read = text => NUMBER.test(text) ? Number(text.replace(',', '.')) : NaN;
+/** Reads what is more than a number, such as pi/2 or 90deg; the page sets it. */
+export const arithmetic = { ask: null };
+
+/** The number in rad or m that a text says, counted in so many parts of a unit; NaN if it says none. */
+export async function typed(text, unit, factor) {
+  if (NUMBER.test(text)) return Number(text.replace(',', '.')) / factor;
+  const { value = NaN, turns } = await arithmetic.ask(text);
+  return turns && unit?.startsWith('rad') ? value : value / factor;
+}
 
 export function element(tag, properties = {}, ...children) {
   const made = Object.assign(document.createElement(tag), properties);
@@ -84,14 +91,14 @@ export class Reason {
 
 /** A number with a slider. Each time it is taken hold of is a gesture. */
 export class Slider {
-  constructor({ label, title, unit, low, high, kind, value, scale, step, digits = 6 }, request) {
-    Object.assign(this, { unit, low, high, kind, scale, digits, accepted: value, held: false, gesture: {} });
+  constructor({ label, title, unit, low, high, kind, value, scale, step, digits = 6, times = () => 1 }, request) {
+    Object.assign(this, { unit, low, high, kind, scale, digits, times, accepted: value, held: false, gesture: {} });
     const id = nextId();
     this.range = element('input', { type: 'range', id });
     this.range.min = kind === 'integer' ? low : 0;
     this.range.max = kind === 'integer' ? high : STOPS;
     this.range.step = kind === 'integer' ? step || 1 : FINE;
-    this.number = element('input', { type: 'text', inputMode: 'decimal', autocomplete: 'off', ariaLabel: label });
+    this.number = element('input', { type: 'text', autocomplete: 'off', ariaLabel: label });
     this.reason = new Reason(`${id}r`);
     for (const input of [this.range, this.number]) input.setAttribute('aria-describedby', `${id}r`);
     this.unitShown = element('span', { className: 'unit' });
@@ -139,9 +146,14 @@ export class Slider {
     return this.asked.busy ? this.offered : this.accepted;
   }
 
-  type(text) {
-    const value = read(text) / units.of(this.unit).factor;
-    this.mistyped = text !== '' && !Number.isFinite(value);
+  /** By what its value is multiplied to be shown. */
+  get factor() {
+    return units.of(this.unit).factor * this.times();
+  }
+
+  async type(text) {
+    const value = text ? await typed(text, this.unit, this.factor) : 0;
+    this.mistyped = !Number.isFinite(value);
     if (this.mistyped) this.explain(`Refused: ${text} is not a number that can be set`);
     else if (text) this.offer(value);
   }
@@ -202,8 +214,39 @@ export class Slider {
   }
 
   shortened(value) {
-    return String(Number((value * units.of(this.unit).factor).toPrecision(this.digits)));
+    return String(Number((value * this.factor).toPrecision(this.digits)));
   }
+}
+
+/** A button for each of two values, of which the pressed one holds. */
+export class Choice {
+  constructor({ label, title, value }, words, request) {
+    this.reason = new Reason();
+    this.buttons = new Map(Object.entries(words).map(([sign, textContent]) => [Number(sign), element('button', {
+      type: 'button', textContent, onclick: async () => {
+        const { reason } = await request(Number(sign), {}, this.value);
+        this.reason.say(reason && `Refused: ${reason}`);
+        if (!reason) this.update(Number(sign));
+      },
+    })]));
+    this.group = element('span', { className: 'choice', ariaLabel: label }, ...this.buttons.values());
+    this.group.setAttribute('role', 'group');
+    this.row = element('div', { className: 'row', title }, element('span', { textContent: label }), this.group, this.reason.line);
+    this.update(value);
+  }
+
+  update(value) {
+    if (value !== this.value) this.reason.fade();
+    this.value = value;
+    for (const [sign, button] of this.buttons) button.setAttribute('aria-pressed', sign === value);
+  }
+
+  /** Call the values so. */
+  name(words) {
+    for (const [sign, textContent] of Object.entries(words)) put(this.buttons.get(Number(sign)), { textContent });
+  }
+
+  render() {}
 }
 
 /** A switch. */

@@ -4,6 +4,7 @@
 // The page: what the viewer sends goes into the picture and the panel, what is dragged goes back.
 
 import { Connection } from './connection.js';
+import { arithmetic, element, put } from './control.js';
 import { Hand } from './hand.js';
 import { Mechanism } from './mechanism.js';
 import { Panel } from './panel.js';
@@ -12,15 +13,19 @@ import { units } from './units.js';
 import { View } from './view.js';
 
 const mechanisms = new Map();
-const views = document.getElementById('views');
-const status = document.getElementById('status');
-const names = document.getElementById('names');
+const at = id => document.getElementById(id);
+const [views, status, names, workshop, arrows, whole, notice] = [
+  'views', 'status', 'names', 'workshop', 'arrows', 'whole', 'notice'].map(at);
 const naming = names.closest('label');
-let shown = '';
+/** What a reload keeps. */
+const kept = { shown: '', names: true, workshop: false, arrows: '', ...JSON.parse(sessionStorage.getItem('kept') ?? '{}') };
+let { shown } = kept;
 let scheduled = false;
 let frames = 0;
 
-const picture = new Picture(document.getElementById('picture'));
+const keep = values => sessionStorage.setItem('kept', JSON.stringify(Object.assign(kept, values)));
+
+const picture = new Picture(at('picture'));
 const hand = new Hand(picture, {
   drag(mechanism, want) {
     panel.drag(mechanism.key, want);
@@ -30,7 +35,6 @@ const hand = new Hand(picture, {
   choose: (mechanism, dimension) => panel.goTo(mechanism.key, dimension),
 });
 picture.pull = () => hand.pull;
-const whole = document.getElementById('whole');
 picture.view = new View(picture.canvas, () => hand.grabbed !== null, () => {
   whole.hidden = picture.view.whole;
   draw();
@@ -45,14 +49,21 @@ function light(mechanism, dimension) {
   draw();
 }
 
+/** Say over the picture what keeps it from being shown or moved; nothing: all is well. */
+function say(words) {
+  put(notice, { textContent: words, hidden: !words });
+}
+
 const connection = new Connection({
   opened() {
     for (const mechanism of mechanisms.values()) mechanism.markers.clear();
+    say(mechanisms.size ? '' : 'Loading …');
     status.textContent = 'connected';
   },
 
   closed() {
-    status.textContent = 'the viewer is gone; trying again';
+    say('Connection lost: the viewer is gone. Trying again …');
+    status.textContent = 'not connected';
   },
 
   scene({ mechanisms: described }) {
@@ -61,10 +72,14 @@ const connection = new Connection({
     for (const one of described) {
       const mechanism = known.get(one.key) ?? new Mechanism(one);
       mechanism.describe(one);
+      // Those of one name in two namespaces are told apart.
+      mechanism.title = described.some(({ key, name }) => name === one.name && key !== one.key) ? one.key.slice(1) : one.name;
       mechanisms.set(one.key, mechanism);
     }
-    document.getElementById('empty').hidden = mechanisms.size > 0;
-    show(mechanisms.has(shown) ? shown : '');
+    at('empty').hidden = mechanisms.size > 0;
+    say('');
+    // What was shown before a reload may be found later.
+    show(mechanisms.has(kept.shown) ? kept.shown : '');
   },
 
   look({ number, mechanism, ...look }) {
@@ -86,23 +101,24 @@ const connection = new Connection({
   frame(buffer) {
     const numbers = new DataView(buffer);
     const now = performance.now();
-    for (let at = 0; at < buffer.byteLength;) {
-      const number = numbers.getUint32(at, true);
-      const count = numbers.getUint32(at + 4, true);
+    for (let from = 0; from < buffer.byteLength;) {
+      const number = numbers.getUint32(from, true);
+      const count = numbers.getUint32(from + 4, true);
       for (const mechanism of mechanisms.values()) {
         const marker = mechanism.markers.get(number);
         if (!marker) continue;
-        marker.points = new Float32Array(buffer, at + 8, 3 * count);
+        marker.points = new Float32Array(buffer, from + 8, 3 * count);
         if (marker.look.kind !== 'strip') mechanism.heard = now;
       }
-      at += 8 + 12 * count;
+      from += 8 + 12 * count;
     }
     draw(() => connection.tell({ op: 'drawn' }));
     frames += 1;
   },
 });
+arithmetic.ask = text => connection.ask({ op: 'read', text });
 
-const panel = new Panel(document.getElementById('panel'), connection, light);
+const panel = new Panel(at('panel'), connection, light, say);
 
 /** Draw once before the next refresh of the screen, then do what is to be done after it. */
 function draw(after) {
@@ -119,31 +135,35 @@ function show(key) {
   if (key !== shown) picture.view.reset();
   shown = key;
   const several = mechanisms.size > 1;
-  const labels = several
-    ? [['', 'all'], ...[...mechanisms.values()].map(one => [one.key, one.name])] : [];
-  views.replaceChildren(...labels.map(([value, label]) => {
-    const button = document.createElement('button');
-    button.textContent = label;
-    button.setAttribute('aria-pressed', value === key);
-    button.onclick = () => show(value);
+  const labels = several ? [['', 'all'], ...[...mechanisms.values()].map(one => [one.key, one.title])] : [];
+  views.replaceChildren(...labels.map(([value, textContent]) => {
+    const button = element('button', { type: 'button', textContent, ariaPressed: value === key });
+    button.onclick = () => {
+      keep({ shown: value });
+      show(value);
+    };
     return button;
   }));
   const selected = [...mechanisms.values()].filter(mechanism => !key || mechanism.key === key);
+  for (const mechanism of selected) mechanism.arrows.kind = kept.arrows;
   picture.show(selected);
   panel.show(selected, several && !key);
   naming.hidden = selected.length !== 1 || selected[0].legs > 1;
   draw();
 }
 
-names.onchange = () => {
-  picture.named = names.checked;
+/** Let what is chosen above the picture take effect, and a reload keep it. */
+function choose() {
+  keep({ names: names.checked, workshop: workshop.checked, arrows: arrows.value });
+  picture.named = kept.names;
+  if (units.workshop !== kept.workshop) units.choose(kept.workshop);
+  for (const mechanism of mechanisms.values()) mechanism.arrows = { kind: kept.arrows, at: {} };
   draw();
-};
+}
 
-document.getElementById('workshop').onchange = ({ target }) => {
-  units.choose(target.checked);
-  draw();
-};
+[names.checked, workshop.checked, arrows.value] = [kept.names, kept.workshop, kept.arrows];
+names.onchange = workshop.onchange = arrows.onchange = choose;
+choose();
 
 new ResizeObserver(() => draw()).observe(picture.canvas);
 

@@ -11,6 +11,8 @@ export class Mechanism {
     this.heard = performance.now();
     /** What may be tuned: travel, bars and fixed joints; empty until the viewer has said. */
     this.tunable = { travel: {}, bars: {}, fixed: [] };
+    /** What arrows are asked for, and what is known of them. */
+    this.arrows = { kind: '', at: {} };
     this.describe(described);
     this.history = new History(this);
   }
@@ -19,6 +21,11 @@ export class Mechanism {
     Object.assign(this, described);
     this.settings = new Map(described.settings.map(setting => [setting.name, setting]));
     this.history?.begin();
+  }
+
+  /** Take arrows that were asked for, by joint. */
+  show(arrows) {
+    Object.assign(this.arrows, arrows);
   }
 
   value(name) {

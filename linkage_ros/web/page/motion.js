@@ -3,7 +3,7 @@
 
 // How a mechanism moves: a slider for each input, play and step, and what its outputs are now.
 
-import { element, LINEAR, Newest, put, Reason, read, Slider } from './control.js';
+import { element, LINEAR, Newest, put, Reason, Slider, typed } from './control.js';
 import { units } from './units.js';
 
 const STEP = Math.PI / 180;
@@ -66,14 +66,15 @@ class OutputRow {
   constructor(name, editable, count, want) {
     this.editable = editable;
     this.value = editable
-      ? element('input', { type: 'text', inputMode: 'decimal', autocomplete: 'off', ariaLabel: name })
+      ? element('input', { type: 'text', autocomplete: 'off', ariaLabel: name })
       : element('span');
     this.unit = element('span', { className: 'unit' });
     this.rates = Array.from({ length: count }, () => element('td'));
     this.row = element('tr', {}, element('th', { scope: 'row', textContent: name }),
       element('td', {}, this.value, ' ', this.unit), ...this.rates);
-    this.value.onchange = () => {
-      const value = read(this.value.value.trim()) / units.of(this.output.unit).factor;
+    this.value.onchange = async () => {
+      const { unit } = this.output;
+      const value = await typed(this.value.value.trim(), unit, units.of(unit).factor);
       this.value.blur();
       if (Number.isFinite(value)) want({ output: name, value });
       this.render();
@@ -103,7 +104,7 @@ class OutputRow {
 
 /** The part of the panel in which one mechanism is moved; calls `onshow` when it was heard where it is. */
 export class Motion {
-  constructor(mechanism, connection, open) {
+  constructor(mechanism, connection, open, sayInPicture) {
     this.mechanism = mechanism;
     this.connection = connection;
     this.speeds = new Map([...mechanism.settings.keys()].filter(name => name.endsWith('.speed')).map(name => [name, 0]));
@@ -114,9 +115,13 @@ export class Motion {
     this.place = element('div', { className: 'inputs' });
     this.table = element('table');
     this.reason = new Reason();
-    this.folding = element('details', { open, hidden: true }, element('summary', { textContent: 'Outputs' }), this.table);
+    this.folding = element('details', { open, hidden: true }, element('summary', { textContent: 'Outputs', title: 'Coordinates count from the origin of its own plane' }), this.table);
     this.element = element('div', {}, this.place, this.reason.line, this.folding);
-    this.dragged = new Newest(async want => this.say(await this.want(want)));
+    this.dragged = new Newest(async want => {
+      const answer = await this.want(want);
+      this.say(answer);
+      if (this.connection.opened) sayInPicture(answer.reason);
+    });
     this.renderPlay();
   }
 
@@ -177,16 +182,24 @@ export class Motion {
     this.dragged.offer(want);
   }
 
+  /** What arrows are asked for: at the speeds with which it plays, or would. */
+  get arrows() {
+    if (!this.mechanism.arrows.kind) return {};
+    const speeds = Object.fromEntries([...this.inputs.keys()].map(name => [name, this.playing[`${name}.speed`] ?? this.usual(`${name}.speed`)]));
+    return { arrows: this.mechanism.arrows.kind, speeds };
+  }
+
   /** See where it is. */
   async look() {
     if (this.looking || !this.connection.opened) return;
     this.looking = true;
-    const answer = await this.connection.ask({ op: 'pose', mechanism: this.mechanism.key });
+    const answer = await this.connection.ask({ op: 'pose', mechanism: this.mechanism.key, ...this.arrows });
     this.looking = false;
     if (answer.inputs) this.show(answer);
   }
 
-  show({ inputs, outputs }) {
+  show({ inputs, outputs, arrows }) {
+    if (arrows) this.mechanism.show(arrows);
     const names = [...Object.keys(inputs), ...Object.keys(outputs)].join();
     if (names !== this.built) this.build(names, inputs, outputs);
     for (const [name, input] of Object.entries(inputs)) this.inputs.get(name).show(input);

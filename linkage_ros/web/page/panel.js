@@ -15,21 +15,22 @@ const LOOKS = 120;
 
 /** The part of one mechanism. A part is an element with render(), to be added to `parts`. */
 class Section {
-  constructor(mechanism, connection, folded, light) {
-    const { key, name } = mechanism;
+  constructor(mechanism, { connection, light, say }, folded) {
+    const { key, name, title } = mechanism;
     const type = mechanism.value('type') ?? '';
     this.mechanism = mechanism;
-    this.motion = new Motion(mechanism, connection, !folded);
+    this.motion = new Motion(mechanism, connection, !folded, say);
     this.plot = new Plot(mechanism, connection, this.motion);
     this.motion.place.after(this.plot.element);
     this.motion.onshow = () => this.plot.look();
     this.tuning = new Tuning(mechanism, connection, !folded, own => light(mechanism, own));
     this.parts = [this.motion, this.plot, this.tuning];
     this.still = element('p', { className: 'still', hidden: true });
-    this.element = element('section', { ariaLabel: name },
-      element('header', {}, element('h2', { textContent: name }),
+    this.loading = element('p', { className: 'about', textContent: 'Waiting for its parameters …', hidden: mechanism.settings.size > 0 });
+    this.element = element('section', { ariaLabel: title },
+      element('header', {}, element('h2', { textContent: title }),
         element('span', { className: 'about', textContent: type === name ? '' : type }), this.motion.play),
-      this.still, this.motion.element, ...this.tuning.speeds, this.tuning.element,
+      this.still, this.loading, this.motion.element, ...this.tuning.speeds, this.tuning.element,
       new Files(mechanism, connection).element);
     this.element.dataset.key = key;
   }
@@ -58,8 +59,9 @@ class Section {
 
 /** All sections that are shown. */
 export class Panel {
-  constructor(place, connection, light) {
-    Object.assign(this, { place, connection, light });
+  /** Calls `light`, and `say` with the reason why a joint is not dragged. */
+  constructor(place, connection, light, say) {
+    Object.assign(this, { place, connection, light, say });
     this.sections = new Map();
     units.onchange(() => this.render());
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.render());
@@ -71,9 +73,9 @@ export class Panel {
   show(mechanisms, folded) {
     const before = this.sections;
     this.sections = new Map(mechanisms.map(one => {
-      const built = JSON.stringify([folded, [...one.settings.values()].map(({ value, ...rest }) => rest)]);
+      const built = JSON.stringify([folded, one.title, [...one.settings.values()].map(({ value, ...rest }) => rest)]);
       const old = before.get(one.key);
-      return [one.key, old?.built === built ? old : new Section(one, this.connection, folded, this.light).after(old, built)];
+      return [one.key, old?.built === built ? old : new Section(one, this, folded).after(old, built)];
     }));
     for (const [key, section] of before) if (this.sections.get(key) !== section) section.plot.end();
     const parts = [...this.sections.values()].map(section => section.element);

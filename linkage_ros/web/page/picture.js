@@ -9,6 +9,11 @@ const MARGIN = 44;
 const SLACK = 0.06;
 const SHRUNK = 10;
 const LINE = 18;
+const MARK = 13;
+const ARROW = 90;
+const HEAD = 9;
+/** Where a name is tried: beside its joint from the side away from the middle on, then farther out. */
+const TURNS = [1, 1.9].flatMap(ring => [0, 1, -1, 2, -2, 3, -3, 4].map(eighth => [ring, eighth * Math.PI / 4]));
 const MOST_LINES = 100;
 /** How many numbers make a line, a triangle, a joint. */
 const PIECE = { lines: 4, triangles: 6, joints: 2 };
@@ -131,11 +136,13 @@ export class Picture {
     if (!this.scale || !this.pull()) this.fit(shapes, width, height);
     if (!this.view.turned) this.grid(width, height);
     this.planes();
-    shapes.sort((a, b) => a.depth - b.depth);
+    // A slot hides what is behind it, and no bar is.
+    shapes.sort((a, b) => this.isSlot(b) - this.isSlot(a) || a.depth - b.depth);
     const joints = shapes.filter(({ look }) => look.kind === 'joints');
     for (const shape of shapes) if (!joints.includes(shape)) this[shape.look.kind](shape);
     this.light();
     for (const shape of joints) this.joints(shape);
+    this.arrows();
     this.ghost();
     if (this.named && this.mechanisms.length === 1) this.names(shapes);
     if (this.mechanisms.length > 1) this.titles();
@@ -226,28 +233,33 @@ export class Picture {
     const { name, factor } = units.of('m');
     const step = round(90 / this.scale * factor) / factor;
     const digits = Math.max(0, -Math.floor(Math.log10(step * factor) + 1e-9));
+    // One mechanism is seen in its own plane, in which its outputs count; several in the scene's frame.
+    const [one, ...others] = this.maps.values();
+    const [across, up] = others.length ? [0, 0] : one.map(([, , , from]) => from);
     const [left, bottom] = this.from(0, height);
     const [right, top] = this.from(width, 0);
+    const unit = `${name} ${others.length ? 'in the scene' : 'from its origin'}`;
     context.font = FONT;
     context.lineWidth = 1;
     context.strokeStyle = paint('--grid');
     context.fillStyle = paint('--faint');
     context.textAlign = 'center';
     context.textBaseline = 'bottom';
-    for (const value of multiples(step, left, right)) {
-      const [x] = this.at(value, 0);
+    const room = 12 + context.measureText(unit).width + 20;
+    for (const value of multiples(step, left - across, right - across)) {
+      const [x] = this.at(value + across, 0);
       this.line(x, 0, x, height);
-      if (x > 70 && x < width - 30) context.fillText((value * factor).toFixed(digits), x, height - 5);
+      if (x > room && x < width - 30) context.fillText((value * factor).toFixed(digits), x, height - 5);
     }
     context.textAlign = 'left';
     context.textBaseline = 'middle';
-    for (const value of multiples(step, bottom, top)) {
-      const [, y] = this.at(0, value);
+    for (const value of multiples(step, bottom - up, top - up)) {
+      const [, y] = this.at(0, value + up);
       this.line(0, y, width, y);
       if (y < height - 30 && y > 12) context.fillText((value * factor).toFixed(digits), 6, y);
     }
     context.textBaseline = 'bottom';
-    context.fillText(name, 6, height - 5);
+    context.fillText(unit, 6, height - 5);
   }
 
   line(...ends) {
@@ -278,12 +290,16 @@ export class Picture {
     }
   }
 
+  /** Whether lines are a slot: they are wider than a joint. */
+  isSlot({ mechanism, look }) {
+    const joints = [...mechanism.markers.values()].find(marker => marker.look.kind === 'joints');
+    return look.kind === 'lines' && look.width > joints?.look.width;
+  }
+
   lines(shape) {
     const { context } = this;
     const wide = context.lineWidth = Math.max(2, shape.look.width * this.scale);
-    const joints = [...shape.mechanism.markers.values()].find(({ look }) => look.kind === 'joints');
-    // What is wider than a joint is a slot.
-    const slot = wide > 4 && shape.look.width > joints?.look.width;
+    const slot = wide > 4 && this.isSlot(shape);
     context.lineCap = 'round';
     this.legs(shape, (places, front) => {
       context.strokeStyle = colour(shape.look.colour, front);
@@ -312,9 +328,12 @@ export class Picture {
     this.legs(shape, (places, front) => {
       context.beginPath();
       for (let i = 0; i < places.length; i += 6) {
-        for (let k = 0; k < 6; k += 2) {
-          context[k ? 'lineTo' : 'moveTo'](...this.at(places[i + k], places[i + k + 1]));
-        }
+        const [first, ...others] = [0, 2, 4].map(k => this.at(places[i + k], places[i + k + 1]));
+        // The mark of a joint on the ground can be seen below it however small.
+        const size = Math.max(...others.map(([x, y]) => Math.hypot(x - first[0], y - first[1])));
+        const larger = same.length ? 1 : Math.max(1, MARK / size);
+        context.moveTo(...first);
+        for (const [x, y] of others) context.lineTo(first[0] + larger * (x - first[0]), first[1] + larger * (y - first[1]));
         context.closePath();
       }
       context.fillStyle = same.length ? mixed(shape.look.colour, 0.8, 'paper') : colour(shape.look.colour);
@@ -363,10 +382,17 @@ export class Picture {
       const seen = names.map((name, i) => this.at(places[2 * i], places[2 * i + 1]));
       const middle = [0, 1].map(i => seen.reduce((sum, at) => sum + at[i], 0) / seen.length);
       const away = look.width * this.scale / 2 + 12;
+      const written = seen.map(([x, y]) => ({ x, y, half: 5, high: 5 }));
       names.forEach((name, i) => {
-        const way = [seen[i][0] - middle[0], seen[i][1] - middle[1]];
-        const size = Math.hypot(...way) || 1;
-        this.text(name, seen[i][0] + way[0] / size * away, seen[i][1] + way[1] / size * away);
+        const half = context.measureText(name).width / 2;
+        const start = Math.atan2(seen[i][1] - middle[1], seen[i][0] - middle[0]);
+        const tried = TURNS.map(([ring, turn]) => ({
+          x: seen[i][0] + Math.cos(start + turn) * (ring * away + half - 5), y: seen[i][1] + Math.sin(start + turn) * ring * away, half, high: 8,
+        }));
+        const free = at => written.every(other => Math.abs(other.x - at.x) > other.half + half || Math.abs(other.y - at.y) > other.high + 8);
+        const place = tried.find(free) ?? tried[0];
+        written.push(place);
+        this.text(name, place.x, place.y);
       });
     }
   }
@@ -378,7 +404,7 @@ export class Picture {
     context.textAlign = 'center';
     context.textBaseline = 'top';
     const written = [];
-    for (const { key, name } of this.mechanisms) {
+    for (const { key, title: name } of this.mechanisms) {
       const box = this.boxes.get(key);
       if (!box) continue;
       const half = context.measureText(name).width / 2 + 4;
@@ -426,6 +452,48 @@ export class Picture {
         if (seen.has(a) && seen.has(b)) this.line(...seen.get(a), ...seen.get(b));
       }
     }
+  }
+
+  /** Draw what was asked for at the joints of the first legs; the longest of a mechanism is as long as any. */
+  arrows() {
+    const { context } = this;
+    context.strokeStyle = context.fillStyle = paint('--ink');
+    context.lineWidth = 2;
+    for (const { mechanism: { arrows }, leg, map, seen } of this.legsSeen()) {
+      const at = Object.entries(arrows.at).filter(([joint, [x]]) => arrows.kind && !leg && x !== null && seen.has(joint));
+      const most = Math.max(0, ...at.map(([, way]) => Math.hypot(...way)));
+      const [longest] = at.find(([, way]) => Math.hypot(...way) === most) ?? [];
+      for (const [joint, [x, y]] of most ? at : []) {
+        const [right, up] = map.map(([a, b]) => (a * x + b * y) * ARROW / most);
+        this.arrow(seen.get(joint), [right, -up]);
+      }
+      if (this.mechanisms.length === 1 && arrows.kind && !leg) this.legend(arrows, longest, most);
+    }
+  }
+
+  arrow([x, y], way) {
+    const size = Math.hypot(...way);
+    if (size < 1) return;
+    const { context } = this;
+    const [along, across] = way.map(part => part / size * Math.min(HEAD, size));
+    const [tipX, tipY] = [x + way[0], y + way[1]];
+    this.line(x, y, tipX - along / 2, tipY - across / 2);
+    context.beginPath();
+    context.moveTo(tipX, tipY);
+    for (const side of [0.45, -0.45]) context.lineTo(tipX - along + side * across, tipY - across - side * along);
+    context.fill();
+  }
+
+  /** Say how long the longest arrow is, and what holds the loads. */
+  legend({ kind, unit, efforts = {} }, joint, most) {
+    const { name, factor } = units.of(unit);
+    const figure = value => value === null ? 'without bound' : Number(value.toPrecision(3));
+    const holds = Object.entries(efforts).map(([input, [value, of]]) => `, the ${input} holds ${figure(value)} ${of}`);
+    this.context.font = FONT;
+    this.context.textAlign = 'left';
+    this.context.textBaseline = 'top';
+    this.text(joint ? `longest ${kind}: ${figure(most * factor)} ${name} at ${joint}${holds.join('')}`
+      : kind === 'force' ? `no loads on its joints${holds.join('')}` : `no ${kind}`, 64, 12);
   }
 
   /** Draw from the joint that is dragged to where it is wanted. */

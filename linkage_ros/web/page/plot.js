@@ -10,7 +10,6 @@ import { units } from './units.js';
 const KINDS = ['position', 'velocity', 'acceleration', 'transmission angle', 'force ratio'];
 // What grows with the input's speed, and by which power of it.
 const POWERS = { velocity: 1, acceleration: 2 };
-const HEIGHT = 220;
 const FONT = "12px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
 const DIGIT = 7.5;
 const DEGREES = [1, 2, 5, 10, 15, 30, 45, 90, 180, 360];
@@ -62,6 +61,7 @@ export class Plot {
       this.chosen[this.about] = this.other.value.trim() || undefined;
       this.refresh();
     } });
+    this.enlarging = element('button', { type: 'button', textContent: 'Enlarge', onclick: () => this.enlarge() });
     this.now = element('div', { className: 'now' });
     this.place = element('div', { className: 'plot', tabIndex: 0, ariaLabel: 'No curve yet' });
     this.place.setAttribute('role', 'img');
@@ -69,12 +69,26 @@ export class Plot {
     this.marks = element('p', { className: 'answer' });
     this.reason = new Reason();
     this.element = element('details', {}, element('summary', { textContent: 'Plot' }),
-      element('div', { className: 'tools' }, this.kind, this.output, this.other), this.reason.line, this.place, this.read, this.marks);
-    this.element.ontoggle = () => this.refresh();
+      element('div', { className: 'tools' }, this.kind, this.output, this.other, this.enlarging), this.reason.line, this.place, this.read, this.marks);
+    this.element.ontoggle = () => {
+      if (!this.element.open) this.enlarge(false);
+      this.refresh();
+    };
+    this.element.onkeydown = ({ key }) => { if (key === 'Escape') this.enlarge(false); };
     this.asked = new Newest(() => this.ask());
     new ResizeObserver(() => {
-      if (this.element.open) this.plot?.setSize({ width: this.place.clientWidth, height: HEIGHT });
+      if (this.element.open) this.plot?.setSize(this.size);
     }).observe(this.place);
+  }
+
+  get size() {
+    return { width: this.place.clientWidth, height: this.place.clientHeight };
+  }
+
+  /** Fill the window with the plot, or leave that. */
+  enlarge(large = !this.element.classList.contains('large')) {
+    this.element.classList.toggle('large', large);
+    this.enlarging.textContent = large ? 'Back' : 'Enlarge';
   }
 
   choice(ariaLabel, names) {
@@ -131,10 +145,6 @@ export class Plot {
     const title = `${kind} of ${output}${power ? ` with the ${input} at ${shown(speed * wide)} ${acrossName}/s` : ''}`;
     this.data = [x.map(value => value * wide), y.map(value => value === null ? null : value * high * speed ** power)];
     this.bounds = bounds(this.data[1]);
-    // From one side of a pole to the other there is no line.
-    const [least, most] = this.bounds;
-    this.data[1] = this.data[1].map((value, i, { [i - 1]: last = null }) =>
-      value > most && last !== null && last < least || last > most && value !== null && value < least ? null : value);
     this.dead = dead.map(value => value * wide);
     // A whole turn has no ends.
     const whole = across === 'rad' && reach[0][1] - reach[0][0] > 2 * Math.PI - NOTHING;
@@ -172,11 +182,11 @@ export class Plot {
       label, font: FONT, labelFont: FONT, stroke: () => paint('--ink'), labelSize: 20, labelGap: 0,
       grid: { stroke: () => paint('--grid'), width: 1 }, ticks: { show: false },
       // The library's own way to these adds until an end is reached.
-      splits: (_, axis, low, high, step) => multiples(step, low, high),
+      splits: (_, side, low, high, step) => multiples(step, low, high),
       values: (_, splits) => splits.map(value => String(Number(value.toPrecision(6)))),
     });
     return {
-      width: this.place.clientWidth, height: HEIGHT, legend: { show: false },
+      ...this.size, pxAlign: 0, legend: { show: false },
       cursor: { y: false, drag: { x: false, y: false } },
       scales: { x: { time: false, range: (_, low, high) => [low, high] }, y: { range: () => this.bounds } },
       series: [{}, { stroke: () => paint('--accent'), width: 2, points: { show: false } }],

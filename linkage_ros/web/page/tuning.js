@@ -3,17 +3,20 @@
 
 // What a mechanism is: a control for each parameter, undo and reset, and its scene as a file.
 
-import { BY_FACTOR, element, FINE_ABOUT_ZERO, LINEAR, Reason, Slider, Switch } from './control.js';
+import { BY_FACTOR, Choice, element, FINE_ABOUT_ZERO, LINEAR, Reason, Slider, Switch } from './control.js';
 import { download } from './files.js';
 
 const DIMENSION = 'dimensions.';
+const BRANCH = 'branches.';
+const SIGNS = { 1: '+1', '-1': '−1' };
 const MOVES = /\.(speed|start)$/;
 const RESTED = 300;
 
 /** A parameter's name without what its place in the panel says. */
-function labelled(name) {
-  return name.replace(/^dimensions\./, '').replace(/^branches\./, 'branch ')
-    .replace(/^[a-z]+(\d*)\.(speed|start)$/, '$2 $1').trim();
+function labelled(name, inputs) {
+  const [input, what] = name.split('.');
+  if (MOVES.test(name)) return inputs > 1 ? `${what} of ${input}` : what;
+  return name.replace(/^(dimensions|branches)\./, '');
 }
 
 function law({ name, kind, low, high }) {
@@ -32,12 +35,14 @@ export class Tuning {
     Object.assign(this, { mechanism, connection, light });
     this.controls = new Map();
     this.reason = new Reason();
-    const groups = { speeds: [], dimensions: [], more: [] };
+    this.inputs = [...mechanism.settings.keys()].filter(name => name.endsWith('.speed')).length;
+    const groups = { speeds: [], dimensions: [], branches: [], more: [] };
     for (const setting of mechanism.settings.values()) {
       const control = this.control(setting);
       if (!control) continue;
       this.controls.set(setting.name, control);
-      const group = setting.name.startsWith(DIMENSION) ? 'dimensions' : setting.name.endsWith('.speed') ? 'speeds' : 'more';
+      const group = setting.name.startsWith(DIMENSION) ? 'dimensions' : setting.name.startsWith(BRANCH) ? 'branches'
+        : setting.name.endsWith('.speed') ? 'speeds' : 'more';
       groups[group].push(control.row);
     }
     this.speeds = groups.speeds;
@@ -45,7 +50,8 @@ export class Tuning {
     this.resetting = this.button('Reset', () => this.reset());
     const tools = element('div', { className: 'tools' }, this.undoing, this.resetting,
       this.button('Save as scene file', () => this.save()), this.reason.line);
-    this.element = element('div', {}, tools, folding('Dimensions', groups.dimensions, open), folding('More', groups.more, false));
+    this.element = element('div', {}, tools, folding('Dimensions', groups.dimensions, open),
+      folding('Branches', groups.branches, open), folding('More', groups.more, false));
     this.renderTools();
     this.refresh();
   }
@@ -58,10 +64,13 @@ export class Tuning {
     const { name, kind, meaning, allowed, fixed, low, high } = setting;
     if (fixed) return null;
     const described = {
-      ...setting, label: labelled(name), title: `${meaning}\nMay be: ${allowed}.`,
+      ...setting, label: labelled(name, this.inputs), title: `${meaning}\nMay be: ${allowed}.`,
       unit: /\[([^\]]+)\]/.exec(meaning)?.[1] ?? '', scale: law(setting),
+      // A dimension is shown as long as it is in the picture.
+      times: () => name.startsWith(DIMENSION) ? this.mechanism.value('scale') ?? 1 : 1,
     };
     const request = (...about) => this.set(name, ...about);
+    if (name.startsWith(BRANCH)) return new Choice(described, SIGNS, request);
     if (kind === 'bool') return new Switch(described, request);
     const ranged = low !== null && high !== null && low < high;
     if (!ranged || kind !== 'double' && kind !== 'integer') return null;
@@ -120,6 +129,9 @@ export class Tuning {
       if ([...this.controls.values()].some(({ held }) => held)) return this.refresh();
       if (tunable.reason) return;
       this.mechanism.tunable = tunable;
+      for (const [joint, [plus, minus]] of Object.entries(tunable.sides)) {
+        this.controls.get(BRANCH + joint)?.name({ 1: plus, '-1': minus });
+      }
       for (const [name, ends] of Object.entries(tunable.travel)) {
         if (ends && ends[0] < ends[1]) this.controls.get(name)?.bound(...ends);
       }
@@ -128,6 +140,7 @@ export class Tuning {
 
   update(name, value) {
     this.controls.get(name)?.update(value);
+    if (name === 'scale') this.render();
     if (this.mechanism.history.first.has(name)) this.refresh();
     if (MOVES.test(name)) return;
     this.renderTools();
