@@ -69,7 +69,8 @@ class CrankDriver(scene_node.SceneNode):
         self._publisher = InProcessPublisher(self, 'crank_states', in_process)
         self._timer = self.create_timer(1.0, self.guarded('a crank message', self._tick))
         # On system time a timer sleeps until an old time comes round again, if that is set back.
-        self.create_timer(1.0, self.guarded('a look at the clock', self._wake), clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_timer(1.0, self.guarded('a look at the clock', self._wake),
+                          clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.begin()
 
     def adopt(self, new: scene.Scene) -> None:
@@ -131,9 +132,8 @@ class CrankDriver(scene_node.SceneNode):
     def _tick(self) -> None:
         now = self._settled()
         if self._publisher.has_subscribers:
-            positions, speeds = zip(*[self._position(key, drive, now) for key, drive in self._sent])
-            self._message.publish(pack(Stamp(*divmod(now, SECOND))),
-                                  [positions + speeds])
+            positions, speeds = zip(*[self._position(*sent, now) for sent in self._sent])
+            self._message.publish(pack(Stamp(*divmod(now, SECOND))), [positions + speeds])
 
     def _position(self, key: Tuple[str, str], drive: scene.Drive, now: int) -> Tuple[float, float]:
         """Return the position and the speed of an input's source [rad or m, per second]."""

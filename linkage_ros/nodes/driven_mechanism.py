@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from typing import AbstractSet, Any, Callable, Iterator, Optional, Sequence, Tuple
+from typing import AbstractSet, Any, Callable, Iterator, Optional, Tuple
 
 import numpy as np
 from rclpy.duration import Duration
@@ -52,7 +52,8 @@ class DrivenMechanism:
 
     def __init__(self, node: Any, machine: scene.Machine, changed: Callable[[], None]):
         name = self.name = machine.name
-        self._joint_states = TrackedPublisher(node, JointState, f'{name}/joint_states', 10, changed)
+        self._joint_states = TrackedPublisher(
+            node, JointState, f'{name}/joint_states', 10, changed)
         self._markers = TrackedPublisher(node, MarkerArray, f'{name}/markers', 1, changed)
         self._locus = node.create_publisher(Marker, f'{name}/locus', LATCHED)
         self._description = node.create_publisher(String, f'{name}/robot_description', LATCHED)
@@ -214,7 +215,7 @@ class DrivenMechanism:
                 markers=[messages.deleted(self.name, id_) for id_ in sorted(ids)]))
 
     def _out_of_reach(self) -> str:
-        assembled: Sequence = self.pose.legs() if self.pose else ()
+        assembled = [*self.pose.legs()] if self.pose else []
         legs = ', '.join(f'{self.name}_{prefix}'.rstrip('_') for leg, prefix in enumerate(
             self.model.assembly.legs) if leg not in assembled)
         inputs = self.model.inputs

@@ -67,7 +67,7 @@ class Reader:
 
         """
         alike = self._sources.get(len(text), {})
-        number = alike and int.from_bytes(text, 'little')
+        number = int.from_bytes(text, 'little') if alike else 0
         for mask, sources in alike.items():
             if source := sources.get(number & mask):
                 self._used.move_to_end(source)

@@ -57,7 +57,7 @@ class Kinematics(scene_node.SceneNode):
         try:
             next(iter(self.scene.machines.values())).linkage.accelerated()
         except ImportError as error:
-            self.get_logger().info(f'{error}; plain Python solves the mechanisms, to the same bits')
+            self.get_logger().info(f'{error}; plain Python moves the legs, to the same places')
         self.create_subscription(
             JointState, 'crank_states', self.guarded('crank_states', self._receive,
                                                      self._planner.discard),

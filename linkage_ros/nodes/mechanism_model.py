@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from functools import cached_property
 from itertools import combinations
 import math
@@ -18,6 +17,7 @@ from visualization_msgs.msg import MarkerArray
 from . import messages
 from .message_layout import PatchedPublisher
 from .. import scene
+from ..cache import Cache
 from ..linkage.quantities import Spot
 from ..linkage.walker import Layout, Solution
 from ..robot_model import bodies, shapes, urdf
@@ -81,9 +81,8 @@ class MechanismModel:
         self._points, shown = _shown(machine)
         self._drawn = *drawn, bodies.size(machine), shown
         self._joint_states = messages.JointStates()
-        self._solutions: Dict[tuple, Solution] = {}
-        self._conversions: Dict[Layout, tuple] = {}
-        self._publishers: OrderedDict[tuple, PatchedPublisher] = OrderedDict()
+        self._solutions, self._conversions = Cache(), Cache(self._conversion)
+        self._publishers = Cache(size=ARRANGEMENTS)
 
     @cached_property
     def marker_array(self) -> messages.Markers:
@@ -92,7 +91,7 @@ class MechanismModel:
 
     def latched(self) -> Tuple[str, Optional[Any]]:
         """Return the messages that are published once: the robot model and, if any, the locus."""
-        *drawn, size = self._drawn[:4]
+        drawn, size = self._drawn[:3], self._drawn[3]
         curve = self.assembly.locus(self.machine.tracer)
         return (urdf.write(self.robot),
                 messages.locus(*drawn, curve, size) if len(curve) > 1 else None)
@@ -101,13 +100,11 @@ class MechanismModel:
         """Return the solver of all legs for the topics that have subscribers."""
         # Only a pose tells how far several inputs reach, so all its angles are needed to know.
         joints = joints or len(self.inputs) > 1
-        key = joints, markers, moving
-        if key not in self._solutions:
-            names = self.assembly.joints if joints else ()
-            self._solutions[key] = self.assembly.solution(
+        names = self.assembly.joints if joints else ()
+        return self._solutions.get_or_make((joints, markers, moving), lambda: (
+            self.assembly.solution(
                 self._points if markers else (), names, names if joints and moving else None,
-                len(self.inputs) if self.machine.loads else 0)
-        return self._solutions[key]
+                len(self.inputs) if self.machine.loads else 0)))
 
     def regular(self, solution: Solution) -> Pose:
         """Return the pose of a solution in which every number is finite and within reach."""
@@ -140,27 +137,20 @@ class MechanismModel:
 
         That is factors, what is added, and the indices of what is wrapped to half a turn.
         """
-        if self._is_plain:
-            return None
-        if layout not in self._conversions:
-            none = np.zeros(len(self._signs))
-            self._conversions[layout] = (
-                _arranged(layout, 1.0, self._signs, self._signs),
+        return None if self._is_plain else self._conversions[layout]
+
+    def _conversion(self, layout: Layout) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        none = np.zeros(len(self._signs))
+        return (_arranged(layout, 1.0, self._signs, self._signs),
                 _arranged(layout, 0.0, self._offsets, none),
                 np.flatnonzero(_arranged(layout, 0.0, self._wrapped, none)))
-        return self._conversions[layout]
 
     def publisher(self, publisher: Any, build: Callable, pose: Pose, logger: Any
                   ) -> PatchedPublisher:
         """Return what publishes the message that `build` makes of the values of a pose."""
-        key = publisher, pose
-        if key not in self._publishers:
-            self._publishers[key] = PatchedPublisher(
-                publisher, lambda stamp, values: build(pose, values, stamp),
-                pose.solution.layout.size, logger)
-            if len(self._publishers) > ARRANGEMENTS:
-                self._publishers.popitem(last=False)
-        return self._publishers[key]
+        return self._publishers.get_or_make((publisher, pose), lambda: PatchedPublisher(
+            publisher, lambda stamp, values: build(pose, values, stamp),
+            pose.solution.layout.size, logger))
 
     def joint_message(self, pose: Pose, values: np.ndarray, stamp: Any) -> JointState:
         """Return the joint states of the assembled legs."""
@@ -189,7 +179,7 @@ class MechanismModel:
         """Return the markers of the assembled legs."""
         layout, legs = pose.solution.layout, pose.legs()
         places = layout.rows(values)[legs, :layout.coordinates].reshape(len(legs), -1, 2)
-        # Legs on the left and on the right follow each other; each side stands on ground of its own.
+        # Legs on the left and on the right follow each other; each side has ground of its own.
         _, grounded = np.unique(legs % (1 + self.machine.mirrored), return_index=True)
         return self.marker_array.message(stamp, places, sorted(grounded))
 
@@ -201,7 +191,7 @@ def _shown(machine: scene.Machine) -> Tuple[Sequence, Dict[int, list]]:
     # A plate is drawn instead of its bars: the message is the smaller for it.
     edges = {frozenset(edge) for plate in plates for edge in combinations(plate, 2)}
     bars = [bar for bar in linkage.bars if bar not in cranks and frozenset(bar) not in edges]
-    pieces = {messages.LINKS_ID: [*bars, *linkage.cylinders],
+    pieces: Dict[int, list] = {messages.LINKS_ID: [*bars, *linkage.cylinders],
               messages.JOINTS_ID: [(name,) for name in wanted],
               messages.GUIDES_ID: [], messages.BODIES_ID: [], messages.CRANKS_ID: cranks,
               messages.DRIVEN_ID: [], messages.PLATES_ID: plates,
@@ -222,8 +212,10 @@ def _arranged(layout: Layout, rest: float, joints: np.ndarray, rates: np.ndarray
     """Return numbers for joints, inputs first, for their velocities and efforts, and the rest."""
     values, n = np.full(layout.size, rest), layout.inputs
     rows, driven = layout.rows(values), layout.driven(values)
-    driven[:n], rows[:, layout.coordinates:layout.posed].flat = np.split(joints, [n])
+    driven[:n] = joints[:n]
+    rows[:, layout.coordinates:layout.posed] = joints[n:].reshape(layout.legs, -1)
     layout.effort(values)[:] = rates[:layout.efforts]
     if layout.speeds:
-        driven[n:], rows[:, layout.posed:].flat = np.split(rates, [n])
+        driven[n:] = rates[:n]
+        rows[:, layout.posed:] = rates[n:].reshape(layout.legs, -1)
     return values

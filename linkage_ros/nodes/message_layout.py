@@ -259,7 +259,7 @@ class PatchedPublisher:
             logger.warning(f'{publisher.topic_name}: {reason}; publishing ordinary messages',
                            once=True)
 
-    def publish(self, stamp: bytes, values: Sequence[np.ndarray]) -> None:
+    def publish(self, stamp: bytes, values: Sequence[Sequence[float]]) -> None:
         """Publish the message with this stamp, packed, and values, one array after the other."""
         joined = np.concatenate(values) if len(values) > 1 else values[0]
         if self.template:

@@ -19,7 +19,7 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from .. import scene
+from .. import scene as scenes
 from ..scene import slider
 from ..words import elided, quoted
 
@@ -33,7 +33,7 @@ class SceneParameters:
     node : rclpy.node.Node
         Whose parameters they are; made with `automatically_declare_parameters_from_overrides`.
     role : str
-        One of scene.ALL: which parameters it acts on.
+        One of scenes.ALL: which parameters it acts on.
     check : callable
         Raises SceneError for a scene that the node cannot act on; quick.
     changed : callable
@@ -45,6 +45,8 @@ class SceneParameters:
         What the parameters say now.
     fields : dict
         The Field of each parameter.
+    is_given : bool
+        Whether the node was started with any of the scene's parameters.
 
     Raises
     ------
@@ -53,21 +55,23 @@ class SceneParameters:
 
     """
 
-    def __init__(self, node: Node, role: str, check: Callable[[scene.Scene], None],
-                 changed: Callable[[List[scene.Parameter]], None]):
+    def __init__(self, node: Node, role: str, check: Callable[[scenes.Scene], None],
+                 changed: Callable[[List[scenes.Parameter]], None]):
         self._node, self._role, self._check, self._changed = node, role, check, changed
         # Whose value counts instead of an own one, and whether that is being followed.
         self.owner_of: Callable[[str], Optional[str]] = lambda name: None
         self._is_followed = self._is_derived = False
         given = {name: one.value for name, one in node.get_parameters_by_prefix('').items()}
-        self.scene = scene.read({name: scene.plain(value) for name, value in given.items()})
+        self.scene = scenes.read({name: scenes.plain(value) for name, value in given.items()})
         own = [one for one in self.scene.parameters if role in one.field.readers]
         self.fields = {one.name: one.field for one in own}
+        self.is_given = not given.keys().isdisjoint(one.name for one in self.scene.parameters)
         for name in given.keys() & self.fields.keys():
             node.undeclare_parameter(name)
         self._declare(own)
         self._candidate = self.scene
-        self._ends: Dict[str, Tuple[scene.Machine, Any, Any]] = {}
+        # By name: the mechanism and the value that a range was found for.
+        self._ends: Dict[str, Tuple[Any, Any, Any]] = {}
         node.add_pre_set_parameters_callback(self._typed_alike)
         node.add_on_set_parameters_callback(self._validate)
         node.add_post_set_parameters_callback(self._adopt)
@@ -99,15 +103,15 @@ class SceneParameters:
             self._slider_ends(name)
 
     def _slider_ends(self, name: str) -> Any:
-        value = scene.plain(self._node.get_parameter(name).value)
+        value = scenes.plain(self._node.get_parameter(name).value)
         machine, made_of, ends = self._ends.get(name, (None, None, None))
         present = self.scene.machines.get(name.partition('.')[0])
         if name not in self._ends or machine is not present or made_of != value:
-            ends = slider.ends(self.scene, scene.Parameter(name, self.fields[name], value))
+            ends = slider.ends(self.scene, scenes.Parameter(name, self.fields[name], value))
             self._ends[name] = present, value, ends
         return ends
 
-    def _declare(self, own: Sequence[scene.Parameter]) -> None:
+    def _declare(self, own: Sequence[scenes.Parameter]) -> None:
         descriptors = {field: _descriptor(field) for field in set(self.fields.values())}
         self._node.declare_parameters('', [
             (one.name, one.value, copy(descriptors[one.field])) if one.value != () else
@@ -128,7 +132,7 @@ class SceneParameters:
             return parameter if not field or parameter.type_ == Parameter.Type.NOT_SET else (
                 Parameter(parameter.name, _kind(field), field.checked(
                     parameter.name, parameter.value)))
-        except scene.SceneError:
+        except scenes.SceneError:
             # It is refused in words by what comes next.
             return parameter
 
@@ -138,10 +142,10 @@ class SceneParameters:
         try:
             values = {one.name: self._value(one) for one in parameters
                       if one.name in self.fields}
-            strict = not self._is_followed and self._role in scene.START.readers
-            candidate = scene.changed(self.scene, values, strict) if values else self.scene
+            strict = not self._is_followed and self._role in scenes.START.readers
+            candidate = scenes.changed(self.scene, values, strict) if values else self.scene
             self._check(candidate)
-        except scene.SceneError as error:
+        except scenes.SceneError as error:
             return SetParametersResult(successful=False, reason=str(error))
         except Exception as error:
             self._node.get_logger().error(f'internal error: {error!r}')
@@ -153,11 +157,11 @@ class SceneParameters:
     def _value(self, parameter: Parameter) -> Any:
         name, field = parameter.name, self.fields[parameter.name]
         if parameter.type_ == Parameter.Type.NOT_SET:
-            raise scene.SceneError(f'{name} cannot be removed; it must be {field.allowed}')
+            raise scenes.SceneError(f'{name} cannot be removed; it must be {field.allowed}')
         value = field.checked(name, parameter.value)
         owner = None if self._is_followed else self.owner_of(name)
         if owner:
-            raise scene.SceneError(
+            raise scenes.SceneError(
                 f'{name} belongs to {owner} while it runs: ros2 param set {owner} {name} '
                 + quote(quoted(list(value) if isinstance(value, tuple) else value)))
         return value
@@ -189,7 +193,7 @@ def _kind(field: Any) -> Parameter.Type:
     return Parameter.Type[field.kind.upper()]
 
 
-def _parameter(parameter: scene.Parameter) -> Parameter:
+def _parameter(parameter: scenes.Parameter) -> Parameter:
     """Return a parameter whose type does not depend on its value."""
     return Parameter(parameter.name, _kind(parameter.field), parameter.value)
 

@@ -11,9 +11,8 @@ executors takes them on the same arrays: `plan_python`, or `plan_llvm` once its 
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from dataclasses import dataclass
-from typing import AbstractSet, Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import AbstractSet, Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -22,13 +21,14 @@ from .joint_state_reader import Reader, Source
 from .message_layout import PatchedPublisher
 from .plan_python import PythonExecutor
 from .scene_joint_states import SceneJointStates
+from ..cache import Cache
 from ..linkage.walker import Solution
 
 try:
-    from .plan_llvm import llvm_executor
+    from . import plan_llvm
 except ImportError:
     # Without llvmlite there is no machine code.
-    llvm_executor = None
+    plan_llvm = None  # type: ignore[assignment]
 
 # Plans that are cached.
 PLANS = 64
@@ -112,7 +112,7 @@ class Plan:
         for one in self._members:
             if one not in moved:
                 one.refresh(one.solution(in_scene))
-        self._outputs: Dict[tuple, Output] = {}
+        self._outputs = Cache(size=PLANS)
         self._output: Optional[Output] = None
         self._version, self._runs, self._is_interpreted = -1, 0, True
         self._executor: Any = PythonExecutor(self)
@@ -136,27 +136,26 @@ class Plan:
         if self._version != self._planner.version:
             self._version, self._output = self._planner.version, self._find_output()
         self._executor.publish(self._output)
-        if self._is_interpreted and llvm_executor:
+        if self._is_interpreted and plan_llvm:
             self._runs += 1
             # Tried ever more rarely: while subscribers come one by one no plan lasts.
             if self._runs > 1 and self._runs & (self._runs - 1) == 0 and (
-                    executor := llvm_executor(self)):
+                    executor := plan_llvm.executor(self)):
                 self._executor, self._is_interpreted = executor, False
 
     def _find_output(self) -> Output:
         poses = tuple(one.pose for one in (*(one for one, _ in self.solved), *self._members))
-        if poses not in self._outputs:
-            messages = [Message(publisher, [solution.values], one.stamp)
-                        for one, solution in self.solved for publisher in one.publishers()]
-            if self._members and (found := self._planner.scene_joint_states.message(
-                    self._members)):
-                messages.append(Message(*found, self.stamp))
-            if len(self._outputs) == PLANS:
-                self._outputs.clear()
-            self._outputs[poses] = Output(messages, all(
-                one.pose == one.model.regular(solution) and not solution.layout.efforts
-                for one, solution in self.solved))
-        return self._outputs[poses]
+        return self._outputs.get_or_make(poses, self._made_output)
+
+    def _made_output(self) -> Output:
+        """Return what publishes the present poses."""
+        messages = [Message(publisher, [solution.values], one.stamp)
+                    for one, solution in self.solved for publisher in one.publishers()]
+        if found := self._planner.scene_joint_states.message(self._members):
+            messages.append(Message(*found, self.stamp))
+        return Output(messages, all(
+            one.pose == one.model.regular(solution) and not solution.layout.efforts
+            for one, solution in self.solved))
 
 
 class Planner:
@@ -189,7 +188,7 @@ class Planner:
         self.mechanisms, self.scene_joint_states = mechanisms, scene_joint_states
         self.now, self._reader = now, reader
         self.stamp, self.version = np.zeros(1, np.int64), 0
-        self._plans: OrderedDict[tuple, Plan] = OrderedDict()
+        self._plans = Cache(size=PLANS)
         # The last plan, if the next message of its source selects it again.
         self._last: Optional[Plan] = None
 
@@ -234,15 +233,13 @@ class Planner:
         for route in received:
             route.mechanism.known[:, route.input] = True, moving
         after = [one.known.tobytes() for one in self.mechanisms]
-        key = source, tuple(after), failed
-        plan = self._plans.get(key)
-        if plan is None:
-            moved = tuple(dict.fromkeys(route.mechanism for route in routes))
-            plan = Plan(source, routes, moved, self) if moved else None
-            if source.size and plan:
-                self._plans[key] = plan
-                if len(self._plans) > PLANS:
-                    self._plans.popitem(last=False)
+        moved = tuple(dict.fromkeys(route.mechanism for route in routes))
+        plan = None
+        if moved and source.size:
+            plan = self._plans.get_or_make(
+                (source, tuple(after), failed), lambda: Plan(source, routes, moved, self))
+        elif moved:
+            plan = Plan(source, routes, moved, self)
         self._last = plan if plan and not measured and before == after and source.size else None
         return plan
 

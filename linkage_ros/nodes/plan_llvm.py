@@ -14,7 +14,7 @@ from ..formula import llvm_pipeline as native
 from ..linkage.walker import Solution
 
 
-def llvm_executor(plan: Any) -> Any:
+def executor(plan: Any) -> Any:
     """Return the executor of a plan in machine code; None while that is not compiled."""
     ready = plan.source and plan.source.size and native.code().done() and all(
         solution.batch.code for _, solution in plan.solved)

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from typing import Any, Callable, Iterable, List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from .mechanism_model import MechanismModel, Pose
 from .message_layout import PatchedPublisher
 from .messages import JointStates
 from .publishers import LATCHED, TrackedPublisher
+from ..cache import Cache
 
 # Arrangements of the message that are cached.
 ARRANGEMENTS = 16
@@ -45,7 +45,7 @@ class SceneJointStates:
         self._descriptions = node.create_publisher(String, 'robot_description', LATCHED)
         self._received = frozenset(sources if same else ())
         self._logger, self._message = node.get_logger(), JointStates()
-        self._publishers: OrderedDict[tuple, PatchedPublisher] = OrderedDict()
+        self._publishers = Cache(self._publisher, ARRANGEMENTS)
         self._description = ''
 
     @property
@@ -65,14 +65,13 @@ class SceneJointStates:
                       if member.pose and member.pose.exists)
         if not poses:
             return None
-        if poses not in self._publishers:
-            self._publishers[poses] = PatchedPublisher(
-                self._joint_states.publisher, lambda stamp, values: self._built(
-                    poses, values, stamp),
-                sum(pose.solution.layout.size for _, pose in poses), self._logger)
-            if len(self._publishers) > ARRANGEMENTS:
-                self._publishers.popitem(last=False)
         return self._publishers[poses], [pose.solution.values for _, pose in poses]
+
+    def _publisher(self, poses: Sequence[Tuple[MechanismModel, Pose]]) -> PatchedPublisher:
+        return PatchedPublisher(
+            self._joint_states.publisher,
+            lambda stamp, values: self._built(poses, values, stamp),
+            sum(pose.solution.layout.size for _, pose in poses), self._logger)
 
     def _built(self, poses: Sequence[Tuple[MechanismModel, Pose]], values: np.ndarray,
                stamp: Any) -> JointState:

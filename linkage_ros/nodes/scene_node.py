@@ -26,7 +26,7 @@ from .ownership import Announcer, Follower
 from .parameters import SceneParameters
 from .shutdown import ShutdownHandler
 from .worker import Job, Worker
-from .. import scene
+from .. import scene as scenes
 from ..words import elided, listed, quoted
 
 try:
@@ -65,7 +65,7 @@ class SceneNode(Node):
         self.guarded = incidents.guarded
         self._worker = Worker(self, incidents.report)
         self._announcer: Optional[Announcer] = None
-        self._adopted: Optional[scene.Scene] = None
+        self._adopted: Optional[scenes.Scene] = None
         with self._or_destroyed():
             self._parameters_of_scene = SceneParameters(self, name, self.check, self._changed)
         self._role = name
@@ -75,9 +75,14 @@ class SceneNode(Node):
             clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     @property
-    def scene(self) -> scene.Scene:
+    def scene(self) -> scenes.Scene:
         """What the parameters say."""
         return self._parameters_of_scene.scene
+
+    @property
+    def is_given(self) -> bool:
+        """Whether the node was started with any parameters of a scene."""
+        return self._parameters_of_scene.is_given
 
     @property
     def is_settled(self) -> bool:
@@ -90,7 +95,7 @@ class SceneNode(Node):
             self.check(self.scene)
             prepared = self.prepare(self.scene)
         self._adopt(self.scene, prepared)
-        if self._role == scene.OWNER:
+        if self._role == scenes.OWNER:
             self._announcer = Announcer(self)
             self.later([self._announcer.first])
         else:
@@ -100,10 +105,10 @@ class SceneNode(Node):
             SECONDS_BETWEEN_LOOKS, self.guarded('a look for namesakes', self._look_for_namesakes),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def check(self, new: scene.Scene) -> None:
+    def check(self, new: scenes.Scene) -> None:
         """Raise SceneError for a scene that the node cannot act on; quick."""
 
-    def prepare(self, new: scene.Scene) -> Any:
+    def prepare(self, new: scenes.Scene) -> Any:
         """Return all that a scene needs, changing nothing in the node; on the worker's thread."""
         return new
 
@@ -130,18 +135,18 @@ class SceneNode(Node):
         self._worker.end()
         super().destroy_node()
 
-    def _changed(self, changed: List[scene.Parameter]) -> None:
+    def _changed(self, changed: List[scenes.Parameter]) -> None:
         """Prepare the newest scene, and tell the nodes that follow."""
         self._worker.replace('scene', partial(self._prepared, self.scene))
         self._worker.replace('ranges', self._parameters_of_scene.renew_ranges)
         if self._announcer:
             self._announcer.announce(changed)
 
-    def _prepared(self, new: scene.Scene) -> Callable[[], None]:
+    def _prepared(self, new: scenes.Scene) -> Callable[[], None]:
         """Return what adopts a scene."""
         return partial(self._adopt, new, self.prepare(new))
 
-    def _adopt(self, new: scene.Scene, prepared: Any) -> None:
+    def _adopt(self, new: scenes.Scene, prepared: Any) -> None:
         self._adopted = new
         self.adopt(prepared)
 
@@ -161,7 +166,7 @@ class SceneNode(Node):
     def _or_destroyed(self) -> Iterator[None]:
         try:
             yield
-        except scene.SceneError:
+        except scenes.SceneError:
             self.destroy_node()
             raise
 
@@ -185,7 +190,7 @@ def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_clas
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         _refuse_arguments(args)
-    except (RuntimeError, scene.SceneError) as error:
+    except (RuntimeError, scenes.SceneError) as error:
         # What the client library makes of an argument may be as long as that.
         rclpy.try_shutdown()
         unknown = isinstance(error, rclpy_implementation.UnknownROSArgsError)
@@ -208,7 +213,7 @@ def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_clas
             get_logger(name), lambda: not rclpy.ok()))
     except ExternalShutdownException:
         pass
-    except scene.SceneError as error:
+    except scenes.SceneError as error:
         return _failed(name, error)
     finally:
         gc.enable()
@@ -249,14 +254,14 @@ def _refuse_namesake(node: Node, others: Iterable[Node]) -> None:
     name = node.get_name()
     if name in {other.get_name() for other in others}:
         node.destroy_node()
-        raise scene.SceneError(f'two nodes would be called {name}; to rename one of them: '
+        raise scenes.SceneError(f'two nodes would be called {name}; to rename one of them: '
                                '-r kinematics:__node:=NAME')
 
 
 def _refuse_arguments(args: Any) -> None:
     unknown = remove_ros_args(args)[1:]
     if unknown:
-        raise scene.SceneError(f'unknown argument {quoted(unknown[0])}: there are none but '
+        raise scenes.SceneError(f'unknown argument {quoted(unknown[0])}: there are none but '
                                'those of ROS, after --ros-args')
 
 

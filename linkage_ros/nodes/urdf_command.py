@@ -3,8 +3,11 @@
 
 """Command that prints a robot model, of a scene that comes as a node's parameters too."""
 
+from __future__ import annotations
+
 import re
 import sys
+from typing import List, Optional
 
 import rclpy
 from rclpy.utilities import remove_ros_args
@@ -14,17 +17,17 @@ from .. import command, scene
 from ..robot_model.command import NAME, NEEDS, show
 
 
-def main(args=None) -> int:
+def main(args: Optional[List[str]] = None) -> int:
     """Print URDF; return the exit code."""
     return command.run(NAME, _show, sys.argv[1:] if args is None else args, NEEDS)
 
 
-def _show(args):
+def _show(args: List[str]) -> None:
     from_ros = '--ros-args' in args
-    show(_without_ros(args) if from_ros else args, _told(args) if from_ros else None)
+    show(_without_ros(args) if from_ros else args, _scene(args) if from_ros else None)
 
 
-def _without_ros(args):
+def _without_ros(args: List[str]) -> List[str]:
     """Return the arguments that are not for ROS; raise RequestError if others are wrong."""
     try:
         return remove_ros_args([NAME, *args])[1:]
@@ -34,7 +37,7 @@ def _without_ros(args):
         raise command.RequestError(f'the arguments for ROS are wrong: {why}') from None
 
 
-def _told(args) -> scene.Scene:
+def _scene(args: List[str]) -> scene.Scene:
     """Return the scene in the parameters that come with ROS arguments."""
     rclpy.init(args=args)
     try:
@@ -46,11 +49,11 @@ def _told(args) -> scene.Scene:
 
 
 class _Reader(scene_node.SceneNode):
-    """A node that is told a scene, or says that it was not."""
+    """A node that is given a scene; RequestError if it is not."""
 
     def __init__(self, promised: bool):
         super().__init__(NAME)
-        if promised and not self._parameter_overrides:
+        if promised and not self.is_given:
             self.destroy_node()
             raise command.RequestError("the parameter file must have '/**:' and below it "
                                        "'ros__parameters:' with a scene")
