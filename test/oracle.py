@@ -883,6 +883,19 @@ class Generator:
                 *(f'{name}=2.5' for name in linkage.joints if self._random.random() < 0.1)]
 
 
+def everything(parameters):
+    """Return the steps after which every topic of a scene is listened to."""
+    return [('listen', topic, True) for topic in Generator(parameters, None).topics]
+
+
+def message(positions, velocities=(), sec=1):
+    """Return the step that sends values by the names of their sources."""
+    sent = JointState(name=list(positions), position=list(positions.values()),
+                      velocity=velocities)
+    sent.header.stamp.sec = sec
+    return 'send', serialize_message(sent)
+
+
 def history(parameters, seed, length=60):
     """Return a random history of a scene: steps as `Bench.run` takes them."""
     return Generator(parameters, np.random.default_rng(seed)).history(length)
