@@ -177,6 +177,16 @@ class Process:
         """Send a signal."""
         self._process.send_signal(signal)
 
+    @property
+    def id(self):
+        """Its number."""
+        return self._process.pid
+
+    @property
+    def has_ended(self):
+        """Whether it has ended."""
+        return self._process.poll() is not None
+
     def line(self):
         """Return the next line that is printed, '' after the last."""
         return self._process.stdout.readline()

@@ -4,6 +4,9 @@
 """After any history the kinematics node publishes what the library says, on every topic."""
 
 import math
+import os
+from pathlib import Path
+import subprocess
 import sys
 
 import numpy as np
@@ -14,24 +17,14 @@ pytest.importorskip('rclpy')
 from oracle import Bench, everything, history, message, Mismatch, SCENES  # noqa: E402
 from ros_harness import Graph  # noqa: E402
 
-# Of each scene, with each executor: 260 histories in all, and 10 000.
+# Of each scene, with machine code and without: 260 histories in all, and 10 000.
 FEW, MANY = range(10), range(10, 395)
-
-
-@pytest.fixture(params=['machine code', 'plain Python'])
-def executor(request, monkeypatch):
-    """Have machine code, or no llvmlite."""
-    if request.param == 'plain Python':
-        monkeypatch.setitem(sys.modules, 'llvmlite', None)
-    else:
-        pytest.importorskip('llvmlite')
-    return request.param
 
 
 @pytest.mark.parametrize('name', SCENES)
 @pytest.mark.parametrize('seeds', [FEW, pytest.param(MANY, marks=pytest.mark.long)],
                          ids=['few', 'many'])
-def test_whatever_happens_the_node_publishes_what_the_library_says(executor, name, seeds):
+def test_whatever_happens_the_node_publishes_what_the_library_says(name, seeds):
     with Graph() as graph:
         bench = Bench(graph, SCENES[name])
         for seed in seeds:
@@ -55,7 +48,7 @@ UNHEARD = {
 
 
 @pytest.mark.parametrize('parameters, steps', UNHEARD.values(), ids=UNHEARD)
-def test_a_message_that_sets_nothing_off_ends_nothing(executor, graph, parameters, steps):
+def test_a_message_that_sets_nothing_off_ends_nothing(graph, parameters, steps):
     Bench(graph, parameters).run(steps)
 
 
@@ -68,7 +61,7 @@ LOADED = {
 
 
 @pytest.mark.parametrize('parameters', LOADED.values(), ids=LOADED)
-def test_efforts_are_there_whoever_sets_the_message_off(executor, graph, parameters):
+def test_efforts_are_there_whoever_sets_the_message_off(graph, parameters):
     Bench(graph, parameters).run([
         *everything(parameters), message({'a_crank': 2.0}), ('compiled',),
         *(step for i in range(10) for step in (
@@ -84,7 +77,7 @@ END = 2.0 * math.acos(5.0 / 6.0)
     message({'a_crank': 0.3}, [math.nan]), message({'a_crank': 0.3}, [math.inf]),
     message({'a_crank': 0.3}, [1e308]), message({'b_crank': END}, [1.0])],
     ids=['nan', 'inf', 'overflow', 'an end of the reach'])
-def test_a_velocity_that_is_no_number_leaves_all_velocities_out(executor, graph, by):
+def test_a_velocity_that_is_no_number_leaves_all_velocities_out(graph, by):
     Bench(graph, PAIR).run([
         *everything(PAIR), message({'a_crank': 0.2, 'b_crank': 0.1}, [1.0, 1.0]), ('compiled',),
         *(step for i in range(5) for step in (
@@ -93,7 +86,7 @@ def test_a_velocity_that_is_no_number_leaves_all_velocities_out(executor, graph,
 
 
 @pytest.mark.parametrize('seed', range(5))
-def test_what_leaves_its_reach_leaves_the_picture(executor, graph, seed):
+def test_what_leaves_its_reach_leaves_the_picture(graph, seed):
     parameters = {'mechanisms': ['b'], 'b.type': 'peaucellier'}
     near = END + 2e-3 * np.random.default_rng(seed).normal(size=20)
     Bench(graph, parameters).run([
@@ -103,12 +96,29 @@ def test_what_leaves_its_reach_leaves_the_picture(executor, graph, seed):
 
 @pytest.mark.parametrize('name', ['an excavator', 'a reach that ends',
                                   'more legs than are solved one by one'])
-def test_numbers_are_the_same_at_the_ends_of_the_reach_and_in_many_legs(executor, graph, name):
+def test_numbers_are_the_same_at_the_ends_of_the_reach_and_in_many_legs(graph, name):
     bench = Bench(graph, SCENES[name])
     drives = [drive for machine in bench.model.scene.machines.values()
               for drive in machine.inputs.values()]
     middle = {drive.source: 0.5 * sum(drive.reach[0]) for drive in drives}
     speeds = [1.0] * len(drives)
     bench.run([*everything(SCENES[name]), message(middle, speeds), ('compiled',), *(
-        message({**middle, drive.source: end + i}, speeds)
-        for i in (0.0, 1e-9, -1e-9) for drive in drives for end in drive.reach[0])])
+        message({**middle, drive.source: drive.reach[0][0] + part * (
+            drive.reach[0][1] - drive.reach[0][0])}, speeds)
+        for drive in drives for part in (0.0, 1.0, 1e-9, -1e-9, *np.linspace(0.1, 0.9, 9)))])
+
+
+WITHOUT = 'LINKAGE_ROS_WITHOUT_LLVMLITE'
+
+
+@pytest.mark.skipif(WITHOUT in os.environ, reason='this is without')
+@pytest.mark.parametrize('which', ['not long', pytest.param('long', marks=pytest.mark.long)])
+def test_all_this_holds_without_llvmlite(tmp_path, which):
+    (tmp_path / 'sitecustomize.py').write_text(
+        "import sys\nsys.modules['llvmlite'] = None\n")
+    paths = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', '')])
+    done = subprocess.run(
+        [sys.executable, '-m', 'pytest', '-q', '-p', 'no:cacheprovider', '-m', which, __file__],
+        env={**os.environ, 'PYTHONPATH': paths, WITHOUT: '1'}, cwd=Path(__file__).parents[1],
+        capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-5000:]

@@ -1,0 +1,328 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A node goes on after any exception, and ends at a signal, whatever it is doing."""
+
+from collections import Counter
+import math
+import os
+from pathlib import Path
+import resource
+import signal
+
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('linkage_interfaces')
+
+from linkage_interfaces.srv import InputsFor, ServoInverse as Service  # noqa: E402
+from linkage_ros import scene  # noqa: E402
+from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
+from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
+from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
+from rcl_interfaces.msg import Log, ParameterEvent  # noqa: E402
+from rclpy.logging import LoggingSeverity  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
+from rclpy.publisher import Publisher  # noqa: E402
+from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
+from ros_harness import Graph, Process, RETRY  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
+from visualization_msgs.msg import MarkerArray  # noqa: E402
+
+CONFIG = Path(__file__).parents[1] / 'config'
+LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+LEVER = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}
+# What a process may still compute after a signal [s], however busy the machine is.
+ENDS_WITHIN = 1.0
+
+
+@pytest.fixture
+def slips(monkeypatch):
+    """Return how often publishing on a topic is still to raise, by the topic."""
+    left, publish = Counter(), Publisher.publish
+
+    def slipping(self, message):
+        topic = self.topic_name.lstrip('/')
+        if left[topic]:
+            left[topic] -= 1
+            raise ZeroDivisionError(f'slip on {topic}')
+        publish(self, message)
+
+    monkeypatch.setattr(Publisher, 'publish', slipping)
+    return left
+
+
+@pytest.fixture
+def errors(graph):
+    """Return what returns the errors that were logged."""
+    said = graph.listen(Log, '/rosout', 1000)
+    return lambda: [m.msg for m in said if m.level >= LoggingSeverity.ERROR]
+
+
+def logged_once(graph, errors, *words):
+    """Wait for an error with some words, and see that there is no other."""
+    graph.until(errors)
+    with pytest.raises(AssertionError, match='in time'):
+        graph.until(lambda: len(errors()) > 1, 3 * RETRY)
+    assert all(word in errors()[0] for word in ('slip', *words)), errors()
+
+
+@pytest.mark.parametrize('topic', ['m/joint_states', 'm/markers', 'joint_states'])
+def test_after_a_slip_the_next_crank_message_is_answered(graph, slips, errors, topic):
+    node = graph.start(Kinematics, {'mechanisms': ['m'], 'm.type': 'jansen'})
+    turn = graph.crank(['m_crank'])
+    answers = graph.listen(MarkerArray if topic == 'm/markers' else JointState, topic, 100)
+    graph.until(lambda: node.count_subscribers('/rosout'))
+    turn([0.1], answers)
+    slips[topic] = 1
+    answers.clear()
+    turn([0.2], answers)
+    assert not slips[topic]
+    turn([0.3], answers)
+    logged_once(graph, errors, 'crank_states')
+
+
+@pytest.mark.parametrize('topic', ['m/locus', 'm/robot_description', 'robot_description',
+                                   'scene_parameters'])
+def test_after_a_slip_of_the_worker_messages_are_answered(graph, slips, errors, topic):
+    graph.until(lambda: graph.node.count_publishers('/rosout'))
+    slips[topic] = 1
+    node = graph.start(Kinematics, {'mechanisms': ['m'], 'm.type': 'jansen'})
+    graph.until(lambda: not slips[topic])
+    logged_once(graph, errors)
+    graph.crank(['m_crank'])([0.3], graph.listen(JointState, 'm/joint_states'))
+    assert graph.set(node, m__dimensions__m=16.0).successful
+
+
+def test_after_a_slip_the_timer_goes_on(graph, slips, errors):
+    heard = graph.listen(JointState, 'crank_states', 100)
+    node = graph.start(CrankDriver, LEVER)
+    graph.until(lambda: heard and node.count_subscribers('/rosout'))
+    slips['crank_states'] = 1
+    graph.until(lambda: not slips['crank_states'])
+    heard.clear()
+    graph.until(lambda: len(heard) > 3)
+    logged_once(graph, errors)
+
+
+@pytest.mark.parametrize('node_class', [Kinematics, CrankDriver, ServoInverse])
+def test_after_a_slip_parameters_can_be_set(graph, monkeypatch, errors, node_class):
+    node = graph.start(node_class, LEVER)
+    graph.until(lambda: node.count_subscribers('/rosout'))
+    with monkeypatch.context() as context:
+        for name in ('read', 'changed'):
+            context.setattr(scene, name, slip)
+        result = graph.set(node, lever__dimensions__a=81.0)
+    assert not result.successful and 'slip' in result.reason
+    logged_once(graph, errors)
+    assert graph.set(node, lever__dimensions__a=82.0).successful
+    assert node.get_parameter('lever.dimensions.a').value == 82.0
+
+
+def slip(*_, **__):
+    raise ZeroDivisionError('slip')
+
+
+def test_after_a_slip_the_owner_is_followed(graph, monkeypatch, errors):
+    node = graph.start(CrankDriver, LEVER)
+    graph.until(lambda: node.count_subscribers('/rosout'))
+    publisher = graph.node.create_publisher(ParameterEvent, 'scene_parameters', LATCHED)
+    graph.until(publisher.get_subscription_count)
+
+    def announce(**values):
+        values = {f'lever.{name.replace("__", ".")}': value for name, value in values.items()}
+        publisher.publish(ParameterEvent(node='/kinematics', new_parameters=[
+            Parameter(name, value=value).to_parameter_msg() for name, value in {
+                'mechanisms': ['lever'], 'lever.type': 'slotted_lever', **values}.items()]))
+
+    with monkeypatch.context() as context:
+        for name in ('read', 'changed'):
+            context.setattr(scene, name, slip)
+        announce(dimensions__a=81.0)
+        graph.until(errors)
+    logged_once(graph, errors)
+    announce(dimensions__a=82.0)
+    graph.until(lambda: node.get_parameter('lever.dimensions.a').value == 82.0)
+
+
+class Broken:
+    """A scene that raises whatever it is asked."""
+
+    def __getattr__(self, name):
+        slip()
+
+
+@pytest.mark.parametrize('service, kind, request_', [
+    ('servo_inverse', Service, Service.Request(lever_angle=[0.1])),
+    ('inputs_for', InputsFor, InputsFor.Request(outputs=['P.x', 'P.y'], values=[0.5, 0.9]))],
+    ids=['servo_inverse', 'inputs_for'])
+def test_after_a_slip_a_service_answers(graph, errors, service, kind, request_):
+    node = graph.start(ServoInverse, {'mechanisms': ['lever', 'five'], 'five.type': 'five_bar',
+                                      'lever.type': 'slotted_lever'})
+    client = graph.node.create_client(kind, service)
+    graph.until(lambda: node.count_subscribers('/rosout'))
+    whole, node.scene = node.scene, Broken()
+    answer = graph.call(client, request_)
+    assert not answer.success and 'slip' in answer.message
+    node.scene = whole
+    logged_once(graph, errors)
+    assert 'slip' not in graph.call(client, request_).message
+
+
+def trajectory(count, **middles):
+    """Return a trajectory of so many points, all near some values."""
+    return JointTrajectory(joint_names=list(middles), points=[JointTrajectoryPoint(
+        positions=[middle * (1.0 + 0.01 * math.sin(1e-3 * i)) for middle in middles.values()])
+        for i in range(count)])
+
+
+@pytest.mark.parametrize('topic, kind, answer, wanted', [
+    ('wanted_states', JointState, 'servo_commands',
+     JointState(name=['lever_lever'], position=[0.1])),
+    ('wanted_trajectory', JointTrajectory, 'servo_trajectory', trajectory(3, lever_lever=0.1))],
+    ids=['wanted_states', 'wanted_trajectory'])
+def test_after_a_slip_the_next_command_is_given(graph, slips, errors, topic, kind, answer, wanted):
+    node = graph.start(ServoInverse, LEVER)
+    publisher = graph.node.create_publisher(kind, topic, 10)
+    answers = graph.listen(JointState if kind is JointState else kind, answer)
+    graph.until(lambda: publisher.get_subscription_count() and node.count_subscribers('/rosout')
+                and node.count_subscribers(answer))
+    slips[answer] = 1
+    publisher.publish(wanted)
+    graph.until(lambda: not slips[answer])
+    logged_once(graph, errors, topic)
+    publisher.publish(wanted)
+    graph.until(lambda: answers)
+
+
+# --- signals ---------------------------------------------------------------------------------
+
+SIGNALS = [signal.SIGINT, signal.SIGTERM]
+
+
+@pytest.fixture
+def processes():
+    """Return a list of processes, all of which are ended."""
+    started = []
+    yield started
+    for process in started:
+        if not process.has_ended:
+            process.interrupt(signal.SIGKILL)
+            process.end()
+
+
+def cpu(process):
+    """Return the time that a process has computed [s]."""
+    fields = Path(f'/proc/{process.id}/stat').read_text().rpartition(')')[2].split()
+    return sum(map(int, fields[11:13])) / os.sysconf('SC_CLK_TCK')
+
+
+def ends_quietly(process, number):
+    """Let a process end by a signal; return what else it printed."""
+    def of_ended():
+        used = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return used.ru_utime + used.ru_stime
+
+    others, before = of_ended(), cpu(process)
+    process.interrupt(number)
+    code, printed = process.end()
+    assert code == 0 and 'Traceback' not in printed and 'rror' not in printed, printed
+    assert of_ended() - others - before < ENDS_WITHIN
+    return printed
+
+
+@pytest.fixture
+def many(tmp_path):
+    """Return a scene of a thousand mechanisms."""
+    path = tmp_path / 'many.yaml'
+    names = [f'm{i}' for i in range(1000)]
+    path.write_text(f'/**:\n  ros__parameters:\n    mechanisms: [{", ".join(names)}]\n' + ''.join(
+        f'    {name}.type: {"slotted_lever" if i % 2 else "jansen"}\n'
+        for i, name in enumerate(names)))
+    return path
+
+
+@pytest.mark.parametrize('number', SIGNALS)
+@pytest.mark.parametrize('publishers', [
+    0, pytest.param(100, marks=pytest.mark.long), pytest.param(1500, marks=pytest.mark.long)])
+@pytest.mark.parametrize('name', [
+    'kinematics', pytest.param('crank_driver', marks=pytest.mark.long),
+    pytest.param('servo_inverse', marks=pytest.mark.long),
+    pytest.param('together', marks=pytest.mark.long)])
+def test_a_signal_ends_the_start_of_a_thousand_mechanisms(processes, many, name, publishers,
+                                                          number):
+    process = Process(name, many)
+    processes.append(process)
+    node = 'kinematics' if name == 'together' else name
+
+    def begun():
+        return process.has_ended or node in graph.node.get_node_names() and publishers <= len(
+            graph.node.get_publisher_names_and_types_by_node(node, '/'))
+
+    with Graph(process.domain) as graph:
+        # How many there are depends on the node.
+        if name in ('kinematics', 'together') or publishers == 0:
+            graph.until(begun)
+            assert not process.has_ended
+            ends_quietly(process, number)
+
+
+@pytest.mark.parametrize('number', SIGNALS)
+@pytest.mark.parametrize('name', [
+    'servo_inverse', pytest.param('together', marks=pytest.mark.long)])
+def test_a_signal_ends_a_long_trajectory(processes, tmp_path, name, number):
+    path = tmp_path / 'scene.yaml'
+    path.write_text('/**:\n  ros__parameters:\n    mechanisms: [m]\n    m.type: five_bar\n')
+    process = Process(name, path)
+    processes.append(process)
+    with Graph(process.domain) as graph:
+        graph.listen(JointTrajectory, 'servo_trajectory')
+        publisher = graph.node.create_publisher(JointTrajectory, 'wanted_trajectory', 10)
+        graph.until(lambda: publisher.get_subscription_count()
+                    and graph.node.count_publishers('servo_trajectory'))
+        before = cpu(process)
+        publisher.publish(trajectory(5000, **{'m_P.x': 0.059, 'm_P.y': 0.1}))
+        graph.until(lambda: cpu(process) > before + 0.2)
+        ends_quietly(process, number)
+
+
+@pytest.mark.parametrize('number', SIGNALS)
+def test_a_signal_ends_a_node_that_compiles(processes, number):
+    process = Process('kinematics', CONFIG / 'all.yaml')
+    processes.append(process)
+    with Graph(process.domain) as graph:
+        graph.listen(MarkerArray, 'jansen/markers')
+        graph.crank(['jansen_crank'])([0.1], graph.listen(JointState, 'jansen/joint_states'))
+        ends_quietly(process, number)
+
+
+# --- without llvmlite --------------------------------------------------------------------------
+
+
+@pytest.fixture
+def without_llvmlite(tmp_path, monkeypatch):
+    """Let the processes that are started find no llvmlite."""
+    (tmp_path / 'sitecustomize.py').write_text(
+        "import sys\nsys.modules['llvmlite'] = None\n")
+    monkeypatch.setenv('PYTHONPATH', os.pathsep.join(
+        [str(tmp_path), os.environ.get('PYTHONPATH', '')]))
+
+
+@pytest.mark.parametrize('name', ['kinematics', 'together'])
+def test_without_llvmlite_a_message_that_nobody_listens_to_ends_nothing(
+        processes, without_llvmlite, name):
+    process = Process(name, CONFIG / 'jansen.yaml')
+    processes.append(process)
+    with Graph(process.domain) as graph:
+        turn, answers = graph.crank(['jansen_crank']), []
+        publisher = graph.node.create_publisher(JointState, 'crank_states', 10)
+        graph.until(lambda: process.has_ended or publisher.get_subscription_count())
+        for angle in (0.1, 0.2, 0.3):
+            publisher.publish(JointState(name=['jansen_crank'], position=[angle]))
+        answers = graph.listen(JointState, 'jansen/joint_states')
+        graph.until(lambda: process.has_ended or graph.node.count_publishers(
+            'jansen/joint_states'))
+        assert not process.has_ended, process.end()[1]
+        turn([0.4], answers)
+        ends_quietly(process, signal.SIGINT)
