@@ -146,26 +146,19 @@ def test_after_a_slip_the_owner_is_followed(graph, monkeypatch, errors):
     graph.until(lambda: node.get_parameter('lever.dimensions.a').value == 82.0)
 
 
-class Broken:
-    """A scene that raises whatever it is asked."""
-
-    def __getattr__(self, name):
-        slip()
-
-
 @pytest.mark.parametrize('service, kind, request_', [
     ('servo_inverse', Service, Service.Request(lever_angle=[0.1])),
     ('inputs_for', InputsFor, InputsFor.Request(outputs=['P.x', 'P.y'], values=[0.5, 0.9]))],
     ids=['servo_inverse', 'inputs_for'])
-def test_after_a_slip_a_service_answers(graph, errors, service, kind, request_):
+def test_after_a_slip_a_service_answers(graph, monkeypatch, errors, service, kind, request_):
     node = graph.start(ServoInverse, {'mechanisms': ['lever', 'five'], 'five.type': 'five_bar',
                                       'lever.type': 'slotted_lever'})
     client = graph.node.create_client(kind, service)
     graph.until(lambda: node.count_subscribers('/rosout'))
-    whole, node.scene = node.scene, Broken()
-    answer = graph.call(client, request_)
+    with monkeypatch.context() as context:
+        context.setattr(ServoInverse, 'scene', property(slip))
+        answer = graph.call(client, request_)
     assert not answer.success and 'slip' in answer.message
-    node.scene = whole
     logged_once(graph, errors)
     assert 'slip' not in graph.call(client, request_).message
 
@@ -249,12 +242,12 @@ def many(tmp_path):
 @pytest.mark.parametrize('name', [
     'kinematics', pytest.param('crank_driver', marks=pytest.mark.long),
     pytest.param('servo_inverse', marks=pytest.mark.long),
-    pytest.param('together', marks=pytest.mark.long)])
+    pytest.param('scene_process', marks=pytest.mark.long)])
 def test_a_signal_ends_the_start_of_a_thousand_mechanisms(processes, many, name, publishers,
                                                           number):
     process = Process(name, many)
     processes.append(process)
-    node = 'kinematics' if name == 'together' else name
+    node = 'kinematics' if name == 'scene_process' else name
 
     def begun():
         return process.has_ended or node in graph.node.get_node_names() and publishers <= len(
@@ -262,7 +255,7 @@ def test_a_signal_ends_the_start_of_a_thousand_mechanisms(processes, many, name,
 
     with Graph(process.domain) as graph:
         # How many there are depends on the node.
-        if name in ('kinematics', 'together') or publishers == 0:
+        if name in ('kinematics', 'scene_process') or publishers == 0:
             graph.until(begun)
             assert not process.has_ended
             ends_quietly(process, number)
@@ -270,7 +263,7 @@ def test_a_signal_ends_the_start_of_a_thousand_mechanisms(processes, many, name,
 
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('name', [
-    'servo_inverse', pytest.param('together', marks=pytest.mark.long)])
+    'servo_inverse', pytest.param('scene_process', marks=pytest.mark.long)])
 def test_a_signal_ends_a_long_trajectory(processes, tmp_path, name, number):
     path = tmp_path / 'scene.yaml'
     path.write_text('/**:\n  ros__parameters:\n    mechanisms: [m]\n    m.type: five_bar\n')
@@ -309,7 +302,7 @@ def without_llvmlite(tmp_path, monkeypatch):
         [str(tmp_path), os.environ.get('PYTHONPATH', '')]))
 
 
-@pytest.mark.parametrize('name', ['kinematics', 'together'])
+@pytest.mark.parametrize('name', ['kinematics', 'scene_process'])
 def test_without_llvmlite_a_message_that_nobody_listens_to_ends_nothing(
         processes, without_llvmlite, name):
     process = Process(name, CONFIG / 'jansen.yaml')

@@ -21,7 +21,7 @@ from linkage_ros import mechanisms, scene
 from linkage_ros.nodes import scene_node
 from linkage_ros.nodes.joint_state_reader import ANY
 from linkage_ros.nodes.kinematics import Kinematics
-from linkage_ros.nodes.whole_scene import LATCHED
+from linkage_ros.nodes.publishers import LATCHED
 from linkage_ros.scene.motion import Motion
 from rcl_interfaces.msg import ParameterDescriptor
 from rcl_interfaces.srv import SetParameters
@@ -35,6 +35,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 import yaml
 
 from .driving import Process
+from .quiet import until_the_end
 from .report import BARE, KINEMATICS
 
 COUNTS, LEGS = (1, 4, 16, 64, 256, 1000), (1, 12, 100)
@@ -91,7 +92,7 @@ class Bare(Node):
                     description='What it means.', additional_constraints='What it may be.'))
         self.create_subscription(JointState, 'crank_states', self._turn, ANY, raw=True)
 
-    @scene_node.until_the_end
+    @until_the_end
     def _turn(self, _):
         for publisher, text in self._out:
             publisher.publish(text)

@@ -19,10 +19,10 @@ import time
 
 from linkage_interfaces.srv import ServoInverse
 from linkage_ros import scene
-from linkage_ros.nodes import mechanism_publisher, messages, scene_node
+from linkage_ros.nodes import driven_mechanism, messages, plan, scene_node
 from linkage_ros.nodes.joint_state_reader import ANY
 from linkage_ros.nodes.kinematics import Kinematics
-from linkage_ros.nodes.mechanism_model import Model
+from linkage_ros.nodes.mechanism_model import MechanismModel
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -31,6 +31,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
+from .quiet import until_the_end
 from .relay import Loops
 
 
@@ -45,7 +46,7 @@ class Floor(Node):
                      for topic, (type_, depth, text) in self.ready.items()]
         self.create_subscription(JointState, 'crank_states', self._turn, ANY)
 
-    @scene_node.until_the_end
+    @until_the_end
     def _turn(self, _):
         for publisher, text in self._out:
             publisher.publish(text)
@@ -62,7 +63,7 @@ class Timed(Node):
                      for topic, (type_, depth, text) in self.ready.items()]
         self.create_timer(1.0 / self.get_parameter('rate').value, self._tick)
 
-    @scene_node.until_the_end
+    @until_the_end
     def _tick(self):
         for publisher, text in self._out:
             publisher.publish(text)
@@ -79,22 +80,24 @@ class Deaf(Node):
         pass
 
 
-class FreshModel(Model):
+class FreshModel(MechanismModel):
     """Builds ordinary messages, as one writes it: new ones each time."""
 
-    def is_patched(self, build):
-        """Never."""
-        return False
+    def publisher(self, *args):
+        """Return a publisher that never patches."""
+        publisher = super().publisher(*args)
+        publisher.template = None
+        return publisher
 
-    def joint_message(self, pose, stamp):
+    def joint_message(self, *args):
         """Return new joint states."""
-        self.joint_state = messages.JointStates()
-        return super().joint_message(pose, stamp)
+        self._joint_states = messages.JointStates()
+        return super().joint_message(*args)
 
-    def marker_message(self, pose, stamp):
+    def marker_message(self, *args):
         """Return new markers."""
-        self.marker_array = messages.Markers(*self.drawn)
-        return super().marker_message(pose, stamp)
+        self.marker_array = messages.Markers(*self._drawn)
+        return super().marker_message(*args)
 
 
 class Relay(Node):
@@ -108,7 +111,7 @@ class Relay(Node):
         self._publisher = self.create_publisher(JointState, 'leg/joint_states', 10)
         self.create_subscription(JointState, 'crank_states', self._turn, ANY)
 
-    @scene_node.until_the_end
+    @until_the_end
     def _turn(self, cranks):
         angles = self._loops.joint_angles(cranks.position[0])
         message = JointState(name=self._names, position=angles.tolist())
@@ -164,13 +167,9 @@ class Fresh(Kinematics):
     """The same node with ordinary messages."""
 
     def __init__(self, **kwargs):
-        usual, mechanism_publisher.Model = mechanism_publisher.Model, FreshModel
-        try:
-            super().__init__(**kwargs)
-        finally:
-            mechanism_publisher.Model = usual
         # No machine code sends patched ones.
-        self._ticks.learn = lambda *_: None
+        driven_mechanism.MechanismModel, plan.plan_llvm = FreshModel, None
+        super().__init__(**kwargs)
 
 
 KINDS = {'kinematics': Kinematics, 'fresh': Fresh, 'floor': Floor, 'relay': Relay,
