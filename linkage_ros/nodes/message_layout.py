@@ -10,8 +10,10 @@ wire). Whoever uses a layout tries it first: what it reads or writes has to be w
 message says.
 """
 
+from __future__ import annotations
+
 import struct
-from typing import Callable, List, Optional, Sequence, Tuple
+from typing import Any, Callable, List, Optional, Sequence, Tuple
 
 from builtin_interfaces.msg import Time
 import numpy as np
@@ -49,7 +51,7 @@ class Unreadable(ValueError):
     """A message that cannot be deserialised; the text says why."""
 
 
-def deserialized(text: bytes, kind: type):
+def deserialized(text: bytes, kind: type) -> Any:
     """Return a message from its bytes; raise Unreadable if they are none of its kind."""
     if len(text) < SHORTEST:
         raise Unreadable(f'there must be {SHORTEST} at least')
@@ -91,7 +93,7 @@ class MessageLayout:
 
     """
 
-    def __init__(self, text: bytes, message):
+    def __init__(self, text: bytes, message: Any):
         if text[:len(LITTLE_ENDIAN)] != LITTLE_ENDIAN:
             raise NoLayout('its encoding is another')
         self.stamps: List[int] = []
@@ -117,11 +119,11 @@ class MessageLayout:
         """Return the numbers of a message that fits, an array for each sequence."""
         return [np.frombuffer(text, '<f8', count, place) for place, count in self.numbers]
 
-    def _walk(self, message):
+    def _walk(self, message: Any) -> None:
         for name, kind in message.get_fields_and_field_types().items():
             self._field(kind, getattr(message, name))
 
-    def _field(self, kind, value):
+    def _field(self, kind: str, value: Any) -> None:
         if kind == 'string':
             self._pass(1, self._count())
         elif kind in _SIZES:
@@ -133,7 +135,7 @@ class MessageLayout:
         else:
             self._walk(value)
 
-    def _sequence(self, kind, values):
+    def _sequence(self, kind: str, values: Any) -> None:
         count = self._count()
         if count != len(values):
             raise NoLayout('its bytes are another message')
@@ -146,10 +148,10 @@ class MessageLayout:
             for value in values:
                 self._field(kind, value)
 
-    def _count(self):
+    def _count(self) -> int:
         return _COUNT.unpack_from(self._text, self._pass(4, 4))[0]
 
-    def _pass(self, alignment, size, mask=b'\xff'):
+    def _pass(self, alignment: int, size: int, mask: bytes = b'\xff') -> int:
         """Go on by some bytes; return where they begin, at a multiple after the header."""
         place = self._place + (HEADER - self._place) % alignment
         self._place = end = place + size
@@ -203,7 +205,7 @@ class Template:
             self._sources[start:start + size] = self._numbers[start:start + size]
         self._check(build, layout, count)
 
-    def patched(self, stamp: bytes, values: np.ndarray) -> bytes:
+    def patched(self, stamp: bytes, values: Any) -> bytes:
         """Return the message with this stamp, packed, and these values, serialised."""
         self._values[:] = values
         self._table.take(self._sources, out=self._numbers, mode='clip')
@@ -218,7 +220,7 @@ class Template:
         stamps = [start - len(LEAD) - HEADER + place.start for place in self._stamps]
         return start + 8 * own, self._sources[own] - 1, np.array(stamps, int)
 
-    def _check(self, build, layout, count):
+    def _check(self, build: Callable, layout: MessageLayout, count: int) -> None:
         stamp, values = Time(sec=12, nanosec=345), np.linspace(-1.5, 7.25, count)
         if not layout.is_same(self.patched(pack(stamp), values),
                               serialize_message(build(stamp, values))):
@@ -249,7 +251,7 @@ class PatchedPublisher:
 
     """
 
-    def __init__(self, publisher, build: Callable, count: int, logger):
+    def __init__(self, publisher: Any, build: Callable, count: int, logger: Any):
         self.publisher = publisher
         self._build = build
         self.template: Optional[Template] = None
@@ -259,9 +261,9 @@ class PatchedPublisher:
             logger.warning(f'{publisher.topic_name}: {reason}; publishing ordinary messages',
                            once=True)
 
-    def publish(self, stamp: bytes, values: Sequence[Sequence[float]]) -> None:
+    def publish(self, stamp: bytes, values: Sequence[Any]) -> None:
         """Publish the message with this stamp, packed, and values, one array after the other."""
-        joined = np.concatenate(values) if len(values) > 1 else values[0]
+        joined: Any = np.concatenate(values) if len(values) > 1 else values[0]
         if self.template:
             self.publisher.publish(self.template.patched(stamp, joined))
         else:

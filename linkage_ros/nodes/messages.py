@@ -3,9 +3,11 @@
 
 """Joint states and markers of a mechanism as messages, from the numbers that were solved."""
 
+from __future__ import annotations
+
 from array import array
 import math
-from typing import Mapping, Sequence
+from typing import Any, Dict, List, Mapping, Sequence, Tuple
 
 from geometry_msgs.msg import Point, Pose, Quaternion
 import numpy as np
@@ -33,7 +35,7 @@ LOOKS = (
 STEP = 1 / 250
 
 
-def _rgba(colour):
+def _rgba(colour: str) -> ColorRGBA:
     return ColorRGBA(**dict(zip('rgb', palette.rgb(colour))), a=1.0)
 
 
@@ -44,11 +46,11 @@ FACE = _rgba(palette.PLATE)
 class JointStates:
     """The joint states of one mechanism, or of several cranks."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._message = JointState()
 
-    def message(self, stamp, names: Sequence[str], positions, velocities=(),
-                efforts=()) -> JointState:
+    def message(self, stamp: Any, names: Sequence[str], positions: Any, velocities: Any = (),
+                efforts: Any = ()) -> JointState:
         """Return joints [rad or m], their velocities and efforts, where they are known."""
         self._message.header.stamp = stamp
         self._message.name = names
@@ -83,15 +85,15 @@ class Markers:
 
     """
 
-    def __init__(self, name: str, frame_id: str, pose, size: float,
+    def __init__(self, name: str, frame_id: str, pose: Sequence[float], size: float,
                  shown: Mapping[int, Sequence]):
         self._shown = [(_marker(name, id_, frame_id, pose, size), np.array(points, int).ravel())
                        for id_, points in shown.items() if points]
         self._message = MarkerArray(markers=[marker for marker, _ in self._shown])
         self.ids = frozenset(marker.id for marker, _ in self._shown)
-        self._points = {}
+        self._points: Dict[Tuple[int, int], List[Point]] = {}
 
-    def message(self, stamp, places: np.ndarray, grounded: Sequence[int] = (0,)
+    def message(self, stamp: Any, places: np.ndarray, grounded: Sequence[int] = (0,)
                 ) -> MarkerArray:
         """
         Return the markers of some legs.
@@ -116,7 +118,7 @@ class Markers:
                 marker.colors = [face] * (len(marker.points) // 3)
         return self._message
 
-    def _filled(self, id_, pairs):
+    def _filled(self, id_: int, pairs: List) -> List[Point]:
         """Return points at x, y pairs; for as many as before, the same ones."""
         points = self._points.get((id_, len(pairs)))
         if points is None:
@@ -126,7 +128,8 @@ class Markers:
         return points
 
 
-def locus(name: str, frame_id: str, pose, places: np.ndarray, size: float) -> Marker:
+def locus(name: str, frame_id: str, pose: Sequence[float], places: np.ndarray,
+          size: float) -> Marker:
     """Return the curve through places [m], shape (n, 2); without a stamp it holds at any time."""
     marker = _marker(name, LOCUS_ID, frame_id, pose, size)
     marker.points = [Point(x=x, y=y) for x, y in places.tolist()]
@@ -146,7 +149,7 @@ def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
                       z=cr * cp * sy - sr * sp * cy, w=cr * cp * cy + sr * sp * sy)
 
 
-def _marker(name, id_, frame_id, pose, size) -> Marker:
+def _marker(name: str, id_: int, frame_id: str, pose: Sequence[float], size: float) -> Marker:
     type_, colour, width, layer = LOOKS[id_]
     marker = Marker(ns=name, id=id_, type=type_, action=Marker.ADD)
     marker.header.frame_id = frame_id

@@ -41,9 +41,10 @@ class LlvmExecutor:
                  for _, solution in plan.solved]
         limits = [row for i, (mechanism, solution) in enumerate(plan.solved)
                   for row in _limits(i, mechanism, solution)]
+        same, mask = (number.to_bytes(source.size, 'little')
+                      for number in (source.same, source.mask))
         self._pipeline = native.Pipeline(
-            *(number.to_bytes(source.size, 'little') for number in (source.same, source.mask)),
-            self._stamp, plan, takes=[*_readings(plan)], copies=copies, loops=loops, limits=limits)
+            same, mask, self._stamp, plan, [*_readings(plan)], copies, loops, limits)
         self._solved = [mechanism for mechanism, _ in plan.solved]
         at = native.address(self._stamp)
         self._stamps = np.array([(at, native.address(one)) for one in (
