@@ -147,3 +147,31 @@ def test_threads_ask_one_mechanism_for_more_than_it_caches():
             leg.function(names[0][9:-1].split(','))
 
     at_once(*(lambda seed=seed: ask(seed) for seed in range(THREADS)))
+
+
+def test_threads_are_the_first_to_ask_a_linkage_all_at_once():
+    theta = np.linspace(-3.0, 3.0, 40)
+    questions = [
+        lambda leg: leg.solve(0.4)['G'], lambda leg: leg.solve(theta)['G'],
+        lambda leg: leg.joint_angles(theta, ('distance(O,G)', 'angle(A,G)'))['angle(A,G)'],
+        lambda leg: leg.joint_rates(theta, leg.joints)[leg.joints[-1]],
+        lambda leg: leg.acceleration(0.4, 1.0, 0.5)['G'], lambda leg: leg.reach(),
+        lambda leg: leg.dead_points(), lambda leg: leg.input_for('G.x', -60.0),
+        lambda leg: leg.function(('F',), leg.joints)(0.3), lambda leg: leg.with_dimensions(
+            m=14.0).solve(theta)['G'], lambda leg: leg.effort(0.2, {'G': (1.0, -2.0)})]
+    joints = mechanisms.design('jansen').joints
+
+    def fresh(number):
+        return mechanisms.create('custom', joints=(*joints, f'X{number} ground 0 {number}'),
+                                 **mechanisms.defaults('jansen'))
+
+    expected = [question(fresh(0)) for question in questions]
+    for number in range(1, 3):
+        answers = at_once(*(lambda ask=ask, number=number: ask(fresh(number))
+                            for ask in questions))
+        for found, true in zip(answers, expected):
+            assert np.array_equal(found, true, equal_nan=True)
+        leg = fresh(number + 10)
+        answers = at_once(*(lambda ask=ask, leg=leg: ask(leg) for ask in questions))
+        for found, true in zip(answers, expected):
+            assert np.array_equal(found, true, equal_nan=True)

@@ -171,3 +171,15 @@ def test_several_outputs_have_such_names_too(kind):
     assert linkage.inputs_for(odd, wanted) == linkage.inputs_for(outputs, wanted) != []
     with pytest.raises(ValueError, match='five_bar has no output'):
         linkage.inputs_for([CLASSES[kind]('none'), 'C.x'], wanted)
+
+
+@pytest.mark.parametrize('kind', CLASSES)
+def test_parameters_have_such_names_too(kind):
+    made = CLASSES[kind]
+    given = {'mechanisms': ['leg'], 'leg.type': 'jansen', 'leg.dimensions.m': 14.0}
+    read = scene.read({made(name): value for name, value in given.items()})
+    assert read.parameters == scene.read(given).parameters
+    changed = scene.changed(read, {made('leg.dimensions.m'): 14.5})
+    assert [each.name for each in changed.changed_from(read)] == ['leg.dimensions.m']
+    with pytest.raises(scene.SceneError, match=r'^leg\.colour is not a parameter of the scene'):
+        scene.changed(read, {made('leg.colour'): 1.0})

@@ -279,7 +279,7 @@ class _Header:
         theta = np.linspace(low + edge, high - edge, SAMPLED).astype(np.float32)
         pose = linkage.posed(linkage.points, ())
         exact = pose.over(theta.astype(float))
-        worst = np.nanmax(np.abs(pose.rounded(theta) - exact)) / linkage.longest
+        worst = np.nanmax(np.abs(pose.searched(theta) - exact)) / linkage.longest
         return (f'float: joints are off by up to {worst:.1g} of the longest bar at {SAMPLED} '
                 'poses over the reach, without its outermost hundredth.')
 

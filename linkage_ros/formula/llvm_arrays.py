@@ -155,17 +155,13 @@ def _approximated(builder: Builder, spell: Dict[str, Callable], approximation: C
             far = [builder.select(holds, value, exact(*operands))
                    for value, exact in zip(near, library)]
             beyond = builder.block
-        return [_either(builder, (value, before), (other, beyond))
-                for value, other in zip(near, far)]
+        either = [builder.phi(VECTOR) for _ in far]
+        for phi, value, other in zip(either, near, far):
+            phi.add_incoming(value, before)
+            phi.add_incoming(other, beyond)
+        return either
 
     return appended
-
-
-def _either(builder: Builder, *ways: Tuple[ir.Value, ir.Block]) -> ir.Value:
-    value = builder.phi(VECTOR)
-    for way in ways:
-        value.add_incoming(*way)
-    return value
 
 
 @cached()

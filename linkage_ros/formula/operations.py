@@ -59,13 +59,8 @@ class Operation(NamedTuple):
     @property
     def array(self) -> str:
         """Code on arrays, as `python`; numpy's operators take over memory that is free again."""
-        operands = ', '.join(f'{{{i}}}' for i in range(self.operands))
+        operands = ', '.join(self.c.count('{}') * ['{}'])
         return self.python if self.c == self.python else f'{self.name}({operands})'
-
-    @property
-    def operands(self) -> int:
-        """How many operands it has."""
-        return sum(f'{{{i}}}' in self.python for i in range(3)) or self.python.count('{}')
 
 
 # Its operands x and y, x + y, and what that has of y.
@@ -122,11 +117,6 @@ def _constants(function: Callable) -> Callable:
     return folded
 
 
-def _alike(_: Any, x: Any, y: Any) -> Any:
-    """Return either of two that are the same."""
-    return x if x is y or x.value is not None and x.value == y.value else None
-
-
 def _product_rule(do: Callable, n: Any, dx: Any, dy: Any) -> Any:
     x, y = n.args
     return 2.0 * (dx * x) if x is y else dx * y + x * dy
@@ -135,10 +125,6 @@ def _product_rule(do: Callable, n: Any, dx: Any, dy: Any) -> Any:
 def _angle_rule(do: Callable, n: Any, dy: Any, dx: Any) -> Any:
     y, x = n.args
     return (x * dy - y * dx) / (x * x + y * y)
-
-
-def _root_rule(do: Callable, n: Any, dx: Any, *_: Any) -> Any:
-    return dx / (2.0 * n)
 
 
 # In rules n is the expression that is differentiated, dx, dy, ... are the rates of its operands.
@@ -159,7 +145,7 @@ OPERATIONS = {row.name: row for row in (
               'fabs{f}({})', lambda do, n, dx: do('where', n.args[0] < 0.0, -dx, dx),
               _constants(abs)),
     Operation('sqrt', 'sqrt({})', np.sqrt, lambda b, x: b.called('llvm.sqrt', x), 'sqrt{f}({})',
-              _root_rule, None, (0,)),
+              lambda do, n, dx: dx / (2.0 * n), None, (0,)),
     Operation('sin', 'sin({})', np.sin, lambda b, x: b.called('llvm.sin', x), 'sin{f}({})',
               lambda do, n, dx: do('cos', *n.args) * dx, _constants(math.sin)),
     Operation('cos', 'cos({})', np.cos, lambda b, x: b.called('llvm.cos', x), 'cos{f}({})',
@@ -176,10 +162,11 @@ OPERATIONS = {row.name: row for row in (
     # One value where a condition holds, else another.
     Operation('where', '({1} if {0} else {2})', np.where, lambda b, c, x, y: b.select(c, x, y),
               '({} ? {} : {})', lambda do, n, _, dx, dy: do('where', n.args[0], dx, dy),
-              _alike, (1, 2)),
+              lambda c, x, y: x if x is y or x.value is not None and x.value == y.value else None,
+              (1, 2)),
     # The root of x, zero where x is down to -tolerance, NaN below.
     Operation('root', '(sqrt({0}) if {0} > 0.0 else 0.0 if {0} >= -{1} else nan)', _root,
-              _root_in_llvm, '{name}_root({}, {})', _root_rule),
+              _root_in_llvm, '{name}_root({}, {})', lambda do, n, dx, _: dx / (2.0 * n)),
     # A value where a margin is not below -tolerance, else NaN.
     Operation('gated', '({0} if {1} >= -{2} else nan)', _gated, _gated_in_llvm,
               '{name}_gated({}, {}, {})', lambda do, n, dx, *_: do('gated', dx, *n.args[1:])),

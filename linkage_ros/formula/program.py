@@ -12,7 +12,7 @@ condition on dimensions: the code for a pose has no branch for it.
 
 from __future__ import annotations
 
-from concurrent.futures import Future, wait
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import chain, count
@@ -21,7 +21,6 @@ import math
 from operator import attrgetter
 import re
 from struct import Struct
-from threading import Thread
 from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple
 import warnings
 from weakref import finalize
@@ -43,15 +42,9 @@ _NUMBERS, _NAMED, _OPERANDS = count(), re.compile(r'\bv\d+'), attrgetter('operan
 
 def compile_in_background(make: Callable[[], Any]) -> Future:
     """Return what will be made, in a thread of its own."""
-    made: Future = Future()
-
-    def run() -> None:
-        try:
-            made.set_result(make())
-        except Exception as error:
-            made.set_exception(error)
-
-    Thread(target=run, name='linkage_ros compiler').start()
+    thread = ThreadPoolExecutor(1, 'linkage_ros compiler')
+    made = thread.submit(make)
+    thread.shutdown(wait=False)
     return made
 
 
@@ -151,10 +144,9 @@ class _Listing:
 
     def operations(self) -> tuple:
         """Return the operations as (number, name, operands), the constants and the outputs."""
-        needed = [(number, *self.entries[number])
-                  for number in self._uses if number not in self.constants]
-        return [(number, node.op, node.args if node.op == 'constant' else args)
-                for number, node, args in needed], self.constants, self.outputs
+        return [(number, self.entries[number][0].op, self.entries[number][1])
+                for number in self._uses if number not in self.constants
+                ], self.constants, self.outputs
 
     def statements(self, dialect: Dialect) -> Tuple[List[Tuple[str, str]], List[str]]:
         """Return the assignments as (name, code) and the code of each output."""
@@ -163,6 +155,7 @@ class _Listing:
                      for name, code in dialect.templates.items()}
         repeated = {args[i] for node, args in map(self.entries.__getitem__, self._uses)
                     for i in repeating.get(node.op, ())}
+        leaves = {'constant': dialect.number, 'argument': 'x{}'.format}
         text: Dict[int, str] = {}
         depth = dict.fromkeys(self._uses, 0)
         lines = []
@@ -170,10 +163,8 @@ class _Listing:
             node, args = self.entries[number]
             if number in self.constants:
                 text[number] = f'k{number}'
-            elif node.op == 'constant':
-                text[number] = dialect.number(*node.args)
-            elif node.op == 'argument':
-                text[number] = f'x{args[0]}'
+            elif node.op in leaves:
+                text[number] = leaves[node.op](*args)
             else:
                 text[number] = dialect.templates[node.op].format(*(text[a] for a in args))
                 depth[number] = 1 + max(depth[a] for a in args)
@@ -300,31 +291,24 @@ class Program:
         with np.errstate(all='ignore'):
             decisions = () if swept else tuple(
                 bool(evaluate(c, dimensions, known)) for c in self._conditions)
-            variant = self._variants.get_or_make(
-                decisions, lambda: self._variant(decisions))
+            variant = self._variants.get_or_make(decisions, lambda: _Variant(
+                self._outputs, dict(zip(self._conditions, decisions)), self._replaced,
+                self._arguments))
             constants = [evaluate(c, dimensions, known) for c in variant.constants]
         if not swept:
             constants = list(map(float, constants))
         shape = np.broadcast_shapes(*map(np.shape, constants)) if swept else ()
         return Pose(variant, constants, shape, accelerate)
 
-    def _variant(self, decisions: tuple) -> _Variant:
-        decided = dict(zip(self._conditions, decisions))
-        return _Variant(self._outputs, decided, self._replaced, self._arguments)
-
 
 def _conditions(outputs: Iterable[Real]) -> list:
     """Return the conditions on dimensions alone that varying operations choose by."""
-    found, seen, waiting = [], set(), list(outputs)
-    while waiting:
-        node = waiting.pop()
-        if node in seen or not node.varies:
-            continue
-        seen.add(node)
-        if node.op == 'where' and not node.args[0].varies and node.args[0] not in found:
-            found.append(node.args[0])
-        waiting.extend(a for a in node.args if isinstance(a, Real))
-    return found
+    seen: Dict[Real, None] = {}
+    for output in outputs:
+        for node in unknown(output, lambda x: [a for a in x.operands if a.varies], seen):
+            seen[node] = None
+    return list(dict.fromkeys(node.args[0] for node in seen if node.varies
+                              and node.op == 'where' and not node.args[0].varies))
 
 
 class Pose:
@@ -354,12 +338,6 @@ class Pose:
         with np.errstate(all='ignore'):
             return tuple(map(float, self._quiet(*map(np.float64, arguments))))
 
-    def rounded(self, argument: np.ndarray) -> np.ndarray:
-        """Return the outputs over one argument, worked out in the precision of that array."""
-        with np.errstate(all='ignore'):
-            rows = self.variant.array(*self.constants)(argument)
-        return np.array([np.broadcast_to(row, argument.shape) for row in rows])
-
     def statements(self, dialect: Dialect) -> Tuple[Dict[str, float], List[Tuple[str, str]],
                                                     List[str]]:
         """Return constants by name, assignments (name, code) and the code of each output."""
@@ -382,25 +360,25 @@ class Pose:
 
     def over(self, *arguments: Any) -> np.ndarray:
         """Return the outputs over arrays that are broadcast together, shape (outputs, *shape)."""
-        arrays: Sequence[np.ndarray] = [np.asarray(a, float) for a in arguments]
-        if self.shape:
-            return self._swept(arrays)
-        if len(arrays) > 1:
-            arrays = np.broadcast_arrays(*arrays)
-        shape, size = arrays[0].shape, arrays[0].size
-        flat = [a.ravel() for a in arrays]
-        if self._accelerate:
-            out = self.variant.arrays.solve(flat, self._given)
-        else:
-            out = self._plainly(flat, size)
-        return out.reshape(self.variant.outputs, *shape)
+        arrays = [np.asarray(a, float) for a in arguments]
+        return self._swept(arrays) if self.shape else self._flat(
+            self._natively if self._accelerate else self._plainly, arrays)
 
     def searched(self, *arguments: Any) -> np.ndarray:
-        """Return what `over` does for one set of dimensions, without code for single poses."""
-        arguments = np.broadcast_arrays(*arguments)
-        flat = [a.ravel() for a in arguments]
-        return self._blocks(flat, arguments[0].size).reshape(
-            self.variant.outputs, *arguments[0].shape)
+        """
+        Return what `over` does for one set of dimensions, without code for single poses.
+
+        Arguments of single precision are worked on in it.
+        """
+        return self._flat(self._blocks, arguments)
+
+    def _flat(self, solve: Callable, arrays: Sequence[np.ndarray]) -> np.ndarray:
+        first, *others = np.broadcast_arrays(*arrays) if len(arrays) > 1 else arrays
+        flat = [a.ravel() for a in (first, *others)]
+        return solve(flat, first.size).reshape(self.variant.outputs, *first.shape)
+
+    def _natively(self, given: Sequence[np.ndarray], _: int) -> np.ndarray:
+        return self.variant.arrays.solve(given, self._given)
 
     def batch(self, rows: np.ndarray) -> Batch:
         """Return poses to be solved again and again, into rows (poses, outputs)."""

@@ -33,7 +33,7 @@ from .parameters import (
     Values,
 )
 from .. import mechanisms
-from ..words import quoted
+from ..words import plain_text, quoted
 
 __all__ = ['changed', 'Drive', 'DRIVER', 'FARTHEST', 'in_words', 'INVERSE', 'KINEMATICS', 'load',
            'Machine', 'OWNER', 'Parameter', 'plain', 'read', 'Scene', 'SceneError', 'START']
@@ -162,7 +162,7 @@ def _parted(given: Any) -> Dict[str, Dict[str, Any]]:
     parts: Dict[str, Dict[str, Any]] = {}
     for name, value in given.items():
         mechanism, dot, _ = name.partition('.')
-        parts.setdefault(mechanism if dot else '', {})[name] = value
+        parts.setdefault(mechanism if dot else '', {})[plain_text(name)] = value
     return parts
 
 
