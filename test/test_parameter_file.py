@@ -13,6 +13,7 @@ pytest.importorskip('yaml')
 
 from linkage_ros import scene  # noqa: E402
 from linkage_ros.scene.parameter_file import overrides  # noqa: E402
+from rcl_interfaces.msg import ParameterDescriptor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 
 # `{b:1}` is left out: libyaml reads it one way or another, by its version.
@@ -26,6 +27,8 @@ yes No ON y N TRUE tRUE [] {} [1,2] [0,1.5] [1.5,0] [1.5,.5] [true,no] [1,true] 
     '!!str 5', '!!float 5', '!custom 3', '{b: 1}', '{b: {c: 1}, d: 2}', '{b.c: {d: 1}, e: 2}',
     '- 5', '&x 5', '|-\n      5', '|\n      5', '>\n      text', '[{a: 1}]', '{[1]: 2}', '? 3',
     '"a: 1"', '{a: [1, 2.0]}', '"\\u0041"', '0.1 # so', '[nan, 1.0]', '  7  ', 'a b', '']
+# What every node has.
+OF_ROS = 'use_sim_time', 'start_type_description_service'
 SECTIONS = ['/**', '**', '/kinematics', 'kinematics', '/**/kinematics', '/*', '*', '/*/kinematics',
             'other', '/robot/kinematics', '/crank_driver', '5', 'a b', '/:\n  kinematics', '//a']
 NAMES = ['a', 'b', 'a.b', 'rate', 'm', '"c"', '1', 'm.crank.speed', '""']
@@ -53,18 +56,25 @@ def written(rng):
     return '\n'.join(lines) + '\n' * (rng.random() < 0.9)
 
 
-def of_ros(path, name):
+def of_ros(path, name, expected):
     """Return what a node is given by a file, or why it is not started."""
+    given = {'cli_args': ['--ros-args', '--params-file', str(path)], 'enable_rosout': False,
+             'use_global_arguments': False, 'start_parameter_services': False}
     try:
-        node = Node(name, cli_args=['--ros-args', '--params-file', str(path)],
-                    use_global_arguments=False, enable_rosout=False,
-                    start_parameter_services=False)
+        node = Node(name, allow_undeclared_parameters=True,
+                    automatically_declare_parameters_from_overrides=True, **given)
+        found = node.get_parameters_by_prefix('')
     except Exception as error:
-        return re.search(r'Error: (.*?)\s*, at /', str(error), re.DOTALL)[1]
-    found = {key: value.value for key, value in node._parameter_overrides.items()}
+        refused = re.search(r'Error: (.*?)\s*, at /', str(error), re.DOTALL)
+        if refused:
+            return refused[1]
+        # An empty list has no type, and is declared only by name.
+        node = Node(name, **given)
+        found = {key: node.declare_parameter(key, None, ParameterDescriptor(dynamic_typing=True))
+                 for key in expected}
     node.destroy_node()
-    return {key: list(value) if hasattr(value, 'tolist') else value
-            for key, value in found.items()}
+    return {key: list(one.value) if hasattr(one.value, 'tolist') else one.value
+            for key, one in found.items() if key not in OF_ROS}
 
 
 def of_ours(path, name):
@@ -96,7 +106,8 @@ def check(path, text):
     """Read a file both ways, for two nodes."""
     path.write_text(text)
     for node in ('kinematics', 'crank_driver'):
-        theirs, own = of_ros(path, node), of_ours(path, node)
+        own = of_ours(path, node)
+        theirs = of_ros(path, node, own)
         assert alike(theirs, own), (text, theirs, own)
 
 
