@@ -162,7 +162,7 @@ def test_the_inverse_finds_every_length_that_gives_an_output(output):
 
 def test_several_cylinders_are_several_inputs():
     machine = scene.load('config/excavator.yaml').machines['excavator']
-    assert list(machine.inputs) == ['cylinder', 'cylinder2', 'cylinder3']
+    assert list(machine.inputs) == ['boom', 'arm', 'bucket']
     lengths = [0.9, 1.3, 1.1]
     place = {name: complex(*at) for name, at in machine.linkage.solve(lengths).items()}
     for (base, rod), length in zip(('PB', 'CD', 'FG'), lengths):

@@ -554,3 +554,35 @@ def test_points_and_joints_are_names(names):
 def test_one_point_is_one_name_to_a_function_as_well():
     linkage = made('AB line A B 1')
     assert linkage.function('AB')(0.5) == linkage.function(('AB',))(0.5)
+
+
+def test_an_input_has_the_name_that_its_line_gives_it():
+    lines = ('O ground 0 0', 'Q ground 3 0', 'A crank O 1 called motor', 'B dyad A Q 3 2.5 left',
+             'C line Q B 4', 'D crank Q 1 up geared motor -2 0.5 called fan', 'E crank O 0.5')
+    linkage = mechanisms.create('custom', joints=lines)
+    assert [input_.name for input_ in linkage.inputs] == ['motor', 'crank']
+    angles = linkage.joint_angles([0.3, 0.7])
+    assert (angles['motor'], angles['crank']) == (0.3, 0.7)
+    assert angles['fan'] == pytest.approx(-0.1)
+    usual = mechanisms.create('custom', joints=[
+        line.replace(' called motor', '').replace(' called fan', '').replace('geared motor', (
+            'geared crank')) for line in lines])
+    for name, place in linkage.solve([0.3, 0.7]).items():
+        assert (place == usual.solve([0.3, 0.7])[name]).all()
+    mirrored = mechanisms.create('custom', joints=(
+        'O ground 0 0', 'H ground 0 1', 'P ground 1 0', 'B cylinder P O 1 left called ram',
+        'X mirrored O H'))
+    assert [input_.name for input_ in mirrored.inputs] == ['ram']
+    place = mirrored.solve(1.2)
+    assert place['BX'] == pytest.approx(place['B'] * (-1.0, 1.0))
+
+
+@pytest.mark.parametrize('line, reason', [
+    ('A crank O 1 called', 'expected'), ('A crank O 1 called 1st', 'no name for an input'),
+    ('A crank O 1 called dimensions', 'but not ground, dimensions, branches'),
+    ('A crank O 1 called QB', 'its link QB would have the name of another'),
+    ('A dyad O Q 3 3 left called x', 'expected')])
+def test_an_input_cannot_have_any_name(line, reason):
+    with pytest.raises(ValueError, match=reason):
+        mechanisms.create('custom', joints=(
+            'O ground 0 0', 'Q ground 3 0', line, 'B dyad A Q 3 2.5 left', 'C crank O 2'))

@@ -300,12 +300,16 @@ def test_the_mechanisms_of_the_scene_of_all_stand_apart():
     assert all(left[1] < right[0] for left, right in zip(boxes, boxes[1:]))
 
 
-@pytest.mark.parametrize('text', ['', 'mechanisms: [jansen]', '/**: 3', '/**: {', '[]'])
-def test_a_file_that_is_no_scene_says_so(tmp_path, text):
+@pytest.mark.parametrize('text, reason', [
+    ('', 'scene.yaml must be YAML with'), ('{}', 'scene.yaml must be YAML with'),
+    ('mechanisms: [jansen]', 'Sequences can only be values and not keys in params'),
+    ('/**: 3', 'Cannot have a value before ros__parameters at line 1'),
+    ('/**: {', 'Error parsing a event near line 1'), ('[]', 'Sequences cannot be key at line 1')])
+def test_a_file_that_is_no_scene_says_so(tmp_path, text, reason):
     pytest.importorskip('yaml')
     path = tmp_path / 'scene.yaml'
     path.write_text(text)
-    with pytest.raises(scene.SceneError, match='scene.yaml must be YAML with'):
+    with pytest.raises(scene.SceneError, match=reason):
         scene.load(path)
 
 

@@ -1985,7 +1985,7 @@ def test_a_reload_keeps_view_units_and_arrows_and_a_lost_connection_is_said(show
         assert await page.value('document.getElementById("workshop").checked')
         assert await page.value('document.getElementById("arrows").value') == 'velocity'
         assert await page.value('document.getElementById("notice").hidden')
-        running.viewer._server.stop()
+        running.graph.end(running.viewer)
         await browser.until(lambda: page.value(
             '/^Connection lost/.test(document.getElementById("notice").textContent)'))
         page.complaints.clear()

@@ -134,9 +134,10 @@ class Builder:
         self.points[name] = _Point(place, GROUND, abs(place.x) + abs(place.y))
 
     def crank(self, name: str, centre: str, length: Real, up: bool = False,
-              zero: Optional[str] = None, geared: Optional[Gear] = None) -> None:
+              zero: Optional[str] = None, geared: Optional[Gear] = None,
+              called: str = '') -> None:
         """Turn a crank [m] about a joint; its zero is +x, or +y if `up`, or towards a joint."""
-        link = self._numbered('crank')
+        link = called or self._numbered('crank')
         turning = self._drive(Input(link, ANGLE), geared)
         if zero is None:
             self._on_ground(centre, '; or its zero is towards a joint of its link')
@@ -157,10 +158,10 @@ class Builder:
             self.points[name].crank = crank
 
     def cylinder(self, name: str, base: str, pivot: str, bar: Real, side: float,
-                 geared: Optional[Gear] = None) -> None:
+                 geared: Optional[Gear] = None, called: str = '') -> None:
         """Join a bar [m] from a pivot and a cylinder from a base, left of base -> pivot."""
         shortest, longest = self._stroke(base, pivot, bar)
-        word = self._numbered('cylinder')
+        word = called or self._numbered('cylinder')
         length = self._drive(Input(word, LENGTH, shortest, longest), geared)
         found = planar.dyad(self._plain_arm(base, pivot), length, bar, side, longest=longest)
         self.limits += found.limits
@@ -173,9 +174,9 @@ class Builder:
         self.cylinders.append((base, name))
 
     def carriage(self, name: str, origin: str, towards: str, low: Real, high: Real,
-                 geared: Optional[Gear] = None) -> None:
+                 geared: Optional[Gear] = None, called: str = '') -> None:
         """Drive a joint along the line from a joint towards another of one link, low to high."""
-        word = self._numbered('carriage')
+        word = called or self._numbered('carriage')
         place = self._drive(Input(word, LENGTH, low, high), geared)
         self._ride(word, name, origin, towards, place, abs(low) + abs(high))
 
@@ -437,9 +438,14 @@ class Builder:
         taken = sum(link.name.rstrip('0123456789') == word for link in self.links)
         return f'{word}{taken + 1}' if taken else word
 
+    def _check_new(self, link: str) -> None:
+        if link in self.joint_values:
+            raise ConstructionError(f'its link {link} would have the name of another')
+
     def _slide(self, name: str, parent: str, joint: str, tip: str, place: Real, along: Complex,
                direction: Number = 0.0) -> None:
         """Add a link that slides in a direction, seen from its parent, and has its tip at zero."""
+        self._check_new(name)
         self.links.append(Link(name, parent, joint, 'prismatic', real(direction), tip))
         self.joint_values[name] = place
         self.directions[name] = along
@@ -502,8 +508,7 @@ class Builder:
         from its parent: the link that the joint belongs to, unless another is given.
         """
         name = name or ('' if len(joint + tip) == 2 else '_').join((joint, tip))
-        if name in self.joint_values:
-            raise ConstructionError(f'its link {name} would have the name of another')
+        self._check_new(name)
         parent, start = parent or self.points[joint].home, start or real(0.0)
         zero = Complex(0.0, 1.0) if start.value else Complex(1.0, 0.0)
         relative = bar * self.directions.get(parent, zero).conjugate()

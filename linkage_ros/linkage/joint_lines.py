@@ -24,6 +24,10 @@ Linkages written down: one line a joint, in the order they are placed.
     T block S x y             on the block of S, x ahead of it and y to its left
     C antiparallelogram B A D     corner opposite B where the bars cross that a parallelogram has
 
+What drives is an input, `crank`, `crank2`, `cylinder` and so on, or what its line ends in:
+
+    B cylinder P O r left called boom
+
 A joint's name begins with a letter, and a letter, digit or underscore follows; so does a
 dimension's. `left` and `right` are as seen along the first two joints; `out` is the half of a slot
 on the tip's side, or the block ahead of the pin; `in` the other. A number is a length [m], an
@@ -67,9 +71,11 @@ _PLAIN = ('ANGLE', 'RATIO')
 # words of INPUTS add an input each, unless it is geared to another.
 FORMS = {
     'ground': ('ground X Y',),
-    'crank': ('crank CENTRE LENGTH [up] [zero JOINT] [geared INPUT RATIO ANGLE]',),
-    'cylinder': ('cylinder BASE PIVOT LENGTH left|right [geared INPUT RATIO DISTANCE]',),
-    'carriage': ('carriage ORIGIN along TOWARDS DISTANCE DISTANCE [geared INPUT RATIO DISTANCE]',),
+    'crank': ('crank CENTRE LENGTH [up] [zero JOINT] [geared INPUT RATIO ANGLE] [called NAME]',),
+    'cylinder': (
+        'cylinder BASE PIVOT LENGTH left|right [geared INPUT RATIO DISTANCE] [called NAME]',),
+    'carriage': ('carriage ORIGIN along TOWARDS DISTANCE DISTANCE '
+                 '[geared INPUT RATIO DISTANCE] [called NAME]',),
     'yoke': ('yoke PIN ORIGIN along TOWARDS',),
     'block': ('block JOINT X Y',),
     'dyad': ('dyad FIRST SECOND LENGTH LENGTH left|right',),
@@ -89,8 +95,10 @@ INPUTS = 'crank', 'cylinder', 'carriage'
 _NAME = re.compile(r'[A-Za-z][A-Za-z0-9_]{0,63}')
 # What a dimension cannot be called: words of arithmetic, and what `mechanisms.create` takes.
 _TAKEN = (*WORDS, 'joints', 'tracer', 'branches')
+# What an input cannot be called: other links, and groups of parameters.
+_GROUPS = 'ground', 'dimensions', 'branches'
 # Letters in a line, and in what is said about it.
-_LONGEST, _SAID = 10000, 220
+_LONGEST, _SAID = 10000, 240
 # An angle [rad] beyond this was meant in degrees, unless it is written with `deg` or `pi`.
 _TURN = 6.2832
 
@@ -125,6 +133,11 @@ class Line(NamedTuple):
     def drives(self) -> bool:
         """Whether it adds an input."""
         return self.word in INPUTS and not any(arg.option == 'geared' for arg in self.arguments)
+
+    @property
+    def called(self) -> str:
+        """The name that it gives its input or what is geared; empty: the usual one."""
+        return next((arg.text for arg in self.arguments if arg.kind == 'NAME'), '')
 
     @property
     def sides(self) -> Tuple[str, ...]:
@@ -178,7 +191,7 @@ def _mirrored(lines: List[Line], mirror: Line) -> List[Line]:
     count: Dict[str, int] = {}
     found = []
     for line in lines:
-        count[line.word] = count.get(line.word, 0) + 1
+        count[line.word] = count.get(line.word, 0) + (not line.called)
         if own >= {*line.names} or line.stands_on and own >= {*line.stands_on} \
                 and line.word in ('line', 'carriage'):
             own |= {*line.names}
@@ -188,11 +201,11 @@ def _mirrored(lines: List[Line], mirror: Line) -> List[Line]:
                                  f'{" ".join(mirror.stands_on)}')._replace(text=mirror.text))
             continue
         args = [_image(line.word, arg, '' if arg.text in own else mirror.names[0])
-                for arg in line.arguments if arg.option != 'geared']
+                for arg in line.arguments if arg.option not in ('geared', 'called')]
         if line.word in INPUTS:
             number = count[line.word] if count[line.word] > 1 else ''
             ratio = -1 if line.word == 'crank' else 1
-            args += [f'geared {line.word}{number} {ratio} 0']
+            args += [f'geared {line.called or line.word + str(number)} {ratio} 0']
         names = [name + mirror.names[0] for name in line.names[::-1]]
         found.append(_parsed(f'{" ".join(names)} {line.word} {" ".join(args)}')._replace(
             text=mirror.text, mirrors=(*line.mirrors, mirror.stands_on)))
@@ -236,6 +249,9 @@ def _parsed(text: str) -> Line:
         if not _NAME.fullmatch(name) or name in FORMS:
             raise line.error(f'{quoted(name)} is no name for a joint: a letter, then up to 63 '
                              'letters, digits and underscores, but none of the constructions')
+    if line.called and (not _NAME.fullmatch(line.called) or line.called in _GROUPS):
+        raise line.error(f'{quoted(line.called)} is no name for an input: a letter, then up to 63 '
+                         f'letters, digits and underscores, but not {", ".join(_GROUPS)}')
     for kind, arg, _ in line.arguments:
         if '|' in kind and arg not in kind.split('|'):
             raise line.error(f'{quoted(arg)} must be {kind.replace("|", " or ")}')

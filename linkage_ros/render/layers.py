@@ -9,6 +9,7 @@ Each adds artists to axes and moves them; `artists` are those that move, in draw
 
 import cmath
 import math
+import re
 import textwrap
 
 from matplotlib.collections import LineCollection, PolyCollection
@@ -290,7 +291,7 @@ class Headline:
 def readings(linkage, inputs, short=False):
     """Return as texts the inputs, the angle of a lever that one drives, and their ratios."""
     if not hasattr(linkage, 'reduction'):
-        return [reading('θ' + input_.name[len('crank'):], value) if input_.turns
+        return [reading(re.sub(r'^crank(?=\d*$)', 'θ', input_.name), value) if input_.turns
                 else f'{input_.name} = {value:.4g} m'
                 for input_, value in zip(linkage.inputs, inputs)]
     theta = math.remainder(inputs[0], math.tau)

@@ -14,11 +14,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field as some
 import re
-from typing import Any, Dict, Iterator, List, Optional, Tuple
+from typing import Any, Dict, List, Optional, Tuple
 
 from .drive import Drive, FARTHEST, in_words, START
 from .joint_names import check_distinct
 from .machine import FRAME, FRAME_RULE, Machine, read_machine
+from .parameter_file import overrides
 from .parameters import (
     ALL,
     DRIVER,
@@ -81,18 +82,20 @@ class Scene:
 
 
 def load(path: str) -> Scene:
-    """Read a scene from a parameter file, its `/**` section; needs PyYAML."""
-    import yaml
-
-    try:
-        with open(path) as file:
-            given = dict(_flattened(yaml.safe_load(file)['/**']['ros__parameters']))
-    except (yaml.YAMLError, LookupError, TypeError, AttributeError, ValueError,
-            RecursionError) as error:
-        reason = ' '.join(str(error).split())
-        raise SceneError(f"{path} must be YAML with '/**:' and below it 'ros__parameters:' "
-                         f'({reason})') from None
-    return read(given)
+    """Read a scene from a parameter file, as its nodes in no namespace do; needs PyYAML."""
+    found = {node: overrides(path, f'/{node}') for node in ALL}
+    if not any(own is not None for own in found.values()):
+        raise SceneError(f"{path} must be YAML with '/**:' and below it 'ros__parameters:'")
+    told = {node: own or {} for node, own in found.items()}
+    merged = {name: value for node in (*ALL, OWNER) for name, value in told[node].items()}
+    scene = read(merged)
+    if all(own == merged for own in told.values()):
+        return scene
+    # What is for one node alone counts where that node's value does.
+    owners = {parameter.name: OWNER if OWNER in parameter.field.readers
+              else parameter.field.readers[0] for parameter in scene.parameters}
+    return read({name: told[owner][name] for name, owner in owners.items()
+                 if name in told[owner]})
 
 
 def read(given: Mapping[str, Any], before: Optional[Scene] = None, strict: bool = True) -> Scene:
@@ -164,11 +167,3 @@ def _parted(given: Any) -> Dict[str, Dict[str, Any]]:
         mechanism, dot, _ = name.partition('.')
         parts.setdefault(mechanism if dot else '', {})[plain_text(name)] = value
     return parts
-
-
-def _flattened(values: Mapping[str, Any], prefix: str = '') -> Iterator[Tuple[str, Any]]:
-    for key, value in values.items():
-        if isinstance(value, dict):
-            yield from _flattened(value, f'{prefix}{key}.')
-        else:
-            yield f'{prefix}{key}', value

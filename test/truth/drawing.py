@@ -138,6 +138,7 @@ class Line(NamedTuple):
     up: bool
     zero: str = ''
     geared: str = ''
+    called: str = ''
 
     @property
     def turns(self):
@@ -159,7 +160,7 @@ def read(text):
     kinds = re.sub('[js]', '', form) + ('ra' if word == 'crank' else 'rn') * bool(gear)
     return Line(tuple(parts[:at]), word, (*given['j'], *filter(None, zero)),
                 (*given['n'], *gear), kinds, side, rest[2:3] == ['up'],
-                *zero, geared)
+                *zero, geared, *_option(rest, 'called', 1))
 
 
 def _option(rest, word, count):
@@ -373,8 +374,9 @@ class Linkage:
         found = {}
         for i, line in enumerate(self.lines):
             if line.word in _INPUTS:
-                before = sum(self.lines[k].word == line.word for k in found)
-                found[i] = f'{line.word}{before + 1}' if before else line.word
+                before = sum(self.lines[k].word == line.word and not self.lines[k].called
+                             for k in found)
+                found[i] = line.called or (f'{line.word}{before + 1}' if before else line.word)
         return found
 
     def driven(self, rows, values):

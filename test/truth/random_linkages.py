@@ -244,19 +244,22 @@ class _Writer:
         self._driven(True)
 
     def _gear(self, word, value, geared):
-        """Return what a line says of its gear, and note the value of the input there would be."""
+        """Return what a line says of its gear and name; note the value its input would have."""
         rng, turns = self._rng, word == 'crank'
         others = [name for name, (kind, _) in self._inputs.items() if (kind == 'crank') == turns]
-        before = sum(kind == word for kind, _ in self._inputs.values())
-        self._inputs[f'{word}{before + 1}' if before else word] = word, value
+        before = sum(name.rstrip('0123456789') == word for name in self._inputs)
+        # The second has a name of its own.
+        called = 'drive' if len(self._inputs) == 1 else ''
+        self._inputs[called or (f'{word}{before + 1}' if before else word)] = word, value
+        called = called and f' called {called}'
         if not geared or not others:
-            return ''
+            return called
         other = self._pick(others)
         ratio = float(rng.choice(RATIOS))
         offset = value - ratio * self._inputs[other][1]
         if turns:
-            return f' geared {other} {ratio!r} {math.remainder(offset, math.tau)!r}'
-        return f' geared {other} {ratio!r} {self._number(offset, False)}'
+            return f' geared {other} {ratio!r} {math.remainder(offset, math.tau)!r}{called}'
+        return f' geared {other} {ratio!r} {self._number(offset, False)}{called}'
 
     def _geared_to_any(self, word, geared):
         """Tell whether a line can be geared, where it is to be."""
