@@ -62,7 +62,8 @@ def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Calla
         return failing(theta) == len(limits)
 
     closed = [limit for limit in limits if limit.ends and limit.ends.theta.args[0] == 0]
-    ends = [end for limit in closed for end in _crank_ends(limit, value)]
+    ends = [end + math.tau * turn for limit in closed for end in _crank_ends(limit, value)
+            for turn in range(input_.period)]
     if input_.turns:
         # What follows a turn later may be another assembly: the arcs are then those of [-pi, pi].
         ends.append(input_.low)
@@ -148,8 +149,8 @@ def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
     if (input_.turns and len(found) > 1 and found[0][0] + input_.turn - found[-1][1] <= NARROWEST
             and joined()):
         found[-1] = found[-1][0], found.pop(0)[1] + input_.turn
-    return [(lo - input_.turn, hi - input_.turn) if input_.turns and lo >= input_.high else (lo, hi)
-            for lo, hi in found]
+    return [(lo - input_.turn, hi - input_.turn) if input_.turns and lo >= input_.high
+            else (lo, hi) for lo, hi in found]
 
 
 def _crank_ends(limit: Limit, value: Callable) -> List[float]:

@@ -12,7 +12,7 @@ searched: one input between the extremes of the output, several by steps on the 
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache, reduce
+from functools import reduce
 from itertools import chain, combinations, islice, product
 import math
 from typing import (
@@ -31,12 +31,13 @@ from typing import (
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .analysis import Analysis
 from .arguments import numbers
 from .curves import LEAST
 from .inverse_linkage import InverseLinkage, taken_apart
-from .monotone import MonotoneBranches
 from .planar import GRAZE
-from .search import Search, SINGULAR
+from .search import blocks, Search, SINGULAR
+from ..cache import cached
 from ..formula.expression import (
     argument,
     gated,
@@ -57,10 +58,15 @@ if TYPE_CHECKING:
 ROUNDING = 32 * 2.0 ** -53
 # An answer is tried so far beside where it was found [rad, sizes], as the reach may end there.
 BESIDE = 16 * 2.0 ** -52 * math.pi
+# At an end of the reach, where rates have no bound, what that makes of an output, as a part.
+ENDED = 1e-7
 # What misses by more than this part of the output's size is the answer of another assembly.
 OTHER = 1e-2
 # Newton steps that may take a closed form's rounding away; each doubles the digits.
 POLISHING = 5
+# What an output misses [its size] that is no more than this is not made less. Outputs tell inputs
+# badly where the inputs move by more than their rounding through this.
+TINY, SOUND = 2.0 ** -54, 0.1
 # Answers that are no further apart than this [rad, sizes], or than what rounding of the outputs
 # makes of it where that is no more than the second, are one.
 SAME, NEIGHBOURS = 1e-13, 1e-4
@@ -70,6 +76,8 @@ STEP, ALIKE = 0.3, 1e-5
 # An input is at an end of its sweep if the outputs do not tell by rounding, or by this, and by
 # this part of the end.
 CLOSE, ULPS = 1e-7, 4 * 2.0 ** -52
+# Of so many values at once the last rounding is left in the answers.
+MANY = 1024
 # More than any input.
 LARGE = 1e300
 
@@ -144,6 +152,7 @@ class Inverse:
         self.linkage, self.outputs = linkage, outputs
         if linkage.checked(outputs).shape:
             raise ValueError('the inverse is for one set of dimensions, not for arrays')
+        blocks(linkage, outputs)
         self._n, self._inputs = len(outputs), linkage.inputs
         self._angular = [linkage.is_angle(name) for name in outputs]
         self._scales = [1.0 if angular else linkage.longest for angular in self._angular]
@@ -153,8 +162,10 @@ class Inverse:
         self.closed: Optional[InverseLinkage] = taken_apart(linkage, outputs)
         if self.closed:
             self._solve = self.closed.bind(linkage.is_accelerated)
+            self._turns = list(product(*self.closed.turns))
         else:
-            self._search: Any = self._branches() if self._n == 1 else Search(linkage, outputs)
+            self._search: Any = Analysis(linkage).branches(*outputs) if self._n == 1 else Search(
+                linkage, outputs)
 
     def __str__(self) -> str:
         what = listed(self.outputs)
@@ -164,7 +175,7 @@ class Inverse:
 
     # All answers.
 
-    def all(self, values: ArrayLike) -> List[Answer]:
+    def all(self, values: ArrayLike, near: Optional[ArrayLike] = None) -> List[Answer]:
         """
         Return all answers for one value of each output.
 
@@ -172,16 +183,26 @@ class Inverse:
         ----------
         values : float or array-like (outputs,)
             What the outputs are to be [rad or m], angles with whole turns aside.
+        near : array-like (inputs,), optional
+            Values of the inputs [rad or m] to which the answers are brought by whole turns, the
+            nearest first, a length being counted in parts of about its stroke.
 
         Returns
         -------
         list of Answer
-            Those of the linkage's own assembly, its `branches`, inside its reach; crank angles in
-            [-pi, pi), the first input's ascending; [] where the outputs cannot be had. Of answers
-            that rounding does not tell apart one is given.
+            Those of the linkage's own assembly, its `branches`, inside its reach; without `near`
+            crank angles in [-pi, pi), the first input's ascending; [] where the outputs cannot be
+            had. Of answers that rounding does not tell apart one is given.
 
         """
-        return [Answer(inputs, self) for inputs, _ in self._all(self._one_each(values))]
+        found = [inputs for inputs, _ in self._all(self._one_each(values))]
+        if near is not None:
+            beside = self._one_each(near, 'near')
+            if not all(map(math.isfinite, beside)):
+                raise ValueError(f'near must be finite, got {quoted(list(beside))}')
+            found = sorted((self._next_to(inputs, beside) for inputs in found), key=lambda x: sum(
+                ((a - b) / size) ** 2 for a, b, size in zip(x, beside, self._sizes)))
+        return [Answer(inputs, self) for inputs in found]
 
     def over(self, *values: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
         """
@@ -189,24 +210,25 @@ class Inverse:
 
         Returns
         -------
-        (array (inputs, *shape, answers), array (outputs, inputs, *shape, answers))
-            The inputs, the first ascending, filled up with NaN, and d output / d input there.
+        (array (inputs, *shape, answers), array (outputs * inputs, *shape, answers))
+            The inputs, the first ascending, filled up with NaN; and the rate of each output by the
+            first input, by the second and so on.
 
         """
         rows = np.broadcast_arrays(*(numbers('values', each) for each in values))
         inputs, rates = self._found(np.stack([row.ravel() for row in rows]))
         order = np.argsort(np.where(np.isnan(inputs[:, 0]), np.inf, inputs[:, 0]), axis=0)
-        inputs = np.take_along_axis(inputs, order[:, None], 0)
-        rates = np.take_along_axis(rates, order[:, None, None], 0)
         most = max(int(np.isfinite(inputs[:, 0]).sum(axis=0).max(initial=0)), 1)
-        inputs, rates = (np.moveaxis(part[:most], 0, -1) for part in (inputs, rates))
-        return (inputs.reshape(*inputs.shape[:1], *rows[0].shape, most),
-                rates.reshape(*rates.shape[:2], *rows[0].shape, most))
+        parts = (np.moveaxis(np.take_along_axis(part, order[:, None], 0)[:most], 0, -1)
+                 for part in (inputs, rates))
+        inputs, rates = (part.reshape(len(part), *rows[0].shape, most) for part in parts)
+        return inputs, rates
 
     def _all(self, values: Tuple[float, ...]) -> List[Found]:
         """Return inputs in order, each with d output / d input row by row, for one question."""
         if not all(map(math.isfinite, values)):
             return []
+        values = self._reduced(values)
         if not self.closed:
             return _columns(*self._searched(np.array(values)[:, None]))
         n, flat, found = self._n, self._solve(*values), []
@@ -216,16 +238,16 @@ class Inverse:
                     found.append(own)
         return self._distinct(found) if len(found) > 1 else found
 
+    def _reduced(self, values: Tuple[float, ...]) -> Tuple[float, ...]:
+        """Return values with angles beyond a turn within one: sine and cosine lose no digit."""
+        return tuple(math.atan2(math.sin(x), math.cos(x)) if angular and abs(x) > math.tau else x
+                     for x, angular in zip(values, self._angular))
+
     def _turned(self, inputs: Tuple[float, ...]) -> Iterable[Tuple[float, ...]]:
         """Return inputs in all turns that may differ; none if they have no value."""
-        if inputs != inputs or any(x != x for x in inputs):
+        if any(x != x for x in inputs):
             return ()
         return [tuple(x + turn for x, turn in zip(inputs, turns)) for turns in self._turns]
-
-    @cached_property
-    def _turns(self) -> List[Tuple[float, ...]]:
-        return list(product(*([math.tau * turn for turn in range(input_.period)]
-                              for input_ in self._inputs)))
 
     def _own(self, inputs: Tuple[float, ...], values: Sequence[float],
              within: bool = True) -> Optional[Found]:
@@ -242,21 +264,27 @@ class Inverse:
             else:
                 return None
         for _ in range(POLISHING):
-            gaps, sure, far = self._missed(row, inputs, values, slack)
-            if sure:
+            gaps, sure, away = self._missed(row, inputs, values, slack)
+            if not sure and not away <= OTHER:
+                return None
+            stepped = self._stepped(inputs, row[n:], gaps) if away > TINY else (math.nan,)
+            if sure and not self._is_near(stepped, inputs):
                 return self._within(inputs) if within else inputs, row[n:]
-            if far:
+            if any(x != x for x in stepped):
                 return None
-            inputs, row, before = self._stepped(inputs, row[n:], gaps), row, inputs
-            if any(x != x for x in inputs):
-                return None
-            row, before_row = at(*inputs), row
-            if any(x != x for x in row[:n]):
-                # The step leads out of the reach: the answer is at its end, if it is one.
-                sure = self._missed(before_row, before, values, BESIDE)[1]
-                return (self._within(before) if within else before,
-                        before_row[n:]) if sure else None
+            after = at(*stepped)
+            if sure:
+                # The step takes rounding away, or there is none that it could.
+                better = self._missed(after, stepped, values, slack)[2] < away
+                inputs, row = (stepped, after) if better else (inputs, row)
+                return self._within(inputs) if within else inputs, row[n:]
+            inputs, row = stepped, after
         return None
+
+    def _is_near(self, stepped: Sequence[float], inputs: Sequence[float]) -> bool:
+        """Return whether a step is one that rounding makes where outputs tell inputs well."""
+        return all(abs(x - y) <= ROUNDING * size / SOUND
+                   for x, y, size in zip(stepped, inputs, self._sizes))
 
     def _beside(self, inputs: Tuple[float, ...]) -> Iterator[Tuple[float, ...]]:
         """Yield inputs that differ by rounding, one a little."""
@@ -265,21 +293,22 @@ class Inverse:
                 yield (*inputs[:i], inputs[i] + step, *inputs[i + 1:])
 
     def _missed(self, row: Sequence[float], inputs: Sequence[float], values: Sequence[float],
-                slack: float) -> Tuple[List[float], bool, bool]:
-        """Return by how much outputs miss their values, and whether that is rounding, or far."""
-        n, gaps, sure, far = self._n, [], True, False
+                slack: float) -> Tuple[List[float], bool, float]:
+        """Return what outputs miss, whether that is rounding, and the most, in their sizes."""
+        n, gaps, sure, most = self._n, [], True, 0.0
         for i, (value, angular, scale) in enumerate(zip(values, self._angular, self._scales)):
             gap = row[i] - value
-            if angular:
+            if angular and gap - gap == 0.0:
                 gap = math.remainder(gap, math.tau)
             gaps.append(gap)
             away, allowed = abs(gap), ROUNDING * scale
-            if away > allowed:
-                for rate, x, size in zip(row[n + n * 0 + i::n], inputs, self._sizes):
+            if not away <= allowed:
+                for rate, x, size in zip(row[n + i::n], inputs, self._sizes):
                     allowed += slack * abs(rate) * max(size, abs(x))
-                sure = sure and not away > allowed
-                far = far or not away <= OTHER * scale
-        return gaps, sure, far
+                sure = sure and away <= min(allowed, ENDED * scale)
+            if not away / scale <= most:
+                most = away / scale
+        return gaps, sure, most
 
     def _stepped(self, inputs: Tuple[float, ...], rates: Sequence[float],
                  gaps: Sequence[float]) -> Tuple[float, ...]:
@@ -306,12 +335,13 @@ class Inverse:
         return kept
 
     def _are_one(self, answer: Found, other: Found) -> bool:
-        apart = max(abs(math.remainder(x - y, input_.period * math.tau) if input_.turns else x - y) / size for input_, size, x, y in zip(
-            self._inputs, self._sizes, answer[0], other[0]))
+        apart = max(abs(math.remainder(x - y, input_.turn) if input_.turns else x - y) / size
+                    for input_, size, x, y in zip(self._inputs, self._sizes, answer[0], other[0]))
         if apart <= SAME or not apart <= NEIGHBOURS:
             return apart <= SAME
         values = np.linalg.svd(self._jacobian(answer[1]), compute_uv=False)
-        return bool(apart <= SAME * (1.0 + values[0]) / max(values[-1], SAME))
+        rounding = 8 * 2.0 ** -53 if self.closed or self._n == 1 else SAME
+        return bool(apart <= rounding * (1.0 + values[0]) / max(values[-1], SAME))
 
     def _jacobian(self, rates: Sequence[float]) -> np.ndarray:
         """Return d outputs / d inputs, both in their sizes, from rates by each input."""
@@ -325,48 +355,56 @@ class Inverse:
         Their shapes are (answers, inputs, questions) and (answers, inputs * outputs, questions).
         """
         values = np.where(np.isfinite(values), values, np.nan)
+        if any(self._angular) and np.any(np.abs(values) > math.tau):
+            values[self._angular] = np.arctan2(np.sin(values), np.cos(values))[self._angular]
         if not self.closed:
             return self._searched(values)
         n, count = self._n, values.shape[1]
         with np.errstate(all='ignore'):
-            found = self._solve.over(*values).reshape(-1, n, count)
+            found = self._solve.over(*values).reshape(self.closed.count, n, count)
             if len(self._turns) > 1:
-                found = np.concatenate([found + np.reshape(turns, (n, 1)) for turns in self._turns])
-            flat = found.transpose(1, 0, 2).reshape(n, -1)
+                found = np.concatenate([found + np.reshape(turns, (n, 1))
+                                        for turns in self._turns])
+            flat = found.transpose(1, 0, 2).reshape(n, len(found) * count)
             rows = self._check.over(*flat)
             wanted = np.tile(values, (1, len(found)))
             gaps = rows[:n] - wanted
             gaps[self._angular] -= math.tau * np.round(gaps[self._angular] / math.tau)
             gaps, scales = np.abs(gaps), np.reshape(self._scales, (-1, 1))
-            speeds = np.abs(rows[n:].reshape(n, n, -1))
+            speeds = np.abs(rows[n:].reshape(n, n, flat.shape[1]))
             allowed = ROUNDING * (scales + (speeds * np.maximum(
                 np.abs(flat), np.reshape(self._sizes, (-1, 1)))[:, None]).sum(axis=0))
+            allowed = np.minimum(allowed, ENDED * scales)
             sure = ~(gaps > allowed).any(axis=0) & np.isfinite(gaps).all(axis=0)
-            near = (gaps <= OTHER * scales).all(axis=0) & ~sure
+            # What is not only rounding, and what of it a step may take away.
+            near = (gaps <= OTHER * scales).all(axis=0) & (~sure | (
+                gaps > TINY * scales).any(axis=0) & (count <= MANY))
             ended = np.isnan(gaps).any(axis=0) & np.isfinite(flat).all(axis=0)
             places = np.flatnonzero(ended)
             for beside in self._beside(tuple(flat[:, places])) if len(places) else ():
                 near[places] |= np.isfinite(self._check.over(*beside)[:n]).all(axis=0)
+        closed = flat
         flat, rates = np.where(sure, flat, np.nan), np.where(sure, rows[n:], np.nan)
         for place in np.flatnonzero(near):
-            inputs = found.transpose(1, 0, 2).reshape(n, -1)[:, place]
-            if own := self._own(tuple(inputs.tolist()), tuple(wanted[:, place].tolist())):
+            if own := self._own(tuple(closed[:, place].tolist()),
+                                tuple(wanted[:, place].tolist())):
                 flat[:, place], rates[:, place] = own
-        for input_, row in zip(self._inputs, flat):
-            row[:] = input_.wrapped(np.where(np.abs(row) < LEAST, 0.0, row))
-        return self._single(flat.reshape(n, -1, count).swapaxes(0, 1),
-                            rates.reshape(n * n, -1, count).swapaxes(0, 1))
+        return self._single(flat.reshape(n, len(found), count).swapaxes(0, 1),
+                            rates.reshape(n * n, len(found), count).swapaxes(0, 1))
 
     def _single(self, inputs: np.ndarray, rates: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Return answers of which those are NaN that rounding does not tell from another."""
+        """Return answers as they are counted, NaN what rounding does not tell from another."""
+        for i, input_ in enumerate(self._inputs):
+            inputs[:, i] = input_.wrapped(np.where(np.abs(inputs[:, i]) < LEAST, 0.0,
+                                                   inputs[:, i]))
         for one, two in combinations(range(len(inputs)), 2):
             with np.errstate(invalid='ignore'):
                 apart = np.max([input_.apart(x, y) / size for input_, size, x, y in zip(
                     self._inputs, self._sizes, inputs[one], inputs[two])], axis=0)
                 places = np.flatnonzero(apart <= NEIGHBOURS)
             for place in places:
-                if self._are_one((inputs[one, :, place], rates[one, :, place]),
-                                 (inputs[two, :, place], rates[two, :, place])):
+                if self._are_one(*((tuple(inputs[k, :, place]), tuple(rates[k, :, place]))
+                                   for k in (one, two))):
                     inputs[two, :, place] = rates[two, :, place] = np.nan
         return inputs, rates
 
@@ -408,7 +446,6 @@ class Inverse:
             answers: Sequence[Any] = self._all(tuple(values))
         else:
             inputs, rates = self.over(*values)
-            rates = rates.reshape(-1, *rates.shape[2:])
             answers = [(inputs[..., k], rates[..., k]) for k in range(inputs.shape[-1])]
         return self._chosen(answers, near, ends)
 
@@ -417,7 +454,7 @@ class Inverse:
         n, sizes = self._n, self._sizes
         if not answers:
             return (math.nan,) * n, (math.nan,) * (n * n)
-        limits = [end for end in ends or (None,) * n]
+        limits = ends or (None,) * n
         choice = _choice(len(answers), tuple(input_.period * input_.turns for input_ in
                                              self._inputs), near is not None,
                          tuple(map(bool, limits)))
@@ -431,6 +468,37 @@ class Inverse:
             *(end / size for pair, size in zip(limits, sizes) if pair for end in pair))
         return (tuple(x * size for x, size in zip(found[:n], sizes)),
                 tuple(rate / sizes[i // n] for i, rate in enumerate(found[n:])))
+
+    def path(self, values: Sequence[np.ndarray], near: Optional[Sequence[float]] = None,
+             ends: Ends = None) -> Tuple[Any, Any]:
+        """
+        Return the answers that go on from value to value: each is the nearest to the last.
+
+        Parameters
+        ----------
+        values : sequence of array (n,)
+            What each output is to be, one after the other [rad or m].
+        near, ends
+            As for `nearest`, for the first value; a value that cannot be had is passed over.
+
+        Returns
+        -------
+        (tuple of array (n,), tuple of array (n,))
+            As `nearest` does.
+
+        """
+        inputs, rates = self.over(*values)
+        rows = np.concatenate([inputs, rates]).transpose(1, 2, 0)
+        near = None if near is None else tuple(np.ravel(near).tolist())
+        n, found = self._n, []
+        for row in rows.tolist():
+            answers = [(each[:n], each[n:]) for each in row if each[0] == each[0]]
+            taken = self._chosen(answers, near, ends)
+            if taken[0][0] == taken[0][0]:
+                near = taken[0]
+            found.append((*taken[0], *taken[1]))
+        columns = np.reshape(found, (len(values[0]), n + n * n)).T
+        return tuple(columns[:n]), tuple(columns[n:])
 
     def follow(self, values: ArrayLike, near: ArrayLike) -> Found:
         """
@@ -455,6 +523,7 @@ class Inverse:
         nothing = (math.nan,) * self._n, (math.nan,) * self._n ** 2
         if not all(map(math.isfinite, (*values, *near))):
             return nothing
+        values = self._reduced(values)
         if self.closed:
             return self._along(values, near) or nothing
         if self._n > 1:
@@ -502,13 +571,10 @@ class Inverse:
                 yield mode, self._next_to(inputs, near)
 
     def _next_to(self, inputs: Sequence[float], near: Sequence[float]) -> Tuple[float, ...]:
-        return tuple(x + math.tau * round((y - x) / math.tau) if input_.turns else x
+        return tuple(x + input_.turn * round((y - x) / input_.turn) if input_.turns else x
                      for input_, x, y in zip(self._inputs, inputs, near))
 
     # The search for what does not come apart.
-
-    def _branches(self) -> MonotoneBranches:
-        return self.linkage.monotone_branches(self.outputs[0])
 
     def _searched(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return all answers as `_found` does."""
@@ -562,7 +628,7 @@ def _columns(inputs: np.ndarray, rates: np.ndarray) -> List[Found]:
     return sorted(found)
 
 
-@lru_cache(maxsize=256)
+@cached(256)
 def _choice(count: int, periods: Tuple[int, ...], follows: bool, ended: Tuple[bool, ...]) -> Pose:
     """
     Return the code that takes one of some answers.

@@ -16,7 +16,7 @@ from __future__ import annotations
 import cmath
 from itertools import product
 import math
-from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, TYPE_CHECKING
 
 import numpy as np
 
@@ -24,11 +24,23 @@ from . import joint_lines
 from .builder import GROUND, Link, UNIT
 from .design import Design
 from .dyads import Dyads, Hinge, Motor, Slide
-from .mechanism import Mechanism
+from .inputs import Input
 from .quantities import Names, PAIR, Structure
-from ..formula.expression import argument, Complex, derivative, dot, Real, real, spin
-from ..formula.expression import arctangent, square_root
+from ..formula.expression import (
+    arctangent,
+    argument,
+    Complex,
+    derivative,
+    dot,
+    Real,
+    real,
+    spin,
+    square_root,
+)
 from ..formula.program import Program
+
+if TYPE_CHECKING:
+    from .mechanism import Mechanism
 
 # Two to the power of this many assembly modes at most.
 MOST_SIDES = 5
@@ -47,7 +59,8 @@ class Mode(NamedTuple):
     linkage : Structure
         Its joints, as expressions of its own inputs.
     inputs : tuple of Real
-        The values [rad or m] of the inputs of the linkage itself in this mode.
+        The values [rad or m] of the inputs of the linkage itself in this mode; one that is an
+        output, too, is that argument of the program.
     rates : tuple of tuple of Real
         For each input its rate by each output.
 
@@ -70,16 +83,19 @@ class InverseLinkage:
         For each of its inputs an output, and the ratio and offset that make it the input's value.
     modes : tuple of Mode
         One for each choice of the sides of its dyads.
+    turns : tuple of tuple of float
+        For each input what may be added to what a mode tells [rad]: 0, and whole turns of what it
+        is read from, until all comes round.
     program : Program
-        From the outputs [rad or m] to the inputs of each mode, then each input's rates by each
-        output, the modes one after the other; for floats, arrays, machine code and C.
+        From the outputs [rad or m] to the inputs of each mode, the modes one after the other; for
+        floats, arrays, machine code and C.
 
     """
 
     def __init__(self, outputs: Names, sketch: _Sketch):
         self.outputs = outputs
         lines = joint_lines.parse(sketch.lines)
-        used = {name for ends in sketch.ends for end in ends for name in end.joints}
+        used = {name for read in sketch.reads for end in read.ends for name in end.joints}
         for line in lines[::-1]:
             if used & {*line.names}:
                 used |= {*line.stands_on}
@@ -93,28 +109,37 @@ class InverseLinkage:
         if len(self.branches) > MOST_SIDES:
             raise ValueError(f'more than {2 ** MOST_SIDES} assembly modes')
         self.design = Design('inverse', {}, self.lines, lines[-1].names[0])
+        self.turns = tuple(read.turns for read in sketch.reads)
         self.modes = tuple(self._mode(sketch, dict(zip(self.branches, signs)))
                            for signs in product((1, -1), repeat=len(self.branches)))
-        parts = [part for mode in self.modes for part in (
-            *mode.inputs, *(rate for row in mode.rates for rate in row))]
         given = [ratio * argument(outputs.index(name)) + offset
                  for name, ratio, offset in self.driving]
         # An argument is told from others by its place.
-        self.program = Program(parts, len(outputs), {
-            leaf: value for mode in self.modes for leaf, value in zip(
-                mode.linkage.built.arguments, given)})
+        self.program = Program(
+            [value for mode in self.modes for value in mode.inputs], len(outputs), {
+                leaf: value for mode in self.modes for leaf, value in zip(
+                    mode.linkage.built.arguments, given)})
 
     def _mode(self, sketch: _Sketch, signs: Dict[str, int]) -> Mode:
         structure = Structure(self.design, signs)
         inputs, rates = [], []
-        for ends in sketch.ends:
-            value, turning = _told(structure.built, *ends)
-            inputs.append(value)
-            row: Dict[str, Real] = {}
-            for i, (output, ratio, _) in enumerate(self.driving):
-                row[output] = _rate(value, turning, {i: ratio})
-            rates.append(tuple(row[output] for output in self.outputs))
+        for read in sketch.reads:
+            if read.name in self.outputs:
+                value, row = argument(self.outputs.index(read.name)), [
+                    real(float(read.name == name)) for name in self.outputs]
+            else:
+                value, turning = _told(structure.built, *read.ends)
+                found = {name: _rate(value, turning, {i: ratio})
+                         for i, (name, ratio, _) in enumerate(self.driving)}
+                row = [found[name] for name in self.outputs]
+            inputs.append((value - read.offset) / read.ratio)
+            rates.append(tuple(rate / read.ratio for rate in row))
         return Mode(structure, tuple(inputs), tuple(rates))
+
+    @property
+    def count(self) -> int:
+        """How many assembly modes it has."""
+        return len(self.modes)
 
     def bind(self, accelerate: bool = False) -> Any:
         """Return its program as a function of the outputs."""
@@ -138,6 +163,16 @@ class _End(NamedTuple):
 
     joints: Tuple[str, ...]
     places: Tuple[complex, ...] = ()
+
+
+class _Read(NamedTuple):
+    """How an input is read: a link and its parent; its value is ratio * input + offset."""
+
+    name: str
+    ends: Tuple[_End, ...]
+    ratio: float
+    offset: float
+    turns: Tuple[float, ...]
 
 
 def taken_apart(linkage: Mechanism, outputs: Names) -> Optional[InverseLinkage]:
@@ -192,8 +227,8 @@ class _Sketch(Dyads):
     ----------
     driving : dict
         By the joint that a line places: the output that drives it, its ratio and offset.
-    ends : list of (_End, ...)
-        For each input of the linkage how its two bodies lie.
+    reads : list of _Read
+        How each input of the linkage is read.
 
     """
 
@@ -217,11 +252,13 @@ class _Sketch(Dyads):
                 self._named.setdefault(joint, {})[body] = place
         self._turns = {GROUND: 1.0 + 0.0j}
         for link in linkage.links:
-            angle = link.zero + (pose[link.name] if link.kind == 'revolute' else 0.0)
+            angle = self._zero(link) + (pose[link.name] if link.kind == 'revolute' else 0.0)
             self._turns[link.name] = self._turns[link.parent] * cmath.rect(1.0, angle)
             motion = self._motion(link)
-            (motors if link.name in outputs else slides).append(motion) if isinstance(
-                motion, Slide) or link.name in outputs else None
+            if link.name in outputs:
+                motors.append(motion)
+            elif isinstance(motion, Slide):
+                slides.append(motion)
         for block, pin in linkage.yokes.items():
             slides.append(self._guided(pin, f'{block}-{pin}', block, 1j, self._turns[block]))
         for output in sorted(outputs, key=lambda name: name.startswith('angle(')):
@@ -231,19 +268,30 @@ class _Sketch(Dyads):
         size = max(size, linkage.longest)
         bodies = [*self._frames, *(body for pin in self._named.values() for body in pin),
                   *(body for each in (*slides, *motors) for body in each.bodies)]
+        # A joint of one body alone is only needed where an input is read from it.
+        read = {end for name in (*linkage.geared, *(input_.name for input_ in linkage.inputs))
+                if self._links[name].kind == 'prismatic'
+                for end in (self._links[name].joint, self._links[name].tip)}
+        self._named = {name: pin for name, pin in self._named.items()
+                       if len(pin) > 1 or name in read}
         super().__init__(ground, list(dict.fromkeys(bodies)), list(self._named.values()), slides,
                          motors, size, NEAR * size)
         self.farthest = 4.0 * (sum(linkage.bar_lengths.values()) + size)
         self.take_apart()
-        self.ends = [self._ends(self._links[input_.name]) for input_ in linkage.inputs]
+        self.reads = [self._read(by, input_) for by, input_ in enumerate(linkage.inputs)]
+
+    @staticmethod
+    def _zero(link: Link) -> float:
+        return float(np.asarray(link.zero))
 
     def _motion(self, link: Link) -> Motor:
         """Return how a link moves against its parent."""
         bodies, hangs = (link.parent, link.name), self._frames[link.parent][link.joint]
         if link.kind == 'revolute':
-            return Hinge(bodies, (hangs, self._frames[link.name][link.joint]), 1.0, link.zero,
-                         link.name)
-        return Slide(bodies, (hangs, 0.0j), (cmath.rect(1.0, link.zero), 1.0 + 0.0j), link.name)
+            return Hinge(bodies, (hangs, self._frames[link.name][link.joint]), 1.0,
+                         self._zero(link), link.name)
+        along = cmath.rect(1.0, self._zero(link))
+        return Slide(bodies, (hangs, 0.0j), (along, 1.0 + 0.0j), link.name)
 
     def _place(self, joint: str) -> complex:
         return complex(self._pose[f'{joint}.x'], self._pose[f'{joint}.y'])
@@ -274,14 +322,14 @@ class _Sketch(Dyads):
             return
         joint, axis = output.split('.')
         for link in self._linkage.links:
-            along = cmath.rect(1.0, link.zero)
+            along = cmath.rect(1.0, self._zero(link))
             part = along.real if axis == 'x' else along.imag
             if (link.tip, link.parent, link.kind) == (joint, GROUND, 'prismatic') and \
                     abs(part) > NEAR and joint in self._frames[link.name]:
                 # A block on a line of the ground: its slide tells its coordinates.
                 start = self._frames[GROUND][link.joint] + along * self._frames[link.name][joint]
                 self._scaled[output] = part, start.real if axis == 'x' else start.imag
-                motion = self._motion(link)
+                motion = next(slide for slide in slides if slide.joint == link.name)
                 slides.remove(motion)
                 motors.append(motion._replace(joint=output))
                 return
@@ -305,8 +353,9 @@ class _Sketch(Dyads):
         for body in self._named[first].keys() & self._named[second].keys() & self._frames.keys():
             frame = self._frames[body]
             for joint in frame.keys() & level.keys():
-                return Hinge((level[joint], body), (self._named[joint][level[joint]], frame[joint]),
-                             1.0, -cmath.phase(frame[second] - frame[first]), output)
+                places = self._named[joint][level[joint]], frame[joint]
+                return Hinge((level[joint], body), places, 1.0,
+                             -cmath.phase(frame[second] - frame[first]), output)
         for start, end, turn in ((first, second, along), (second, first, -along)):
             if start in level:
                 body = self._pin(start, output, turn)
@@ -322,6 +371,10 @@ class _Sketch(Dyads):
             return start + turn * place
         joint, origin = next(iter(self._frames[body].items()))
         return self._place(joint) + self._turns[body] * (place - origin)
+
+    def turned(self, body: str, along: complex) -> complex:
+        """Return a direction on a body as it is in the pose."""
+        return (self._at[body][1] if body in self._at else self._turns[body]) * along
 
     def said(self, value: float) -> str:
         """Return a length as it is."""
@@ -349,18 +402,34 @@ class _Sketch(Dyads):
         self._noted = joint, ratio / part, offset - ratio * start / part
         return self.number(word), ''
 
+    def _read(self, by: int, input_: Input) -> _Read:
+        """Return how an input is read, from its own link or from one that is geared to it."""
+        at_zero = [0.0] * len(self._linkage.inputs)
+        for name in (input_.name, *self._linkage.geared_to(input_.name)):
+            try:
+                ends = self._ends(self._links[name])
+            except ValueError:
+                continue
+            ratio, offset = (1.0, 0.0) if name == input_.name else map(float, np.ravel(
+                self._linkage.posed((), (name,), (name,)).searched(*at_zero))[[1 + by, 0]])
+            count = round(abs(ratio) * input_.period) if input_.turns else 1
+            return _Read(name, ends, ratio, offset, tuple(
+                turn * math.tau / abs(ratio) for turn in range(count)))
+        raise ValueError(f'{input_.name} is not placed')
+
     def _ends(self, link: Link) -> Tuple[_End, ...]:
         """Return how an input's link and its parent lie."""
         if link.kind == 'revolute':
             return (self._end_of(link.name, cmath.rect(1.0, 0.0)),
-                    self._end_of(link.parent, cmath.rect(1.0, link.zero)))
+                    self._end_of(link.parent, cmath.rect(1.0, self._zero(link))))
         tip, origin = ((self._joint(body, joint),) for body, joint in (
             (link.name, link.tip), (link.parent, link.joint)))
         parent = self._links.get(link.parent)
         if parent and len(self._frames[parent.name]) == 1 and parent.kind == 'revolute':
             # A barrel: as long as its ends are apart.
             return _End(tip), _End(origin)
-        return _End(tip), _End(origin), self._end_of(link.parent, cmath.rect(1.0, link.zero))
+        along = cmath.rect(1.0, self._zero(link))
+        return _End(tip), _End(origin), self._end_of(link.parent, along)
 
     def _joint(self, body: str, joint: str) -> str:
         """Return a joint that the lines place; raise ValueError if they do not."""

@@ -15,7 +15,6 @@ import math
 from typing import Any, Callable, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .curves import LEAST, refined, sampled, turns
 from .inputs import Arc, Input
@@ -47,15 +46,6 @@ def in_order(answers: np.ndarray, input_: Input) -> np.ndarray:
     most = int(np.isfinite(rows).sum(axis=0).max(initial=0))
     rows = rows[:max(most, 1)] if len(rows) else np.full((1, answers.shape[1]), np.nan)
     return np.moveaxis(rows, 0, -1)
-
-
-def nearest(answers: np.ndarray, near: ArrayLike, input_: Input) -> Any:
-    """Return of answers, shape (..., k), the one nearest to a value, whole turns included."""
-    near = np.asarray(near, float)[..., None]
-    theta = input_.beside(answers, near)
-    away = np.where(np.isnan(theta), np.inf, np.abs(theta - near))
-    best = np.argmin(away, axis=-1)[..., None]
-    return np.take_along_axis(np.broadcast_to(theta, away.shape), best, -1)[..., 0][()]
 
 
 def distinct(theta: Iterable[float], input_: Input) -> List[float]:

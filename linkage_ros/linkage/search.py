@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from itertools import chain, combinations
 import math
-from typing import Callable, List, Optional, Sequence, Tuple, TYPE_CHECKING
+from typing import Callable, List, Optional, Sequence, Set, Tuple, TYPE_CHECKING
 
 import numpy as np
 
@@ -51,11 +51,12 @@ def blocks(linkage: Mechanism, outputs: Names) -> List[Tuple[List[int], List[int
     Raises ValueError if they cannot tell all inputs.
     """
     needs = [{by for by in range(len(outputs)) if linkage.moves(name, by)} for name in outputs]
-    left, known = set(range(len(needs))), set[int]()
+    left: Set[int] = set(range(len(needs)))
+    known: Set[int] = set()
     found = []
     while left:
         for rows in chain(*(combinations(sorted(left), n + 1) for n in range(len(left)))):
-            columns = set[int]().union(*(needs[row] for row in rows)) - known
+            columns = set().union(*(needs[row] for row in rows)) - known
             if len(columns) < len(rows):
                 raise dependent(outputs, rows)
             if len(columns) == len(rows):
@@ -95,7 +96,7 @@ class Search:
     def _held(self, inputs: np.ndarray) -> np.ndarray:
         """Return for rows of inputs whether all of the linkage can be assembled there."""
         with np.errstate(invalid='ignore'):
-            return (self._margins(*inputs.T) >= 0.0).all(axis=0)
+            return np.asarray((self._margins(*inputs.T) >= 0.0).all(axis=0))
 
     def over(self, q: np.ndarray, target: np.ndarray) -> _Pair:
         """Return what outputs miss of their target, and the Jacobian, for each row of q."""
