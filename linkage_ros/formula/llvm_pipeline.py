@@ -15,7 +15,7 @@ from concurrent.futures import Future
 from contextlib import contextmanager
 import ctypes
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any, Callable, Dict, Iterator, Optional, Sequence, Tuple
 
 from llvmlite import ir
@@ -23,6 +23,7 @@ import numpy as np
 
 from .llvm_code import address, compiled, COUNT, count, NUMBER
 from .program import compile_in_background
+from ..cache import cached
 
 BYTE = ir.IntType(8)
 TYPES = {'i': COUNT, 'f': NUMBER}
@@ -134,7 +135,7 @@ def addresses(array: np.ndarray) -> np.ndarray:
         [index * stride for index, stride in zip(np.indices(array.shape), array.strides)])
 
 
-@lru_cache(maxsize=None)
+@cached(1)
 def code() -> Future:
     """Return the machine code, which is compiled once, in the background."""
     return compile_in_background(_compiled)

@@ -379,7 +379,7 @@ class Builder:
             if self.mirrors:
                 along = self._mirrored(along)
                 angle = arctangent(along.y, along.x)
-        rail = self._rail(pin, origin, along)
+        rail = self._rail(pin, origin, along, direction)
         found = planar.slider(rail, rod, side)
         self.limits += found.limits
         link = self._hang(pin, name, found.rod, rod)
@@ -388,9 +388,17 @@ class Builder:
         self.transmissions[name] = arctangent(abs(found.reach), rail.height)
         self._slide(self._numbered('block'), parent, origin, name, found.place, along, angle)
 
-    def _rail(self, pin: str, origin: str, along: Complex) -> planar.Rail:
+    def _rail(self, pin: str, origin: str, along: Complex, towards: object) -> planar.Rail:
         """Return a joint as seen from a line through another."""
         start, end = self.points[origin], self.points[pin]
+        link = self._side(origin, towards).link if isinstance(towards, str) else GROUND
+        crank = next((point.crank for point in self.points.values()
+                      if point.crank and point.home == link), None)
+        if crank and end.home == GROUND and end.place is not crank.centre:
+            frame = self.frames[link]
+            zero = frame[str(towards)] - frame[origin]
+            return planar.TurnedRail(end.place, crank, start.place, along, zero.direction(),
+                                     frame[origin], start.span + end.span)
         if end.crank and not along.x.varies and start.home == GROUND:
             return planar.CrankRail(end.crank, start.place, along, start.span + end.span)
         return planar.Rail(end.place, start.place, along, start.span + end.span)
