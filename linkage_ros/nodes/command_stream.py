@@ -1,12 +1,25 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Commands for actuators from what is wanted of outputs, message by message or ahead of time."""
+"""Commands for actuators from values of outputs, message by message or ahead of time."""
+
+from __future__ import annotations
 
 from itertools import chain
 import math
 import time
-from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
+from typing import (
+    Any,
+    Callable,
+    Dict,
+    Iterable,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Tuple,
+)
 
 import numpy as np
 from sensor_msgs.msg import JointState
@@ -16,44 +29,51 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from . import joint_state_reader
 from .message_layout import NEVER, pack, PatchedPublisher, unpack, Unreadable
 from .messages import JointStates
+from .publishers import TrackedPublisher
+from .throttle import Once, Throttle
+from .worker import Worker
+from ..cache import Cache
 from ..scene.inverse_request import InverseRequest
 from ..scene.joint_names import JointName
 from ..scene.machine import Machine
-from ..words import elided
+from ..words import elided, listed
 
-SECONDS_BETWEEN_WARNINGS, SECONDS_BETWEEN_SEARCHES = 5.0, 0.5
-# So many arrangements of commands are remembered.
-MOST_WIRES = 100
+# Between two searches for a first command, which may be anywhere [s].
+SECONDS_BETWEEN_SEARCHES = 0.5
+# Arrangements of commands that are cached, unknown names that are warned about, and points of a
+# trajectory: that many take the worker some seconds.
+ARRANGEMENTS, UNKNOWN_NAMES, MOST_POINTS = 100, 1000, 10_000
 
 
-class Route(NamedTuple):
-    """From a mechanism's outputs, as others call them, to the actuators that move them."""
+class Target(NamedTuple):
+    """Outputs of a mechanism as a message names them, and what solves them for its actuators."""
 
-    called: str
+    named: str
     machine: Machine
-    wanted: Any
+    request: InverseRequest
     places: Tuple[int, ...]
     names: Tuple[JointName, ...]
 
     @property
-    def actuators(self):
-        """What moves its inputs: of one that is measured elsewhere, the input itself."""
+    def actuators(self) -> List[str]:
+        """What moves the inputs: of one that is measured elsewhere, the input itself."""
         return [f'{self.machine.name}_{drive.input.name}' if drive.measures else drive.source
                 for drive in self.machine.inputs.values()]
 
-    def commanded(self, positions, speeds, near, jumps):
+    def command(self, positions: Sequence[float], speeds: Optional[Sequence[float]],
+                near: Sequence[float], jumps: bool) -> Any:
         """Return what `InverseRequest.command` does, for what a message says [rad or m]."""
-        return self.wanted.command(
-            self._meant(positions),
+        return self.request.command(
+            self._values(positions),
             speeds and [name.sign * speeds[place] for name, place in zip(self.names, self.places)],
             near, jumps)
 
-    def reason(self, positions):
+    def reason(self, positions: Sequence[float]) -> str:
         """Return in words why positions cannot be had."""
-        said = ', '.join(f'{positions[place]:.6g}' for place in self.places)
-        return f'{self.called} cannot be {said}: {self.wanted.reason(*self._meant(positions))}'
+        values = ', '.join(f'{positions[place]:.6g}' for place in self.places)
+        return f'{self.named} cannot be {values}: {self.request.reason(*self._values(positions))}'
 
-    def _meant(self, positions):
+    def _values(self, positions: Sequence[float]) -> List[float]:
         return [name.sign * (positions[place] - name.offset)
                 for name, place in zip(self.names, self.places)]
 
@@ -61,7 +81,7 @@ class Route(NamedTuple):
 class Command(NamedTuple):
     """What a mechanism's actuators are to do, and its inputs there [rad or m]; speeds if known."""
 
-    route: Route
+    target: Target
     inputs: Sequence[float]
     positions: Sequence[float]
     speeds: Optional[Sequence[float]]
@@ -69,7 +89,7 @@ class Command(NamedTuple):
     @property
     def efforts(self) -> List[float]:
         """What actuators give at rest against the loads [N m or N]; 0 where there are none."""
-        machine = self.route.machine
+        machine = self.target.machine
         if not machine.loads:
             return [0.0] * len(self.inputs)
         return [drive.actuator[0] * effort for drive, effort in zip(
@@ -80,12 +100,13 @@ class CommandStream:
     """
     Publishes `servo_commands`, `<mechanism>/commands` and `servo_trajectory`.
 
-    What is wanted comes on `wanted_states` and `wanted_trajectory`. Every answer is the one that
-    goes on from the last; what cannot be had leaves its actuator at the last good command.
+    The outputs come on `wanted_states` and `wanted_trajectory`. Every answer is the one that goes
+    on from the last; an output out of reach leaves its actuator at the last good command. A
+    trajectory is computed in a worker's thread; a newer one replaces it.
 
     Parameters
     ----------
-    node : rclpy.node.Node
+    node : SceneNode
         Whose topics they are.
     mechanisms : iterable of str
         The mechanisms of its scene.
@@ -94,176 +115,207 @@ class CommandStream:
 
     """
 
-    def __init__(self, node, mechanisms, present: Callable[[Machine], List[float]]):
+    def __init__(self, node: Any, mechanisms: Iterable[str],
+                 present: Callable[[Machine], List[float]]):
         self._present, self._logger, self._clock = present, node.get_logger(), node.get_clock()
-        self._commands = node.create_publisher(JointState, 'servo_commands', 10)
-        self._arrays = {name: node.create_publisher(Float64MultiArray, f'{name}/commands', 10)
+        self._commands = TrackedPublisher(node, JointState, 'servo_commands', 10)
+        self._arrays = {name: TrackedPublisher(node, Float64MultiArray, f'{name}/commands', 10)
                         for name in mechanisms}
-        self._trajectories = node.create_publisher(JointTrajectory, 'servo_trajectory', 10)
-        self._message, self._last, self._said, self._next = JointStates(), {}, {}, {}
-        node.create_subscription(JointState, 'wanted_states', self._hear, joint_state_reader.ANY,
-                                 raw=True)
-        node.create_subscription(JointTrajectory, 'wanted_trajectory', self._plan, 10)
+        self._trajectories = TrackedPublisher(node, JointTrajectory, 'servo_trajectory', 10)
+        self._message, self._throttle = JointStates(), Throttle(self._logger)
+        self._unknown = Once(UNKNOWN_NAMES)
+        self._machines: Mapping[str, Machine] = {}
+        self._last: Dict[str, Command] = {}
+        self._searches: Dict[str, float] = {}
+        self._worker = Worker(node, node.report)
+        node.create_subscription(JointState, 'wanted_states', node.guarded(
+            'wanted_states', self._receive), joint_state_reader.ANY, raw=True)
+        node.create_subscription(JointTrajectory, 'wanted_trajectory', node.guarded(
+            'wanted_trajectory', self._receive_trajectory), 10)
 
-    def adopt(self, machines):
+    def adopt(self, machines: Mapping[str, Machine]) -> None:
         """Act on these mechanisms from now on."""
-        self._machines, self._wires = machines, {}
+        self._machines, self._publishers = machines, Cache(self._publisher, ARRANGEMENTS)
         # The last pose of several inputs may be none of another geometry.
         self._last = {name: last for name, last in self._last.items() if len(last.inputs) == 1
-                      or last.route.machine is machines.get(name)}
-        self._reader = joint_state_reader.Reader(self._understood)
+                      or last.target.machine is machines.get(name)}
+        self._reader = joint_state_reader.Reader(self._interpret)
 
-    def _output(self, called: str) -> Tuple[Machine, str, JointName]:
+    def end(self) -> None:
+        """End the trajectory that is being computed."""
+        self._worker.end()
+
+    def _output(self, named: str) -> Optional[Tuple[Machine, str, JointName]]:
         """Return whose output others call so, its own name and how that differs."""
         for machine in self._machines.values():
             own = {name.name: (joint, name) for joint, name in machine.joints.items()}
-            joint, name = own.get(called) or (
-                called.removeprefix(f'{machine.name}_'), JointName(called))
-            if joint != called and machine.linkage.has_output(joint):
+            joint, name = own.get(named) or (
+                named.removeprefix(f'{machine.name}_'), JointName(named))
+            if joint != named and machine.linkage.has_output(joint):
                 return machine, joint, name
-        raise ValueError(f'nothing is called {elided(called)}; an output is called '
-                         '<mechanism>_<link>, <mechanism>_<joint>.x, or as joint_names has it')
+        return None
 
-    def _routes(self, names, leave_out) -> List[Route]:
-        """Return the ways of outputs; tell `leave_out` why of the others."""
-        found, routes = {}, []
-        for place, called in enumerate(names):
-            try:
-                machine, *output = self._output(called)
-            except ValueError as error:
-                leave_out(str(error))
-                continue
-            found.setdefault(machine.name, []).append((place, *output))
+    def _targets(self, names: Sequence[str]) -> Tuple[List[Target], List[str], List[str]]:
+        """Return the targets of names, those that are none, and reasons for what is left out."""
+        found: Dict[str, List[Tuple]] = {}
+        targets, unknown, reasons = [], [], []
+        for place, named in enumerate(names):
+            if output := self._output(named):
+                found.setdefault(output[0].name, []).append((place, *output[1:]))
+            else:
+                unknown.append(named)
         for mechanism, outputs in found.items():
             machine = self._machines[mechanism]
             n = len(machine.inputs)
             called = ' and '.join(elided(names[place]) for place, *_ in outputs)
             try:
                 if len(outputs) > n == 1:
-                    leave_out(f'{called} are moved by one input: name one of them')
+                    reasons.append(f'{called} are moved by one input: name one of them')
                 elif len(outputs) != n:
                     raise ValueError(f'{mechanism} has {n} inputs: name as many outputs of it, '
                                      f'not {called}')
                 places, joints, own = zip(*outputs[:n])
-                routes.append(Route(' and '.join(elided(names[place]) for place in places),
-                                    machine, InverseRequest(machine, joints), places, own))
+                targets.append(Target(' and '.join(elided(names[place]) for place in places),
+                                      machine, InverseRequest(machine, joints), places, own))
             except ValueError as error:
-                leave_out(str(error))
-        return routes
+                reasons.append(str(error))
+        return targets, unknown, reasons
 
-    def _understood(self, message):
-        """Return the ways of what a message has positions for, and whether it has speeds."""
-        known = len(message.velocity) == len(message.name)
-        return self._routes(message.name[:len(message.position)], lambda reason: self._warn(
-            reason, reason)), known
+    def _interpret(self, message: JointState) -> Tuple[List[Target], bool]:
+        """Return the targets that a message has positions for, and whether it has speeds."""
+        targets, unknown, reasons = self._targets(message.name[:len(message.position)])
+        for reason in reasons:
+            self._logger.warning(f'wanted_states: {reason}')
+        if unknown := self._unknown.new(unknown):
+            self._logger.warning(f'wanted_states: {_nothing(unknown)}{self._unknown.ending}')
+        return targets, len(message.velocity) == len(message.name)
 
-    def _warn(self, about, reason):
-        self._logger.warning(f'wanted_states: {reason}')
-        self._said[about] = time.monotonic()
-
-    def _hear(self, text):
-        publishers = self._commands, *self._arrays.values()
-        if not any(publisher.get_subscription_count() for publisher in publishers):
+    def _receive(self, text: bytes) -> None:
+        if not self._commands.has_subscribers and not any(
+                one.has_subscribers for one in self._arrays.values()):
             return
         try:
             source = self._reader.source(text)
-            (routes, known), (stamp, positions, speeds) = source.meaning, source.take(text)
         except Unreadable as error:
-            self._logger.warning(
-                f'wanted_states: {len(text)} bytes that are no joint states are passed over: '
-                f'{error}', throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
+            reason = str(error)
+            self._throttle.warn('unreadable', lambda: (
+                f'wanted_states: {len(text)} bytes that are no joint states are ignored: '
+                f'{reason}'))
             return
-        commands = [self._command(route, positions, speeds if known else None)
-                    for route in routes]
-        if commands := [command for command in commands if command]:
-            self._send(pack(self._clock.now().to_msg()) if stamp == NEVER else stamp, commands)
+        (targets, known), (stamp, positions, speeds) = source.meaning, source.take(text)
+        commands = [self._command(target, positions, speeds if known else None)
+                    for target in targets]
+        if found := [command for command in commands if command]:
+            self._send(pack(self._clock.now().to_msg()) if stamp == NEVER else stamp, found)
 
-    def _near(self, route) -> List[float]:
+    def _near(self, target: Target) -> Sequence[float]:
         """Return where inputs were last, or are; else where they start."""
-        if last := self._last.get(route.machine.name):
+        if last := self._last.get(target.machine.name):
             return last.inputs
-        return [place if math.isfinite(place) else drive.start for place, drive in zip(
-            self._present(route.machine), route.machine.inputs.values())]
+        return [position if math.isfinite(position) else drive.start for position, drive in zip(
+            self._present(target.machine), target.machine.inputs.values())]
 
-    def _command(self, route, positions, speeds) -> Optional[Command]:
+    def _command(self, target: Target, positions: Sequence[float],
+                 speeds: Optional[Sequence[float]]) -> Optional[Command]:
         """Return the command for outputs, or the last good one, to be held; None without any."""
-        last = self._last.get(route.machine.name)
-        # Before the first command, which may be anywhere: that takes a search, so now and then.
-        jumps = not last and time.monotonic() > self._next.get(route.machine.name, -math.inf)
-        command = Command(route, *route.commanded(positions, speeds, self._near(route), jumps))
+        name, now = target.machine.name, time.monotonic()
+        last = self._last.get(name)
+        # The first command may be anywhere: that takes a search, so now and then.
+        jumps = not last and now > self._searches.get(name, -math.inf)
+        command = Command(target, *target.command(positions, speeds, self._near(target), jumps))
         if jumps:
-            self._next[route.machine.name] = time.monotonic() + SECONDS_BETWEEN_SEARCHES
+            self._searches[name] = now + SECONDS_BETWEEN_SEARCHES
         if all(map(math.isfinite, command.inputs)):
-            self._last[route.machine.name] = command
+            self._last[name] = command
             return command
-        if time.monotonic() > self._said.get(route.called, -math.inf) + SECONDS_BETWEEN_WARNINGS:
-            self._warn(route.called, route.reason(positions))
+        self._throttle.warn(target.named, lambda: f'wanted_states: {target.reason(positions)}')
         return last and last._replace(speeds=[0.0] * len(last.inputs))
 
-    def _send(self, stamp, commands):
-        names = tuple(name for command in commands for name in command.route.actuators)
+    def _send(self, stamp: bytes, commands: Sequence[Command]) -> None:
+        names = tuple(name for command in commands for name in command.target.actuators)
         values = [position for command in commands for position in command.positions]
         speeds = [speed for command in commands for speed in command.speeds or [math.nan]]
         moving = all(map(math.isfinite, speeds))
-        if self._commands.get_subscription_count():
-            if any(command.route.machine.loads for command in commands):
+        if self._commands.has_subscribers:
+            if any(command.target.machine.loads for command in commands):
                 efforts = [effort for command in commands for effort in command.efforts]
                 self._commands.publish(self._message.message(
                     unpack(stamp), names, values, speeds if moving else (),
                     () if any(map(math.isnan, efforts)) else efforts))
             else:
-                self._wire(names, moving).publish(stamp, [np.array(values + speeds * moving)])
+                self._publishers[names, moving].publish(
+                    stamp, [np.array(values + speeds * moving)])
         for command in commands:
-            publisher = self._arrays[command.route.machine.name]
-            if publisher.get_subscription_count():
+            publisher = self._arrays[command.target.machine.name]
+            if publisher.has_subscribers:
                 publisher.publish(Float64MultiArray(data=command.positions))
 
-    def _wire(self, names, moving) -> PatchedPublisher:
+    def _publisher(self, key: Tuple[Tuple[str, ...], bool]) -> PatchedPublisher:
+        names, moving = key
         n = len(names)
-        if len(self._wires) > MOST_WIRES:
-            self._wires.clear()
-        if (names, moving) not in self._wires:
-            self._wires[names, moving] = PatchedPublisher(
-                self._commands, lambda stamp, values: self._message.message(
-                    stamp, names, values[:n], values[n:]), (1 + moving) * n, self._logger)
-        return self._wires[names, moving]
+        return PatchedPublisher(
+            self._commands.publisher, lambda stamp, values: self._message.message(
+                stamp, names, values[:n], values[n:]), (1 + moving) * n, self._logger)
 
-    def _plan(self, message):
-        if not self._trajectories.get_subscription_count():
+    def _receive_trajectory(self, message: JointTrajectory) -> None:
+        if not self._trajectories.has_subscribers:
             return
         try:
-            self._trajectories.publish(self._planned(message))
+            if len(message.points) > MOST_POINTS:
+                raise ValueError(f'it has {len(message.points)} points; send up to {MOST_POINTS}')
+            targets, unknown, reasons = self._targets(message.joint_names)
+            if unknown or reasons:
+                raise ValueError(_nothing(unknown) if unknown else reasons[0])
         except ValueError as error:
-            self._logger.error(f'wanted_trajectory is refused: {error}')
+            self._refuse(error)
+            return
+        near = [self._near(target) for target in targets]
+        jumps = [target.machine.name not in self._last for target in targets]
+        self._worker.replace('trajectory', lambda: self._solve(message, targets, near, jumps))
 
-    def _planned(self, message) -> JointTrajectory:
-        """Return the actuators' trajectory; raise ValueError if one point of it cannot be."""
-        n = len(message.joint_names)
-        routes = self._routes(message.joint_names, _refuse)
-        near = [self._near(route) for route in routes]
-        planned = JointTrajectory(header=message.header, joint_names=[
-            name for route in routes for name in route.actuators])
-        for i, point in enumerate(message.points):
-            if len(point.positions) != n or len(point.velocities) not in (0, n):
-                raise ValueError(f'point {i} must have {n} positions, and as many velocities or '
-                                 f'none, not {len(point.positions)} and {len(point.velocities)}')
-            found = []
-            for k, route in enumerate(routes):
-                near[k], *actuator = route.commanded(
-                    point.positions, list(point.velocities) or [0.0] * n, near[k],
-                    not (i or route.machine.name in self._last))
-                if not all(map(math.isfinite, near[k])):
-                    raise ValueError(f'point {i}: {route.reason(point.positions)}')
-                if not all(map(math.isfinite, actuator[1])):
-                    raise ValueError(f'point {i}: {route.called} turns back there and cannot have '
-                                     'a speed other than zero')
-                found.append(actuator)
-            positions, speeds = (list(chain.from_iterable(part)) for part in zip(*found))
-            planned.points.append(JointTrajectoryPoint(
-                positions=positions, velocities=speeds if len(point.velocities) else (),
-                time_from_start=point.time_from_start))
-        return planned
+    def _refuse(self, error: ValueError) -> None:
+        self._logger.error(f'wanted_trajectory is refused: {error}')
+
+    def _solve(self, message: JointTrajectory, targets: Sequence[Target],
+               near: List[Sequence[float]], jumps: List[bool]) -> Optional[Callable[[], None]]:
+        """Return what publishes the actuators' trajectory; None if a newer one has come."""
+        solved = JointTrajectory(header=message.header, joint_names=[
+            name for target in targets for name in target.actuators])
+        try:
+            for i, point in enumerate(message.points):
+                if not self._worker.is_newest('trajectory'):
+                    return None
+                solved.points.append(_solved_point(
+                    i, point, len(message.joint_names), targets, near, jumps))
+                jumps = [False] * len(targets)
+        except ValueError as error:
+            self._refuse(error)
+            return None
+        return lambda: self._trajectories.publish(solved)
 
 
-def _refuse(reason):
-    raise ValueError(reason)
+def _solved_point(i: int, point: JointTrajectoryPoint, n: int, targets: Sequence[Target],
+                  near: List[Sequence[float]], jumps: Sequence[bool]) -> JointTrajectoryPoint:
+    """Return the actuators' point of a trajectory, and put where inputs are then into near."""
+    if len(point.positions) != n or len(point.velocities) not in (0, n):
+        raise ValueError(f'point {i} must have {n} positions, and as many velocities or '
+                         f'none, not {len(point.positions)} and {len(point.velocities)}')
+    found = []
+    for k, target in enumerate(targets):
+        near[k], *actuator = target.command(
+            point.positions, list(point.velocities) or [0.0] * n, near[k], jumps[k])
+        if not all(map(math.isfinite, near[k])):
+            raise ValueError(f'point {i}: {target.reason(point.positions)}')
+        if not all(map(math.isfinite, actuator[1])):
+            raise ValueError(f'point {i}: {target.named} turns back there and cannot have '
+                             'a speed other than zero')
+        found.append(actuator)
+    positions, speeds = (list(chain.from_iterable(part)) for part in zip(*found))
+    return JointTrajectoryPoint(positions=positions,
+                                velocities=speeds if len(point.velocities) else (),
+                                time_from_start=point.time_from_start)
+
+
+def _nothing(unknown: Sequence[str]) -> str:
+    return (f'nothing is called {listed(unknown, 150)}; an output is called '
+            '<mechanism>_<link>, <mechanism>_<joint>.x, or as joint_names has it')

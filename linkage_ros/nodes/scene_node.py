@@ -62,7 +62,7 @@ class SceneNode(Node):
     def __init__(self, name: str, **kwargs: Any):
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
         incidents = Incidents(self.get_logger(), lambda: not self.context.ok())
-        self.guarded = incidents.guarded
+        self.guarded, self.report = incidents.guarded, incidents.report
         self._worker = Worker(self, incidents.report)
         self._announcer: Optional[Announcer] = None
         self._adopted: Optional[scenes.Scene] = None
@@ -137,7 +137,10 @@ class SceneNode(Node):
 
     def _changed(self, changed: List[scenes.Parameter]) -> None:
         """Prepare the newest scene, and tell the nodes that follow."""
-        self._worker.replace('scene', partial(self._prepared, self.scene))
+        if type(self).prepare is SceneNode.prepare:
+            self._adopt(self.scene, self.scene)
+        else:
+            self._worker.replace('scene', partial(self._prepared, self.scene))
         self._worker.replace('ranges', self._parameters_of_scene.renew_ranges)
         if self._announcer:
             self._announcer.announce(changed)

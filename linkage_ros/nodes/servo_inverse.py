@@ -1,11 +1,14 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Node that answers where inputs have to be to put a lever, or any outputs, where it is wanted."""
+"""Node that answers where inputs have to be for a lever, or any outputs, to have given values."""
+
+from __future__ import annotations
 
 from array import array
 import math
 import sys
+from typing import Any, Callable, Dict, List, Mapping, Sequence, Tuple
 
 import numpy as np
 from sensor_msgs.msg import JointState
@@ -14,6 +17,7 @@ from . import joint_state_reader, scene_node
 from .command_stream import CommandStream
 from .message_layout import Unreadable
 from .. import scene
+from ..cache import Cache
 from ..robot_model import bodies
 from ..scene.inverse_request import InverseRequest, LEVER, present
 from ..words import elided, listed, MESSAGE, quoted
@@ -33,83 +37,85 @@ MOST_NAMED, MOST = 5, 150
 
 
 class ServoInverse(scene_node.SceneNode):
-    """Serves `servo_inverse` for the mechanisms of a scene."""
+    """Serves `servo_inverse` and `inputs_for`, and turns `wanted_states` into commands."""
 
-    def __init__(self, **kwargs):
+    def __init__(self, **kwargs: Any):
         super().__init__(scene.INVERSE, **kwargs)
-        self._heard = {}
-        self._reader = joint_state_reader.Reader(self._inputs_in)
-        self.create_subscription(
-            JointState, 'crank_states', self._turn, joint_state_reader.ANY, raw=True)
+        self._requests = Cache(self._request)
+        self._sources: frozenset = frozenset()
+        self._positions: Dict[str, float] = {}
+        self._reader = joint_state_reader.Reader(self._interpret)
+        self.create_subscription(JointState, 'crank_states', self.guarded(
+            'crank_states', self._receive), joint_state_reader.ANY, raw=True)
         self.create_service(ServoInverseType, 'servo_inverse', self.answer)
         self.create_service(InputsFor, 'inputs_for', self.answer_together)
         self._stream = CommandStream(self, self.scene.machines, lambda machine: present(
-            machine, self._heard))
+            machine, self._positions))
         self.begin()
 
-    def serves(self):
+    def serves(self) -> str:
         """Say of which mechanisms it answers."""
         return f'answers servo_inverse for {listed(self.scene.machines, 200)}'
 
-    def check(self, new):
+    def check(self, new: scene.Scene) -> None:
         """Refuse lengths that `kinematics` could not publish; SceneError says which."""
         for machine in new.machines.values():
             bodies.size(machine)
 
-    def adopt(self, new):
-        """Forget what was asked about."""
-        self._known = {}
+    def adopt(self, new: scene.Scene) -> None:
+        """Answer for a scene from now on."""
+        self._requests.clear()
         self._stream.adopt(new.machines)
-        self._inputs = {drive.source for machine in new.machines.values()
-                        for drive in machine.inputs.values()}
+        self._sources = frozenset(drive.source for machine in new.machines.values()
+                                  for drive in machine.inputs.values())
 
-    def _inputs_in(self, message):
+    def destroy_node(self) -> None:
+        """End the trajectories too."""
+        if hasattr(self, '_stream'):
+            self._stream.end()
+        super().destroy_node()
+
+    def answer(self, request: Any, response: Any) -> Any:
+        """Fill in a response; what cannot be done is said in it, never raised."""
+        return self._filled(lambda: solve(
+            self._requests[request.mechanism, request.output], request, response), response)
+
+    def answer_together(self, request: Any, response: Any) -> Any:
+        """Fill in a response about several inputs; what cannot be done is said in it."""
+        return self._filled(lambda: solve_together(
+            _machine_together(self.scene, request.mechanism), request, response), response)
+
+    def _request(self, key: Tuple[str, str]) -> InverseRequest:
+        return InverseRequest(_machine(self.scene, *key), [key[1]])
+
+    def _filled(self, fill: Callable[[], None], response: Any) -> Any:
+        response.success = False
+        try:
+            fill()
+        except ValueError as problem:
+            response.message = elided(str(problem), MESSAGE)
+        except Exception as problem:
+            # A client waits for ever for a service that raised.
+            response.message = elided(f'internal error: {problem!r}', MESSAGE)
+            self.report('a request', problem)
+        return response
+
+    def _interpret(self, message: JointState) -> List[Tuple[str, int]]:
         """Return the names of the scene's inputs in a message, and their places."""
         return [(name, place) for place, name in enumerate(message.name[:len(message.position)])
-                if name in self._inputs]
+                if name in self._sources]
 
-    def _turn(self, text):
+    def _receive(self, text: bytes) -> None:
         try:
             source = self._reader.source(text)
         except Unreadable:
             # `kinematics` says so.
             return
         positions = source.take(text).positions
-        self._heard.update((name, positions[place]) for name, place in source.meaning)
-
-    def answer(self, request, response):
-        """Fill in a response; what cannot be done is said in it, never raised."""
-        return self._filled(self._answer, request, response)
-
-    def _answer(self, request, response):
-        key = request.mechanism, request.output
-        asked = self._known.get(key) or InverseRequest(
-            _machine(self.scene, *key), [request.output])
-        solve(asked, request, response)
-        self._known[key] = asked
-
-    def answer_together(self, request, response):
-        """Fill in a response about several inputs; what cannot be done is said in it."""
-        return self._filled(self._answer_together, request, response)
-
-    def _answer_together(self, request, response):
-        solve_together(_machine_together(self.scene, request.mechanism), request, response,
-                       self._heard)
-
-    def _filled(self, fill, request, response):
-        response.success = False
-        try:
-            fill(request, response)
-        except ValueError as problem:
-            response.message = elided(str(problem), MESSAGE)
-        except Exception as problem:
-            # A client waits for ever for a service that raised.
-            response.message = elided(f'internal error: {problem!r}', MESSAGE)
-            self.get_logger().error(response.message)
-        return response
+        self._positions.update((name, positions[place]) for name, place in source.meaning)
 
 
-def solve(asked, request, response):
+def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
     """
     Answer a request for values of an output: on the working branch, or near where it is asked.
 
@@ -119,8 +125,8 @@ def solve(asked, request, response):
         If the request as a whole cannot be answered.
 
     """
-    wanted, near = request.lever_angle, request.servo_near
-    n = len(wanted)
+    values, near = request.lever_angle, request.servo_near
+    n = len(values)
     if not n:
         raise ValueError('lever_angle is empty; give at least one value')
     if n > MOST_VALUES:
@@ -129,34 +135,50 @@ def solve(asked, request, response):
         raise ValueError(f'servo_near must be empty, have one angle, or one for each of the '
                          f'{n} in lever_angle, not {len(near)}')
     # One angle is the usual question, and floats answer it sooner than arrays.
-    values = np.array(wanted) if n > 1 else wanted[0]
-    start = None
-    if near:
-        start = [np.array(near) if len(near) > 1 else near[0]]
-        if not np.all(np.abs(start[0]) <= scene.FARTHEST):
-            raise ValueError(f'servo_near must be finite and within {scene.FARTHEST:g} '
-                             f'{asked.units[0]} of zero')
-    (theta,), (rate,) = asked.positions([values], start)
+    start = [np.array(near) if len(near) > 1 else near[0]] if near else None
+    if start and not np.all(np.abs(start[0]) <= scene.FARTHEST):
+        raise ValueError(f'servo_near must be finite and within {scene.FARTHEST:g} '
+                         f'{inverse.units[0]} of zero')
+    (positions,), (rates,) = inverse.positions([np.array(values) if n > 1 else values[0]], start)
     if n > 1:
-        finite = np.isfinite(theta)
-        response.servo_angle = array('d', theta.tobytes())
-        response.reduction = array('d', rate.tobytes())
+        finite = np.isfinite(positions)
+        response.servo_angle = array('d', positions.tobytes())
+        response.reduction = array('d', rates.tobytes())
         response.success = bool(finite.all())
         response.reachable = [True] * n if response.success else finite.tolist()
     else:
-        response.servo_angle, response.reduction = [theta], [rate]
-        response.success = math.isfinite(theta)
+        response.servo_angle, response.reduction = [positions], [rates]
+        response.success = math.isfinite(positions)
         response.reachable = [response.success]
     if not response.success:
-        response.message = elided(_complaint(asked, [
-            value for value, reached in zip(wanted, response.reachable) if not reached]), MESSAGE)
+        response.message = elided(_complaint(inverse, [
+            value for value, reached in zip(values, response.reachable) if not reached]), MESSAGE)
 
 
-def _machine(scene_, name, output):
+def solve_together(machine: scene.Machine, request: Any, response: Any) -> None:
+    """Answer a request for several outputs; raise ValueError if it cannot be answered."""
+    inverse, values, near = InverseRequest(machine, request.outputs), request.values, request.near
+    n = len(machine.inputs)
+    if len(values) != n or len(near) not in (0, n):
+        raise ValueError(f'values must have {n} numbers and near as many or none, not '
+                         f'{len(values)} and {len(near)}')
+    if not all(-scene.FARTHEST <= position <= scene.FARTHEST for position in near):
+        raise ValueError(f'near must be finite and within {scene.FARTHEST:g} of zero')
+    answers = inverse.answers(values, inverse.inputs_of(near) if near else None)
+    response.names = [drive.source for drive in machine.inputs.values()]
+    response.positions = [position for answer in answers
+                          for position in inverse.positions_of(answer.inputs)]
+    response.modes = [answer.mode for answer in answers]
+    response.singular = [answer.is_singular for answer in answers]
+    response.success = bool(answers)
+    response.message = '' if answers else elided(inverse.reason(*values), MESSAGE)
+
+
+def _machine(scene_: scene.Scene, name: str, output: str) -> scene.Machine:
     """Return a mechanism by its name, or the only one, or for a lever the only slotted lever."""
     levers = {key: machine for key, machine in scene_.machines.items()
               if machine.linkage.type == 'slotted_lever'}
-    machines = scene_.machines if output else levers
+    machines: Mapping[str, scene.Machine] = scene_.machines if output else levers
     if name in machines:
         return machines[name]
     if not name:
@@ -173,29 +195,7 @@ def _machine(scene_, name, output):
     raise ValueError(f'mechanism may be empty only where there is one{what}; allowed: {allowed}')
 
 
-def solve_together(machine, request, response, heard):
-    """Answer a request for several outputs; raise ValueError if it cannot be answered."""
-    asked, values, near = InverseRequest(machine, request.outputs), request.values, request.near
-    n = len(machine.inputs)
-    if len(values) != n or len(near) not in (0, n):
-        raise ValueError(f'values must have {n} numbers and near as many or none, not '
-                         f'{len(values)} and {len(near)}')
-    if not all(-scene.FARTHEST <= position <= scene.FARTHEST for position in near):
-        raise ValueError(f'near must be finite and within {scene.FARTHEST:g} of zero')
-    start = asked.inputs_of(near) if near else [
-        place if abs(place) <= scene.FARTHEST else drive.start
-        for place, drive in zip(present(machine, heard), machine.inputs.values())]
-    answers = asked.answers(values, start)
-    response.names = [drive.source for drive in machine.inputs.values()]
-    response.positions = [place for answer in answers
-                          for place in asked.positions_of(answer.inputs)]
-    response.modes = [answer.mode for answer in answers]
-    response.singular = [answer.is_singular for answer in answers]
-    response.success = bool(answers)
-    response.message = '' if answers else elided(asked.reason(*values), MESSAGE)
-
-
-def _machine_together(scene_, name):
+def _machine_together(scene_: scene.Scene, name: str) -> scene.Machine:
     """Return a mechanism by its name, or the only one with several inputs."""
     able = {key: machine for key, machine in scene_.machines.items() if len(machine.inputs) > 1}
     found = scene_.machines.get(name) or (
@@ -206,15 +206,15 @@ def _machine_together(scene_, name):
     return found
 
 
-def _complaint(asked, missed):
+def _complaint(inverse: InverseRequest, missed: Sequence[float]) -> str:
     named = ', '.join(f'{value:.6g}' for value in missed[:MOST_NAMED])
     more = f' and {len(missed) - MOST_NAMED} more' if len(missed) > MOST_NAMED else ''
     # The reason is that of the first value that is one.
     first = next(filter(math.isfinite, missed), math.nan)
-    return f'{asked.what} {named}{more} cannot be reached; {asked.reason(first)}'
+    return f'{inverse.what} {named}{more} cannot be reached; {inverse.reason(first)}'
 
 
-def main(args=None):
+def main(args: Any = None) -> int:
     """Run the node; return the exit code."""
     return scene_node.run(ServoInverse, scene.INVERSE, args)
 

@@ -20,7 +20,7 @@ DRIVER, KINEMATICS, INVERSE = ALL = 'crank_driver', 'kinematics', 'servo_inverse
 OWNER = KINEMATICS
 
 # What the client library declares for itself.
-_ROS = re.compile(r'(use_sim_time|start_type_description_service|qos_overrides\..*)$')
+_ROS = re.compile(r'(use_sim_time|start_type_description_service)$')
 
 KINDS = {
     'bool': (bool, 'true or false'),
