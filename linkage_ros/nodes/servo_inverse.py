@@ -157,8 +157,11 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
 
 def solve_together(machine: scene.Machine, request: Any, response: Any) -> None:
     """Answer a request for several outputs; raise ValueError if it cannot be answered."""
-    inverse, values, near = InverseRequest(machine, request.outputs), request.values, request.near
-    n = len(machine.inputs)
+    values, near, n = request.values, request.near, len(machine.inputs)
+    if len(request.outputs) != n:
+        raise ValueError(f'{machine.name} has {n} inputs: as many outputs are needed, not '
+                         f'{len(request.outputs)}')
+    inverse = InverseRequest(machine, request.outputs)
     if len(values) != n or len(near) not in (0, n):
         raise ValueError(f'values must have {n} numbers and near as many or none, not '
                          f'{len(values)} and {len(near)}')
