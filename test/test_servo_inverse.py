@@ -20,7 +20,6 @@ pytest.importorskip('linkage_interfaces')
 from linkage_interfaces.srv import InputsFor, ServoInverse as Service  # noqa: E402
 from linkage_ros import mechanisms, scene  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
-from rclpy.serialization import serialize_message  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 
 TWO = {'mechanisms': ['left', 'right', 'drop'], 'left.type': 'slotted_lever',

@@ -94,10 +94,6 @@ class ServoInverse(scene_node.SceneNode):
             fill()
         except ValueError as problem:
             response.message = elided(str(problem), MESSAGE)
-        except Exception as problem:
-            # A client waits for ever for a service that raised.
-            response.message = elided(f'internal error: {problem!r}', MESSAGE)
-            self.report('a request', problem)
         return response
 
     def _interpret(self, message: JointState) -> List[Tuple[str, int]]:
