@@ -422,13 +422,6 @@ def test_dimensions_change_while_the_node_runs(graph):
     assert node.answer(request, Service.Response()).success
 
 
-def test_the_handler_never_raises(graph):
-    node = graph.start(ServoInverse)
-    broken = SimpleNamespace(mechanism='', lever_angle=None, servo_near='x')
-    response = node.answer(broken, Service.Response())
-    assert not response.success and response.message
-
-
 BOOM = {'mechanisms': ['boom'], 'boom.type': 'custom', 'boom.scale': 2.0, 'boom.joints': [
     'O ground 0 0', 'P ground 0.5 0', 'B cylinder P O 1.1 right']}
 

@@ -167,8 +167,8 @@ class SceneNode(Node):
         if type(self).prepare is SceneNode.prepare:
             self._adopt(self.scene, self.scene)
         else:
-            self._worker.replace('scene', partial(self._prepared, self.scene))
-        self._worker.replace('ranges', self._parameters_of_scene.renew_ranges)
+            self._worker.replace('a changed scene', partial(self._prepared, self.scene))
+        self._worker.replace('the ranges of sliders', self._parameters_of_scene.renew_ranges)
         if self._announcer:
             self._announcer.announce(changed)
 

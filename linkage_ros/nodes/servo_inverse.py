@@ -23,7 +23,10 @@ from ..scene.inverse_request import InverseRequest, LEVER, present
 from ..words import elided, listed, MESSAGE, quoted
 
 try:
-    from linkage_interfaces.srv import InputsFor, ServoInverse as ServoInverseType
+    from linkage_interfaces.srv import (  # type: ignore[attr-defined]
+        InputsFor,
+        ServoInverse as ServoInverseType,
+    )
 except ImportError as error:
     raise ImportError(
         'servo_inverse needs the service types of linkage_interfaces: run colcon '
