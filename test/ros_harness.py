@@ -97,7 +97,10 @@ class Graph:
         parameters = [value if isinstance(value, Parameter) else
                       Parameter(name.replace('__', '.'), value=value)
                       for name, value in values.items()]
-        return self.answer(lambda: client.set_parameters_atomically(parameters)).result
+        result = self.answer(lambda: client.set_parameters_atomically(parameters)).result
+        # What is accepted acts when it has been prepared.
+        self.until(lambda: getattr(node, 'is_settled', True))
+        return result
 
     def call(self, client, request):
         """Return what a service answers."""
@@ -167,8 +170,10 @@ class Process:
     def __init__(self, name, parameter_file, *arguments, domain=None, env=None):
         self._domain = None if domain else Domain()
         self.domain = domain or self._domain.id
+        start = ('-m', module(name)) if name == 'urdf' else (
+            '-c', f'from linkage_ros import executables; executables.{name}()')
         self._process = subprocess.Popen(
-            [sys.executable, '-m', module(name), *arguments, '--ros-args',
+            [sys.executable, *start, *arguments, '--ros-args',
              '--params-file', str(parameter_file)],
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
             env={**os.environ, **(env or {}), 'ROS_DOMAIN_ID': str(self.domain)})

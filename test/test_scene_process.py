@@ -119,7 +119,7 @@ def test_a_change_of_the_geometry_reaches_all_three(graph, nodes):
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_them_quietly(number):
-    process = Process('scene_process', CONFIG / 'all.yaml')
+    process = Process('scene', CONFIG / 'all.yaml')
     said = [process.line() for _ in range(3)]
     assert [re.search(r'\[(\w+)\]: ready: .*water_drop', line)[1] for line in said] == [
         'kinematics', 'servo_inverse', 'crank_driver']

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import partial
 import sys
 import time
@@ -15,6 +16,7 @@ from sensor_msgs.msg import JointState
 
 from . import joint_state_reader, scene_node
 from .driven_mechanism import DrivenMechanism
+from .incidents import RCLError
 from .mechanism_model import MechanismModel
 from .message_layout import pack, Unreadable
 from .plan import Planner, Route
@@ -110,6 +112,12 @@ class Kinematics(scene_node.SceneNode):
         except scene.SceneError as error:
             self.get_logger().info(f'no robot_description of the whole scene: {error}', once=True)
         return lambda: self._scene_joint_states.describe(text) if models is self._models else None
+
+    def destroy_node(self) -> None:
+        """Delete what is displayed, then end."""
+        with suppress(RCLError):
+            self.say_goodbye()
+        super().destroy_node()
 
     def say_goodbye(self) -> None:
         """Delete what is displayed."""
