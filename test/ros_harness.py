@@ -41,14 +41,14 @@ class Graph:
         self._own = None if self._domain else Domain()
         self.context = rclpy.Context()
         rclpy.init(context=self.context, domain_id=self._domain or self._own.id)
-        self._executor = SingleThreadedExecutor(context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
         self._nodes = []
         self._stamps = itertools.count(1)
         self.node = self._add(rclpy.create_node('tester', context=self.context))
         return self
 
     def __exit__(self, *_):
-        self._executor.shutdown()
+        self.executor.shutdown()
         for node in self._nodes:
             node.destroy_node()
         rclpy.try_shutdown(context=self.context)
@@ -57,7 +57,7 @@ class Graph:
 
     def _add(self, node):
         self._nodes.append(node)
-        self._executor.add_node(node)
+        self.executor.add_node(node)
         return node
 
     def start(self, node_class, parameters=None, **kwargs):
@@ -68,7 +68,7 @@ class Graph:
 
     def end(self, node):
         """End a node."""
-        self._executor.remove_node(node)
+        self.executor.remove_node(node)
         self._nodes.remove(node)
         node.destroy_node()
 
@@ -84,7 +84,7 @@ class Graph:
         while not (held := predicate()):
             assert time.monotonic() < deadline, 'did not happen in time'
             try:
-                self._executor.spin_once(timeout_sec=0.02)
+                self.executor.spin_once(timeout_sec=0.02)
             except InvalidHandle:
                 # Another thread ended a node while this one waited for it.
                 continue

@@ -16,7 +16,7 @@ from sensor_msgs.msg import JointState
 
 from . import joint_state_reader, scene_node
 from .driven_mechanism import DrivenMechanism
-from .incidents import RCLError
+from .incidents import InvalidHandle, RCLError
 from .mechanism_model import MechanismModel
 from .message_layout import pack, Unreadable
 from .plan import Planner, Route
@@ -115,7 +115,7 @@ class Kinematics(scene_node.SceneNode):
 
     def destroy_node(self) -> None:
         """Delete what is displayed, then end."""
-        with suppress(RCLError):
+        with suppress(RCLError, InvalidHandle):
             self.say_goodbye()
         super().destroy_node()
 
