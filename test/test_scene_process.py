@@ -13,6 +13,7 @@ import pytest
 pytest.importorskip('rclpy')
 pytest.importorskip('linkage_interfaces')
 
+from linkage_interfaces.srv import ServoInverse as ServoInverseType  # noqa: E402
 from linkage_ros.nodes import scene_process  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver, InProcessPublisher  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
@@ -93,6 +94,17 @@ def test_who_listens_to_the_cranks_hears_what_the_lever_was_moved_by(graph, node
     both = said.keys() & then.keys()
     assert len(both) > 15
     assert all(then[time]['lever_crank'] == said[time]['lever_crank'] for time in both)
+
+
+def test_the_service_answers_on_the_working_branch_wherever_the_crank_is(graph, nodes):
+    *_, driver = nodes
+    client = graph.node.create_client(ServoInverseType, 'servo_inverse')
+    cranks = graph.listen(JointState, 'crank_states')
+    for start in (0.4, 2.9):
+        graph.set(driver, lever__crank__start=start, lever__crank__speed=0.0)
+        graph.until(lambda start=start: cranks and cranks[-1].position[0] == start)
+        found = graph.call(client, ServoInverseType.Request(lever_angle=[lever_at(0.4)]))
+        assert found.success and found.servo_angle[0] == pytest.approx(0.4, abs=1e-9)
 
 
 def test_a_change_of_the_geometry_reaches_all_three(graph, nodes):

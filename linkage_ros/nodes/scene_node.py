@@ -269,7 +269,6 @@ def _spin(executor: Any, nodes: List[Node], shutdown: ShutdownHandler,
             except Exception as error:
                 # A callback of the client library's own, such as a parameter service.
                 incidents.report('a request', error)
-        _say_goodbye(nodes)
     finally:
         executor.shutdown()
 
