@@ -2003,7 +2003,8 @@ def test_a_reload_keeps_view_units_and_arrows_and_a_lost_connection_is_said(show
 def test_mechanisms_of_one_name_in_two_namespaces_are_told_apart(graph, show, looked_at):
     for space in ('left', 'right'):
         for kind in (CrankDriver, Kinematics):
-            graph.start(kind, {'mechanisms': ['arm'], 'arm.type': 'four_bar'}, namespace=space)
+            graph.start(kind, {'mechanisms': ['arm'], 'arm.type': 'four_bar',
+                               'frame_prefix': f'{space}/'}, namespace=space)
     running = show({}, kinds=())
 
     async def doing(seen):
@@ -2011,6 +2012,13 @@ def test_mechanisms_of_one_name_in_two_namespaces_are_told_apart(graph, show, lo
             '[...document.querySelectorAll("#views button, section h2")].map('
             'one => one.textContent).join()'
             ' === "all,left/arm,right/arm,left/arm,right/arm"'))
+
+        async def beside():
+            """Return whether two loci are seen beside each other: the frames are two."""
+            columns = np.unique(coloured(await seen.canvas(), *GREEN)[:, 1])
+            return len(columns) and (np.diff(columns) > 30).sum() == 1
+
+        await browser.until(beside)
 
     looked_at(running, doing)
 
