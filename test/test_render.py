@@ -181,7 +181,7 @@ def test_a_gif_keeps_the_colours_that_colour_blind_people_tell_apart(tmp_path):
     file = rendered(tmp_path, '--frames', '3', ending='gif')
     with Image.open(file) as image:
         seen = {colour for _, colour in image.convert('RGB').getcolors(1 << 16)}
-    wanted = [palette.BLUE, palette.ORANGE, palette.GREEN, palette.VERMILION, 'white']
+    wanted = [palette.BAR, palette.DRIVEN, palette.LOCUS, palette.GREY, 'white']
     assert {tuple(round(255 * c) for c in to_rgb(colour)) for colour in wanted} <= seen
 
 
