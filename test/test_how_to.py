@@ -182,6 +182,25 @@ def test_a_flap_is_put_where_a_planner_wants_it(reader, follow):
     assert controlled.count_subscribers('/planner/joint_trajectory') == 1
 
 
+def test_an_ankle_on_two_rods(graph, follow):
+    states = graph.listen(JointState, 'joint_states', 100)
+    assert 'ankle_by_pitch_roll_solve' in follow('how-to/ankle')
+
+    def told():
+        told = {}
+        for state in states:
+            told.setdefault(state.header.stamp.nanosec, {}).update(zip(state.name, state.position))
+        return [joints for joints in told.values() if len(joints) == 4]
+
+    graph.until(lambda: len(told()) > 9)
+    ankle = scene.load('examples/ankle.yaml').machines['ankle'].linkage
+    for joints in told():
+        back = ankle.driven_by('pitch', 'roll').joint_angles(
+            (joints['ankle_pitch'], joints['ankle_roll']), ('right', 'left'))
+        assert back['right'] == pytest.approx(joints['motor_right'], abs=1e-12)
+        assert back['left'] == pytest.approx(joints['motor_left'], abs=1e-12)
+
+
 def test_a_boom_on_a_cylinder(graph, follow):
     states = graph.listen(JointState, 'joint_states', 100)
     command = follow('how-to/cylinder')

@@ -202,7 +202,7 @@ def test_a_tracer_must_be_a_joint():
 
 
 def test_lines_of_a_catalogue_type_are_its_own():
-    with pytest.raises(ValueError, match='joints and tracer are for type custom, not for jansen'):
+    with pytest.raises(ValueError, match='are for type custom or rods, not for jansen'):
         mechanisms.create('jansen', joints=FOUR_BAR)
 
 

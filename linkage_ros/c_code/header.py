@@ -10,6 +10,7 @@ C library's sine, cosine and arctangent.
 
 from __future__ import annotations
 
+from dataclasses import replace
 import math
 import re
 from typing import Callable, List, Sequence
@@ -102,21 +103,32 @@ class _Header:
         self.linkage = machine.linkage
         self.number = 'float' if single else 'double'
         self.inputs = [input_.name for input_ in self.linkage.inputs]
+        # In space nobody on a small board asks where points are.
+        self.points = () if machine.in_space else self.linkage.points
         self.dialect = _dialect(single, self.name)
         self.literal = self.dialect.number
 
     def text(self, outputs: Sequence[str]) -> str:
         """Return all of it."""
         guard = f'{self.name.upper()}_LINKAGE_H'
-        for output in outputs:
+        in_space = self.machine.in_space
+        for output in () if in_space else outputs:
             self.linkage.check_output(output)
-        if outputs and len(self.inputs) > 1:
+        if outputs and len(self.inputs) > 1 and not in_space:
             raise ValueError(f'{self.name} has several inputs; an inverse is there for one')
         parts = [self._about(), f'#ifndef {guard}\n#define {guard}\n\n#include <math.h>\n',
                  self._helpers(), self._struct(), self._solve(),
-                 self._rates(), self._reach(), *map(self._inverse, outputs),
+                 self._rates(), self._reach(),
+                 *([self._driven(outputs)] if in_space and outputs else
+                   map(self._inverse, outputs)),
                  f'#endif /* {guard} */\n']
         return '\n'.join(part for part in parts if part)
+
+    def _driven(self, outputs: Sequence[str]) -> str:
+        """Return the same for the linkage driven by outputs: its closed inverse, with rates."""
+        header = _Header(replace(self.machine, linkage=self.linkage.driven_by(*outputs),
+                                 name=f'{self.name}_by_{"_".join(outputs)}'), self.single)
+        return '\n'.join([header._helpers(), header._struct(), header._solve(), header._rates()])
 
     def _about(self) -> str:
         linkage = self.linkage
@@ -146,18 +158,18 @@ class _Header:
     @property
     def _fields(self) -> List[str]:
         linkage = self.linkage
-        return [*(f'{joint}_{axis}' for joint in linkage.points for axis in 'xy'),
+        return [*(f'{joint}_{axis}' for joint in self.points for axis in 'xy'),
                 *(_field(link, linkage.is_angle(link)) for link in linkage.joints)]
 
     @property
     def _outputs(self) -> List[str]:
-        return [*(f'{joint}.{axis}' for joint in self.linkage.points for axis in 'xy'),
+        return [*(f'{joint}.{axis}' for joint in self.points for axis in 'xy'),
                 *self.linkage.joints]
 
     def _struct(self) -> str:
         links = {link.name: link for link in self.linkage.links}
         lines = []
-        for joint in self.linkage.points:
+        for joint in self.points:
             lines.append(f'    {self.number} {joint}_x, {joint}_y;'.ljust(34) + '/* [m] */')
         for name in self.linkage.joints:
             turns = self.linkage.is_angle(name)
@@ -189,7 +201,7 @@ class _Header:
 
     def _solve(self) -> str:
         linkage, n = self.linkage, self.name
-        pose = linkage.posed(linkage.points, linkage.joints)
+        pose = linkage.posed(self.points, linkage.joints)
 
         def ending(outputs: List[str]) -> List[str]:
             filled = [f'    p->{field} = {self._times(code, self.machine.scale_of(output))};'

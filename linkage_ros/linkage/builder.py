@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
-from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 from . import planar
 from .inputs import ANGLE, Input, LENGTH
@@ -85,8 +85,10 @@ class Bar(NamedTuple):
 
 
 @dataclass
-class _Point:
-    place: Complex
+class Point:
+    """A joint: its place, the link that it belongs to, and the size of its coordinates [m]."""
+
+    place: Any
     home: str
     span: Real
     stands_on: frozenset = frozenset()
@@ -103,7 +105,7 @@ class Builder:
     """The joints, links and limits of a linkage, as expressions of its dimensions and inputs."""
 
     def __init__(self) -> None:
-        self.points: Dict[str, _Point] = {}
+        self.points: Dict[str, Point] = {}
         self.links: List[Link] = []
         self.bars: List[Bar] = []
         self.limits: List[planar.Limit] = []
@@ -121,6 +123,10 @@ class Builder:
         self.yokes: Dict[str, str] = {}
         # The ground joints of the lines that what is added is mirrored in, one after the other.
         self.mirrors: Tuple[Tuple[str, ...], ...] = ()
+        # In space: what the dimensions have to be, and what has to have one pose at most.
+        self.axes = 'xy'
+        self.demands: List[Any] = []
+        self.windows: List[Any] = []
         self._vectors: Dict[Tuple[str, str], _Vector] = {}
         self._axes: Dict[str, _Vector] = {}
         self.driven: Dict[str, Tuple[Input, Real]] = {}
@@ -134,14 +140,14 @@ class Builder:
     def ground(self, name: str, x: Number, y: Number) -> None:
         """Fix a joint to the ground at (x, y) [m]."""
         place = Complex(x, y)
-        self.points[name] = _Point(place, GROUND, abs(place.x) + abs(place.y))
+        self.points[name] = Point(place, GROUND, abs(place.x) + abs(place.y))
 
     def crank(self, name: str, centre: str, length: Real, up: bool = False,
               zero: Optional[str] = None, geared: Optional[Gear] = None,
               called: str = '') -> None:
         """Turn a crank [m] about a joint; its zero is +x, or +y if `up`, or towards a joint."""
         link = called or self._numbered('crank')
-        turning = self._drive(Input(link, ANGLE), geared)
+        turning = self.drive(Input(link, ANGLE), geared)
         if zero is None:
             self._on_ground(centre, '; or its zero is towards a joint of its link')
             parent, along = GROUND, Complex(0.0, 1.0) if up else Complex(1.0, 0.0)
@@ -165,7 +171,7 @@ class Builder:
         """Join a bar [m] from a pivot and a cylinder from a base, left of base -> pivot."""
         shortest, longest = self._stroke(base, pivot, bar)
         word = called or self._numbered('cylinder')
-        length = self._drive(Input(word, LENGTH, shortest, longest), geared)
+        length = self.drive(Input(word, LENGTH, shortest, longest), geared)
         found = planar.dyad(self._plain_arm(base, pivot), length, bar, side, longest=longest)
         self.limits += found.limits
         link = self._hang(pivot, name, found.second, bar)
@@ -180,7 +186,7 @@ class Builder:
                  geared: Optional[Gear] = None, called: str = '') -> None:
         """Drive a joint along the line from a joint towards another of one link, low to high."""
         word = called or self._numbered('carriage')
-        place = self._drive(Input(word, LENGTH, low, high), geared)
+        place = self.drive(Input(word, LENGTH, low, high), geared)
         # As a cylinder has no place beyond its stroke, so a carriage has none beyond its way.
         way = abs(low) + abs(high)
         for margin in (place - low, high - place):
@@ -205,7 +211,7 @@ class Builder:
         parent, along, direction = self._direction(origin, towards)
         self._slide(link, parent, origin, name, place, along, direction)
         start = self.points[origin]
-        self.points[name] = _Point(
+        self.points[name] = Point(
             start.place + along * place, link, start.span + way, frozenset().union(
                 *({x} | self.points[x].stands_on for x in (origin, towards, *others))))
 
@@ -220,7 +226,7 @@ class Builder:
         self._place(name, joint, arm, link, offset.length(), ())
         self.frames[link][name] = self.frames[link][joint] + offset
 
-    def _drive(self, input_: Input, geared: Optional[Gear]) -> Real:
+    def drive(self, input_: Input, geared: Optional[Gear]) -> Real:
         """Return what stands for an input, an angle [rad] or a length: a new one, or geared."""
         if geared is None:
             leaf = argument(len(self.inputs))
@@ -260,7 +266,7 @@ class Builder:
             self._on_ground(joint)
         self.mirrors, origin = ((first, second),), self.points[first]
         place = origin.place + self._mirrored(self.points[point].place - origin.place)
-        self.points[name] = _Point(place, GROUND, self.points[point].span + 2.0 * origin.span)
+        self.points[name] = Point(place, GROUND, self.points[point].span + 2.0 * origin.span)
 
     def _mirrored(self, vector: Complex) -> Complex:
         """Return a vector's image in the mirror lines."""
@@ -305,7 +311,7 @@ class Builder:
     def _fix(self, name: str, first: str, vector: Complex, length: Real) -> None:
         """Fix a joint to the ground, a vector [m] away from another."""
         start = self.points[first]
-        self.points[name] = _Point(start.place + vector, GROUND, start.span + length)
+        self.points[name] = Point(start.place + vector, GROUND, start.span + length)
 
     def mirror(self, name: str, point: str, first: str, second: str) -> None:
         """Mirror a joint in the line of two others: the far corner of a kite."""
@@ -554,7 +560,7 @@ class Builder:
         """
         origin = self.points[start]
         stands_on = frozenset().union(*({x} | self.points[x].stands_on for x in (start, *others)))
-        self.points[name] = _Point(place or origin.place + vector, link, origin.span + length,
+        self.points[name] = Point(place or origin.place + vector, link, origin.span + length,
                                    stands_on)
         self._bar(start, name, vector, length, link)
 

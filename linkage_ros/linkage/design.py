@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Callable, FrozenSet, List, Mapping, Optional, Tuple
+from typing import Any, Callable, FrozenSet, List, Mapping, Optional, Tuple
 
-from . import joint_lines
+from . import joint_lines, rod_lines
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Design:
     dimensions : mapping
         Defaults [m].
     joints : tuple of str
-        One line a joint, as `joint_lines` reads them.
+        One line a joint, as `joint_lines` or `rod_lines` read them.
     tracer : str
         The joint whose curve is the locus.
     signed : frozenset
@@ -32,6 +32,10 @@ class Design:
     check : callable, optional
         From the lines and a mechanism of this type; raises ValueError for dimensions that cannot
         be. Default: every bar must have a length.
+    in_space : bool
+        Whether the lines are those of `rod_lines`.
+    inputs : tuple of str
+        In space, the joints that are given. Default: what is driven.
 
     """
 
@@ -41,11 +45,18 @@ class Design:
     tracer: str
     signed: FrozenSet[str] = frozenset()
     check: Optional[Callable] = None
+    in_space: bool = False
+    inputs: Tuple[str, ...] = ()
+
+    @property
+    def words(self) -> Any:
+        """The module that reads and draws the lines."""
+        return rod_lines if self.in_space else joint_lines
 
     @cached_property
     def lines(self) -> List[joint_lines.Line]:
         """The joints as constructions."""
-        return joint_lines.parse(self.joints)
+        return self.words.parse(self.joints)
 
     @cached_property
     def has_literal_lengths(self) -> bool:
@@ -55,4 +66,4 @@ class Design:
     @cached_property
     def branches(self) -> dict:
         """The assembly sign, +1 or -1, of each joint that has two."""
-        return joint_lines.branches(self.lines)
+        return self.words.branches(self.lines)

@@ -26,6 +26,7 @@ from typing import (
     Sequence,
     Tuple,
     TYPE_CHECKING,
+    Union,
 )
 
 import numpy as np
@@ -35,6 +36,7 @@ from .analysis import Analysis
 from .arguments import numbers
 from .curves import LEAST
 from .inverse_linkage import InverseLinkage, taken_apart
+from .inverse_rods import InverseRods, taken_apart as rods_taken_apart
 from .planar import GRAZE
 from .search import blocks, Search, SINGULAR
 from ..cache import cached
@@ -159,7 +161,8 @@ class Inverse:
         self._sizes = [input_.size for input_ in linkage.inputs]
         self._check = linkage.checked(outputs)
         self._rated = linkage.posed((), outputs, outputs)
-        self.closed: Optional[InverseLinkage] = taken_apart(linkage, outputs)
+        self.closed: Union[InverseLinkage, InverseRods, None] = (
+            taken_apart if linkage.axes == 'xy' else rods_taken_apart)(linkage, outputs)
         if self.closed:
             self._solve = self.closed.bind(linkage.is_accelerated)
             self._turns = list(product(*self.closed.turns))
@@ -607,7 +610,7 @@ class Inverse:
         cranks = {link.name: link for link in linkage.links
                   if any(input_.turns and link.name == input_.name for input_ in self._inputs)}
         places, signs = linkage.solve(inputs if self._n > 1 else inputs[0]), {}
-        for link in linkage.links:
+        for link in linkage.links if linkage.axes == 'xy' else ():
             crank = cranks.get(link.parent)
             if crank and link.kind == 'revolute' and link.joint != crank.joint:
                 (a, b), (c, d) = (places[end] - places[start] for start, end in (

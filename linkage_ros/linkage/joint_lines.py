@@ -63,9 +63,9 @@ from ..words import elided, listed, meant, quoted
 _WORDS = {'left': LEFT, 'right': RIGHT, 'out': 1.0, 'in': -1.0}
 _JOINTS = ('CENTRE', 'BASE', 'FIRST', 'SECOND', 'POINT', 'CORNER', 'POLE', 'PIN', 'PIVOT',
            'ORIGIN', 'JOINT', 'TOWARDS')
-_NUMBERS = ('X', 'Y', 'LENGTH', 'DISTANCE', 'OFFSET', 'ANGLE', 'RATIO')
+_NUMBERS = ('X', 'Y', 'Z', 'U', 'V', 'W', 'LENGTH', 'DISTANCE', 'OFFSET', 'ANGLE', 'RATIO')
 # What is no length: its power of one.
-_PLAIN = ('ANGLE', 'RATIO')
+_PLAIN = ('ANGLE', 'RATIO', 'U', 'V', 'W')
 
 # What follows each word, in the order its construction takes it; in brackets what may follow. The
 # words of INPUTS add an input each, unless it is geared to another.
@@ -179,7 +179,7 @@ def parse(texts: Iterable[str]) -> List[Line]:
     """Return the lines of a linkage; raise ValueError with the line that cannot be."""
     lines: List[Line] = []
     for text in texts:
-        line = _parsed(text)
+        line = parsed(text)
         lines += _mirrored(lines, line) if line.word == 'mirrored' else [line]
     _check_order(lines)
     return lines
@@ -197,7 +197,7 @@ def _mirrored(lines: List[Line], mirror: Line) -> List[Line]:
             own |= {*line.names}
             continue
         if line.word == 'ground':
-            found.append(_parsed(f'{line.names[0]}{mirror.names[0]} image {line.names[0]} '
+            found.append(parsed(f'{line.names[0]}{mirror.names[0]} image {line.names[0]} '
                                  f'{" ".join(mirror.stands_on)}')._replace(text=mirror.text))
             continue
         args = [_image(line.word, arg, '' if arg.text in own else mirror.names[0])
@@ -207,7 +207,7 @@ def _mirrored(lines: List[Line], mirror: Line) -> List[Line]:
             ratio = -1 if line.word == 'crank' else 1
             args += [f'geared {line.called or line.word + str(number)} {ratio} 0']
         names = [name + mirror.names[0] for name in line.names[::-1]]
-        found.append(_parsed(f'{" ".join(names)} {line.word} {" ".join(args)}')._replace(
+        found.append(parsed(f'{" ".join(names)} {line.word} {" ".join(args)}')._replace(
             text=mirror.text, mirrors=(*line.mirrors, mirror.stands_on)))
     return found
 
@@ -225,28 +225,29 @@ def _image(word: str, arg: Argument, suffix: str) -> str:
     return f'{word} {text}'.strip()
 
 
-def _parsed(text: str) -> Line:
+def parsed(text: str, forms: Mapping[str, Tuple[str, ...]] = FORMS) -> Line:
+    """Return one line; raise ValueError if it has none of the forms."""
     if len(text) > _LONGEST:
         raise _error(text, f'a line has up to {_LONGEST} letters, this has {len(text)}')
     parts = text.split()
-    found = [i for i, part in enumerate(parts) if part in FORMS and i > 0]
+    found = [i for i, part in enumerate(parts) if part in forms and i > 0]
     if not found:
         for part in parts[1:]:
-            if near := meant(part, FORMS):
+            if near := meant(part, forms):
                 raise _error(text, f'{quoted(part)} is no construction{near}')
-        raise _error(text, f'expected NAME and one of the constructions {", ".join(FORMS)}')
+        raise _error(text, f'expected NAME and one of the constructions {", ".join(forms)}')
     at = found[0]
     line = Line(text, tuple(parts[:at]), parts[at], tuple(parts[at + 1:]))
     names = 3 if line.word == 'inversor' else 1
-    fitting = [arguments for form in FORMS[line.word]
+    fitting = [arguments for form in forms[line.word]
                if (arguments := _fitted(form, line.args)) is not None]
     if len(line.names) != names or not fitting:
         several = '; one line a joint' if len(found) > 1 else ''
-        forms = ' or '.join(f'"{"NAME " * names}{form}"' for form in FORMS[line.word])
-        raise line.error(f'expected {forms}{several}')
+        expected = ' or '.join(f'"{"NAME " * names}{form}"' for form in forms[line.word])
+        raise line.error(f'expected {expected}{several}')
     line = line._replace(arguments=tuple(fitting[-1]))
     for name in line.names:
-        if not _NAME.fullmatch(name) or name in FORMS:
+        if not _NAME.fullmatch(name) or name in forms:
             raise line.error(f'{quoted(name)} is no name for a joint: a letter, then up to 63 '
                              'letters, digits and underscores, but none of the constructions')
     if line.called and (not _NAME.fullmatch(line.called) or line.called in _GROUPS):
@@ -364,6 +365,11 @@ def branches(lines: Iterable[Line]) -> dict:
     return {line.names[0]: int(_WORDS[arg])
             for line in lines if line.word != 'rigid'
             for kind, arg, _ in line.arguments if '|' in kind}
+
+
+def points(lines: Iterable[Line]) -> List[str]:
+    """Return the joints that lines place."""
+    return [name for line in lines for name in line.names]
 
 
 def check_name(called: str) -> None:

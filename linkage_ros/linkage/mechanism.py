@@ -5,12 +5,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from importlib.util import find_spec
 import math
 from types import MappingProxyType
-from typing import Any, Callable, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, List, Mapping, Optional, Sequence, Tuple, TypeVar, Union
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,6 +37,7 @@ MOST_TURNS = 1000
 # Values of expressions of dimensions that are held: some twenty times those of Jansen's leg.
 MOST_VALUES = 10000
 
+Own = TypeVar('Own', bound='Mechanism')
 # One input, or a sequence of several; each a number or an array [rad or m].
 Inputs = Union[ArrayLike, Sequence[ArrayLike]]
 
@@ -120,6 +122,7 @@ class Mechanism:
         self._poses, self._placers = Cache(), Cache()
         # What was worked out of it: reach, inverses, travels.
         self.cache = Cache()
+        self.axes = built.axes
         self.inputs = tuple(map(self._counted_input, range(len(built.inputs)), built.inputs))
         self.geared = tuple(built.driven.keys() - {input_.name for input_ in self.inputs})
         self.links = tuple(link._replace(zero=np.asarray(self._value(link.zero)).tolist())
@@ -146,6 +149,24 @@ class Mechanism:
         """Return for each line of a rigid triangle whether the dimensions allow it."""
         return {self.line_of(name): np.isfinite(self._value(height))
                 for name, height in self._structure.built.triangles.items()}
+
+    def constants(self, expressions: Any) -> Any:
+        """Return tuples of expressions of dimensions as tuples of their values."""
+        if isinstance(expressions, Real):
+            return self._value(expressions)
+        if not isinstance(expressions, tuple):
+            return expressions
+        values = map(self.constants, expressions)
+        make = getattr(expressions, '_make', tuple)
+        return make(values)
+
+    def demands(self) -> list:
+        """Return what dimensions have to make positive: line, amount, and the problem."""
+        return [self.constants(tuple(demand)) for demand in self._structure.built.demands]
+
+    def windows(self) -> list:
+        """Return the links on two hinges in a row that two rods hold, with their limits."""
+        return [self.constants(held) for held in self._structure.built.windows]
 
     @cached_property
     def frames(self) -> Mapping:
@@ -177,6 +198,48 @@ class Mechanism:
             self.branches, self._accelerate)
         made.check()
         return made
+
+    def driven_by(self: Own, *outputs: str, branches: Optional[Mapping[str, int]] = None) -> Own:
+        """
+        Return a linkage in space with other inputs: what its joints are for values of others.
+
+        Parameters
+        ----------
+        *outputs : str
+            As many joints as it has inputs, those that are given instead.
+        branches : mapping, optional
+            For each rod the side of its crank, 1 as it is drawn or -1. Default: its own.
+
+        Returns
+        -------
+        Mechanism
+
+        Raises
+        ------
+        ValueError
+            If there is no such joint, or what is left cannot be solved.
+
+        """
+        unknown = [name for name in outputs if name not in self.joints]
+        if self.axes != 'xyz' or unknown or len({*outputs}) != len(self.inputs):
+            raise ValueError(f'{self.type} can be driven by {len(self.inputs)} of '
+                             f'{listed(self.joints if self.axes == "xyz" else ())}, '
+                             f'not by {listed(outputs)}')
+        sides = {**self.branches, **(branches or {})}
+        made = self.cache.get_or_make(('driven by', outputs, *sides.values()), lambda: type(self)(
+            replace(self._design, inputs=outputs), self.dimensions, sides, self._accelerate))
+        made.check()
+        return made
+
+    @property
+    def design(self) -> Design:
+        """What it is a mechanism of."""
+        return self._design
+
+    @property
+    def lengths(self) -> Mapping:
+        """Its dimensions in its own unit, and that unit, as its programs are bound to them."""
+        return self._lengths
 
     def check(self) -> None:
         """Raise ValueError, with the line, if its dimensions cannot be."""
@@ -863,8 +926,8 @@ class Mechanism:
     def _vectors(self, kind: str, theta: Inputs, points: Any, *by: int) -> dict:
         names, pose = self._ready(kind, points, *by)
         values = pose.over(*self.each_input(theta))
-        pairs = np.moveaxis(values.reshape(len(names), 2, *values.shape[1:]), 1, -1)
-        return dict(zip(names, pairs))
+        places = values.reshape(len(names), len(self.axes), *values.shape[1:])
+        return dict(zip(names, np.moveaxis(places, 1, -1)))
 
     def _scalars(self, kind: str, theta: Inputs, joints: Any, *by: int) -> dict:
         names, pose = self._ready(kind, joints, *by)

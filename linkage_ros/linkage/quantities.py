@@ -17,6 +17,7 @@ from . import joint_lines
 from .builder import Builder, in_metres
 from .design import Design
 from .planar import Arm, Limit
+from .spatial import Vector
 from ..cache import Cache, cached
 from ..formula.expression import (
     arctangent,
@@ -69,8 +70,9 @@ class Structure:
 
     def __init__(self, design: Design, branches: Mapping[str, int]):
         self.built = Builder()
-        joint_lines.draw(self.built, design.lines, joint_lines.symbols_of(
-            design.dimensions, design.signed), branches)
+        given = {'inputs': design.inputs} if design.inputs else {}
+        design.words.draw(self.built, design.lines, joint_lines.symbols_of(
+            design.dimensions, design.signed), branches, **given)
         self.branches = dict(branches)
         self._programs = Cache()
         self._outputs: Mapping[str, Callable] = {
@@ -95,9 +97,9 @@ class Structure:
 
     def _points(self, names: Points) -> List[Real]:
         return [in_metres(part) for place in map(self._place, names)
-                for part in (place.x, place.y)]
+                for part in (place if isinstance(place, Vector) else (place.x, place.y))]
 
-    def _place(self, point: Union[str, Spot]) -> Complex:
+    def _place(self, point: Union[str, Spot]) -> Union[Complex, Vector]:
         """Return where a joint is, or a spot whose coordinates are dimensions."""
         if isinstance(point, str):
             return self.built.points[point].place
@@ -115,16 +117,16 @@ class Structure:
         return rate if alone or not value.varies else gated(rate, abs(value), real(0.0))
 
     def _angles(self, names: Names) -> List[Real]:
-        return [self._value(name) for name in names]
+        return [self.output(name) for name in names]
 
-    def _value(self, name: str) -> Real:
+    def output(self, name: str) -> Real:
         """Return a joint angle, a slide, or another output by its name."""
         if name in self.built.joint_values:
             value = self.built.joint_values[name]
             return in_metres(value) if self._slides(name) else value
         if (arm := self._arm(name)) is None:
             joint, _, axis = name.rpartition('.')
-            return self._points((joint,))['xy'.index(axis)]
+            return self._points((joint,))[self.built.axes.index(axis)]
         if self.turns(name):
             return arctangent(arm.vector.y, arm.vector.x)
         return in_metres(square_root(arm.square))
@@ -153,6 +155,7 @@ class Structure:
         values, speeds, leg = (given[:len(inputs)], given[len(inputs):2 * len(inputs)],
                                Leg(*given[2 * len(inputs):]))
         across = leg.side * leg.size
+        factors = (across, leg.size, leg.size)[:len(self.built.axes)]
         own = {own: leg.start + leg.side * (value - leg.lag) if input_.turns else value / leg.size
                for own, value, input_ in zip(self.built.arguments, values, inputs)}
         turning = [sum((rate * (speed if input_.turns else speed / leg.size)
@@ -160,7 +163,7 @@ class Structure:
                    for rates in zip(*(self._rates(moving, by) for by in range(len(inputs))))]
         # A mirrored leg's own crank turns backwards, which mirrors its rates once more.
         outputs = [*(part * factor for part, factor in zip(self._points(points),
-                                                           cycle((across, leg.size)))),
+                                                           cycle(factors))),
                    *(value * (across if self._slides(name) else leg.side)
                      for name, value in zip(joints, self._angles(joints))),
                    *(value * leg.size if self._slides(name) else value
@@ -171,7 +174,7 @@ class Structure:
         return any(x.name == name and x.kind == 'prismatic' for x in self.built.links)
 
     def _rates(self, names: Names, by: int = 0) -> List[Real]:
-        return [self._due(rate, self._value(name))
+        return [self._due(rate, self.output(name))
                 for name, rate in zip(names, self._turning(names, {by: 1.0}))]
 
     def _point_accelerations(self, names: Names) -> List[Real]:
@@ -207,8 +210,9 @@ class Structure:
             return turned.formula(*map(d, turned.of))
 
         def rate(name: str) -> Real:
-            if not self.turns(name) or name in self.built.driven:
-                return d(self._value(name))
+            # In space a joint turns about its own axis: there is no direction in a plane.
+            if not self.turns(name) or name in self.built.driven or self.built.axes != 'xy':
+                return d(self.output(name))
             if arm := self._arm(name):
                 return turning(arm.vector)
             return turning(directions.get(name)) - turning(directions.get(parents[name]))
@@ -238,13 +242,13 @@ class Structure:
 
     def _output(self, name: str) -> List[Real]:
         """Return an output, as `input_for` names it, and its rate by the first input."""
-        return [self._value(name), *self._rates((name,))]
+        return [self.output(name), *self._rates((name,))]
 
     def has(self, output: str) -> bool:
         """Return whether there is an output of this name."""
         joint, _, axis = output.rpartition('.')
-        pair = PAIR.fullmatch(output)
-        ends = pair.groups() if pair else (joint,) if axis in ('x', 'y') else ()
+        pair = PAIR.fullmatch(output) if self.built.axes == 'xy' else None
+        ends = pair.groups() if pair else (joint,) if axis in [*self.built.axes] else ()
         return output in self.built.joint_values or bool(ends) and len(set(ends)) == len(
             ends) and set(ends) <= self.built.points.keys()
 

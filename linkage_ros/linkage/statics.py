@@ -40,9 +40,9 @@ def _powers(linkage: Mechanism, theta: Inputs, loads: Mapping[str, ArrayLike],
         name = plain_text(name)
         force = numbers(f'the load on {name}', load)
         if name in linkage.points:
-            if force.shape[-1:] != (2,):
-                raise ValueError(f'the load on the joint {name} must be a force x, y [N], not '
-                                 f'{quoted(load)}')
+            if force.shape[-1:] != (len(linkage.axes),):
+                raise ValueError(f'the load on the joint {name} must be a force '
+                                 f'{", ".join(linkage.axes)} [N], not {quoted(load)}')
             velocity = linkage.velocity(theta, (name,), by)[name]
             # A load of nothing takes nothing, however fast its joint moves.
             yield np.where(force == 0.0, 0.0, force * velocity).sum(axis=-1)
@@ -59,6 +59,9 @@ def _powers(linkage: Mechanism, theta: Inputs, loads: Mapping[str, ArrayLike],
 def _chain(linkage: Mechanism, name: str) -> Iterator[str]:
     """Yield the links that turn a link, itself first, down to the ground."""
     links = {link.name: link for link in linkage.links}
+    if linkage.axes != 'xy':  # each turns about its own axis, and is loaded about that
+        yield name
+        return
     while name in links:
         if links[name].kind != 'prismatic':
             yield name

@@ -168,8 +168,8 @@ class Assembly:
         """
         inputs, moving = len(self.linkage.inputs), rates is not None
         rates = tuple(rates or ())
-        layout = Layout(len(self.legs), inputs, 2 * len(points), len(joints), len(rates),
-                        inputs if moving else 0, efforts)
+        layout = Layout(len(self.legs), inputs, len(self.linkage.axes) * len(points), len(joints),
+                        len(rates), inputs if moving else 0, efforts)
         values = np.zeros(layout.size)
         batch = self._fastest.legs(
             tuple(points), tuple(joints), rates, layout.rows(values))

@@ -30,12 +30,12 @@ from ..words import meant, quoted
 # What a scene shows when it names no mechanism, and its scale: from 0.5 m to 1.5 m in size.
 CATALOGUE = {'water_drop': 0.1, 'jansen': 0.005, 'peaucellier': 0.1, 'slotted_lever': 0.002}
 
-CUSTOM = 'custom'
+WRITTEN = tuple(custom.WORDS)
 
 
 def _found() -> Dict[str, ModuleType]:
     """Return the modules of this folder by the type that each is: those of CATALOGUE first."""
-    names = [module.name for module in pkgutil.iter_modules(__path__) if module.name != CUSTOM]
+    names = [module.name for module in pkgutil.iter_modules(__path__) if module.name != 'custom']
     return {name: _module(name) for name in dict.fromkeys((*CATALOGUE, *sorted(names)))}
 
 
@@ -59,7 +59,8 @@ def design(type_: str, /, joints: Optional[Sequence[str]] = None, tracer: Option
     """
     Return what a type is: its dimensions, joints, branches and tracer.
 
-    For 'custom' these follow from the lines of `joints` and the names of the dimensions given.
+    For 'custom' and 'rods' these follow from the lines of `joints` and the names of the
+    dimensions given.
 
     Raises
     ------
@@ -67,13 +68,15 @@ def design(type_: str, /, joints: Optional[Sequence[str]] = None, tracer: Option
         For an unknown type or a bad line; the text says what is allowed.
 
     """
-    if not isinstance(type_, str) or type_ not in (*TYPES, CUSTOM):
+    if not isinstance(type_, str) or type_ not in (*TYPES, *WRITTEN):
         raise ValueError(f'unknown mechanism type {quoted(type_)}; '
-                         f'allowed: {", ".join((*TYPES, CUSTOM))}{meant(type_, (*TYPES, CUSTOM))}')
-    if type_ == CUSTOM:
-        return custom.given(joints, tracer, dimensions)
+                         f'allowed: {", ".join((*TYPES, *WRITTEN))}'
+                         f'{meant(type_, (*TYPES, *WRITTEN))}')
+    if type_ in WRITTEN:
+        return custom.given(type_, joints, tracer, dimensions)
     if joints is not None or tracer is not None:
-        raise ValueError(f'joints and tracer are for type custom, not for {type_}')
+        raise ValueError(f'joints and tracer are for type '
+                         f'{" or ".join(WRITTEN)}, not for {type_}')
     return TYPES[type_].DESIGN
 
 
@@ -93,13 +96,14 @@ def create(type_: str, /, *, branches: Optional[Mapping[str, int]] = None,
     Parameters
     ----------
     type_ : str
-        One of TYPES, or 'custom'.
+        One of TYPES, 'custom' or, for linkages in space, 'rods'.
     branches : mapping, optional
         Assembly signs, +1 or -1, by joint; what is left out is as in the catalogue or as written.
     joints : sequence of str, optional
-        For type 'custom': one line a joint, as `linkage.joint_lines` describes.
+        One line a joint: for type 'custom' as `linkage.joint_lines` describes, for type 'rods' as
+        `linkage.rod_lines` does.
     tracer : str, optional
-        For type 'custom': the joint whose curve is the locus. Default: the last.
+        For type 'custom' or 'rods': the joint whose curve is the locus. Default: the last.
     **dimensions : float or array-like
         Lengths [m]; what is left out is as in the catalogue. Arrays are broadcast against the
         crank angle.

@@ -10,16 +10,19 @@ from typing import Any, Iterable, List, Optional, Tuple
 import numpy as np
 
 from ..cache import cached
-from ..linkage import joint_lines
+from ..linkage import joint_lines, rod_lines
 from ..linkage.design import Design
 from ..linkage.mechanism import check_bars, Mechanism
 from ..words import listed, meant, plain_text, quoted
 
 MOST_LINES = 2000
+# What users write down themselves, and who reads it.
+WORDS = {'custom': joint_lines, 'rods': rod_lines}
 
 
 @cached(64, shared=True)
-def design(joints: Tuple[str, ...], tracer: Optional[str], names: Tuple[str, ...]) -> Design:
+def design(type_: str, joints: Tuple[str, ...], tracer: Optional[str],
+           names: Tuple[str, ...]) -> Design:
     """
     Return the design that lines of joints make.
 
@@ -29,10 +32,11 @@ def design(joints: Tuple[str, ...], tracer: Optional[str], names: Tuple[str, ...
         With the line and what is allowed.
 
     """
-    lines = joint_lines.parse(joints)
-    if not any(line.drives for line in lines):
+    words = WORDS[type_]
+    lines = words.parse(joints)
+    if not any(line.word in words.INPUTS for line in lines):
         raise ValueError('a linkage needs a line that drives it: '
-                         f'{" or ".join(joint_lines.INPUTS)}')
+                         f'{" or ".join(words.INPUTS)}')
     for line in lines:
         for name in joint_lines.lengths([line]):
             joint_lines.check_name(name)
@@ -40,12 +44,13 @@ def design(joints: Tuple[str, ...], tracer: Optional[str], names: Tuple[str, ...
                 raise line.error(f'dimension {name} has no value; given: {listed(names)}'
                                  f'{meant(name, names)}')
     used = joint_lines.lengths(lines)
-    placed = [name for line in lines for name in line.names]
+    placed = words.points(lines)
     if tracer is not None and tracer not in placed:
         raise ValueError(f'tracer {quoted(tracer)} is no joint; allowed: {listed(placed)}'
                          f'{meant(tracer, placed)}')
     signed = frozenset(name for name, length in used.items() if not length)
-    return Design('custom', dict.fromkeys(used, 1.0), joints, tracer or placed[-1], signed, check)
+    return Design(type_, dict.fromkeys(used, 1.0), joints, tracer or placed[-1], signed,
+                  check if words is joint_lines else rod_lines.check, words is rod_lines)
 
 
 def check(lines: List[joint_lines.Line], linkage: Mechanism) -> None:
@@ -63,7 +68,7 @@ def check(lines: List[joint_lines.Line], linkage: Mechanism) -> None:
                              'other two together')
 
 
-def given(joints: Optional[Iterable[str]], tracer: Optional[str],
+def given(type_: str, joints: Optional[Iterable[str]], tracer: Optional[str],
           dimensions: Iterable[str]) -> Design:
     """Return the design of what a user gives; raise ValueError for what is none."""
     if tracer is not None and not isinstance(tracer, str):
@@ -76,7 +81,7 @@ def given(joints: Optional[Iterable[str]], tracer: Optional[str],
                          f'got {quoted(dimensions)}') from None
     for name in names:
         joint_lines.check_name(name)
-    return design(lines, plain_text(tracer), names)
+    return design(type_, lines, plain_text(tracer), names)
 
 
 def given_lines(joints: Any) -> Tuple[str, ...]:

@@ -72,7 +72,8 @@ class Kinematics(scene_node.SceneNode):
     def check(self, new: scene.Scene) -> None:
         """Refuse what has no robot model; SceneError says why."""
         for name, machine in new.machines.items():
-            if name not in self.scene.machines or machine is not self.scene.machines[name]:
+            if not machine.in_space and (name not in self.scene.machines
+                                         or machine is not self.scene.machines[name]):
                 bodies.robot([machine], machine.frame_id or new.frame_id)
 
     def prepare(self, new: scene.Scene) -> Any:
@@ -105,7 +106,8 @@ class Kinematics(scene_node.SceneNode):
     def _robot(self, models: Dict[str, MechanismModel]) -> Callable[[], None]:
         """Make the robot model of the scene; return what publishes it."""
         # Where only named joints are published, they are in a robot model of somebody else's.
-        robots = [model.robot for model in models.values() if not model.machine.only_named]
+        robots = [model.robot for model in models.values()
+                  if model.robot and not model.machine.only_named]
         text = ''
         try:
             text = urdf.write(bodies.together(robots)) if robots else ''

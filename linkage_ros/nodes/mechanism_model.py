@@ -18,6 +18,7 @@ from . import messages
 from .message_layout import PatchedPublisher
 from .. import scene
 from ..cache import Cache
+from ..linkage.mechanism import Mechanism
 from ..linkage.quantities import Spot
 from ..linkage.walker import Layout, Solution
 from ..robot_model import bodies, shapes, urdf
@@ -72,7 +73,7 @@ class MechanismModel:
     def __init__(self, machine: scene.Machine, frame_id: str, prefix: str):
         self.machine, self.made_of = machine, (machine, frame_id, prefix)
         self.inputs = list(machine.inputs.values())
-        self.robot = bodies.robot([machine], frame_id)
+        self.robot = None if machine.in_space else bodies.robot([machine], frame_id)
         self.assembly = machine.assembly()
         self._names, self._signs, self._offsets, self._published, self._wrapped = map(
             np.array, zip(*machine.joints.values()))
@@ -93,7 +94,7 @@ class MechanismModel:
         """Return the messages that are published once: the robot model and, if any, the locus."""
         drawn, size = self._drawn[:3], self._drawn[3]
         curve = self.assembly.locus(self.machine.tracer)
-        return (urdf.write(self.robot),
+        return (urdf.write(self.robot) if self.robot else '',
                 messages.locus(*drawn, curve, size) if len(curve) > 1 else None)
 
     def solution(self, joints: bool, markers: bool, moving: bool) -> Solution:
@@ -178,7 +179,8 @@ class MechanismModel:
     def marker_message(self, pose: Pose, values: np.ndarray, stamp: Any) -> MarkerArray:
         """Return the markers of the assembled legs."""
         layout, legs = pose.solution.layout, pose.legs()
-        places = layout.rows(values)[legs, :layout.coordinates].reshape(len(legs), -1, 2)
+        places = layout.rows(values)[legs, :layout.coordinates].reshape(
+            len(legs), -1, len(self.machine.linkage.axes))
         # Legs on the left and on the right follow each other; each side has ground of its own.
         _, grounded = np.unique(legs % (1 + self.machine.mirrored), return_index=True)
         return self.marker_array.message(stamp, places, sorted(grounded))
@@ -187,6 +189,8 @@ class MechanismModel:
 def _shown(machine: scene.Machine) -> Tuple[Sequence, Dict[int, list]]:
     """Return the points of the markers, joints and others, and which of them each marker shows."""
     linkage, wanted = machine.linkage, machine.points
+    if machine.in_space:
+        return _in_space(linkage, wanted)
     cranks, plates = shapes.cranks(linkage), shapes.plates(linkage, wanted)
     # A plate is drawn instead of its bars: the message is the smaller for it.
     edges = {frozenset(edge) for plate in plates for edge in combinations(plate, 2)}
@@ -206,6 +210,14 @@ def _shown(machine: scene.Machine) -> Tuple[Sequence, Dict[int, list]]:
     return (*wanted, *spots), {
         id_: [[place[point] for point in piece] for piece in several if place.keys() >= set(piece)]
         for id_, several in pieces.items()}
+
+
+def _in_space(linkage: Mechanism, wanted: Sequence[str]) -> Tuple[Sequence, Dict[int, list]]:
+    """Return what `_shown` does for a linkage of rods: lines between points."""
+    place = {point: i for i, point in enumerate(wanted)}
+    return wanted, {messages.LINKS_ID: [
+        [place[end] for end in line] for line in (*linkage.bars, *linkage.cylinders)
+        if place.keys() >= {*line}], messages.JOINTS_ID: [[i] for i in place.values()]}
 
 
 def _arranged(layout: Layout, rest: float, joints: np.ndarray, rates: np.ndarray) -> np.ndarray:

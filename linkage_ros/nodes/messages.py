@@ -102,7 +102,7 @@ class Markers:
         ----------
         stamp : builtin_interfaces.msg.Time
             The time.
-        places : float array (legs, points, 2)
+        places : float array (legs, points, 2 or 3)
             Where the points are [m].
         grounded : sequence of int
             Legs whose ground is shown, one for each ground that there is.
@@ -111,20 +111,23 @@ class Markers:
         for marker, points in self._shown:
             marker.header.stamp = stamp
             legs = places[grounded] if marker.id == GROUND_ID else places
-            marker.points = self._filled(marker.id, legs[:, points].reshape(-1, 2).tolist())
+            marker.points = self._filled(marker.id, legs[:, points].reshape(
+                -1, places.shape[-1]).tolist())
             if marker.type == Marker.TRIANGLE_LIST:
                 # With colours of their own RViz shows both sides of faces so, lit or not.
                 face = FACE if marker.id == PLATES_ID else marker.color
                 marker.colors = [face] * (len(marker.points) // 3)
         return self._message
 
-    def _filled(self, id_: int, pairs: List) -> List[Point]:
-        """Return points at x, y pairs; for as many as before, the same ones."""
-        points = self._points.get((id_, len(pairs)))
+    def _filled(self, id_: int, places: List) -> List[Point]:
+        """Return points at places; for as many as before, the same ones."""
+        points = self._points.get((id_, len(places)))
         if points is None:
-            points = self._points[id_, len(pairs)] = [Point() for _ in pairs]
-        for point, (x, y) in zip(points, pairs):
+            points = self._points[id_, len(places)] = [Point() for _ in places]
+        for point, (x, y, *z) in zip(points, places):
             point.x, point.y = x, y
+            if z:
+                point.z, = z
         return points
 
 
@@ -132,7 +135,7 @@ def locus(name: str, frame_id: str, pose: Sequence[float], places: np.ndarray,
           size: float) -> Marker:
     """Return the curve through places [m], shape (n, 2); without a stamp it holds at any time."""
     marker = _marker(name, LOCUS_ID, frame_id, pose, size)
-    marker.points = [Point(x=x, y=y) for x, y in places.tolist()]
+    marker.points = [Point(**dict(zip('xyz', place))) for place in places.tolist()]
     return marker
 
 

@@ -11,6 +11,7 @@ import shutil
 from . import parts
 from .. import scene
 from ..command import chosen, Parser, RequestError, run
+from ..scene.machine import IN_SPACE
 from ..words import meant
 
 STILL, MOVING = ('.png', '.svg'), ('.gif', '.mp4')
@@ -79,6 +80,9 @@ def draw(asked, machines):
 
     from .picture import Picture, PictureError
 
+    for machine in machines:
+        if machine.in_space:
+            raise RequestError(f'{machine.name} is {IN_SPACE}')
     usual = parts.USUAL_IN_MOTION if asked.moving else parts.USUAL
     with style.context('default', after_reset=True):
         picture = Picture(machines, asked.size, asked.trace, (usual | asked.show) - asked.hide)

@@ -32,6 +32,7 @@ from .. import palette
 from ..linkage.builder import GROUND
 from ..linkage.output_range import common_reach, ground_frame, Travel, travels
 from ..scene import Machine, SceneError
+from ..scene.machine import IN_SPACE
 from ..words import listed
 
 # As in the markers: bars, what inputs move, guides and joints.
@@ -268,6 +269,8 @@ class _Tree:
     """The bodies of a mechanism."""
 
     def __init__(self, machine: Machine, width: Optional[float]):
+        if machine.in_space:
+            raise SceneError(f'{machine.name} is {IN_SPACE}')
         length = size(machine)
         self._thickness = length if width is None else 0.5 * width / BAR
         self._machine, self._assembly = machine, machine.assembly()

@@ -12,11 +12,11 @@ from .parameters import SceneError
 from ..linkage.mechanism import Mechanism
 from ..words import elided, listed
 
-# A moment [N m], or a force x, y [N].
-Load = Union[float, Tuple[float, float]]
+# A moment [N m], or a force x, y and, in space, z [N].
+Load = Union[float, Tuple[float, ...]]
 
 _FIGURE = r'[+-]?(?:\d{1,99}\.?\d{0,99}|\.\d{1,99})(?:[eE][+-]?\d\d?)?'
-_LINE = re.compile(rf'(\w+)=({_FIGURE})(?: +({_FIGURE}))?', re.ASCII)
+_LINE = re.compile(rf'(\w+)=({_FIGURE})(?: +({_FIGURE}))?(?: +({_FIGURE}))?', re.ASCII)
 
 
 def read_loads(mechanism: str, linkage: Mechanism, lines: Iterable[str]) -> Dict[str, Load]:
@@ -30,6 +30,9 @@ def read_loads(mechanism: str, linkage: Mechanism, lines: Iterable[str]) -> Dict
                 f"{mechanism}.loads must be texts such as 'C=0 -9.81', a force [N] at a joint, or "
                 f"'EF=2.5', a moment [N m] on a link, each about another of "
                 f'{listed((*linkage.points, *linkage.joints), 90)}, not {elided(line)!r}')
-        first = float(match[2])
-        loads[match[1]] = (first, float(match[3])) if match[3] else first
+        first, *others = (float(figure) for figure in match.groups()[1:] if figure)
+        if others and len(others) + 1 != len(linkage.axes):
+            raise SceneError(f'{mechanism}.loads: a force has as many parts as a place: '
+                             f'{", ".join(linkage.axes)}, not {elided(line)!r}')
+        loads[match[1]] = (first, *others) if others else first
     return loads

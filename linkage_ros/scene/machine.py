@@ -30,7 +30,9 @@ from ..linkage.mechanism import Mechanism
 from ..linkage.walker import Assembly
 from ..words import listed, meant, quoted
 
-TYPES = (*mechanisms.TYPES, mechanisms.CUSTOM)
+IN_SPACE = ('a linkage in space: pictures, the page and robot models are of linkages in a '
+            'plane')
+TYPES = (*mechanisms.TYPES, *mechanisms.WRITTEN)
 
 # What a frame may be called, or is not.
 FRAME = re.compile(r'(\w[\w.:/-]{0,99})?', re.ASCII)
@@ -91,6 +93,11 @@ class Machine:
             self.given[key] is value for key, value in given.items())
 
     @property
+    def in_space(self) -> bool:
+        """Whether it is of rods: then it has no picture, page or robot model of its own."""
+        return len(self.linkage.axes) > 2
+
+    @property
     def first(self) -> Drive:
         """The first input, for most linkages the only one."""
         return next(iter(self.inputs.values()))
@@ -138,9 +145,8 @@ class Machine:
         units = [self.scale_of(name) for name in self.inputs]
         own = [value / unit for value, unit in zip(values, units)]
         # Where all is so much larger, a force has a longer lever; a moment has none.
-        loads = {name: load if isinstance(load, float) else (self.scale * load[0],
-                                                             self.scale * load[1])
-                 for name, load in self.loads.items()}
+        loads = {name: load if isinstance(load, float) else tuple(
+            self.scale * part for part in load) for name, load in self.loads.items()}
         found = self.linkage.effort(own if len(own) > 1 else own[0], loads)
         return tuple(float(effort) / unit for effort, unit in zip(found, units))
 
@@ -260,7 +266,7 @@ def _legs(name: str, linkage: Mechanism, values: Values) -> Tuple[int, bool]:
 
 def _can_have_more_legs(linkage: Mechanism) -> bool:
     first, *others = linkage.inputs
-    if others or not first.turns:
+    if others or not first.turns or len(linkage.axes) > 2:
         return False
     crank = next(link for link in linkage.links if link.name == first.name)
     return not crank.zero and linkage.solve(0.0, (crank.joint,))[crank.joint][0] == 0.0

@@ -40,6 +40,7 @@ from .poses import Refused
 from .settings import Described, RemoteNode, Setting
 from .. import scene
 from ..scene import writing
+from ..scene.machine import IN_SPACE
 from ..words import quoted
 
 MARKERS, LOCUS, LIST = '/markers', '/locus', '/list_parameters'
@@ -284,6 +285,8 @@ class SceneView:
         """Return a machine and its inputs [rad or m] as they were told last, or as they start."""
         if mechanism.machine is None:
             mechanism.machine = mechanism.scene().machines[mechanism.name]
+        if mechanism.machine.in_space:
+            raise Refused(f'{mechanism.name} is {IN_SPACE}')
         machine, inputs = mechanism.machine, []
         if self._bridge.loop.time() > mechanism.until:
             mechanism.held = {}

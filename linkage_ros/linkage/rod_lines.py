@@ -1,0 +1,506 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Linkages in space written down: hinges with axes anywhere, and rods with ball ends.
+
+    pitch hinge ground at 0 0 0 axis 0 1 0 within -50deg 30deg     turns on the ground
+    roll hinge pitch at 0 0 -h axis 1 0 0 within -15deg 15deg      turns on pitch
+    right motor ground at x 0 z axis 0 1 0                         a hinge that is an input
+    block slide ground at 0 0 0 axis 0 0 1 within 0 d              slides along its axis
+    R rod right 0.04 -0.02 0.2 roll 0.02 -0.02 -0.01               from a ball to a ball
+    C cylinder ground 0 0 0 roll 0.02 0.02 -0.01                   a rod whose length is an input
+    toe fixed roll                                                 another name for a link
+
+Each line but those of rods and cylinders adds a link to one that is written before it, or to the
+`ground`. All points [m] and axes are those of one drawing, in the frame of the ground, and in that
+drawing every angle and slide is zero, counted about or along the axis. A rod is as long as drawn
+unless it ends in `length LENGTH`. Numbers are written as in `linkage.joint_lines`.
+
+What is not driven is found in the order in which it can be: a rod across one hinge or slide that
+nothing else holds, on the side on which it is drawn; two rods across the same two hinges in a row,
+which both need `within`: inside these limits there is shown to be one pose at most.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+import math
+from typing import Any, Collection, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple
+
+import numpy as np
+
+from .builder import Bar, Builder, GROUND, Link, Point
+from .inputs import ANGLE, Input, LENGTH
+from .joint_lines import check_numbers, formula, Line, parsed
+from .planar import GRAZE, Limit
+from .spatial import (
+    drawn_side,
+    EDGE,
+    gated_by,
+    Hinge,
+    Pivot,
+    Rod,
+    rod_on_hinge,
+    rod_on_slide,
+    Turn,
+    Universal,
+    Vector,
+    within,
+)
+from .window import HeldBy, Way, Window
+from ..formula.expression import Real, real, where
+from ..words import listed, quoted
+
+FORMS = {
+    'hinge': ('hinge LINK at X Y Z axis U V W [within ANGLE ANGLE]',),
+    'slide': ('slide LINK at X Y Z axis U V W [within DISTANCE DISTANCE]',),
+    'motor': ('motor LINK at X Y Z axis U V W',),
+    'fixed': ('fixed LINK',),
+    'rod': ('rod LINK X Y Z LINK X Y Z [length LENGTH]',),
+    'cylinder': ('cylinder LINK X Y Z LINK X Y Z [within DISTANCE DISTANCE]',),
+}
+INPUTS = 'motor', 'cylinder'
+_JOINTS, _RODS = ('hinge', 'slide', 'motor'), ('rod', 'cylinder')
+# Lines of one linkage: the order of solution is looked for among all rods.
+MOST_LINES = 200
+# A rod whose drawn pose is nearer to a dead point than this has no side that can be seen.
+_SIDED = 1e-6
+# Two hinges in a row have to lean from each other by an angle of at least this sine.
+_LEANING = 1e-3
+# Without limits, the largest window is looked for up to this angle to each side [rad].
+_WIDEST = 0.5 * math.pi
+
+
+class WindowError(ValueError):
+    """Limits that are none, or too wide; by hinge those that can be [rad], if there are."""
+
+    def __init__(self, problem: ValueError, limits: Dict[str, Tuple[float, float]]):
+        super().__init__(str(problem))
+        self.limits = limits
+
+
+class Demand(NamedTuple):
+    """What dimensions have to make positive, and the problem where they do not."""
+
+    line: Line
+    amount: Real
+    problem: str
+
+
+class HeldLink(NamedTuple):
+    """Two hinges in a row that two rods hold: what its window is made from, as expressions."""
+
+    lines: Tuple[Line, Line]
+    limits: Tuple[Optional[Tuple[Real, Real]], ...]
+    rods: Tuple[Tuple[Any, Any, Any], ...]
+
+
+def parse(texts: Iterable[str]) -> List[Line]:
+    """Return the lines of a linkage; raise ValueError with the line that cannot be."""
+    lines = [parsed(text, FORMS) for text in texts]
+    if len(lines) > MOST_LINES:
+        raise ValueError(f'a linkage in space has up to {MOST_LINES} lines, got {len(lines)}')
+    places = {line.names[0]: i for i, line in reversed([*enumerate(lines, 1)])}
+    links = [GROUND]
+    for i, line in enumerate(lines, 1):
+        name, ends = line.names[0], _links(line)
+        if name == GROUND or places[name] < i:
+            raise line.error(f'there is a link or rod {name} already')
+        for end in ends:
+            if end not in links:
+                later = places.get(end, 0)
+                raise line.error(
+                    f'link {end} is written later, in line {later}: move it up'
+                    if later > i and lines[later - 1].word not in _RODS else
+                    f'there is no link {quoted(end)} before this line; there are: {listed(links)}')
+        if len(set(ends)) < len(ends):
+            raise line.error(f'both of its ends are on {ends[0]}')
+        links += [name] * (line.word not in _RODS)
+    _Assembly(lines).order()
+    return lines
+
+
+def _links(line: Line) -> List[str]:
+    return [arg.text for arg in line.arguments if arg.kind == 'LINK']
+
+
+def points(lines: Iterable[Line]) -> List[str]:
+    """Return the points that lines place: an origin of each link, and both ends of each rod."""
+    joints = [line.names[0] for line in lines if line.word in _JOINTS]
+    return [*(f'{line.names[0]}_{link}' for line in lines if line.word in _RODS
+              for link in _links(line)), *(f'{name}_origin' for name in joints)]
+
+
+def branches(lines: Iterable[Line]) -> dict:
+    """Return the side of each rod: 1 as it is drawn."""
+    return {line.names[0]: 1 for line in lines if line.word in _RODS}
+
+
+def draw(builder: Builder, lines: Iterable[Line], symbols: Mapping[str, Real],
+         signs: Mapping[str, int], inputs: Collection[str] = ()) -> None:
+    """Place the links of a linkage; its inputs are what is driven, unless others are named."""
+    builder.axes = 'xyz'
+    _Drawing(builder, list(lines), symbols, signs, inputs).draw()
+
+
+def turning_rods(lines: List[Line], inputs: Collection[str]) -> List[str]:
+    """Return the rods that turn a hinge, which has two sides, where others are given."""
+    return [group.rods[0].names[0] for group in _Assembly(lines, inputs).order()
+            if len(group.rods) == 1 and group.links]
+
+
+class Group(NamedTuple):
+    """What is solved together: rods, and the hinges or slide that they tell."""
+
+    rods: Tuple[Line, ...]
+    links: Tuple[str, ...]
+
+
+class _Assembly:
+    """The tree of links, and the order in which rods tell what is not an input."""
+
+    def __init__(self, lines: List[Line], inputs: Collection[str] = ()):
+        self.lines = {line.names[0]: line for line in lines}
+        self.inputs = tuple(inputs) or tuple(
+            name for name, line in self.lines.items() if line.word in INPUTS)
+        self.parents = {name: _links(line)[0] for name, line in self.lines.items()
+                        if line.word not in _RODS}
+
+    def chain(self, link: str) -> List[str]:
+        """Return a link and all that carry it, down to the ground."""
+        found = [link]
+        while found[-1] != GROUND:
+            found.append(self.parents[found[-1]])
+        return found
+
+    def between(self, first: str, second: str) -> List[str]:
+        """Return the links whose joints are between two links."""
+        one, other = self.chain(first), self.chain(second)
+        return [link for link in one if link not in other] + [
+            link for link in other if link not in one]
+
+    def order(self) -> List[Group]:
+        """Return what is solved one after the other; raise ValueError for what cannot be."""
+        unknown = {name for name, line in self.lines.items()
+                   if line.word in _JOINTS and name not in self.inputs}
+        left = [line for line in self.lines.values() if line.word in _RODS]
+        found: List[Group] = []
+        while left:
+            open_ = [(line, tuple(x for x in self.between(*_links(line)) if x in unknown))
+                     for line in left]
+            group = self._next(open_)
+            found.append(group)
+            unknown -= {*group.links}
+            left = [line for line in left if line not in group.rods]
+        for name in unknown:
+            raise self.lines[name].error(f'no rod tells where {name} is')
+        return found
+
+    def _next(self, left: List[Tuple[Line, Tuple[str, ...]]]) -> Group:
+        """Return what can be solved of rods, each with what it leaves open."""
+        free = [line for line, _ in left
+                if line.word == 'cylinder' and line.names[0] not in self.inputs]
+        for line, links in left:
+            if not links and line not in free:
+                raise line.error('nothing is left to move between its ends: one rod too many, or '
+                                 'one hinge too few')
+            if len(links) == (line not in free):
+                return Group((line,), links)
+        for (one, links), (other, same) in combinations(left, 2):
+            if links == same and len(links) == 2 and not {one, other} & set(free) \
+                    and self._in_a_row(links):
+                return Group((one, other), links[::-1])
+        line, links = min(left, key=lambda each: len(each[1]))
+        others = [other.names[0] for other, also in left
+                  if other is not line and set(also) & set(links)]
+        raise line.error(
+            f'between its ends {listed(links)} are open'
+            f'{f", as for {listed(others)}" if others else ""}: solved are rods across one open '
+            'hinge or slide, and two across the same two hinges in a row')
+
+    def _in_a_row(self, links: Tuple[str, ...]) -> bool:
+        second, first = links
+        return self.parents[second] == first and all(
+            self.lines[link].word in ('hinge', 'motor') for link in links)
+
+
+class _Joint:
+    """A link on its joint, which is solved once it has a turn or a shift."""
+
+    def __init__(self, name: str, line: Line, numbers: List[Real]):
+        self.name, self.line, self.parent = name, line, _links(line)[0]
+        self.turn: Optional[Turn] = None
+        self.shift: Optional[Real] = None
+        self.limits = (numbers[6], numbers[7]) if len(numbers) > 6 else None
+        if numbers:
+            self.origin, self.direction = Vector(*numbers[:3]), Vector(*numbers[3:6])
+            self.hinge = Hinge(self.origin, self.direction.unit())
+
+    def moved(self, point: Vector, back: bool = False) -> Vector:
+        """Return a point of the link as its parent sees it, or the other way round."""
+        if self.turn:
+            return self.hinge.turned(point, self.turn.back() if back else self.turn)
+        if self.shift is not None:
+            return point.plus(self.hinge.axis.times(-self.shift if back else self.shift))
+        return point
+
+
+class _End(NamedTuple):
+    link: str
+    point: Vector
+
+
+class _Drawing:
+    """Links and rods as expressions, placed in the order of solution."""
+
+    def __init__(self, builder: Builder, lines: List[Line], symbols: Mapping[str, Real],
+                 signs: Mapping[str, int], inputs: Collection[str]):
+        self._builder, self._signs = builder, signs
+        self._assembly = _Assembly(lines, inputs)
+        self._numbers = {line.names[0]: [formula(arg.text).expression(symbols) for arg in
+                                         line.arguments if arg.kind != 'LINK'] for line in lines}
+        self._joints = {name: _Joint(name, self._assembly.lines[name], self._numbers[name])
+                        for name in self._assembly.parents}
+        self._lengths: Dict[str, Real] = {}
+        self._span = sum((part for numbers in self._numbers.values() for part in map(
+            abs, numbers[:3])), real(0.0))
+
+    def draw(self) -> None:
+        """Fill the builder."""
+        for joint in self._joints.values():
+            self._check_joint(joint)
+        for name, line in self._assembly.lines.items():
+            if line.word == 'rod':
+                numbers = self._numbers[name]
+                self._lengths[name] = numbers[6] if len(numbers) > 6 else self._drawn(line)
+        for name in self._assembly.inputs:
+            self._drive(name, self._assembly.lines[name])
+        for group in self._assembly.order():
+            if len(group.links) == 2:
+                self._hold(group)
+            elif group.links:
+                self._fit(group.rods[0], self._joints[group.links[0]])
+            else:
+                line, = group.rods
+                self._lengths[line.names[0]] = self._apart(line)
+        for name, line in self._assembly.lines.items():
+            self._show(name, line)
+
+    def _check_joint(self, joint: _Joint) -> None:
+        if joint.line.word == 'fixed':
+            return
+        length = joint.direction.length()
+        if length.value is None or length.value <= 0.0:
+            self._demand(joint.line, length, 'its axis has no direction')
+        if joint.limits:
+            low, high = joint.limits
+            self._demand(joint.line, high - low, 'within goes from a lower end to a higher one')
+            if joint.line.word == 'hinge':
+                for end in joint.limits:
+                    self._demand(joint.line, math.pi + EDGE - abs(end),
+                                 'within is from -180deg to 180deg at most')
+
+    def _demand(self, line: Line, amount: Real, problem: str) -> None:
+        self._builder.demands.append(Demand(line, amount, problem))
+
+    def _drive(self, name: str, line: Line) -> None:
+        """Make an angle or a length an input."""
+        numbers, joint = self._numbers[name], self._joints.get(name)
+        if joint and line.word != 'slide':
+            value = self._builder.drive(Input(name, ANGLE), None)
+            joint.turn = Turn.by(gated_by(value, self._edges(joint, value)))
+            return
+        low, high = numbers[6:] if len(numbers) > 6 else (
+            real(0.0) if joint is None else -self._span, self._span)
+        value = self._builder.drive(Input(name, LENGTH, low, high), None)
+        if joint:
+            joint.shift = value
+        else:
+            self._lengths[name] = value
+
+    def _ends(self, line: Line) -> Tuple[_End, _End]:
+        first, second = _links(line)
+        numbers = self._numbers[line.names[0]]
+        return _End(first, Vector(*numbers[:3])), _End(second, Vector(*numbers[3:6]))
+
+    def _drawn(self, line: Line) -> Real:
+        first, second = self._ends(line)
+        return second.point.minus(first.point).length()
+
+    def _apart(self, line: Line) -> Real:
+        first, second = self._ends(line)
+        return self._seen(second, first.link).minus(first.point).length()
+
+    def _seen(self, end: _End, link: str) -> Vector:
+        """Return a point of one link in the coordinates of another."""
+        up, down = self._assembly.chain(end.link), self._assembly.chain(link)
+        point = end.point
+        for name in up:
+            if name in down:
+                break
+            point = self._joints[name].moved(point)
+        for name in reversed([name for name in down if name not in up]):
+            point = self._joints[name].moved(point, back=True)
+        return point
+
+    def _pivot(self, end: _End, link: str) -> Pivot:
+        """Return a point of one link in the coordinates of another, on a circle if it can be."""
+        moving = self._moving(end.link, link)
+        joint = self._joints[moving[0]] if len(moving) == 1 else None
+        if joint is None or joint.turn is None:
+            return Pivot.at(self._seen(end, link))
+        carries = joint.name in self._assembly.chain(end.link)
+        return Pivot(joint.hinge.circle(end.point), joint.turn if carries else joint.turn.back())
+
+    def _beyond(self, line: Line, link: str) -> Tuple[_End, _End]:
+        """Return the end of a rod that a link carries, and the other."""
+        first, second = self._ends(line)
+        return (first, second) if link in self._assembly.chain(first.link) else (second, first)
+
+    def _fit(self, line: Line, joint: _Joint) -> None:
+        """Turn or slide a joint so that a rod fits."""
+        end, pivot = self._beyond(line, joint.name)
+        name, length = line.names[0], self._lengths[line.names[0]]
+        base, seen = self._pivot(pivot, joint.parent), self._seen(end, joint.name)
+        sign = real(float(self._signs.get(name, 1)))
+        span = self._span + (length if not length.varies else real(0.0))
+        limits: Tuple[Limit, ...]
+        if joint.line.word == 'slide':
+            ahead = joint.hinge.axis.dot(end.point.minus(pivot.point))
+            side, sided = _sign(ahead), abs(ahead) / self._drawn(line)
+            value, *limits_ = rod_on_slide(
+                joint.hinge.axis, base.place, seen, length, sign * side, span)
+            limits = tuple(limits_)
+        else:
+            side, sided = drawn_side(joint.hinge, pivot.point, end.point)
+            held = rod_on_hinge(joint.hinge, base, seen, length, sign * side, span)
+            value, limits = held.turn.angle, held.limits
+            joint.turn = held.turn
+            self._builder.transmissions[name] = held.transmission
+        self._demand(line, sided - _SIDED, f'as drawn it is at a dead point of {joint.name}: its '
+                     'side cannot be seen; draw the linkage in another pose')
+        self._builder.limits += limits
+        edges = self._edges(joint, value)
+        if joint.turn:
+            joint.turn = Turn(*(gated_by(x, edges) for x in joint.turn))
+        else:
+            joint.shift = gated_by(value, edges)
+
+    def _edges(self, joint: _Joint, value: Real) -> List[Limit]:
+        """Return the limits of a joint, and have them kept."""
+        if not joint.limits:
+            return []
+        slack = GRAZE * self._span if joint.line.word == 'slide' else real(EDGE)
+        found = within(value, *joint.limits, slack)
+        self._builder.limits += found
+        return found
+
+    def _hold(self, group: Group) -> None:
+        """Solve two hinges in a row for two rods."""
+        first, second = (self._joints[name] for name in group.links)
+        home = [0.5 * (low + high) for low, high in (
+            joint.limits or (real(0.0), real(0.0)) for joint in (first, second))]
+        universal = Universal(first.hinge, second.hinge, home)
+        self._demand(second.line, universal.sine - _LEANING,
+                     f'its axis is nearly parallel to that of {first.name}')
+        ends = [self._beyond(line, second.name) for line in group.rods]
+        lengths = [self._lengths[line.names[0]] for line in group.rods]
+        pivots = [self._pivot(pivot, first.parent) for _, pivot in ends]
+        for line, (end, pivot), length, turning in zip(group.rods, ends, lengths, pivots):
+            if moving := self._moving(end.link, second.name):
+                raise line.error(f'{listed(moving)} moves between {second.name} and its end, '
+                                 'which must not be where two rods share two hinges')
+            anyhow = any(part.varies for part in turning.way.centre)
+            if anyhow or turning.turn and length.varies:
+                what = 'be on' if length.varies else 'turn about one axis on'
+                raise line.error(f'its end on {pivot.link} must {what} {first.parent}, which '
+                                 'carries the two hinges that it shares with another')
+        self._builder.windows.append(HeldLink(
+            (first.line, second.line), (first.limits, second.limits), tuple(
+                (universal.frame_way(pivot.way),
+                 universal.frame_way(second.hinge.circle(end.point)),
+                 None if length.varies else length)
+                for (end, _), pivot, length in zip(ends, pivots, lengths))))
+        *turns, limit = universal.solved([
+            Rod(pivot, end.point, length)
+            for (end, _), pivot, length in zip(ends, pivots, lengths)])
+        limits = [limit, *self._edges(first, turns[0].angle),
+                  *self._edges(second, turns[1].angle)]
+        self._builder.limits.append(limit)
+        first.turn, second.turn = (Turn(*(gated_by(x, limits) for x in turn)) for turn in turns)
+
+    def _moving(self, link: str, other: str) -> List[str]:
+        return [name for name in self._assembly.between(link, other)
+                if self._joints[name].line.word != 'fixed']
+
+    def _show(self, name: str, line: Line) -> None:
+        """Add what users ask for: a joint or a length, points and lines."""
+        builder, joint = self._builder, self._joints.get(name)
+        value = self._lengths.get(name) if joint is None else \
+            joint.turn.angle if joint.turn else joint.shift
+        if value is not None and line.word != 'rod':
+            kind = 'revolute' if joint and joint.turn else 'prismatic'
+            place = f'{name}_origin' if joint else f'{name}_{_links(line)[0]}'
+            builder.links.append(Link(name, _links(line)[0], place, kind, real(0.0), place))
+            builder.joint_values[name] = value
+        if joint and line.word != 'fixed':
+            self._point(f'{name}_origin', _End(name, joint.origin))
+        for end in self._ends(line) if joint is None else ():
+            self._point(f'{name}_{end.link}', end)
+            if end.link != GROUND and self._joints[end.link].line.word != 'fixed':
+                length = end.point.minus(self._joints[end.link].origin).length()
+                builder.bars.append(Bar(f'{end.link}_origin', f'{name}_{end.link}', length))
+        if line.word in _RODS:
+            first, second = (f'{name}_{link}' for link in _links(line))
+            if line.word == 'rod':
+                builder.bars.append(Bar(first, second, self._lengths[name]))
+                self._demand(line, self._lengths[name], 'it must be longer than zero')
+            else:
+                builder.cylinders.append((first, second))
+
+    def _point(self, name: str, end: _End) -> None:
+        if name in self._builder.points:
+            raise self._assembly.lines[end.link].error(f'a point of a rod is called {name}, too')
+        self._builder.points[name] = Point(self._seen(end, GROUND), end.link, self._span)
+
+
+def _sign(x: Real) -> Real:
+    return where(x < 0.0, -1.0, 1.0)
+
+
+def check(lines: List[Line], linkage: Any) -> None:
+    """Raise ValueError, with its line, for dimensions that cannot be."""
+    check_numbers(lines, linkage.dimensions)
+    for line, amount, problem in linkage.demands():
+        if not np.all(amount > 0.0):
+            raise line.error(problem)
+    for held in linkage.windows():
+        _check_window(held)
+
+
+def _check_window(held: HeldLink) -> None:
+    """Raise ValueError, with the largest window, unless it holds one pose at most."""
+    line = held.lines[1]
+    if any(np.ndim(part) for pivot, end, _ in held.rods for way in (pivot, end)
+           for vector in way for part in vector):
+        raise line.error('two rods on two hinges are shown to have one pose for one set of '
+                         'dimensions, not for arrays')
+    rods = [HeldBy(Way(*map(np.array, pivot)), Way(*map(np.array, end)), length)
+            for pivot, end, length in held.rods]
+    limits = [each or (-_WIDEST, _WIDEST) for each in held.limits]
+    window = Window(rods, *zip(*limits))
+    given = all(held.limits)
+    if given and window.is_right():
+        return
+    largest = window.largest()
+    low, high = np.ceil(10.0 * np.degrees(largest.low)), np.floor(10.0 * np.degrees(largest.high))
+    said = ', '.join(f'{each.names[0]} within {a / 10.0:g}deg {b / 10.0:g}deg'
+                      for each, a, b in zip(held.lines, low, high))
+    problem = 'there may be a second pose in these limits' if given else 'both hinges need limits'
+    found = {each.names[0]: (a, b) for each, a, b in zip(held.lines, low, high) if a < b}
+    raise WindowError(line.error(f'{problem}; ' + (
+        f'the largest shown to have one at most: {said}' if len(found) == 2 else
+        'there are none about their middle, which is next to a singular pose')), {
+            name: (math.radians(a / 10.0), math.radians(b / 10.0))
+            for name, (a, b) in found.items()} if len(found) == 2 else {})

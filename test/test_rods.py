@@ -1,0 +1,452 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Linkages of rods in space: against 90 digits, a polynomial of degree eight and brute force."""
+
+import ctypes
+import math
+import re
+import shutil
+import subprocess
+
+import gmpy2
+from linkage_ros import mechanisms, scene
+from linkage_ros.c_code import header
+import numpy as np
+import pytest
+from truth import rods
+
+RULE, RATE_RULE = 4.0, 8.0
+DEGREE = math.pi / 180.0
+# The ankle of a Unitree G1, from its maker's model.
+G1 = (
+    'pitch hinge ground at 0 0 0 axis 0 1 0 within -50deg 30deg',
+    'roll hinge pitch at 0 0 -0.0176 axis 1 0 0 within -15deg 15deg',
+    'right motor ground at 0.022 0 0.2159 axis 1 0 0',
+    'left motor ground at 0.022 0 0.1509 axis 1 0 0',
+    'R rod right 0.0395 -0.0164 0.2112 roll 0.022 -0.015 -0.0096',
+    'L rod left 0.035 0.0165 0.1469 roll 0.022 0.015 -0.0096')
+ONE_ROD = (
+    'out hinge ground at ox oy oz axis hx hy hz', 'crank motor ground at mx my mz axis ax ay az',
+    'R rod crank px py pz out ex ey ez length l')
+LETTERS = dict(zip('maphe', ('motor', 'motor_axis', 'pivot', 'hinge_axis', 'end')), o='hinge')
+
+
+def made(lines, **dimensions):
+    """Return a linkage of rods."""
+    return mechanisms.create('rods', joints=lines, **dimensions)
+
+
+def swept(cases):
+    """Return the linkages of random rods as one with arrays of dimensions."""
+    parts = {f'{letter}{axis}': cases[name][:, i] for letter, name in LETTERS.items()
+             for i, axis in enumerate('xyz')}
+    return made(ONE_ROD, l=cases['length'], **parts)
+
+
+def check_random_rods(seed, count):
+    """Hold angles and rates of random rods to the rule; return how many can be assembled."""
+    cases = rods.random_rods(np.random.default_rng(seed), count)
+    linkage, values = swept(cases), cases['angle']
+    angles = linkage.joint_angles(values, ['out'])['out']
+    rates = linkage.joint_rates(values, ['out'])['out']
+    assembled = 0
+    for i in range(len(values)):
+        with rods.exactly():
+            case = rods.Rod(*([gmpy2.mpfr(x) for x in np.atleast_1d(cases[name][i])]
+                              for name in cases))
+            angle, rate = rods.measured(case)
+            if angle is None:
+                assert math.isnan(angles[i]) or rods.beyond(case) < 16.0
+                continue
+            assembled += 1
+            error = rods.apart(angle[0], gmpy2.mpfr(angles[i]))
+            assert error <= RULE * angle[1] + np.spacing(math.pi), (seed, i)
+            if rate:
+                error = abs(rate[0] - gmpy2.mpfr(rates[i]))
+                assert error <= RATE_RULE * rate[1] + np.spacing(abs(rates[i])), (seed, i)
+    return assembled
+
+
+def test_a_rod_on_a_hinge_is_right_to_the_last_digits():
+    assert check_random_rods(1, 250) > 100
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('seed', range(10))
+def test_a_hundred_thousand_rods_on_hinges_are(seed):
+    assert check_random_rods(100 + seed, 20000) > 9000
+
+
+def offered(lines):
+    """Return the window [rad] that is offered where there are no limits; None if there is none."""
+    with pytest.raises(ValueError, match='both hinges need limits') as error:
+        made(lines)
+    found = re.findall(r'within (\S+)deg (\S+)deg', str(error.value))
+    return np.array(found, float).T * DEGREE if found else None
+
+
+def ankles(seed, count):
+    """Yield random ankles with the window that is offered for each."""
+    rng = np.random.default_rng(seed)
+    while count:
+        ankle = rods.random_ankle(rng, plausible=count % 3 > 0)
+        window = offered(ankle.lines)
+        if window is not None:
+            count -= 1
+            yield ankle, window, rng
+
+
+def driven(ankle, window):
+    """Return an ankle's linkage, and its inputs for arrays of poses, on the sides drawn."""
+    linkage = made(ankle.within(*window))
+    inverse = linkage.driven_by('pitch', 'roll')
+
+    def motors(poses):
+        found = inverse.joint_angles(poses, ['l', 'r'])
+        return np.stack([found['l'], found['r']])
+    return linkage, motors
+
+
+def pose(linkage, motors):
+    """Return pitch and roll."""
+    return np.stack(list(linkage.joint_angles(motors, ['pitch', 'roll']).values()))
+
+
+def check_ankle(ankle, window, rng, poses, exact):
+    """Hold an ankle to the rule: no pose missed, none but the right one."""
+    linkage, motors = driven(ankle, window)
+    wanted = rng.uniform(*window, (poses, 2)).T
+    # The edges of the window belong to it.
+    wanted[0, ::10], wanted[1, 5::10] = window[1][0], window[0][1]
+    inputs = motors(wanted)
+    reached = ~np.isnan(inputs).any(axis=0)
+    found = pose(linkage, inputs)
+    np.testing.assert_allclose(found[:, reached], wanted[:, reached], atol=1e-11)
+    assert np.isnan(found[:, ~reached]).all()
+    with rods.exactly():
+        for i in rng.choice(np.flatnonzero(reached), exact):
+            errors, sensitivity = rods.pose_error(ankle, inputs[:, i], *found[:, i])
+            for error, given, value in zip(errors, sensitivity, found[:, i]):
+                assert error <= RULE * given + np.spacing(abs(value))
+
+
+def test_two_rods_find_every_pose_inside_the_limits():
+    for ankle, window, rng in ankles(2, 3):
+        check_ankle(ankle, window, rng, poses=2000, exact=20)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('seed', range(20))
+def test_two_rods_of_two_hundred_ankles_do(seed):
+    for ankle, window, rng in ankles(1000 + seed, 10):
+        check_ankle(ankle, window, rng, poses=10000, exact=100)
+
+
+def check_assemblies(ankle, window, rng, count):
+    """Hold numbers and NaN to all real assemblies; return how many poses are in the window."""
+    linkage, motors = driven(ankle, window)
+    inputs = rng.uniform(-math.pi, math.pi, (2, count))
+    if ankle.motor_axes[0] is None:
+        inputs = motors(rng.uniform(*window, (count, 2)).T) * rng.uniform(0.8, 1.2, (2, count))
+    found = pose(linkage, inputs)
+    all_ = np.stack(rods.assemblies(ankle, inputs), axis=-1)
+    inside = ((all_ > window[0]) & (all_ < window[1])).all(axis=-1)
+    # Where a root is on the edge but for the rounding of the judge either will do.
+    edge = np.abs(np.minimum(all_ - window[0], window[1] - all_)).min(axis=-1) < 1e-6
+    clear = ~edge.any(axis=1)
+    assert inside.sum(axis=1).max() <= 1
+    assert (np.isnan(found[0]) == ~inside.any(axis=1))[clear].all()
+    there = inside.any(axis=1) & clear
+    right = all_[there][inside[there]]
+    np.testing.assert_allclose(found[:, there].T, right, atol=1e-5)
+    return there.sum()
+
+
+def test_no_pose_is_of_another_assembly():
+    assert sum(check_assemblies(*each, 1000) for each in ankles(3, 3)) > 200
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('seed', range(20))
+def test_no_pose_of_a_million_motor_pairs_is_of_another_assembly(seed):
+    assert sum(check_assemblies(*each, 10000) for each in ankles(2000 + seed, 5)) > 1000
+
+
+def check_windows(seed, count):
+    """Refuse windows with a second or a singular pose; return how many of them there were."""
+    rng, ambiguous = np.random.default_rng(seed), 0
+    for i in range(count):
+        ankle = rods.random_ankle(rng, plausible=i % 3 > 0)
+        half = rng.uniform(0.2, 1.4, 2)
+        middle = rng.uniform(-0.3, 0.3, 2)
+        try:
+            made(ankle.within(middle - half, middle + half))
+        except ValueError as error:
+            assert 'there may be a second pose' in str(error)
+            ambiguous += rods.is_ambiguous(ankle, middle - half, middle + half)
+        else:
+            assert not rods.is_ambiguous(ankle, middle - half, middle + half), (seed, i)
+    return ambiguous
+
+
+def test_limits_with_a_second_or_a_singular_pose_are_refused():
+    assert check_windows(4, 12) > 3
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('seed', range(20))
+def test_a_thousand_such_windows_are(seed):
+    assert check_windows(3000 + seed, 75) > 45
+
+
+def test_of_limits_that_are_too_wide_the_largest_that_can_be_are_named():
+    wide = [line.replace('-50deg 30deg', '-110deg 90deg') for line in G1]
+    with pytest.raises(ValueError, match='there may be a second pose in these limits; the largest '
+                       r'shown to have one at most: pitch within -\d.*deg, roll within -\d.*deg'):
+        made(wide)
+
+
+@pytest.fixture(scope='module')
+def g1():
+    return made(G1)
+
+
+@pytest.fixture(scope='module')
+def poses():
+    rng = np.random.default_rng(5)
+    return rng.uniform((-50 * DEGREE, -15 * DEGREE), (30 * DEGREE, 15 * DEGREE), (4000, 2)).T
+
+
+def test_outside_the_limits_there_is_no_pose(g1):
+    inverse = g1.driven_by('pitch', 'roll')
+    for pitch, roll in ((31, 0), (-51, 0), (0, 16), (0, -16)):
+        values = inverse.joint_angles((pitch * DEGREE, roll * DEGREE), ['right', 'left'])
+        assert any(math.isnan(value) for value in values.values())
+    assert all(math.isnan(x) for x in g1.joint_angles((1.2, -0.05), ['pitch', 'roll']).values())
+
+
+def test_a_pose_is_that_of_the_motors_alone(g1, poses):
+    motors = np.random.default_rng(6).uniform(-1.0, 1.0, (2, 500))
+    alone = np.array([g1.function((), ('pitch', 'roll'))(*each) for each in motors.T.tolist()]).T
+    found = pose(g1, motors)
+    np.testing.assert_allclose(found, alone, atol=1e-15)
+    later = pose(g1, motors + 2.0 * math.pi)
+    np.testing.assert_array_equal(np.isnan(later), np.isnan(found))
+    np.testing.assert_allclose(later, found, atol=1e-13)
+
+
+def test_machine_code_finds_the_same_poses(g1, poses):
+    pytest.importorskip('llvmlite')
+    motors = np.random.default_rng(7).uniform(-1.0, 1.0, (2, 20000))
+    np.testing.assert_allclose(pose(g1.accelerated(), motors), pose(g1, motors), atol=2e-15)
+
+
+def test_motors_give_the_power_that_the_joints_take(g1, poses):
+    inverse, names = g1.driven_by('pitch', 'roll'), ('right', 'left')
+    values = inverse.joint_angles(poses, names)
+    motors = [values[name] for name in names]
+    there = ~np.isnan(motors).any(axis=0)
+    rng = np.random.default_rng(8)
+    loads = {name: rng.uniform(-30.0, 30.0, poses.shape[1]) for name in ('pitch', 'roll')}
+    efforts = g1.effort(motors, loads)
+    speeds = rng.uniform(-3.0, 3.0, (2, poses.shape[1]))
+    rates = [np.array([g1.joint_rates(motors, ['pitch', 'roll'], by)[name] for by in (0, 1)])
+             for name in ('pitch', 'roll')]
+    moved = [(rate * speeds).sum(axis=0) for rate in rates]
+    given = (efforts.T * speeds).sum(axis=0)
+    taken = sum(load * speed for load, speed in zip(loads.values(), moved))
+    scale = sum(abs(load * speed) for load, speed in zip(loads.values(), moved))
+    assert (np.abs(given + taken) <= 1e-12 * (scale + np.abs(efforts.T * speeds).sum(0)))[
+        there].all()
+    # The inverse's rates are those of the forward, the other way round.
+    back = np.array([[inverse.joint_rates(poses, [name], by)[name] for by in (0, 1)]
+                     for name in names])
+    product = np.einsum('ijn,jkn->ikn', np.array(rates), back)[..., there]
+    worst = np.abs(back[..., there]).max(axis=(0, 1))
+    assert (np.abs(product - np.eye(2)[..., None]).max(axis=(0, 1)) <= 1e-13 * (1 + worst)).all()
+
+
+def test_all_motors_of_a_pose_are_found_and_the_nearest(g1):
+    found = g1.inputs_for(('pitch', 'roll'), (-0.1, 0.05))
+    assert len(found) == 4
+    for answer in found:
+        np.testing.assert_allclose(pose(g1, answer.inputs), (-0.1, 0.05), atol=1e-14)
+    nearest = g1.inputs_for(('pitch', 'roll'), (-0.1, 0.05), near=(0.0, 0.0))[0]
+    drawn = g1.driven_by('pitch', 'roll').joint_angles((-0.1, 0.05), ('right', 'left'))
+    assert np.allclose(nearest.inputs, list(drawn.values()), atol=1e-15)
+    assert g1.inputs_for(('pitch', 'roll'), (1.0, 0.05)) == []
+
+
+def test_accelerations_are_those_of_the_motion(g1):
+    step, at, speed, change = 1e-4, (0.1, -0.05), (1.0, 2.0), (3.0, -1.0)
+    moved = [pose(g1, [x + v * t + 0.5 * a * t * t for x, v, a in zip(at, speed, change)])
+             for t in (-step, 0.0, step)]
+    found = g1.joint_accelerations(at, speed, change, ['pitch', 'roll'])
+    np.testing.assert_allclose(list(found.values()),
+                               (moved[0] - 2.0 * moved[1] + moved[2]) / step ** 2, rtol=1e-6)
+
+
+def test_every_rod_keeps_its_length(g1, poses):
+    motors = np.random.default_rng(9).uniform(-0.6, 0.6, (2, 1000))
+    place = g1.solve(motors)
+    for first, second in (('R_right', 'R_roll'), ('L_left', 'L_roll')):
+        length = np.linalg.norm(place[first] - place[second], axis=-1)
+        there = ~np.isnan(length)
+        assert there.sum() > 300
+        np.testing.assert_allclose(length[there], g1.bar_lengths[first, second], atol=2e-16)
+
+
+def test_the_reach_of_one_rod_ends_where_it_is_stretched():
+    # A crank of 1 under a hinge of 1, both about z, a rod between them that is a little too short.
+    linkage = made(('out hinge ground at 3 0 0 axis 0 0 1',
+                    'crank motor ground at 0 0 0 axis 0 0 1',
+                    'R rod crank 1 0 0 out 3 1 0 length 2.5'))
+    (low, high), = linkage.reach()
+    # Then hinge and crank pin are 3.5 apart.
+    stretched = math.acos((1 + 9 - 3.5 ** 2) / 6)
+    assert np.allclose((low, high), (-stretched, stretched), atol=1e-15)
+    assert not math.isnan(linkage.joint_angles(low, ['out'])['out'])
+    assert math.isnan(linkage.joint_angles(low - 1e-6, ['out'])['out'])
+    assert np.allclose(linkage.dead_points(), (low, high))
+
+
+def test_in_a_plane_a_rod_is_a_dyad():
+    flat = mechanisms.create('custom', joints=(
+        'O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'B dyad A Q 2.5 2 left'))
+    space = made(('out hinge ground at 3 0 0 axis 0 0 1', 'crank motor ground at 0 0 0 axis 0 0 1',
+                  'R rod crank 1 0 0.5 out 3 2 0.5 length 2.5'))
+    theta = np.linspace(-3.0, 3.0, 101)
+    turned = space.joint_angles(theta, ['out'])['out'] + 0.5 * math.pi
+    either = [flat.joint_angles(theta, ['QB'])['QB'], mechanisms.create(
+        'custom', joints=('O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'B dyad A Q 2.5 2 right')
+    ).joint_angles(theta, ['QB'])['QB']]
+    away = [np.abs(np.exp(1j * turned) - np.exp(1j * each)).max() for each in either]
+    assert min(away) < 1e-14
+
+
+@pytest.mark.parametrize('lines, problem', [
+    ((*G1, 'S rod pitch 0.1 0 0 left 0.1 0 0.2'), 'nothing is left to move between its ends'),
+    (G1[:5], 'between its ends roll, pitch are open: solved are rods across one open'),
+    (G1[:4], 'no rod tells where (pitch|roll) is'),
+    (('a hinge ground at 0 0 0 axis 0 0 0', *G1[2:5]), 'no link'),
+    ((G1[0].replace('0 1 0', '0 0 0'), *G1[1:]), 'its axis has no direction'),
+    ((G1[0].replace('-50deg', '50deg'), *G1[1:]), 'from a lower end to a higher one'),
+    ((G1[0].replace('-50deg', '-190deg'), *G1[1:]), 'from -180deg to 180deg'),
+    ((G1[0], G1[1].replace('1 0 0 within', '1e-5 1 0 within'), *G1[2:]), 'nearly parallel'),
+    ((G1[1], G1[0], *G1[2:]), 'link pitch is written later, in line 2: move it up'),
+    ((*G1, G1[5]), 'there is a link or rod L already'),
+    ((*G1[:5], 'L rod left 0 0 0 left 1 0 0'), 'both of its ends are on left'),
+    ((*G1[:5], 'L rod leg 0 0 0 roll 1 0 0'), "no link 'leg' before this line; there are: gr"),
+    ((*G1[:5], G1[5] + ' length -1'), 'a bar must be longer than zero'),
+    ((*G1[:5], 'L rod left 0 0 roll 1 0 0'), 'expected "NAME rod LINK X Y Z LINK X Y Z'),
+    ((*G1[:5], 'L bar left 0 0 0 roll 1 0 0'), 'expected NAME and one of the constructions hinge'),
+    (('a hinge ground at 0 0 0 axis 0 0 1', 'm motor ground at 2 0 0 axis 0 0 1',
+      'R rod m 3 0 0 a 1 0 0'), 'as drawn it is at a dead point of a'),
+    (('a hinge ground at 0 0 0 axis 0 0 1', 'R rod ground 3 0 0 a 1 1 0'), 'line that drives it'),
+])
+def test_what_cannot_be_solved_is_refused_in_words(lines, problem):
+    with pytest.raises(ValueError, match=problem):
+        made(lines)
+
+
+def test_platforms_on_more_rods_are_refused_by_name():
+    legs = [f'{a}{b} hinge {c} at 0 0 {z} axis {axis}' for a, b, c, z, axis in (
+        ('x', '', 'ground', 0, '1 0 0'), ('y', '', 'x', 0, '0 1 0'), ('z', '', 'y', 0, '0 0 1'))]
+    rods_ = [f'C{i} cylinder ground {x} {y} -1 z {x} {y + 0.1} 0' for i, (x, y) in enumerate(
+        ((1, 0), (0, 1), (-1, -1)))]
+    with pytest.raises(ValueError, match='between its ends z, y, x are open, as for C1, C2: '
+                       'solved are rods across one open hinge'):
+        made((*legs, *rods_))
+
+
+def test_a_rod_on_a_slide_and_a_hinge_on_a_moving_link_are_solved():
+    linkage = made((
+        'crank motor ground at 0 0 0 axis 0 0 1', 'block slide ground at 2 0 0 axis 1 0.1 0.2',
+        'R rod crank 0.5 0 0 block 2 0 0.1', 'arm hinge block at 2 0 1 axis 0 1 0',
+        'S rod crank 0.3 0.1 0 arm 2.5 0 1', 'tip fixed arm'))
+    theta = np.linspace(-0.3, 0.3, 50)
+    place = linkage.solve(theta)
+    for ends in (('R_crank', 'R_block'), ('S_crank', 'S_arm')):
+        length = np.linalg.norm(place[ends[0]] - place[ends[1]], axis=-1)
+        np.testing.assert_allclose(length, linkage.bar_lengths[ends], atol=2e-15)
+    rate = linkage.joint_rates(theta, ['block', 'arm'])
+    later, before = (linkage.joint_angles(theta + step, ['block', 'arm'])
+                     for step in (1e-6, -1e-6))
+    for name in rate:
+        np.testing.assert_allclose(rate[name], (later[name] - before[name]) / 2e-6, atol=1e-8)
+
+
+def test_a_cylinder_turns_a_lever():
+    lever = made(('lever hinge ground at 0 0 0 axis 0 1 0',
+                  'C cylinder ground -1 0.2 0.1 lever 0 0 1'))
+    length = np.linspace(1.1, 1.6, 40)
+    place = lever.solve(length)
+    np.testing.assert_allclose(
+        np.linalg.norm(place['C_ground'] - place['C_lever'], axis=-1), length, atol=1e-15)
+    back = lever.driven_by('lever').joint_angles(
+        lever.joint_angles(length, ['lever'])['lever'], ['C'])['C']
+    np.testing.assert_allclose(back, length, atol=1e-15)
+
+
+def test_dimensions_may_be_names_and_are_checked_again():
+    lines = [line.replace('0.2112', 'high') for line in G1]
+    linkage = made(lines, high=0.2112)
+    assert linkage.dimensions == {'high': 0.2112}
+    with pytest.raises(ValueError, match='a second pose|singular'):
+        linkage.with_dimensions(high=0.02)
+    with pytest.raises(ValueError, match='one set of dimensions, not for arrays'):
+        linkage.with_dimensions(high=[0.2112, 0.2113])
+
+
+def test_a_linkage_a_million_times_the_size_has_the_same_angles(g1):
+    def larger(match):
+        return str(float(match[0]) * 2.0 ** 40)
+
+    lines = [re.sub(r'-?\d\.\d+', larger, line) for line in G1]
+    np.testing.assert_array_equal(pose(made(lines), (0.1, 0.2)), pose(g1, (0.1, 0.2)))
+
+
+@pytest.fixture(scope='module')
+def compiled(tmp_path_factory):
+    """Return the ankle as C, with its inverse."""
+    compiler = shutil.which('cc')
+    if not compiler:
+        pytest.skip('there is no C compiler')
+    folder = tmp_path_factory.mktemp('c')
+    machine = scene.read({'mechanisms': ['ankle'], 'ankle.type': 'rods',
+                          'ankle.joints': list(G1)}).machines['ankle']
+    text = header.written(machine, ('pitch', 'roll'))
+    calls = ''.join(f"""
+int {name}_(double x, double y, {name}_pose *p)
+{{
+    {name}_rates(x, y, p + 1, p + 2);
+    return {name}_solve(x, y, p);
+}}
+""" for name in ('ankle', 'ankle_by_pitch_roll'))
+    (folder / 'ankle.c').write_text(text + calls)
+    subprocess.run([compiler, '-std=c99', '-Wall', '-Wextra', '-pedantic', '-Werror', '-O2',
+                    '-shared', '-fPIC', 'ankle.c', '-o', 'ankle.so', '-lm'],
+                   check=True, cwd=folder)
+    return text, ctypes.CDLL(str(folder / 'ankle.so'))
+
+
+def test_c_has_no_loop_and_no_heap(compiled):
+    assert not re.search(r'\b(for|while|do|goto|malloc)\b(?! it)', re.sub(
+        r'/\*.*?\*/', '', compiled[0], flags=re.S))
+
+
+@pytest.mark.parametrize('name, given', [
+    ('ankle', ('right', 'left')), ('ankle_by_pitch_roll', ('pitch', 'roll'))])
+def test_c_is_python(compiled, g1, name, given):
+    linkage = g1 if name == 'ankle' else g1.driven_by(*given)
+    solve = getattr(compiled[1], name + '_')
+    solve.argtypes = [ctypes.c_double, ctypes.c_double, ctypes.c_void_p]
+    for values in np.random.default_rng(11).uniform(-0.4, 0.4, (300, 2)).tolist():
+        out = np.zeros((3, 4))
+        is_there = solve(*values, out.ctypes.data)
+        found = [linkage.joint_angles(values), *(
+            linkage.joint_rates(values, by=by) for by in (0, 1))]
+        wanted = np.array([list(each.values()) for each in found])
+        assert bool(is_there) == np.isfinite(wanted[0]).all()
+        np.testing.assert_allclose(out, wanted, rtol=1e-12, atol=1e-14)

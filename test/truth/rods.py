@@ -1,0 +1,486 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Linkages of rods in space, another way, in 90 digits.
+
+A rod across one hinge is a cos + b sin = c, solved with an arc cosine, which cancels badly, and
+90 digits do not mind. Two rods across two hinges are closed from an answer by Newton's method:
+that judges its digits alone; which assembly it is, the polynomial of degree eight tells.
+"""
+
+import itertools
+import math
+from typing import NamedTuple
+
+import gmpy2
+from gmpy2 import mpfr
+import numpy as np
+
+BITS = 300
+# Of difference quotients.
+STEP = 2.0 ** -110
+UNIT = 2.0 ** -53
+
+
+def exactly():
+    """Return the context in which all this is computed."""
+    return gmpy2.context(precision=BITS)
+
+
+class Rod(NamedTuple):
+    """A motor with an axis, a rod of a length from its crank, and a hinge that carries its end."""
+
+    motor: list
+    motor_axis: list
+    pivot: list
+    hinge: list
+    hinge_axis: list
+    end: list
+    length: list
+    angle: list
+    # By how much both ends are off, as seen from the hinge.
+    pivot_off: tuple = (0, 0, 0)
+    end_off: tuple = (0, 0, 0)
+
+
+def dot(x, y):
+    return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
+
+
+def cross(x, y):
+    return [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
+
+
+def turned(point, origin, axis, angle):
+    """Return a point turned about an axis of any length, after Rodrigues."""
+    length = gmpy2.sqrt(dot(axis, axis))
+    axis = [x / length for x in axis]
+    arm = [x - o for x, o in zip(point, origin)]
+    c, s, along = gmpy2.cos(angle), gmpy2.sin(angle), dot(axis, arm)
+    return [o + x * c + y * s + a * along * (1 - c)
+            for o, x, y, a in zip(origin, arm, cross(axis, arm), axis)]
+
+
+def seen(rod):
+    """Return both ends of a rod as seen from the hinge, that on the hinge at angle zero."""
+    points = turned(rod.pivot, rod.motor, rod.motor_axis, rod.angle[0]), rod.end
+    return [[x - o + off for x, o, off in zip(point, rod.hinge, offs)]
+            for point, offs in zip(points, (rod.pivot_off, rod.end_off))]
+
+
+def equation(rod):
+    """Return a, b, c of a cos + b sin = c for the angle of the hinge."""
+    axis = [x / gmpy2.sqrt(dot(rod.hinge_axis, rod.hinge_axis)) for x in rod.hinge_axis]
+    foot, end = seen(rod)
+    up, along = dot(axis, foot), dot(axis, end)
+    return (dot(foot, end) - up * along, dot(axis, cross(end, foot)),
+            (dot(foot, foot) + dot(end, end) - rod.length[0] ** 2) / 2 - up * along)
+
+
+def angle(rod, side):
+    """Return the angle of the hinge on a side; None where the rod does not reach."""
+    a, b, c = equation(rod)
+    size = gmpy2.hypot(a, b)
+    if abs(c) > size:
+        return None
+    return gmpy2.atan2(b, a) + side * gmpy2.acos(c / size)
+
+
+def rate(rod, side):
+    """Return d hinge / d motor on a side."""
+    psi, step = angle(rod, side), mpfr(STEP)
+    a, b, c = equation(rod)
+    later, before = (equation(rod._replace(angle=[rod.angle[0] + way])) for way in (step, -step))
+    by_motor = [(x - y) / (2 * step) for x, y in zip(later, before)]
+    cos, sin = gmpy2.cos(psi), gmpy2.sin(psi)
+    return (by_motor[2] - by_motor[0] * cos - by_motor[1] * sin) / (b * cos - a * sin)
+
+
+def drawn_side(rod):
+    """Return the side on which the rod is drawn, at angle zero."""
+    foot, end = ([x - o for x, o in zip(point, rod.hinge)] for point in (rod.pivot, rod.end))
+    return 1 if dot(rod.hinge_axis, cross(foot, end)) >= 0 else -1
+
+
+def sensitivity(of, rod):
+    """
+    Return what half a last digit of each number, the largest of its vector, does to a value.
+
+    Like joints in a plane, both ends as seen from the hinge are rounded once more.
+    """
+    total = mpfr(0)
+    for name, vector, size in zip(Rod._fields, rod, [*rod[:8], *seen(rod)]):
+        half = np.spacing(max(abs(float(x)) for x in size)) / 2
+        for i, part in enumerate(vector):
+            step = mpfr(half) * STEP
+            ends = []
+            for way in (step, -step):
+                moved = list(vector)
+                moved[i] = part + way
+                ends.append(of(rod._replace(**{name: moved})))
+            if None in ends:
+                return mpfr('inf')
+            total += abs(ends[0] - ends[1]) / (2 * STEP)
+    return total
+
+
+class Ankle(NamedTuple):
+    """
+    Two hinges in a row that two rods hold: numbers as in its lines.
+
+    Of the motors, the pivots on their cranks, the ends on the foot and the lengths there are two
+    each; a rod that is a cylinder has a motor without an axis.
+    """
+
+    first: list
+    first_axis: list
+    second: list
+    second_axis: list
+    motors: list
+    motor_axes: list
+    pivots: list
+    ends: list
+    lengths: list
+
+    @property
+    def lines(self):
+        """The lines of it, without limits."""
+        def text(vector):
+            return ' '.join(map(repr, map(float, vector)))
+
+        def joint(word, at, axis):
+            return f'{word} at {text(at)} axis {text(axis)}'
+
+        lines = [joint('pitch hinge ground', self.first, self.first_axis),
+                 joint('roll hinge pitch', self.second, self.second_axis)]
+        for name, at, axis, pivot, end, length in zip('lr', *self[4:]):
+            if axis is None:
+                lines.append(f'{name} cylinder ground {text(pivot)} roll {text(end)}')
+            else:
+                lines += [joint(f'{name} motor ground', at, axis),
+                          f'{name}rod rod {name} {text(pivot)} roll {text(end)} '
+                          f'length {length!r}']
+        return lines
+
+    def within(self, low, high):
+        """Return its lines with limits of both hinges [rad]."""
+        return [f'{line} within {float(a)!r} {float(b)!r}' if i < 2 else line
+                for i, (line, a, b) in enumerate(zip(self.lines, [*low, 0, 0, 0, 0],
+                                                     [*high, 0, 0, 0, 0]))]
+
+
+def drawn(*parts):
+    """Return an ankle whose rods are as long as drawn, rounded."""
+    return Ankle(*parts, [math.dist(*each) for each in zip(*parts[6:])])
+
+
+def random_ankle(rng, plausible=True):
+    """Return an ankle like those of robots, or with everything anywhere."""
+    def vector(size, about=(0.0, 0.0, 0.0)):
+        return (np.array(about) + rng.normal(size=3) * size).tolist()
+
+    cylinders = rng.random() < 0.3
+    if not plausible:
+        return drawn(*(vector(1.0) for _ in range(4)), [vector(1.0) for _ in range(2)],
+                     [None if cylinders else vector(1.0) for _ in range(2)],
+                     *([vector(1.0) for _ in range(2)] for _ in range(2)))
+    high, side = rng.uniform(0.1, 0.3, 2), rng.uniform(0.02, 0.06)
+    motors = [vector(0.01, (0.02, y, z)) for y, z in zip((side, -side), high)]
+    return drawn(vector(0.001), vector(0.05, (0, 1, 0)), vector(0.01), vector(0.05, (1, 0, 0)),
+                 motors, [None if cylinders else vector(0.1, (0, 1, 0)) for _ in range(2)],
+                 [vector(0.01, np.array(m) + (rng.uniform(0.02, 0.06), 0, 0)) for m in motors],
+                 [vector(0.005, (rng.uniform(0.03, 0.06), y, -0.02)) for y in (side, -side)])
+
+
+def rotated(points, axis, angle):
+    """Return points (..., 3) turned about an axis through the origin, by angles (...)."""
+    axis = np.asarray(axis, float) / np.linalg.norm(axis)
+    c, s = (np.asarray(f(angle))[..., None] for f in (np.cos, np.sin))
+    points = np.asarray(points, float)
+    return points * c + np.cross(axis, points) * s + axis * (points @ axis)[..., None] * (1.0 - c)
+
+
+def foot_point(ankle, which, pitch, roll):
+    """Return where an end on the foot is at both angles, in float64."""
+    second, first = np.array(ankle.second), np.array(ankle.first)
+    point = rotated(np.array(ankle.ends[which]) - second, ankle.second_axis, roll) + second
+    return rotated(point - first, ankle.first_axis, pitch) + first
+
+
+def crank_pin(ankle, which, value):
+    """Return where the pivot of a rod is at a motor's angle, in float64."""
+    motor = np.array(ankle.motors[which])
+    if ankle.motor_axes[which] is None:
+        return np.broadcast_to(ankle.pivots[which], (*np.shape(value), 3))
+    return rotated(np.array(ankle.pivots[which]) - motor, ankle.motor_axes[which], value) + motor
+
+
+def rod_length(ankle, which, value):
+    """Return how long a rod is: as drawn, or as its cylinder is."""
+    if ankle.motor_axes[which] is None:
+        return value
+    return ankle.lengths[which]
+
+
+def gaps(ankle, motors, pitch, roll):
+    """Return by how much the halves of both squared lengths are off, in float64."""
+    return [0.5 * (((crank_pin(ankle, i, value) - foot_point(ankle, i, pitch, roll)) ** 2).sum(-1)
+                   - rod_length(ankle, i, value) ** 2) for i, value in enumerate(motors)]
+
+
+def assemblies(ankle, motors):
+    """
+    Return all real poses of each motor pair: pitch and roll, arrays (n, 8), NaN for none.
+
+    Both equations are a cos(pitch) + b sin(pitch) = c with a, b, c linear in cos and sin of the
+    roll; without the pitch a polynomial of degree eight in e^(i roll) is left. Its roots next to
+    the unit circle are refined by Newton's method on both equations and told apart.
+    """
+    motors = [np.asarray(value, float) for value in motors]
+    turns = np.exp(2j * np.pi * np.arange(16) / 16)
+
+    def parts(roll):
+        ways = []
+        for i, value in enumerate(motors):
+            zero, quarter = (np.stack(np.broadcast_arrays(*gaps(
+                ankle, [value[:, None]] * 2, pitch, roll)))[i] for pitch in (0.0, 0.5 * np.pi))
+            half = np.stack(np.broadcast_arrays(*gaps(
+                ankle, [value[:, None]] * 2, np.pi, roll)))[i]
+            c = 0.5 * (zero + half)
+            ways.append((zero - c, quarter - c, c))
+        return ways
+
+    (a1, b1, c1), (a2, b2, c2) = parts(np.angle(turns)[None])
+    values = (b1 * c2 - b2 * c1) ** 2 + (c1 * a2 - c2 * a1) ** 2 - (a1 * b2 - a2 * b1) ** 2
+    series = np.fft.fft(values, axis=1) / 16
+    poly = np.concatenate([series[:, -4:], series[:, :5]], axis=1)[:, ::-1]
+    scale = np.abs(poly).max(axis=1, keepdims=True)
+    poly = np.where(np.abs(poly) > 1e-14 * scale, poly, 1e-14 * scale) / scale
+    companion = np.zeros((len(poly), 8, 8), complex)
+    companion[:, 0] = -poly[:, 1:] / poly[:, :1]
+    companion[:, np.arange(1, 8), np.arange(7)] = 1.0
+    roots = np.linalg.eigvals(companion)
+    roll = np.where(np.abs(np.abs(roots) - 1.0) < 0.05, np.angle(roots), np.nan)
+    (a1, b1, c1), (a2, b2, c2) = parts(roll)
+    sign = np.sign(a1 * b2 - a2 * b1)
+    pitch = np.arctan2(sign * (c1 * a2 - c2 * a1), sign * (b1 * c2 - b2 * c1))
+    return _distinct(*_refined(ankle, motors, pitch, roll))
+
+
+def _refined(ankle, motors, pitch, roll):
+    motors = [value[:, None] for value in motors]
+    step = 1e-7
+    with np.errstate(all='ignore'):
+        for _ in range(20):
+            f = gaps(ankle, motors, pitch, roll)
+            fp, fr = ([(x - y) / (2 * step) for x, y in zip(
+                gaps(ankle, motors, pitch + dp, roll + dr),
+                gaps(ankle, motors, pitch - dp, roll - dr))] for dp, dr in (
+                    (step, 0.0), (0.0, step)))
+            det = fp[0] * fr[1] - fp[1] * fr[0]
+            moves = ((f[0] * fr[1] - f[1] * fr[0]) / det, (fp[0] * f[1] - fp[1] * f[0]) / det)
+            pitch, roll = pitch - np.clip(moves[0], -0.5, 0.5), roll - np.clip(moves[1], -0.5, 0.5)
+        scale = max(np.abs(np.array([*ankle.pivots, *ankle.ends])).max(), 1e-3) ** 2
+        kept = np.maximum(*map(np.abs, gaps(ankle, motors, pitch, roll))) < 1e-11 * scale
+    turn = 2.0 * np.pi
+    return [np.where(kept, x - turn * np.round(x / turn), np.nan) for x in (pitch, roll)]
+
+
+def _distinct(pitch, roll):
+    """Return poses that are named once."""
+    turn = 2.0 * np.pi
+    for i in range(1, pitch.shape[1]):
+        for j in range(i):
+            away = [x[:, i] - x[:, j] for x in (pitch, roll)]
+            same = np.all([np.abs(x - turn * np.round(x / turn)) < 1e-6 for x in away], axis=0)
+            pitch[same, i] = roll[same, i] = np.nan
+    return pitch, roll
+
+
+def exact_gaps(ankle, motors, pitch, roll):
+    """Return what `gaps` does, in digits."""
+    found = []
+    for i, value in enumerate(motors):
+        pivot, end = ankle.pivots[i], ankle.ends[i]
+        length = value
+        if ankle.motor_axes[i] is not None:
+            length = ankle.lengths[i]
+            pivot = turned(pivot, ankle.motors[i], ankle.motor_axes[i], value)
+        end = turned(end, ankle.second, ankle.second_axis, roll)
+        rod = [x - y for x, y in zip(pivot, turned(end, ankle.first, ankle.first_axis, pitch))]
+        found.append((dot(rod, rod) - length ** 2) / 2)
+    return found
+
+
+def _exact(ankle):
+    def of(part):
+        return None if part is None else [of(x) for x in part] if isinstance(part, list) \
+            else mpfr(part)
+
+    return Ankle(*map(of, ankle))
+
+
+def pose_error(ankle, motors, pitch, roll):
+    """Return both angles' errors, and what half a last digit of each number does to them."""
+    ankle = _exact(ankle)
+    motors, start = [mpfr(x) for x in motors], (mpfr(pitch), mpfr(roll))
+    p, r = start
+    step = mpfr(STEP)
+    for _ in range(4):
+        f = exact_gaps(ankle, motors, p, r)
+        columns = [[(x - y) / (2 * step) for x, y in zip(
+            exact_gaps(ankle, motors, p + dp, r + dr), exact_gaps(ankle, motors, p - dp, r - dr))]
+            for dp, dr in ((step, 0), (0, step))]
+        moved = _solved(columns, f)
+        p, r = p - moved[0], r - moved[1]
+    errors = [abs(float(start[0] - p)), abs(float(start[1] - r))]
+    totals = [0.0, 0.0]
+    for name, part in zip(Ankle._fields, ankle[:-1]):
+        vectors = [(None, part)] if name in Ankle._fields[:4] else list(enumerate(part))
+        for i, vector in vectors:
+            if vector is None:
+                continue
+            half = float(np.spacing(max(abs(float(x)) for x in vector)) / 2)
+            for k in range(3):
+                ends = []
+                for way in (step, -step):
+                    moved = list(vector)
+                    moved[k] += way
+                    changed = moved if i is None else [*part[:i], moved, *part[i + 1:]]
+                    ends.append(exact_gaps(ankle._replace(**{name: changed}), motors, p, r))
+                _add(totals, columns, [(x - y) / (2 * step) for x, y in zip(*ends)], half)
+    for i, value in enumerate(motors):
+        ends = [exact_gaps(ankle, [*motors[:i], value + way, *motors[i + 1:]], p, r)
+                for way in (step, -step)]
+        _add(totals, columns, [(x - y) / (2 * step) for x, y in zip(*ends)],
+             float(np.spacing(abs(float(value))) / 2))
+        if ankle.motor_axes[i] is not None:
+            change = [mpfr(0), mpfr(0)]
+            change[i] = -ankle.lengths[i]
+            _add(totals, columns, change, float(np.spacing(float(ankle.lengths[i])) / 2))
+    return errors, totals
+
+
+def _solved(columns, f):
+    (a, c), (b, d) = columns
+    det = a * d - b * c
+    return (f[0] * d - f[1] * b) / det, (a * f[1] - c * f[0]) / det
+
+
+def _add(totals, columns, change, half):
+    for k, moved in enumerate(_solved(columns, change)):
+        totals[k] += abs(float(moved)) * half
+
+
+def measured(case, side=None):
+    """
+    Return the true angle of a rod's hinge and its rate, each with its sensitivity.
+
+    None where the rod does not reach; the rate is None next to a dead point.
+    """
+    side = drawn_side(case) if side is None else side
+    true = angle(case, side)
+    if true is None:
+        return None, None
+    a, b, c = equation(case)
+    found = true, sensitivity(lambda x: angle(x, side), case)
+    if abs(abs(c) / gmpy2.hypot(a, b) - 1) < 1e-6:
+        return found, None
+    return found, (rate(case, side), sensitivity(lambda x: rate(x, side), case))
+
+
+def apart(angle_, other):
+    """Return how far angles are from each other, whole turns aside."""
+    turn = 2 * gmpy2.const_pi()
+    away = angle_ - other
+    return abs(away - turn * gmpy2.rint(away / turn))
+
+
+def beyond(case):
+    """Return how far a rod is from reaching, as a part of what rounding its numbers does."""
+    a, b, c = equation(case)
+    size = sum(abs(float(x)) for vector in case[:7] for x in vector) ** 2
+    return float((abs(c) - gmpy2.hypot(a, b)) / (size * UNIT))
+
+
+def random_rods(rng, count):
+    """
+    Return rods at random, as arrays by what `Rod` calls them.
+
+    Axes are a third each anywhere, parallel but for 1e-16 to 1e-1, and along x, y and z; rods are
+    a quarter each long enough, every decade to 1e-17 from a dead point, at it but for some last
+    digits, and with an end next to the hinge's axis.
+    """
+    def any_of(many=3):
+        return rng.normal(size=(count, many))
+
+    motor, hinge, pivot, end, axis, other = (any_of() for _ in range(6))
+    kind = rng.integers(3, size=count)
+    near = axis + any_of() * 10.0 ** rng.uniform(-16, -1, size=(count, 1))
+    other[kind == 1] = near[kind == 1]
+    for vectors in (axis, other):
+        vectors[kind == 2] = np.eye(3)[rng.integers(3, size=count)][kind == 2]
+    value = rng.uniform(-np.pi, np.pi, count)
+    along = axis / np.linalg.norm(axis, axis=1, keepdims=True)
+    kind = rng.integers(4, size=count)
+    close = hinge + along * any_of(1) + (end - hinge) * 10.0 ** rng.uniform(-12, 0, (count, 1))
+    end[kind == 3] = close[kind == 3]
+    foot = np.array([rotated(p - m, a, v) + m for p, m, a, v in zip(
+        pivot, motor, other, value)]) - hinge
+    up = ((foot - end + hinge) * along).sum(axis=1)
+    w, rho = (np.linalg.norm(np.cross(along, x), axis=1) for x in (foot, end - hinge))
+    low, high = np.hypot(up, w - rho), np.hypot(up, w + rho)
+    sign = rng.choice([-1, 1], count)
+    edge = np.where(sign > 0, low, high)
+    length = rng.uniform(low, high)
+    decades = edge * (1 + sign * 10.0 ** rng.uniform(-17, 0, count))
+    digits = edge * (1 + rng.integers(-4, 5, size=count) * 2.0 ** -52)
+    length = np.select([kind == 1, kind == 2], [decades, digits], length)
+    sided = np.einsum('ij,ij->i', along, np.cross(pivot - hinge, end - hinge))
+    seen = np.abs(sided) > 2e-6 * np.linalg.norm(
+        np.cross(along, pivot - hinge), axis=1) * rho
+    kept = seen & (length > 0.0)
+    return {name: part[kept] for name, part in zip(Rod._fields[:8], (
+        motor, other, pivot, hinge, axis, end, length, value))}
+
+
+def motor_values(ankle, which, pitch, roll):
+    """Return a motor's values for poses, one array for each side of its crank, in float64."""
+    end = foot_point(ankle, which, pitch, roll)
+    if ankle.motor_axes[which] is None:
+        return [np.linalg.norm(end - ankle.pivots[which], axis=-1)]
+    zero, quarter, half = (crank_pin(ankle, which, x) for x in (0.0, 0.5 * np.pi, np.pi))
+    centre = 0.5 * (zero + half)
+    a, b = ((end - centre) @ (x - centre) for x in (zero, quarter))
+    c = 0.5 * (((end - centre) ** 2).sum(-1) + ((zero - centre) ** 2).sum()
+               - ankle.lengths[which] ** 2)
+    with np.errstate(invalid='ignore'):
+        off = np.arccos(c / np.hypot(a, b))
+    return [np.arctan2(b, a) + side * off for side in (1, -1)]
+
+
+def determinants(ankle, motors, pitch, roll):
+    """Return the determinant of the derivatives of `gaps` by both angles, in float64."""
+    step = 1e-6
+    (a, c), (b, d) = ([(x - y) / (2 * step) for x, y in zip(
+        gaps(ankle, motors, pitch + dp, roll + dr), gaps(ankle, motors, pitch - dp, roll - dr))]
+        for dp, dr in ((step, 0.0), (0.0, step)))
+    return a * d - b * c
+
+
+def is_ambiguous(ankle, low, high, count=11):
+    """Return whether a window has a second or a singular pose for some motors that it needs."""
+    axes = [np.linspace(*ends, count) for ends in zip(low, high)]
+    pitch, roll = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2).T
+    for motors in itertools.product(*(motor_values(ankle, i, pitch, roll) for i in (0, 1))):
+        there = ~np.isnan(motors).any(axis=0)
+        if not there.any():
+            continue
+        motors = [x[there] for x in motors]
+        if len({*np.sign(determinants(ankle, motors, pitch[there], roll[there]))}) > 1:
+            return True
+        all_ = np.stack(assemblies(ankle, motors), axis=-1)
+        if ((all_ > low + 1e-6) & (all_ < high - 1e-6)).all(axis=-1).sum(axis=1).max() > 1:
+            return True
+    return False
