@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 import sys
 import time
@@ -72,9 +73,12 @@ class Kinematics(scene_node.SceneNode):
     def check(self, new: scene.Scene) -> None:
         """Refuse what has no robot model; SceneError says why."""
         for name, machine in new.machines.items():
-            if not machine.in_space and (name not in self.scene.machines
-                                         or machine is not self.scene.machines[name]):
-                bodies.robot([machine], machine.frame_id or new.frame_id)
+            before = self.scene.machines[name]
+            if not machine.in_space and (
+                    machine is not before or new.frame_id != self.scene.frame_id):
+                bodies.size(machine)
+                # Nothing else that is refused depends on dimensions, whose travels take long.
+                bodies.robot([replace(machine, linkage=before.linkage)], new.frame_id)
 
     def prepare(self, new: scene.Scene) -> Any:
         """Return the model of each mechanism, another for each that has changed, and its robot."""
