@@ -436,3 +436,17 @@ def test_without_matplotlib_its_package_is_named(tmp_path):
     assert ended.returncode == 1
     assert ended.stderr.startswith('render: matplotlib is not installed: ')
     assert ended.stderr.count('\n') == 1
+
+
+def test_readings_are_written_beside_or_below_each_other():
+    machines = [*scene.load(str(CONFIG / 'excavator.yaml')).machines.values(),
+                *scene.load(str(CONFIG / 'scissor_lift.yaml')).machines.values(),
+                machine('five_bar')]
+    picture = picture_of(*machines, size=(900, 400))
+    picture.at(0.0)
+    for panel in picture.panels:
+        headline = next(layer for layer in panel.moving if isinstance(layer, layers.Headline))
+        boxes = [text.get_window_extent() for text in headline.artists]
+        for one, other in itertools.combinations(boxes, 2):
+            assert (min(one.x1, other.x1) <= max(one.x0, other.x0)
+                    or min(one.y1, other.y1) <= max(one.y0, other.y0))
