@@ -59,6 +59,15 @@ def test_a_scene_is_written_as_the_few_values_that_tell_it(file, tmp_path):
     assert len(kept) < len(before.parameters) / 2
 
 
+def test_names_that_ros_takes_for_values_are_written_as_texts(tmp_path):
+    before = scene.read({'mechanisms': ['y', 'nan', 'Inf', 'on'], 'frame_id': '1e5', **{
+        f'{name}.type': 'klann' for name in ('y', 'nan', 'Inf', 'on')},
+        'y.frame_id': '08', 'nan.frame_id': '0x1F', 'nan.crank.source': '1_0'})
+    again = tmp_path / 'again.yaml'
+    again.write_text(writing.in_yaml(writing.without_defaults(before)))
+    assert scene.load(str(again)).parameters == before.parameters
+
+
 def test_scale_multiplies_every_length():
     lever = mechanisms.create('slotted_lever')
     small, large = (Assembly(lever, scale=scale) for scale in (0.001, 1.0))

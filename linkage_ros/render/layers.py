@@ -275,11 +275,14 @@ class Headline:
             fixed_lines += textwrap.wrap(words, 60 if single else 28)
         self.artists = []
         if 'title' in parts:
-            fixed_lines.append(' ')
             count = len(readings(self._linkage, [1.0] * len(machine.inputs), self._short))
+            across = min(count, 4 - 2 * self._short)
+            rows = math.ceil(count / across)
+            fixed_lines += [' '] * rows
             self.artists = [axes.annotate(
-                '', (k / count, 1.0), (0, 6), 'axes fraction', 'offset points', fontsize=size,
-                va='baseline', animated=True, in_layout=False) for k in range(count)]
+                '', (k % across / across, 1.0), (0, 6 + 1.2 * size * (rows - 1 - k // across)),
+                'axes fraction', 'offset points', fontsize=size, va='baseline', animated=True,
+                in_layout=False) for k in range(count)]
         axes.set_title('\n'.join(fixed_lines), loc='left', fontsize=size)
 
     def show(self, pose):
