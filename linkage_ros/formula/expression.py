@@ -14,7 +14,19 @@ from __future__ import annotations
 
 from functools import reduce
 from math import cos, sin
-from typing import Any, Callable, Iterable, Iterator, Mapping, NamedTuple, Optional, Tuple, Union
+from typing import (
+    Any,
+    Callable,
+    Iterable,
+    Iterator,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Tuple,
+    Union,
+)
 
 
 class Real:
@@ -364,6 +376,20 @@ def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
         else:
             known[x] = _RULES[x.op](x, rates, *map(known.get, x.operands))
     return known[node]
+
+
+def substituted(outputs: Sequence[Real], arguments: Sequence[Real]) -> List[Real]:
+    """Return expressions whose arguments are other expressions; rates of their own are lost."""
+    known: dict = {}
+    for x in in_order(outputs, lambda x: x.operands if x.varies else ()):
+        if x.op == 'argument':
+            known[x] = arguments[x.args[0]]
+        elif not x.varies:
+            known[x] = x
+        else:
+            known[x] = known[x.args[0]] if x.op == 'rated' else Real(
+                x.op, tuple(known[arg] for arg in x.args), positive=x.positive)
+    return [known[x] for x in outputs]
 
 
 class Rate(NamedTuple):

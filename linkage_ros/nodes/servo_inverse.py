@@ -83,8 +83,11 @@ class ServoInverse(scene_node.SceneNode):
 
     def _answer(self, request, response):
         key = request.mechanism, request.output
-        asked = self._known.get(key) or InverseRequest(
-            _machine(self.scene, *key), [request.output])
+        machine = _machine(self.scene, *key)
+        if len(machine.inputs) > 1:
+            raise ValueError(f'{machine.name} has several inputs; one output does not tell them: '
+                             'ask inputs_for')
+        asked = self._known.get(key) or InverseRequest(machine, [request.output])
         solve(asked, request, response)
         self._known[key] = asked
 
