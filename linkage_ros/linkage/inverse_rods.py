@@ -37,7 +37,7 @@ class InverseRods:
         rods = turning_rods(self.design.lines, outputs)
         if len(rods) > MOST_SIDES:
             raise ValueError(f'more than {2 ** MOST_SIDES} assembly modes')
-        self.branches = dict.fromkeys(rods, 1)
+        self.branches, self.given = dict.fromkeys(rods, 1), dict[Real, Real]()
         self.turns = ((0.0,),) * len(outputs)
         names = [input_.name for input_ in linkage.inputs]
         self.modes = tuple(self._mode({**linkage.branches, **dict(zip(rods, sides))}, names)

@@ -25,7 +25,7 @@ from . import custom
 from ..linkage.arguments import checked_branches, checked_dimensions
 from ..linkage.design import Design
 from ..linkage.mechanism import Mechanism
-from ..words import meant, quoted
+from ..words import meant, plain_text, quoted
 
 # What a scene shows when it names no mechanism, and its scale: from 0.5 m to 1.5 m in size.
 CATALOGUE = {'water_drop': 0.1, 'jansen': 0.005, 'peaucellier': 0.1, 'slotted_lever': 0.002}
@@ -73,7 +73,7 @@ def design(type_: str, /, joints: Optional[Sequence[str]] = None, tracer: Option
                          f'allowed: {", ".join((*TYPES, *WRITTEN))}'
                          f'{meant(type_, (*TYPES, *WRITTEN))}')
     if type_ in WRITTEN:
-        return custom.given(type_, joints, tracer, dimensions)
+        return custom.given(plain_text(type_), joints, tracer, dimensions)
     if joints is not None or tracer is not None:
         raise ValueError(f'joints and tracer are for type '
                          f'{" or ".join(WRITTEN)}, not for {type_}')

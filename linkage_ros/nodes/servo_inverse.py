@@ -89,7 +89,11 @@ class ServoInverse(scene_node.SceneNode):
             _machine_together(self.scene, request.mechanism), request, response), response)
 
     def _request(self, key: Tuple[str, str]) -> InverseRequest:
-        return InverseRequest(_machine(self.scene, *key), [key[1]])
+        machine = _machine(self.scene, *key)
+        if len(machine.inputs) > 1:
+            raise ValueError(f'{machine.name} has several inputs; one output does not tell them: '
+                             'ask inputs_for')
+        return InverseRequest(machine, [key[1]])
 
     def _filled(self, fill: Callable[[], None], response: Any) -> Any:
         response.success = False
