@@ -9,7 +9,7 @@ import random
 
 from builtin_interfaces.msg import Duration
 from linkage_ros import mechanisms, scene
-from linkage_ros.scene.wanted import Wanted
+from linkage_ros.scene.inverse_request import InverseRequest
 import numpy as np
 import pytest
 from truth.cases import CASES
@@ -176,13 +176,13 @@ def test_commands_move_the_picture(stream, graph):
     ('watt', 'P.y', 1.0), ('whitworth', 'lever', 3.0)])
 def test_a_turning_crank_is_found_again_without_a_jump(type_, output, part):
     machine = scene.read({'mechanisms': ['one'], 'one.type': type_}).machines['one']
-    linkage, wanted = machine.linkage, Wanted(machine, output)
+    linkage, wanted = machine.linkage, InverseRequest(machine, [output])
     (_, start), (_, end) = linkage.extremes(output)[0]
     near = start + 0.02 * part * (end - start)
     for k in range(2, 98):
         crank = start + 0.01 * k * part * (end - start)
         value = float(linkage.joint_angles(crank, [output])[output])
-        (found,), (actuator,), _ = wanted.commanded([value], None, [near])
+        (found,), (actuator,), _ = wanted.command([value], None, [near])
         assert actuator == found and abs(found - near) < 0.3
         again = float(linkage.joint_angles(found, [output])[output])
         assert math.remainder(again - value, math.tau) == pytest.approx(0.0, abs=1e-12 * max(

@@ -24,6 +24,7 @@ from ..formula.expression import (
     cross,
     dimension,
     dot,
+    gated,
     Number,
     Real,
     real,
@@ -112,6 +113,8 @@ class Builder:
         self.directions: Dict[str, Complex] = {}
         self.transmissions: Dict[str, Real] = {}
         self.folds: List[planar.Limit] = []
+        # Limits that are no dead points: the ends of ways.
+        self.ways: List[planar.Limit] = []
         self.inputs: List[Input] = []
         self.arguments: List[Real] = []
         self.cylinders: List[Tuple[str, str]] = []
@@ -177,6 +180,13 @@ class Builder:
         """Drive a joint along the line from a joint towards another of one link, low to high."""
         word = self._numbered('carriage')
         place = self._drive(Input(word, LENGTH, low, high), geared)
+        # As a cylinder has no place beyond its stroke, so a carriage has none beyond its way.
+        way = abs(low) + abs(high)
+        for margin in (place - low, high - place):
+            limit = planar.Limit(margin, planar.GRAZE * way)
+            self.limits.append(limit)
+            self.ways.append(limit)
+            place = gated(place, limit.margin, limit.tolerance)
         self._ride(word, name, origin, towards, place, abs(low) + abs(high))
 
     def yoke(self, name: str, pin: str, origin: str, towards: str) -> None:
@@ -378,7 +388,7 @@ class Builder:
             if self.mirrors:
                 along = self._mirrored(along)
                 angle = arctangent(along.y, along.x)
-        rail = self._rail(pin, origin, along)
+        rail = self._rail(pin, origin, along, direction)
         found = planar.slider(rail, rod, side)
         self.limits += found.limits
         link = self._hang(pin, name, found.rod, rod)
@@ -387,9 +397,17 @@ class Builder:
         self.transmissions[name] = arctangent(abs(found.reach), rail.height)
         self._slide(self._numbered('block'), parent, origin, name, found.place, along, angle)
 
-    def _rail(self, pin: str, origin: str, along: Complex) -> planar.Rail:
+    def _rail(self, pin: str, origin: str, along: Complex, towards: object) -> planar.Rail:
         """Return a joint as seen from a line through another."""
         start, end = self.points[origin], self.points[pin]
+        link = self._side(origin, towards).link if isinstance(towards, str) else GROUND
+        crank = next((point.crank for point in self.points.values()
+                      if point.crank and point.home == link), None)
+        if crank and end.home == GROUND and end.place is not crank.centre:
+            frame = self.frames[link]
+            zero = frame[str(towards)] - frame[origin]
+            return planar.TurnedRail(end.place, crank, start.place, along, zero.direction(),
+                                     frame[origin], start.span + end.span)
         if end.crank and not along.x.varies and start.home == GROUND:
             return planar.CrankRail(end.crank, start.place, along, start.span + end.span)
         return planar.Rail(end.place, start.place, along, start.span + end.span)

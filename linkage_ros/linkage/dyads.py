@@ -165,6 +165,10 @@ class Dyads:
         """Return where a place on a body is in the pose that sides are told from."""
         return place
 
+    def turned(self, body: str, along: complex) -> complex:
+        """Return a direction on a body as it is in the pose."""
+        return along
+
     def drive(self, word: str, joint: Any, ratio: float, offset: float) -> Tuple[str, str]:
         """
         Note an input, ratio * position + offset of a joint.
@@ -222,6 +226,9 @@ class Dyads:
                 if abs(end - start) > self.near]
         if body == self.ground:
             line = f'ground {said(place.real)} {said(place.imag)}'
+        elif part.slide and [each.joint for each in self.parts.values() if each.slide].count(
+                part.joint) > 1:
+            raise ValueError(f'{part.joint} is on two blocks, of which `block` takes one')
         elif part.slide:
             seen = (place - on[part.joint]) / part.along
             line = f'block {part.joint} {said(seen.real)} {said(seen.imag)}'
@@ -251,7 +258,8 @@ class Dyads:
         name, end = next(((name, end) for name, end in self.on[body].items()
                           if name not in (origin, but)
                           and abs(((end - at) / axis).imag) < ROUNDING * self.size), None) \
-            or self.fixed(body, at + self.size * axis)
+            or self.fixed(body, at + axis * (max(abs(end - at) for end in self.on[body].values())
+                                             or self.size))
         return (origin, at), name, (end - at) / abs(end - at)
 
     def end(self, body: str) -> Pin:
@@ -286,12 +294,13 @@ class Dyads:
         if base != self.ground:
             mark, end = self.other(base, centre)
             zero, along = f' zero {mark}', end - start
-        rail = next((axis for slide in (*self.slides, *self.motors) if isinstance(slide, Slide)
-                     for each, axis in zip(slide.bodies, slide.axes) if each == body), 1.0 + 0.0j)
         centred = hinge.places[1 - way]
+        origin, rail = next(self._rails(body), (centred, 1.0 + 0.0j))
+        foot = origin + rail * ((centred - origin) / rail).real
+        # On the line that something slides on, where that passes the hinge.
         place = next((pin[body] for pin in self.pins
                       if body in pin and abs(pin[body] - centred) > self.near),
-                     centred + self.size * rail)
+                     centred + self.size * rail if abs(foot - centred) < self.near else foot)
         sign = -1.0 if way else 1.0
         number, geared = self.drive('crank', hinge.joint, sign * hinge.sign, sign * hinge.zero
                                     + phase((place - centred) / along))
@@ -299,6 +308,16 @@ class Dyads:
                          f'{geared}')
         self.on[body].setdefault(centre, centred)
         return self.hang(body, centre, name, f'crank{number}')
+
+    def _rails(self, body: str) -> Iterator[Tuple[complex, complex]]:
+        """Yield the lines of a body, a point and the way, that pins of others slide on."""
+        for slide in (*self.slides, *self.motors):
+            if isinstance(slide, Slide) and body in slide.bodies:
+                own = slide.bodies.index(body)
+                pin = next((pin[slide.bodies[1 - own]] for pin in self.pins
+                            if slide.bodies[1 - own] in pin), slide.origins[1 - own])
+                aside = ((pin - slide.origins[1 - own]) / slide.axes[1 - own]).imag
+                yield slide.origins[own] + 1j * slide.axes[own] * aside, slide.axes[own]
 
     def _carriage(self, slide: Slide, way: int) -> bool:
         """Place the body that a motor moves along one that is placed."""
@@ -331,8 +350,8 @@ class Dyads:
             ahead = (pin[rod] - slide.origins[1 - way]) / slide.axes[1 - way] - back
             if bar == barrel or base == self.end(bar)[0] or abs(ahead.imag) > self.near:
                 continue
-            sign = math.copysign(1.0, ((self.seen(rod, pin[rod]) - foot) / (
-                self.seen(barrel, start + slide.axes[way]) - foot)).real)
+            sign = math.copysign(1.0, ((self.seen(rod, pin[rod]) - foot)
+                                       / self.turned(barrel, slide.axes[way])).real)
             number, geared = self.drive('cylinder', slide.joint, sign * (-1.0 if way else 1.0),
                                         sign * ahead.real)
             pivot, at = self.end(bar)
@@ -370,9 +389,8 @@ class Dyads:
             (joint, at), length = self.end(rod), abs(pin[rod] - self.end(rod)[1])
             ahead = (pin[block] - slide.origins[1 - way]) / slide.axes[1 - way]
             (start, on_base), towards, along = self.line(base, origin + axis * ahead, axis, joint)
-            foot = self.seen(base, on_base)
-            half = 'out' if ((self.seen(rod, pin[rod]) - self.seen(rod, at)) / (
-                self.seen(base, on_base + along) - foot)).real > 0.0 else 'in'
+            half = 'out' if (self.turned(rod, pin[rod] - at) / self.turned(
+                base, along)).real > 0.0 else 'in'
             number = self.number('slider', 'yoke')
             name = self.name(pin[rod], rod, f'slider {joint} {self.said(length)} {start} '
                              f'along {towards} {half}')
@@ -389,8 +407,8 @@ class Dyads:
         if pivot == pin:
             return False
         axis, across = slide.axes[way], slide.axes[1 - way]
-        foot = self.seen(lever, start)
-        ahead = ((self.seen(block, end) - foot) / (self.seen(lever, start + axis) - foot)).real
+        ahead = ((self.seen(block, end) - self.seen(lever, start))
+                 / self.turned(lever, axis)).real
         sign, length = math.copysign(1.0, ahead), abs(ahead)
         offset = sign * (((end - slide.origins[1 - way]) / across).imag
                          - ((start - slide.origins[way]) / axis).imag)

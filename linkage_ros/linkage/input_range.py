@@ -62,13 +62,14 @@ def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Calla
         return failing(theta) == len(limits)
 
     closed = [limit for limit in limits if limit.ends and limit.ends.theta.args[0] == 0]
-    ends = [end for limit in closed for end in _crank_ends(limit, value)]
+    ends = [end + math.tau * turn for limit in closed for end in _crank_ends(limit, value)
+            for turn in range(input_.period)]
     if input_.turns:
         # What follows a turn later may be another assembly: the arcs are then those of [-pi, pi].
-        ends.append(-math.pi)
+        ends.append(input_.low)
     if any(x.margin.varies and x not in closed for x in limits):
         ends += [end for arc in input_.between(ends) for end in _limits(margins, failing, *arc)]
-    found = reachable_arcs(ends, assembled, input_, lambda: _is_periodic(places))
+    found = reachable_arcs(ends, assembled, input_, lambda: _is_periodic(places, input_))
     if input_.is_whole(found):
         return found
     trimmed = [_trimmed(assembled, *arc) for arc in found]
@@ -118,10 +119,10 @@ def _trimmed(assembled: Callable, lo: float, hi: float) -> Arc:
     return low, high
 
 
-def _is_periodic(places: Callable) -> bool:
-    """Return whether all joints are at the same places a turn later."""
-    theta = np.linspace(-math.pi, math.pi, 66)[1:-1]
-    now, later = (places(theta + turn) for turn in (0.0, math.tau))
+def _is_periodic(places: Callable, input_: Input) -> bool:
+    """Return whether all joints are at the same places a period later."""
+    theta = np.linspace(input_.low, input_.high, 66)[1:-1]
+    now, later = (places(theta + turn) for turn in (0.0, input_.turn))
     with np.errstate(invalid='ignore'):
         alike = np.abs(now - later) <= ALIKE * np.fmax.reduce(np.abs(now), axis=None)
     return bool(np.all(alike | (np.isnan(now) & np.isnan(later))))
@@ -145,11 +146,11 @@ def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
             found[-1] = found[-1][0], hi
         else:
             found.append((lo, hi))
-    if (input_.turns and len(found) > 1 and found[0][0] + math.tau - found[-1][1] <= NARROWEST
+    if (input_.turns and len(found) > 1 and found[0][0] + input_.turn - found[-1][1] <= NARROWEST
             and joined()):
-        found[-1] = found[-1][0], found.pop(0)[1] + math.tau
-    return [(lo - math.tau, hi - math.tau) if input_.turns and lo >= math.pi else (lo, hi)
-            for lo, hi in found]
+        found[-1] = found[-1][0], found.pop(0)[1] + input_.turn
+    return [(lo - input_.turn, hi - input_.turn) if input_.turns and lo >= input_.high
+            else (lo, hi) for lo, hi in found]
 
 
 def _crank_ends(limit: Limit, value: Callable) -> List[float]:

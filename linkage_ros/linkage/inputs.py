@@ -39,6 +39,9 @@ class Input(NamedTuple):
         stroke.
     high : float
         The other end.
+    period : int
+        After how many turns all comes round: more than one where it drives others by gears of
+        fractions.
 
     """
 
@@ -46,6 +49,12 @@ class Input(NamedTuple):
     kind: str = ANGLE
     low: Any = -math.pi
     high: Any = math.pi
+    period: int = 1
+
+    @property
+    def turn(self) -> float:
+        """The angle [rad] after which all comes round."""
+        return math.tau * self.period
 
     @property
     def turns(self) -> bool:
@@ -73,17 +82,17 @@ class Input(NamedTuple):
 
     def wrapped(self, value: Any) -> Any:
         """Return values within [low, high) where they turn, else as they are."""
-        return wrapped(value) if self.turns else value
+        return wrapped(value, self.turn) if self.turns else value
 
     def turns_of(self, value: float) -> float:
-        """Return the whole turns [rad] by which a value is out of [-pi, pi)."""
-        return math.tau * math.floor((value + math.pi) / math.tau) if self.turns else 0.0
+        """Return the whole periods [rad] by which a value is out of [low, high)."""
+        return self.turn * math.floor(value / self.turn + 0.5) if self.turns else 0.0
 
     def beside(self, value: Any, near: Any) -> Any:
         """Return values plus the whole turns that take them next to others."""
         if not self.turns:
             return value + 0.0 * near
-        return value + math.tau * np.round((near - value) / math.tau)
+        return value + self.turn * np.round((near - value) / self.turn)
 
     def apart(self, value: Any, other: Any) -> Any:
         """Return how far values are from others, whole turns aside."""
@@ -91,7 +100,7 @@ class Input(NamedTuple):
 
     def is_whole(self, arcs: Sequence[Arc]) -> bool:
         """Return whether it turns all round on some arcs."""
-        return self.turns and len(arcs) == 1 and arcs[0][1] - arcs[0][0] >= math.tau
+        return self.turns and len(arcs) == 1 and arcs[0][1] - arcs[0][0] >= self.turn
 
     def is_cut(self, value: float) -> bool:
         """Return whether the input is cut off at a value: a turn at pi, a stroke at its end."""
@@ -102,22 +111,22 @@ class Input(NamedTuple):
         value, slack = np.asarray(value), ROUNDED * self.size
         with np.errstate(invalid='ignore'):
             ahead = [value - low + slack for low, _ in arcs]
-            ahead = [gap % math.tau for gap in ahead] if self.turns else ahead
+            ahead = [gap % self.turn for gap in ahead] if self.turns else ahead
             return np.any([(gap >= 0.0) & (gap <= high - low + 2.0 * slack)
                            for gap, (low, high) in zip(ahead, arcs)], axis=0)
 
     def holds(self, arc: Arc, low: float, high: float) -> bool:
         """Return whether an arc holds another, whole turns aside."""
-        turns = math.tau * math.floor((high - arc[0]) / math.tau) if self.turns else 0.0
+        turns = self.turn * math.floor((high - arc[0]) / self.turn) if self.turns else 0.0
         return arc[0] <= low - turns and high - turns <= arc[1]
 
     def within(self, low: float, high: float) -> Iterator[Arc]:
-        """Yield an arc, in two where it crosses pi."""
+        """Yield an arc, in two where it crosses the upper end of a period."""
         if not self.turns:
             yield low, high
             return
-        for turn in (0.0, math.tau):
-            start, end = max(low - turn, -math.pi), min(high - turn, math.pi)
+        for turn in (0.0, self.turn):
+            start, end = max(low - turn, self.low), min(high - turn, self.high)
             if start < end:
                 yield start, end
 
@@ -131,14 +140,15 @@ class Input(NamedTuple):
                 marks.append(end)
         if not marks:
             return [(self.low, self.high)]
-        return list(zip(marks, marks[1:] + [marks[0] + math.tau] * self.turns))
+        return list(zip(marks, marks[1:] + [marks[0] + self.turn] * self.turns))
 
 
 CRANK = Input('crank')
 
 
-def wrapped(theta: Any) -> Any:
-    """Return angles [rad] in [-pi, pi)."""
-    turned = theta - math.tau * np.floor((theta + math.pi) / math.tau)
-    turned = np.where((turned < -math.pi) | (turned >= math.pi), -math.pi, turned)
-    return np.where((theta >= -math.pi) & (theta < math.pi), theta, turned)
+def wrapped(theta: Any, turn: float = math.tau) -> Any:
+    """Return angles [rad] in [-turn/2, turn/2)."""
+    half = 0.5 * turn
+    turned = theta - turn * np.floor((theta + half) / turn)
+    turned = np.where((turned < -half) | (turned >= half), -half, turned)
+    return np.where((theta >= -half) & (theta < half), theta, turned)

@@ -2,305 +2,690 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Values of the input that bring about a wanted value of any output.
+The inverse: values of the inputs that give as many outputs the values that are asked for.
 
-The output is cut into branches on which it rises or falls all along: at its extremes, at the ends
-of the reach, and where the linkage passes a dead point. On a branch a value is found by Newton's
-method kept inside a bracket, to the last digit.
+Where the inverse linkage comes apart into dyads, each of its assembly modes is a closed form.
+Which of them the linkage has itself, its forward formula tells: an answer gives the outputs their
+values but for rounding, with every dyad on its side, inside the reach. What does not come apart is
+searched: one input between the extremes of the output, several by steps on the exact Jacobian.
 """
 
 from __future__ import annotations
 
+from functools import reduce
+from itertools import chain, combinations, islice, product
 import math
-from typing import Any, Callable, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import (
+    Any,
+    Iterable,
+    Iterator,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Tuple,
+    TYPE_CHECKING,
+)
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .curves import LEAST, refined, sampled, turns
-from .inputs import Arc, Input
+from .analysis import Analysis
+from .arguments import numbers
+from .curves import LEAST
+from .inverse_linkage import InverseLinkage, taken_apart
+from .planar import GRAZE
+from .search import blocks, Search, SINGULAR
+from ..cache import cached
+from ..formula.expression import (
+    argument,
+    gated,
+    nearest_integer,
+    Real,
+    real,
+    square,
+    square_root,
+    where,
+)
+from ..formula.program import Pose, Program
+from ..words import listed, quoted
 
-# Answers that are no further apart than this [rad] are one.
-CLOSE = 1e-13
-# A step to the outermost sample of an arc by more than this part of the output breaks it off.
-BROKEN = 1e-6
-# Newton's method halves its error more than once a step; bisection needs one step a bit.
-STEPS = 200
-# An output that changes by no more than so many times its rounding stands still.
-STILL = 64.0
-# What a value may miss, as a part of the output's range, before it counts as stepped over.
-MISSED = 1e-9
+if TYPE_CHECKING:
+    from .mechanism import Mechanism
+
+# Rounding of an output on its way through both formulas, as a part of its size.
+ROUNDING = 32 * 2.0 ** -53
+# An answer is tried so far beside where it was found [rad, sizes], as the reach may end there.
+BESIDE = 16 * 2.0 ** -52 * math.pi
+# At an end of the reach, where rates have no bound, what that makes of an output, as a part.
+ENDED = 1e-7
+# What misses by more than this part of the output's size is the answer of another assembly.
+OTHER = 1e-2
+# Newton steps that may take a closed form's rounding away; each doubles the digits.
+POLISHING = 5
+# What an output misses [its size] that is no more than this is not made less. Outputs tell inputs
+# badly where the inputs move by more than their rounding through this.
+TINY, SOUND = 2.0 ** -54, 0.1
+# Answers that are no further apart than this [rad, sizes], or than what rounding of the outputs
+# makes of it where that is no more than the second, are one.
+SAME, NEIGHBOURS = 1e-13, 1e-4
+# Outputs go on in steps of this part of their size, and what is nearer than the second is where
+# the inputs are [rad, sizes].
+STEP, ALIKE = 0.3, 1e-5
+# An input is at an end of its sweep if the outputs do not tell by rounding, or by this, and by
+# this part of the end.
+CLOSE, ULPS = 1e-7, 4 * 2.0 ** -52
+# Of so many values at once the last rounding is left in the answers.
+MANY = 1024
+# More than any input.
+LARGE = 1e300
+
+Found = Tuple[Tuple[float, ...], Tuple[float, ...]]
+Ends = Optional[Sequence[Optional[Tuple[float, float]]]]
 
 
-def in_order(answers: np.ndarray, input_: Input) -> np.ndarray:
+class Answer(NamedTuple):
     """
-    Return values of an input, shape (candidates, n), as shape (n, answers).
+    Values of all inputs that give outputs the values that are wanted.
 
-    Each row ascends, holds nothing twice, and is filled up with NaN; angles are in [-pi, pi).
-    """
-    rows = np.sort(input_.wrapped(np.where(np.abs(answers) < LEAST, 0.0, answers)), axis=0)
-    if len(rows) > 1:
-        rows[1:][np.diff(rows, axis=0) <= CLOSE] = np.nan
-        last = np.nanmax(rows, axis=0, initial=-np.inf)
-        again = input_.turns & (rows == last) & (last - rows[0] >= math.tau - CLOSE)
-        rows = np.sort(np.where(again, np.nan, rows), axis=0)
-    most = int(np.isfinite(rows).sum(axis=0).max(initial=0))
-    rows = rows[:max(most, 1)] if len(rows) else np.full((1, answers.shape[1]), np.nan)
-    return np.moveaxis(rows, 0, -1)
-
-
-def nearest(answers: np.ndarray, near: ArrayLike, input_: Input) -> Any:
-    """Return of answers, shape (..., k), the one nearest to a value, whole turns included."""
-    near = np.asarray(near, float)[..., None]
-    theta = input_.beside(answers, near)
-    away = np.where(np.isnan(theta), np.inf, np.abs(theta - near))
-    best = np.argmin(away, axis=-1)[..., None]
-    return np.take_along_axis(np.broadcast_to(theta, away.shape), best, -1)[..., 0][()]
-
-
-def distinct(theta: Iterable[float], input_: Input) -> List[float]:
-    """Return values of an input in order, without those next to another."""
-    found = np.array(list(theta), float)
-    return [x for x in in_order(found[:, None], input_)[0].tolist() if x == x]
-
-
-_Run = Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-
-
-class _Branch(NamedTuple):
-    """Samples of an arc on which an output rises, or falls if the sign is -1."""
-
-    theta: np.ndarray
-    value: np.ndarray
-    sign: float
-
-
-class MonotoneBranches:
-    """
-    An output over the reach, in branches on which it rises or falls all along.
-
-    Parameters
+    Attributes
     ----------
-    curve : callable
-        From values of the input, shape (n,), to the output and its rate, shape (2, n).
-    arcs : sequence of (float, float)
-        Where the input may be; nowhere both sides of -pi or pi.
-    marks : sequence of float
-        Values of the input next to which the output may change quickly or break off.
-    angular : bool
-        Whether the output is an angle, compared modulo a turn.
-    rounding : float
-        What the output is rounded to at least; a value so far beyond an extreme is the extreme.
+    inputs : tuple of float
+        In the order of `Mechanism.inputs` [rad or m].
+    inverse : Inverse
+        Whose answer it is.
 
     """
 
-    def __init__(self, curve: Callable, arcs: Iterable[Arc], marks: Sequence[float],
-                 angular: bool, rounding: float):
-        self._curve = curve
-        self._angular = angular
-        self._rounding = rounding
-        runs = [run for arc in _cut(arcs, marks) for run in self._runs(*arc)]
-        self._range = max((np.ptp(value) for _, value, *_ in runs), default=0.0)
-        self._branches = [branch for run in runs for branch in self._branched(*run)] \
-            if self._moves(runs) else []
-
-    def answers(self, values: np.ndarray) -> np.ndarray:
-        """Return the values of the input for an output's, shape (n,), as (candidates, n)."""
-        asked = [(branch, place, target[place]) for branch in self._branches
-                 for target in self._targets(branch, values)
-                 if len(place := np.flatnonzero(np.isfinite(target)))]
-        found = np.full((max(len(asked), 1), *values.shape), np.nan)
-        if asked:
-            theta = self._solved(*map(np.concatenate, zip(*(
-                _bracketed(branch, target) for branch, _, target in asked))))
-            ends = np.cumsum([len(place) for _, place, _ in asked])[:-1]
-            near = 0.25 * self._rounding
-            for row, (branch, place, target), part in zip(found, asked, np.split(theta, ends)):
-                part = np.where(target <= branch.value[0] + near, branch.theta[0], part)
-                row[place] = np.where(target >= branch.value[-1] - near, branch.theta[-1], part)
-        return found
-
-    def pieces(self, most: float) -> List[Tuple[float, float, float, float]]:
-        """Return the branches, cut where the output has changed by so much: inputs, outputs."""
-        cut = []
-        for theta, value, sign in self._branches:
-            places = [0]
-            for i in range(1, len(theta)):
-                if i + 1 == len(theta) or value[i + 1] - value[places[-1]] > most:
-                    places.append(i)
-            cut += [(float(theta[i]), float(theta[k]), float(sign * value[i]),
-                     float(sign * value[k])) for i, k in zip(places, places[1:])]
-        return cut
+    inputs: Tuple[float, ...]
+    inverse: Inverse
 
     @property
-    def is_one(self) -> bool:
-        """Whether the output rises, or falls, wherever the input may be."""
-        return len(self._branches) == 1
-
-    def follow(self, pose: Callable, size: float, value: float,
-               near: float) -> Tuple[float, float]:
+    def signs(self) -> Mapping[str, int]:
         """
-        Return the input that gives a value on the branch that another is on, and the rate there.
+        The working mode.
 
-        `pose` is the curve for a float; inputs are here in rad or m, `size` of them in one. NaN
-        where the branch does not hold the value.
+        For each link that hangs on an input crank, by its name, the side to which it turns off
+        from the line between the crank's joints, +1 left; and 'det', the sign of the determinant
+        of d outputs / d inputs. 0 where that cannot be told.
         """
-        for branch in self._branches:
-            lo, hi = branch.theta[0], branch.theta[-1]
-            if lo <= near / size <= hi:
-                bracket = self._bracket(branch, value)
-                if bracket:
-                    return self._refined(pose, branch.sign, *bracket, size)
-        return math.nan, math.nan
+        return self.inverse.signs(self.inputs)
 
-    def _bracket(self, branch: _Branch, value: float) -> Optional[Tuple[float, float, float]]:
-        """Return the samples on both sides of a value, as the branch counts it, and that."""
-        low, high, slack = float(branch.value[0]), float(branch.value[-1]), self._rounding
-        target = branch.sign * value
-        if self._angular and math.isfinite(target):
-            if abs(target) > math.tau:
-                target = math.atan2(math.sin(target), math.cos(target))
-            target += math.tau * math.ceil((low - slack - target) / math.tau)
-        if not low - slack <= target <= high + slack:
-            return None
-        i = min(max(int(branch.value.searchsorted(target)), 1), len(branch.theta) - 1)
-        return float(branch.theta[i - 1]), float(branch.theta[i]), target
+    @property
+    def margin(self) -> float:
+        """
+        The least singular value of d outputs / d inputs by the greatest or 1.
 
-    def _refined(self, pose: Callable, sign: float, lo: float, hi: float, target: float,
-                 size: float) -> Tuple[float, float]:
-        """Return what `_solved` does, for one float: arrays would cost more than the search."""
-        lo, hi = lo * size, hi * size
-        theta, last = 0.5 * (lo + hi), math.inf
-        best = theta, math.nan
-        for _ in range(STEPS):
-            now, rate = pose(theta)
-            gap = sign * now - target
-            if self._angular:
-                gap = math.remainder(gap, math.tau)
-            if abs(gap) >= last and last < self._rounding:
-                return best
-            last, best = abs(gap), (theta, rate)
-            lo, hi = (theta, hi) if gap < 0.0 else (lo, theta)
-            guess = theta - sign * gap / rate if rate else math.nan
-            if guess == theta or hi - lo <= math.ulp(max(-lo, hi)):
-                break
-            theta = guess if lo < guess < hi else 0.5 * (lo + hi)
-        return best
+        0 where the inputs cannot move the outputs some way, or not hold them. Lengths are counted
+        in parts of the longest bar or about the stroke, angles in rad.
+        """
+        return self.inverse.margin(self.inputs)
 
-    def _runs(self, lo: float, hi: float) -> Iterator[_Run]:
-        """Yield samples as angles, values, rates and rounding, cut where there is no value."""
-        theta = sampled(lo, hi)
-        theta[[0, -1]] = self._unbroken(theta[[0, -1]], theta[[1, -2]], theta[len(theta) // 2])
-        digit = 4.0 * np.spacing(np.abs(theta).clip(1e-3))
-        around = (theta + digit * np.array([[0.0], [1.0], [-1.0]])).clip(theta[0], theta[-1])
-        value, rate = self._curve(around.ravel()).reshape(2, *around.shape)
-        with np.errstate(all='ignore'):
-            # What the rate does not explain of the values next to each is rounding.
-            noise = np.abs(self._difference(value[1:] - value[0])
-                           - rate[0] * (around[1:] - theta)).max(axis=0)
-        noise[~np.isfinite(noise)] = 0.0
-        known = np.isfinite(value[0])
-        for run in np.split(np.arange(len(theta)), np.flatnonzero(~known)):
-            run = run[known[run]]
-            if len(run) > 1:
-                values = np.unwrap(value[0, run]) if self._angular else value[0, run]
-                yield theta[run], values, rate[0, run], noise[run]
+    @property
+    def is_singular(self) -> bool:
+        """Whether it is at a singular pose, where no more than half of the digits are right."""
+        return self.margin < SINGULAR
 
-    def _unbroken(self, ends: np.ndarray, beside: np.ndarray, middle: float) -> np.ndarray:
-        """Return the ends of an arc, or where the output breaks off right before them."""
-        values = self._curve(np.array([*ends, *beside, middle]))[0]
-        start, size = values[2:4], BROKEN * (math.pi if self._angular else np.ptp(values[2:]))
-        with np.errstate(invalid='ignore'):
-            return refined(lambda x: ~(np.abs(self._difference(
-                self._curve(x.ravel())[0].reshape(x.shape) - start[:, None])) > size),
-                beside, np.nextafter(ends, 2.0 * ends - beside))[0]
+    @property
+    def mode(self) -> str:
+        """The signs as text: 'AP+ CP- det-'."""
+        return ' '.join(f'{name}{"0+-"[sign]}' for name, sign in self.signs.items())
 
-    def _moves(self, runs: Sequence[_Run]) -> bool:
-        """Return whether the output changes by more than rounding."""
-        if not runs:
-            return False
-        _, values, _, noise = (np.concatenate(part) for part in zip(*runs))
-        noise = STILL * (noise + np.median(noise)) + self._rounding
-        return bool(np.any(np.abs(self._difference(values - np.median(values))) > noise))
 
-    def _branched(self, theta: np.ndarray, value: np.ndarray, rate: np.ndarray,
-                  noise: np.ndarray) -> Iterator[_Branch]:
-        least = 4.0 * (noise + self._rounding)
-        with np.errstate(invalid='ignore'):
-            places = turns(value, rate, least)
-            rising = rate[places] >= 0.0
-            ends, _ = refined(lambda x: (self._curve(x.ravel())[1] >= 0.0).reshape(
-                x.shape) == rising[:, None], theta[places], theta[places + 1])
-        reached = self._curve(ends)[0] if len(ends) else ends
-        # An extreme may be the one angle at which an arm has no length and no direction.
-        known = np.isfinite(reached)
-        ends = np.where(known, ends, theta[places])
-        reached = value[places] + self._difference(np.where(known, reached - value[places], 0.0))
-        theta = np.insert(theta, places + 1, ends)
-        value = np.insert(value, places + 1, reached)
-        cuts = [0, *(places + 1 + np.arange(len(places))).tolist(), len(theta) - 1]
-        for first, last in zip(cuts, cuts[1:]):
-            part = slice(first, last + 1)
-            sign = 1.0 if value[last] >= value[first] else -1.0
-            yield _Branch(theta[part], np.maximum.accumulate(sign * value[part]), sign)
+class Inverse:
+    """
+    The inverse of as many outputs as a linkage has inputs; make one with `Mechanism.inverse`.
 
-    def _difference(self, gap: Any) -> Any:
-        return gap - math.tau * np.round(gap / math.tau) if self._angular else gap
+    `print` shows the joint lines of the inverse linkage.
 
-    def _targets(self, branch: _Branch, values: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield the values as the branch counts them; NaN where it does not hold them."""
-        lo, hi = branch.value[0], branch.value[-1]
-        values, slack = branch.sign * values, self._rounding
-        turn, count = math.tau, int((hi - lo + 2.0 * slack) // math.tau) + 1
-        if not self._angular:
-            turn, count = 0.0, 1
+    Attributes
+    ----------
+    outputs : tuple of str
+        What is asked for, named as `Mechanism.has_output` says.
+    closed : InverseLinkage or None
+        Its joint lines, assembly modes and their program; None where the inverse is searched.
+
+    """
+
+    def __init__(self, linkage: Mechanism, outputs: Tuple[str, ...]):
+        self.linkage, self.outputs = linkage, outputs
+        if linkage.checked(outputs).shape:
+            raise ValueError('the inverse is for one set of dimensions, not for arrays')
+        blocks(linkage, outputs)
+        self._n, self._inputs = len(outputs), linkage.inputs
+        self._angular = [linkage.is_angle(name) for name in outputs]
+        self._scales = [1.0 if angular else linkage.longest for angular in self._angular]
+        self._sizes = [input_.size for input_ in linkage.inputs]
+        self._check = linkage.checked(outputs)
+        self._rated = linkage.posed((), outputs, outputs)
+        self.closed: Optional[InverseLinkage] = taken_apart(linkage, outputs)
+        if self.closed:
+            self._solve = self.closed.bind(linkage.is_accelerated)
+            self._turns = list(product(*self.closed.turns))
         else:
+            self._search: Any = Analysis(linkage).branches(*outputs) if self._n == 1 else Search(
+                linkage, outputs)
+
+    def __str__(self) -> str:
+        what = listed(self.outputs)
+        if not self.closed:
+            return f'the inverse of {self.linkage.type} for {what} is searched'
+        return f'# {self.linkage.type} driven by {what}\n{self.closed}'
+
+    # All answers.
+
+    def all(self, values: ArrayLike, near: Optional[ArrayLike] = None) -> List[Answer]:
+        """
+        Return all answers for one value of each output.
+
+        Parameters
+        ----------
+        values : float or array-like (outputs,)
+            What the outputs are to be [rad or m], angles with whole turns aside.
+        near : array-like (inputs,), optional
+            Values of the inputs [rad or m] to which the answers are brought by whole turns, the
+            nearest first, a length being counted in parts of about its stroke.
+
+        Returns
+        -------
+        list of Answer
+            Those of the linkage's own assembly, its `branches`, inside its reach; without `near`
+            crank angles in [-pi, pi), the first input's ascending; [] where the outputs cannot be
+            had. Of answers that rounding does not tell apart one is given.
+
+        """
+        found = [inputs for inputs, _ in self._all(self._one_each(values))]
+        if near is not None:
+            beside = self._one_each(near, 'near')
+            if not all(map(math.isfinite, beside)):
+                raise ValueError(f'near must be finite, got {quoted(list(beside))}')
+            found = sorted((self._next_to(inputs, beside) for inputs in found), key=lambda x: sum(
+                ((a - b) / size) ** 2 for a, b, size in zip(x, beside, self._sizes)))
+        return [Answer(inputs, self) for inputs in found]
+
+    def over(self, *values: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
+        """
+        Return all answers for arrays of values, one array for each output.
+
+        Returns
+        -------
+        (array (inputs, *shape, answers), array (outputs * inputs, *shape, answers))
+            The inputs, the first ascending, filled up with NaN; and the rate of each output by the
+            first input, by the second and so on.
+
+        """
+        rows = np.broadcast_arrays(*(numbers('values', each) for each in values))
+        inputs, rates = self._found(np.stack([row.ravel() for row in rows]))
+        order = np.lexsort(np.nan_to_num(inputs, nan=np.inf).swapaxes(0, 1)[::-1], axis=0)
+        most = max(int(np.isfinite(inputs[:, 0]).sum(axis=0).max(initial=0)), 1)
+        parts = (np.moveaxis(np.take_along_axis(part, order[:, None], 0)[:most], 0, -1)
+                 for part in (inputs, rates))
+        inputs, rates = (part.reshape(len(part), *rows[0].shape, most) for part in parts)
+        return inputs, rates
+
+    def _all(self, values: Tuple[float, ...]) -> List[Found]:
+        """Return inputs in order, each with d output / d input row by row, for one question."""
+        if not all(map(math.isfinite, values)):
+            return []
+        values = self._reduced(values)
+        if not self.closed:
+            return _columns(*self._searched(np.array(values)[:, None]))
+        n, flat, found = self._n, self._solve(*values), []
+        for start in range(0, len(flat), n):
+            for inputs in self._turned(flat[start:start + n]):
+                if own := self._own(inputs, values):
+                    found.append(own)
+        return self._distinct(found) if len(found) > 1 else found
+
+    def _reduced(self, values: Tuple[float, ...]) -> Tuple[float, ...]:
+        """Return values with angles beyond a turn within one: sine and cosine lose no digit."""
+        return tuple(math.atan2(math.sin(x), math.cos(x)) if angular and abs(x) > math.tau else x
+                     for x, angular in zip(values, self._angular))
+
+    def _turned(self, inputs: Tuple[float, ...]) -> Iterable[Tuple[float, ...]]:
+        """Return inputs in all turns that may differ; none if they have no value."""
+        if any(x != x for x in inputs):
+            return ()
+        return [tuple(x + turn for x, turn in zip(inputs, turns)) for turns in self._turns]
+
+    def _own(self, inputs: Tuple[float, ...], values: Sequence[float],
+             within: bool = True) -> Optional[Found]:
+        """Return inputs that a mode gives, and rates, if the linkage has its outputs there."""
+        n, at, slack = self._n, self._check.at, ROUNDING
+        row = at(*inputs)
+        if row[0] != row[0] or n > 1 and any(x != x for x in row[1:n]):
+            # The reach ends here, but for rounding.
+            for beside in self._beside(inputs):
+                row, slack = at(*beside), BESIDE
+                if not any(x != x for x in row[:n]):
+                    inputs = beside
+                    break
+            else:
+                return None
+        for _ in range(POLISHING):
+            gaps, sure, away = self._missed(row, inputs, values, slack)
+            if not sure and not away <= OTHER:
+                return None
+            stepped = self._stepped(inputs, row[n:], gaps) if away > TINY else (math.nan,)
+            if sure and not self._is_near(stepped, inputs):
+                return self._within(inputs) if within else inputs, row[n:]
+            if any(x != x for x in stepped):
+                return None
+            after = at(*stepped)
+            if sure:
+                # The step takes rounding away, or there is none that it could.
+                better = self._missed(after, stepped, values, slack)[2] < away
+                inputs, row = (stepped, after) if better else (inputs, row)
+                return self._within(inputs) if within else inputs, row[n:]
+            inputs, row = stepped, after
+        return None
+
+    def _is_near(self, stepped: Sequence[float], inputs: Sequence[float]) -> bool:
+        """Return whether a step is one that rounding makes where outputs tell inputs well."""
+        return all(abs(x - y) <= ROUNDING * size / SOUND
+                   for x, y, size in zip(stepped, inputs, self._sizes))
+
+    def _beside(self, inputs: Tuple[float, ...]) -> Iterator[Tuple[float, ...]]:
+        """Yield inputs that differ by rounding, one a little."""
+        for i, size in enumerate(self._sizes):
+            for step in (BESIDE * size, -BESIDE * size):
+                yield (*inputs[:i], inputs[i] + step, *inputs[i + 1:])
+
+    def _missed(self, row: Sequence[float], inputs: Sequence[float], values: Sequence[float],
+                slack: float) -> Tuple[List[float], bool, float]:
+        """Return what outputs miss, whether that is rounding, and the most, in their sizes."""
+        n, gaps, sure, most = self._n, [], True, 0.0
+        for i, (value, angular, scale) in enumerate(zip(values, self._angular, self._scales)):
+            gap = row[i] - value
+            if angular and gap - gap == 0.0:
+                gap = math.remainder(gap, math.tau)
+            gaps.append(gap)
+            away, allowed = abs(gap), ROUNDING * scale
+            if not away <= allowed:
+                for rate, x, size in zip(row[n + i::n], inputs, self._sizes):
+                    allowed += slack * abs(rate) * max(size, abs(x))
+                sure = sure and away <= min(allowed, ENDED * scale)
+            if not away / scale <= most:
+                most = away / scale
+        return gaps, sure, most
+
+    def _stepped(self, inputs: Tuple[float, ...], rates: Sequence[float],
+                 gaps: Sequence[float]) -> Tuple[float, ...]:
+        """Return inputs after a step of Newton's method; NaN where there is none."""
+        if self._n == 1:
+            return (inputs[0] - gaps[0] / rates[0] if rates[0] else math.nan,)
+        try:
+            steps = np.linalg.solve(np.reshape(rates, (self._n, self._n)).T, gaps)
+        except np.linalg.LinAlgError:
+            return (math.nan,)
+        return tuple(x - step for x, step in zip(inputs, steps.tolist()))
+
+    def _within(self, inputs: Sequence[float]) -> Tuple[float, ...]:
+        """Return inputs as they are counted: angles in the turns from -pi."""
+        return tuple(0.0 if abs(x) < LEAST * size else x - turns if (
+            turns := input_.turns_of(x)) else x
+            for input_, size, x in zip(self._inputs, self._sizes, inputs))
+
+    def _distinct(self, found: Sequence[Found]) -> List[Found]:
+        """Return answers in order, without those that rounding does not tell from another."""
+        kept: List[Found] = []
+        for answer in sorted(found):
+            if not any(self._are_one(answer, other) for other in kept):
+                kept.append(answer)
+        return kept
+
+    def _are_one(self, answer: Found, other: Found) -> bool:
+        apart = max(abs(math.remainder(x - y, input_.turn) if input_.turns else x - y) / size
+                    for input_, size, x, y in zip(self._inputs, self._sizes, answer[0], other[0]))
+        if apart <= SAME or not apart <= NEIGHBOURS:
+            return apart <= SAME
+        values = np.linalg.svd(self._jacobian(answer[1]), compute_uv=False)
+        rounding = 8 * 2.0 ** -53 if self.closed or self._n == 1 else SAME
+        return bool(apart <= rounding * (1.0 + values[0]) / max(values[-1], SAME))
+
+    def _jacobian(self, rates: Sequence[float]) -> np.ndarray:
+        """Return d outputs / d inputs, both in their sizes, from rates by each input."""
+        return (np.reshape(rates, (self._n, self._n)).T * self._sizes
+                / np.reshape(self._scales, (-1, 1)))
+
+    def _found(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """
+        Return all answers for values (outputs, questions), in no order, filled up with NaN.
+
+        Their shapes are (answers, inputs, questions) and (answers, inputs * outputs, questions).
+        """
+        values = np.where(np.isfinite(values), values, np.nan)
+        if any(self._angular) and np.any(np.abs(values) > math.tau):
+            values[self._angular] = np.arctan2(np.sin(values), np.cos(values))[self._angular]
+        if not self.closed:
+            return self._searched(values)
+        n, count = self._n, values.shape[1]
+        with np.errstate(all='ignore'):
+            found = self._solve.over(*values).reshape(self.closed.count, n, count)
+            if len(self._turns) > 1:
+                found = np.concatenate([found + np.reshape(turns, (n, 1))
+                                        for turns in self._turns])
+            flat = found.transpose(1, 0, 2).reshape(n, len(found) * count)
+            rows = self._check.over(*flat)
+            wanted = np.tile(values, (1, len(found)))
+            gaps = rows[:n] - wanted
+            gaps[self._angular] -= math.tau * np.round(gaps[self._angular] / math.tau)
+            gaps, scales = np.abs(gaps), np.reshape(self._scales, (-1, 1))
+            speeds = np.abs(rows[n:].reshape(n, n, flat.shape[1]))
+            allowed = ROUNDING * (scales + (speeds * np.maximum(
+                np.abs(flat), np.reshape(self._sizes, (-1, 1)))[:, None]).sum(axis=0))
+            allowed = np.minimum(allowed, ENDED * scales)
+            sure = ~(gaps > allowed).any(axis=0) & np.isfinite(gaps).all(axis=0)
+            # What is not only rounding, and what of it a step may take away.
+            near = (gaps <= OTHER * scales).all(axis=0) & (~sure | (
+                gaps > TINY * scales).any(axis=0) & (count <= MANY))
+            ended = np.isnan(gaps).any(axis=0) & np.isfinite(flat).all(axis=0)
+            places = np.flatnonzero(ended)
+            for beside in self._beside(tuple(flat[:, places])) if len(places) else ():
+                near[places] |= np.isfinite(self._check.over(*beside)[:n]).all(axis=0)
+        closed = flat
+        flat, rates = np.where(sure, flat, np.nan), np.where(sure, rows[n:], np.nan)
+        for place in np.flatnonzero(near):
+            if own := self._own(tuple(closed[:, place].tolist()),
+                                tuple(wanted[:, place].tolist())):
+                flat[:, place], rates[:, place] = own
+        return self._single(flat.reshape(n, len(found), count).swapaxes(0, 1),
+                            rates.reshape(n * n, len(found), count).swapaxes(0, 1))
+
+    def _single(self, inputs: np.ndarray, rates: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Return answers as they are counted, NaN what rounding does not tell from another."""
+        for i, input_ in enumerate(self._inputs):
+            inputs[:, i] = input_.wrapped(np.where(
+                np.abs(inputs[:, i]) < LEAST * self._sizes[i], 0.0, inputs[:, i]))
+        for one, two in combinations(range(len(inputs)), 2):
             with np.errstate(invalid='ignore'):
-                # Sine and cosine take off whole turns without loss, however many there are.
-                within = np.arctan2(np.sin(values), np.cos(values))
-            values = np.where(np.abs(values) > math.tau, within, values)
-            values = values + math.tau * np.ceil((lo - slack - values) / math.tau)
-        for i in range(count):
-            target = values + i * turn
-            held = (target >= lo - slack) & (target <= hi + slack)
-            yield np.where(held, np.clip(target, lo, hi), np.nan)
+                apart = np.max([input_.apart(x, y) / size for input_, size, x, y in zip(
+                    self._inputs, self._sizes, inputs[one], inputs[two])], axis=0)
+                places = np.flatnonzero(apart <= NEIGHBOURS)
+            for place in places:
+                if self._are_one(*((tuple(inputs[k, :, place]), tuple(rates[k, :, place]))
+                                   for k in (one, two))):
+                    inputs[two, :, place] = rates[two, :, place] = np.nan
+        return inputs, rates
 
-    def _solved(self, lo: np.ndarray, hi: np.ndarray, target: np.ndarray,
-                sign: np.ndarray) -> np.ndarray:
-        """Return where the output meets its targets, by Newton's method inside a bracket."""
-        theta, step = 0.5 * (lo + hi), hi - lo
-        best, least, steepest = theta, np.full(theta.shape, np.inf), np.zeros(theta.shape)
-        done = np.zeros(theta.shape, bool)
-        for _ in range(STEPS):
-            value, rate = self._curve(theta)
-            gap = self._difference(sign * value - target)
-            closer = np.abs(gap) < least
-            best, least = np.where(closer, theta, best), np.where(closer, np.abs(gap), least)
-            steepest = np.where(closer, np.abs(rate), steepest)
-            lo, hi = np.where(gap < 0.0, theta, lo), np.where(gap < 0.0, hi, theta)
-            with np.errstate(all='ignore'):
-                guess = theta - gap / (sign * rate)
-            digit = np.spacing(np.maximum(np.abs(lo), np.abs(hi)))
-            done |= (least == 0.0) | (hi - lo <= digit) | (np.abs(guess - theta) <= digit)
-            if done.all():
-                break
-            good = (lo < guess) & (guess < hi) & (np.abs(guess - theta) < 0.5 * step)
-            following = np.where(good, guess, 0.5 * (lo + hi))
-            theta, step = following, np.abs(following - theta)
-        # Where the output breaks off, its sides enclose values that it never has.
-        far = STILL * np.spacing(math.pi) * steepest + MISSED * self._range + self._rounding
-        return np.where(least <= far, best, np.nan)
+    def _one_each(self, values: Any, name: str = 'values') -> Tuple[float, ...]:
+        """Return one number for each output; raise ValueError if there are not as many."""
+        found = numbers(name, values)
+        if found.shape != (self._n,) and not (self._n == 1 and found.shape == ()):
+            raise ValueError(f'{self.linkage.type} has {self._n} inputs: {name} must be as many '
+                             f'numbers, got {quoted(found.tolist())}')
+        return tuple(found.ravel().tolist())
+
+    # One of the answers.
+
+    def nearest(self, values: Sequence[Any], near: Optional[Sequence[Any]] = None,
+                ends: Ends = None) -> Tuple[Any, Any]:
+        """
+        Return one answer.
+
+        Parameters
+        ----------
+        values : sequence of float or array
+            What each output is to be [rad or m].
+        near : sequence of float or array, optional
+            The answer nearest to these inputs is taken, whole turns included, a length being
+            counted in parts of about its stroke. Default: of one input the least with which the
+            output grows, else the least: that is the working branch of a lever, on which lever
+            and crank turn the same way. Of several inputs the one whose first is the least.
+        ends : sequence of (float, float) or None, optional
+            For each input the lowest and the highest value [rad or m] that may be taken.
+
+        Returns
+        -------
+        (tuple of float or array, tuple of float or array)
+            The inputs, and the rate of each output by the first input, by the second and so on;
+            NaN where there is none.
+
+        """
+        if set(map(type, (*values, *(near or ())))) == {float}:
+            answers: Sequence[Any] = self._all(tuple(values))
+        else:
+            inputs, rates = self.over(*values)
+            answers = [(inputs[..., k], rates[..., k]) for k in range(inputs.shape[-1])]
+        return self._chosen(answers, near, ends)
+
+    def _chosen(self, answers: Sequence[Any], near: Optional[Sequence[Any]],
+                ends: Ends) -> Tuple[Any, Any]:
+        n, sizes = self._n, self._sizes
+        if not answers:
+            return (math.nan,) * n, (math.nan,) * (n * n)
+        limits = ends or (None,) * n
+        choice = _choice(len(answers), tuple(input_.period * input_.turns for input_ in
+                                             self._inputs), near is not None,
+                         tuple(map(bool, limits)))
+        found = choice(*chain.from_iterable(
+            (*(x / size for x, size in zip(inputs, sizes)),
+             *(rate * sizes[i // n] for i, rate in enumerate(rates)))
+            for inputs, rates in answers),
+            *(GRAZE * (math.pi if angular else scale)
+              for angular, scale in zip(self._angular, self._scales)),
+            *(x / size for x, size in zip(near or (), sizes)),
+            *(end / size for pair, size in zip(limits, sizes) if pair for end in pair))
+        return (tuple(x * size for x, size in zip(found[:n], sizes)),
+                tuple(rate / sizes[i // n] for i, rate in enumerate(found[n:])))
+
+    def path(self, values: Sequence[np.ndarray], near: Optional[Sequence[float]] = None,
+             ends: Ends = None) -> Tuple[Any, Any]:
+        """
+        Return the answers that go on from value to value: each is the nearest to the last.
+
+        Parameters
+        ----------
+        values : sequence of array (n,)
+            What each output is to be, one after the other [rad or m].
+        near, ends
+            As for `nearest`, for the first value; a value that cannot be had is passed over.
+
+        Returns
+        -------
+        (tuple of array (n,), tuple of array (n,))
+            As `nearest` does.
+
+        """
+        inputs, rates = self.over(*values)
+        rows = np.concatenate([inputs, rates]).transpose(1, 2, 0)
+        near = None if near is None else tuple(np.ravel(near).tolist())
+        n, found = self._n, []
+        for row in rows.tolist():
+            answers = [(each[:n], each[n:]) for each in row if each[0] == each[0]]
+            taken = self._chosen(answers, near, ends)
+            if taken[0][0] == taken[0][0]:
+                near = taken[0]
+            found.append((*taken[0], *taken[1]))
+        columns = np.reshape(found, (len(values[0]), n + n * n)).T
+        return tuple(columns[:n]), tuple(columns[n:])
+
+    def follow(self, values: ArrayLike, near: ArrayLike) -> Found:
+        """
+        Return the answer that goes on from where the inputs were without a jump.
+
+        Parameters
+        ----------
+        values : array-like (outputs,)
+            What the outputs are to be [rad or m].
+        near : array-like (inputs,)
+            Where the inputs were [rad or m]; whole turns of a crank are kept.
+
+        Returns
+        -------
+        (tuple of float, tuple of float)
+            The inputs that outputs lead to which go straight from what they were to what is asked
+            for, angles the shorter way; and the rate of each output by the first input, by the
+            second and so on. NaN where that would pass a dead point, or leave the reach.
+
+        """
+        values, near = self._one_each(values), self._one_each(near, 'near')
+        nothing = (math.nan,) * self._n, (math.nan,) * self._n ** 2
+        if not all(map(math.isfinite, (*values, *near))):
+            return nothing
+        values = self._reduced(values)
+        if self.closed:
+            return self._along(values, near) or nothing
+        if self._n > 1:
+            inputs, jacobian = self._search.followed(np.array(near), np.array(values))
+            return tuple(inputs.tolist()), tuple(jacobian.T.ravel().tolist())
+        first = self._inputs[0]
+        turns, size = first.turns_of(near[0]), self._sizes[0]
+        found, rate = self._search.follow(self._rated.at, size, values[0], near[0] - turns)
+        if self._search.is_one and first.is_whole(self.linkage.reach()):
+            # The output turns all round with the crank: beyond pi they go on together.
+            turns = float(first.beside(found, near[0])) - found
+        return (found + turns,), (rate,)
+
+    def _along(self, values: Tuple[float, ...], near: Tuple[float, ...]) -> Optional[Found]:
+        """Return what the mode that the inputs are in leads to."""
+        start = self._check.at(*near)[:self._n]
+        if any(x != x for x in start):
+            return None
+        gaps = [math.remainder(value - now, math.tau) if angular else value - now
+                for value, now, angular in zip(values, start, self._angular)]
+        steps = math.ceil(max(abs(gap) / scale for gap, scale in zip(gaps, self._scales)) / STEP)
+        at = {mode: near for mode, place in self._modes(start, near)
+              if max(abs(x - y) / size for x, y, size in zip(place, near, self._sizes)) < ALIKE}
+        found: List[Found] = []
+        for k in range(1, max(steps, 1) + 1):
+            aim = values if k == max(steps, 1) else tuple(
+                now + k / steps * gap for now, gap in zip(start, gaps))
+            going, found = at, []
+            places = dict(self._modes(aim, near))
+            at = {}
+            for mode, last in going.items():
+                if (place := places.get(mode)) and (own := self._own(
+                        self._next_to(place, last), aim, False)):
+                    at[mode] = own[0]
+                    found.append(own)
+        return min(found, key=lambda own: math.dist(own[0], near)) if found else None
+
+    def _modes(self, values: Sequence[float], near: Sequence[float]
+               ) -> Iterator[Tuple[int, Tuple[float, ...]]]:
+        """Yield what each assembly mode answers that has an answer, next to other inputs."""
+        n, flat = self._n, self._solve(*map(float, values))
+        for mode in range(len(flat) // n):
+            inputs = flat[mode * n:mode * n + n]
+            if not any(x != x for x in inputs):
+                yield mode, self._next_to(inputs, near)
+
+    def _next_to(self, inputs: Sequence[float], near: Sequence[float]) -> Tuple[float, ...]:
+        return tuple(x + input_.turn * round((y - x) / input_.turn) if input_.turns else x
+                     for input_, x, y in zip(self._inputs, inputs, near))
+
+    # The search for what does not come apart.
+
+    def _searched(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Return all answers as `_found` does."""
+        if self._n == 1:
+            inputs = self._search.answers(values[0])[:, None] * self._sizes[0]
+            rates = self._rated.over(inputs.ravel())[1].reshape(inputs.shape)
+            return self._single(inputs, np.where(np.isnan(inputs), np.nan, rates))
+        found = [self._search.answers(column) for column in values.T]
+        most = max((len(each) for each in found), default=0)
+        inputs = np.full((max(most, 1), self._n, len(found)), np.nan)
+        for column, each in enumerate(found):
+            inputs[:len(each), :, column] = each
+        rates = self._rated.over(*inputs.swapaxes(0, 1))[self._n:].swapaxes(0, 1)
+        return inputs, rates
+
+    # The working mode.
+
+    def margin(self, inputs: Sequence[float]) -> float:
+        """Return how far from singular a pose is; see `Answer.margin`."""
+        jacobian = self._jacobian(self._rated.at(*inputs)[self._n:])
+        if not np.isfinite(jacobian).all():
+            return 0.0
+        values = np.linalg.svd(jacobian, compute_uv=False)
+        return float(values[-1] / max(1.0, values[0]))
+
+    def signs(self, inputs: Sequence[float]) -> Mapping[str, int]:
+        """Return the working mode of a pose; see `Answer.signs`."""
+        linkage = self.linkage
+        cranks = {link.name: link for link in linkage.links
+                  if any(input_.turns and link.name == input_.name for input_ in self._inputs)}
+        places, signs = linkage.solve(inputs if self._n > 1 else inputs[0]), {}
+        for link in linkage.links:
+            crank = cranks.get(link.parent)
+            if crank and link.kind == 'revolute' and link.joint != crank.joint:
+                (a, b), (c, d) = (places[end] - places[start] for start, end in (
+                    (crank.joint, link.joint), (link.joint, link.tip)))
+                signs[link.name] = _sign(a * d - b * c, math.hypot(a, b) * math.hypot(c, d))
+        signs['det'] = 0 if self.margin(inputs) < SINGULAR else _sign(float(np.linalg.det(
+            self._jacobian(self._rated.at(*inputs)[self._n:]))), 0.0)
+        return signs
 
 
-def _cut(arcs: Iterable[Arc], marks: Sequence[float]) -> Iterator[Arc]:
-    """Yield arcs, cut at marks, which may be dead points."""
-    for start, end in arcs:
-        inside = [mark for mark in marks if start < mark < end]
-        yield from zip([start, *inside], [*inside, end])
+def _sign(value: float, size: float) -> int:
+    return int(np.sign(value)) if abs(value) > SINGULAR * size else 0
 
 
-def _bracketed(branch: _Branch, target: np.ndarray) -> tuple:
-    """Return the samples on both sides of targets, the targets, and the sign of the branch."""
-    index = np.clip(np.searchsorted(branch.value, target), 1, len(branch.theta) - 1)
-    return (branch.theta[index - 1], branch.theta[index], target,
-            np.full(target.shape, branch.sign))
+def _columns(inputs: np.ndarray, rates: np.ndarray) -> List[Found]:
+    """Return the answers to one question, of arrays."""
+    found = [(tuple(row), tuple(rate)) for row, rate in zip(
+        inputs[:, :, 0].tolist(), rates[:, :, 0].tolist()) if row[0] == row[0]]
+    return sorted(found)
+
+
+@cached(256)
+def _choice(count: int, periods: Tuple[int, ...], follows: bool, ended: Tuple[bool, ...]) -> Pose:
+    """
+    Return the code that takes one of some answers.
+
+    Given are the answers, each its inputs and rates, the rounding of each output, then, if so, the
+    inputs that the answer is to be nearest to, and for each that is to lie between ends, these.
+    What is beyond an end by so little that the outputs do not tell is at the end. Inputs that turn
+    are the same after so many turns.
+    """
+    n = len(periods)
+    given = iter(map(argument, range(count * (n + n * n) + n + n * follows + 2 * sum(ended))))
+    answers = [([*islice(given, n)], [*islice(given, n * n)]) for _ in range(count)]
+    rounding, near = [*islice(given, n)], [*islice(given, n * follows)]
+    ends = [(next(given), next(given)) if each else () for each in ended]
+    choices = []
+    for rank, (inputs, rates) in enumerate(answers):
+        places, away = [], real(rank)
+        if n == 1 and not follows:
+            away = away + where(rates[0] < 0.0, float(count), 0.0)
+        misses: List[Real] = []
+        for j, (x, period) in enumerate(zip(inputs, periods)):
+            speed = reduce(_greater, (abs(rate) / each for rate, each in zip(
+                rates[n * j:n * j + n], rounding)))
+            place, missed = _place(x, period * math.tau, near[j] if follows else None, ends[j],
+                                   where(1.0 < CLOSE * speed, 1.0 / speed, CLOSE))
+            places.append(place)
+            misses += missed
+        if follows:
+            away = square_root(sum((square(x - y) for x, y in zip(places, near)), real(0.0)))
+        away = reduce(lambda far, miss: where(miss, math.inf, far), misses, away)
+        choices.append([where(inputs[0] <= inputs[0], away, math.inf), *places, *rates])
+    away, *taken = reduce(lambda best, other: [
+        where(other[0] < best[0], mine, its) for mine, its in zip(other, best)], choices)
+    total = count * (n + n * n) + n + n * follows + 2 * sum(ended)
+    return Program([gated(part, LARGE - away, 0.0) for part in taken], total).bind({}, {})
+
+
+def _greater(x: Real, y: Real) -> Real:
+    return where(x < y, y, x)
+
+
+def _place(x: Real, turn: float, near: Optional[Real], ends: Sequence[Real],
+           slack: Real) -> Tuple[Real, List[Real]]:
+    """Return where an input is taken, whole turns aside, and what tells that it is not."""
+    def beside(value: Real, other: Real) -> Real:
+        return value + turn * nearest_integer((other - value) / turn) if turn else value
+
+    place = x if near is None else beside(x, near)
+    if not ends:
+        return place, []
+    slack = slack + ULPS * (4.0 + abs(ends[0]) + abs(ends[1]))
+    low, high = ends[0] - slack, ends[1] + slack
+    first, last = (beside(x, end) for end in ends)
+    if turn:
+        first = where(first < low, first + turn, first)
+        last = where(high < last, last - turn, last)
+    place = first if near is None else where(place < low, first, where(high < place, last, place))
+    inside = where(place < ends[0], ends[0], where(ends[1] < place, ends[1], place))
+    return inside, [place < low, high < place]

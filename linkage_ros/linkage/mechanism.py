@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A linkage with its dimensions: poses, velocities, joint angles and reach."""
+"""A linkage with its dimensions, and all that can be asked of it."""
 
 from __future__ import annotations
 
@@ -15,15 +15,17 @@ from typing import Any, Callable, List, Mapping, Optional, Sequence, Tuple, Unio
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import joint_lines
+from . import joint_lines, statics
+from .analysis import Analysis
 from .arguments import checked_dimensions, numbers
 from .builder import in_metres, UNIT
 from .design import Design
 from .input_range import arcs
-from .inputs import Arc
-from .quantities import Points, Spot, structure_of
+from .inputs import Arc, Input
+from .inverse import Answer, Inverse
+from .quantities import Points, Spot, Structure, structure_of
 from ..cache import Cache
-from ..formula.expression import Real
+from ..formula.expression import derivative, Real
 from ..formula.program import Batch, evaluate, Pose
 from ..words import listed, plain_text, quoted
 
@@ -65,7 +67,36 @@ def _plain(names: Any) -> Any:
 
 
 class Mechanism:
-    """A linkage whose dimensions are set: its poses, velocities, joint angles and reach."""
+    """
+    A linkage whose dimensions are set; make one with `linkage_ros.mechanisms.create`.
+
+    A pose depends on the inputs alone: any value, in any order, gives the same numbers. Joint
+    angles in arrays may differ by two ulps from those asked for one by one.
+
+    Attributes
+    ----------
+    type : str
+        The name of its type.
+    dimensions : dict
+        Its dimensions [m] by name.
+    branches : dict
+        The assembly sign, +1 or -1, of each joint that has two.
+    inputs : tuple of Input
+        What drives it: cranks by their angles [rad], cylinders by their lengths [m].
+    points : tuple of str
+        The linkage's joints, in the order in which they are placed.
+    joints : tuple of str
+        Its moving links, whose joint angles there are.
+    links : tuple of Link
+        What each joint angle is: name, parent, joint, kind, zero [rad] and tip.
+    bars : tuple of (str, str)
+        The joints at the ends of each bar.
+    cylinders : tuple of (str, str)
+        The joints at the ends of each cylinder, its base first.
+    tracer : str
+        The joint whose curve is the locus.
+
+    """
 
     def __init__(self, design: Design, dimensions: Mapping, branches: Mapping[str, int],
                  accelerate: bool = False):
@@ -89,9 +120,7 @@ class Mechanism:
         self._poses, self._placers = Cache(), Cache()
         # What was worked out of it: reach, inverses, travels.
         self.cache = Cache()
-        self.inputs = tuple(input_._replace(low=self._metres(input_.low),
-                                            high=self._metres(input_.high))
-                            if not input_.turns else input_ for input_ in built.inputs)
+        self.inputs = tuple(map(self._counted_input, range(len(built.inputs)), built.inputs))
         self.geared = tuple(built.driven.keys() - {input_.name for input_ in self.inputs})
         self.links = tuple(link._replace(zero=np.asarray(self._value(link.zero)).tolist())
                            for link in built.links)
@@ -219,7 +248,7 @@ class Mechanism:
 
         Takes, returns and raises what `solve` does; infinite or NaN at a dead point.
         """
-        return self._vectors('velocities', theta, points, by)
+        return self._vectors('velocities', theta, points, self._checked_by(by))
 
     def joint_angles(self, theta: Inputs, joints: Optional[Sequence[str]] = None) -> dict:
         """
@@ -262,7 +291,7 @@ class Mechanism:
     def joint_rates(self, theta: Inputs, joints: Optional[Sequence[str]] = None,
                     by: int = 0) -> dict:
         """Differentiate the joint angles by one of the inputs; see `joint_angles`."""
-        return self._scalars('rates', theta, joints, by)
+        return self._scalars('rates', theta, joints, self._checked_by(by))
 
     def period(self, by: int = 0) -> int:
         """
@@ -271,12 +300,17 @@ class Mechanism:
         That is more than one where the input drives others by gears of fractions; a ratio that is
         none with a denominator up to MOST_TURNS is taken for the nearest that is.
         """
-        if not self.geared or not self.inputs[by].turns:
-            return 1
-        rates = self.joint_rates([0.0] * len(self.inputs) if len(self.inputs) > 1 else 0.0,
-                                 self.geared, by)
-        return math.lcm(*(Fraction(float(rate)).limit_denominator(MOST_TURNS).denominator
-                          for rate in rates.values() if rate == rate))
+        return self.inputs[by].period
+
+    def _counted_input(self, by: int, input_: Input) -> Input:
+        """Return an input with the values [rad or m] between which all poses lie."""
+        if not input_.turns:
+            return input_._replace(low=self._metres(input_.low), high=self._metres(input_.high))
+        ratios = [np.ravel(self._value(derivative(value, {by: 1.0}, {})))
+                  for _, value in self._structure.built.driven.values()]
+        period = math.lcm(*(Fraction(float(ratio)).limit_denominator(MOST_TURNS).denominator
+                            for each in ratios for ratio in each if math.isfinite(ratio)))
+        return input_._replace(low=-math.pi * period, high=math.pi * period, period=period)
 
     def reach(self, *others: float) -> list:
         """
@@ -384,23 +418,473 @@ class Mechanism:
         program = self._structure.legs(tuple(named), joints, moving)
         return program.bind(lengths, dict(self._evaluated), self._accelerate)
 
+    def acceleration(self, theta: Inputs, rate: Inputs, rate_rate: Inputs,
+                     points: Optional[Sequence[str]] = None) -> dict:
+        """
+        Return the joints' accelerations, by differentiating twice.
+
+        Parameters
+        ----------
+        theta, rate, rate_rate : float or array-like
+            What `solve` takes: each input [rad or m], how fast it moves, and how that changes.
+        points : sequence of str, optional
+            The joints wanted. Default: all.
+
+        Returns
+        -------
+        dict
+            For each joint an array [m/s^2] of their broadcast shape and a last axis for x and y;
+            infinite or NaN at a dead point.
+
+        Raises
+        ------
+        ValueError
+            If a joint does not exist.
+
+        """
+        names, pose = self._ready('point accelerations', points)
+        values = pose.over(*self._motion(theta, rate, rate_rate))
+        pairs = np.moveaxis(values.reshape(len(names), 2, *values.shape[1:]), 1, -1)
+        return dict(zip(names, pairs))
+
+    def joint_accelerations(self, theta: Inputs, rate: Inputs, rate_rate: Inputs,
+                            joints: Optional[Sequence[str]] = None) -> dict:
+        """Return how the joint rates change [rad/s^2 or m/s^2]; see `acceleration`."""
+        names, pose = self._ready('joint accelerations', joints)
+        return dict(zip(names, pose.over(*self._motion(theta, rate, rate_rate))))
+
+    def _motion(self, *each: Inputs) -> Sequence[np.ndarray]:
+        return [values for inputs in each for values in self.each_input(inputs)]
+
+    def effort(self, theta: Inputs, loads: Mapping[str, ArrayLike]) -> np.ndarray:
+        """
+        Return what holds the linkage at rest against loads.
+
+        Parameters
+        ----------
+        theta : float or array-like
+            What `solve` takes.
+        loads : mapping
+            By name: for a joint a force (x, y) [N], for a link a moment [N m], counterclockwise
+            positive; each may have axes of its own in front, in theta's shape.
+
+        Returns
+        -------
+        array
+            Of theta's shape and a last axis for the inputs: the torque of a crank [N m], the force
+            of a cylinder [N], positive where it acts the way the input grows. It grows without
+            bound next to a dead point, and is infinite or NaN there.
+
+        Raises
+        ------
+        ValueError
+            If there is no such joint or link, or a load has another shape.
+
+        """
+        return statics.effort(self, theta, loads)
+
+    def output_effort(self, output: str, theta: Inputs, effort: ArrayLike) -> Any:
+        """
+        Return the force or torque that an output exerts where the input gives an effort.
+
+        Parameters
+        ----------
+        output : str
+            What `input_for` takes, of a linkage with one input.
+        theta : float or array-like
+            What `solve` takes.
+        effort : float or array-like
+            Of the input [N m or N].
+
+        Returns
+        -------
+        float or array
+            [N m] of an angle, [N] of a length or a coordinate; infinite where the output turns
+            back, 0 at a dead point.
+
+        Raises
+        ------
+        ValueError
+            If there is no such output, or there are several inputs.
+
+        """
+        return statics.output_effort(self, output, theta, effort)
+
+    def inverse(self, outputs: Union[str, Sequence[str]]) -> Inverse:
+        """
+        Return the inverse of as many outputs as there are inputs.
+
+        Parameters
+        ----------
+        outputs : str or sequence of str
+            Outputs as `has_output` says.
+
+        Returns
+        -------
+        Inverse
+            All answers, the nearest, or the one that goes on from the last; `print` shows the
+            joint lines of its linkage.
+
+        Raises
+        ------
+        ValueError
+            If there is no such output, there are not as many as inputs, they do not tell all
+            inputs, or a dimension is an array.
+
+        """
+        names = (outputs,) if isinstance(outputs, str) and len(self.inputs) == 1 else outputs
+        if not isinstance(names, (list, tuple)) or not all(isinstance(x, str) for x in names):
+            raise ValueError(f'outputs must be a list of names, got {quoted(outputs)}')
+        plain = tuple(map(plain_text, names))
+        return self.cache.get_or_make(('inverse', plain), lambda: self._inverse(plain))
+
+    def _inverse(self, names: Tuple[str, ...]) -> Inverse:
+        if len(names) != len(self.inputs):
+            raise ValueError(f'{self.type} has {len(self.inputs)} inputs: as many outputs are '
+                             f'needed, got {listed(names)}')
+        for name in names:
+            self.check_there(name)
+        if len(names) == 1:
+            self.check_output(*names)
+        return Inverse(self, names)
+
+    def input_for(self, output: str, value: ArrayLike, near: Optional[ArrayLike] = None,
+                  others: Sequence[float] = ()) -> Any:
+        """
+        Return the values of the first input that give an output the value that is wanted.
+
+        Parameters
+        ----------
+        output : str
+            A link's name: its joint angle [rad], whole turns aside, or its slide [m]; a joint's
+            coordinate such as 'C.x' [m]; 'distance(A,C)' [m]; 'angle(A,C)' [rad] from +x.
+        value : float or array-like
+            What the output is to be.
+        near : float or array-like, optional
+            The answer nearest to this is taken, a crank's with whole turns included.
+        others : sequence of float
+            The values [rad or m] at which further inputs are held, if there are any.
+
+        Returns
+        -------
+        float or array
+            Without `near` all answers, crank angles in [-pi, pi), ascending, on a last axis that
+            is filled up with NaN and at least one long; with `near` the one chosen, in the shape
+            of value and near broadcast. NaN where the output cannot be had, or never changes.
+
+        Raises
+        ------
+        ValueError
+            If there is no such output, it stands still, a dimension is an array, or not every
+            other input is given.
+
+        Notes
+        -----
+        A value beyond an extreme by no more than rounding counts as the extreme. See `inverse`.
+
+        A linkage with one change point in a turn is the same only after two turns: for it the
+        answers are those of the turn [-pi, pi), and `near` should lie there.
+
+        """
+        value, (inverse, held) = numbers('value', value), self._held(output, others)
+        if near is None:
+            return inverse.over(value, *held)[0][0]
+        near = numbers('near', near)
+        return inverse.nearest((value, *held), (near, *held))[0][0][()]
+
+    def _held(self, output: Any, others: Sequence[float]) -> Tuple[Inverse, List[float]]:
+        """Return the inverse of an output where all inputs but the first are held."""
+        self.check_output(output)
+        if len(others) != len(self.inputs) - 1:
+            raise ValueError(f'{self.type} has {len(self.inputs)} inputs: the value of each but '
+                             f'the first is needed, got {len(others)}')
+        return (self.inverse((output, *(input_.name for input_ in self.inputs[1:]))),
+                list(map(float, others)))
+
+    def servos(self, output: str, value: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
+        """Return all that `input_for` does, and d output / d input there."""
+        inputs, rates = self._held(output, ())[0].over(numbers('value', value))
+        return inputs[0], rates[0]
+
+    def servo_for(self, output: str, value: ArrayLike, near: Optional[ArrayLike] = None,
+                  ends: Optional[Tuple[float, float]] = None) -> Sequence:
+        """
+        Return one value of the input that gives an output a value, and d output / d input there.
+
+        Parameters
+        ----------
+        output, value
+            As for `input_for`.
+        near : float or array-like, optional
+            The answer nearest to this is taken, a crank's with whole turns included. Default: the
+            least on the working branch, where the output grows with the input, as lever and crank
+            turn the same way; if there is none, the least.
+        ends : (float, float), optional
+            The lowest and the highest value [rad or m] that may be taken. Default: any; of a
+            crank without near, those of one turn from -pi.
+
+        Returns
+        -------
+        (float or array, float or array)
+            In the shape of value and near broadcast; NaN where there is none.
+
+        """
+        inverse, _ = self._held(output, ())
+        given = [x if type(x) is float else numbers(name, x)
+                 for name, x in (('value', value), ('near', near)) if x is not None]
+        (found,), (rate,) = inverse.nearest(given[:1], given[1:] or None, [ends])
+        return found, rate
+
+    def follow(self, output: str, value: float, near: float) -> Tuple[float, float]:
+        """
+        Return the input that gives an output a value, going on from another without a jump.
+
+        Parameters
+        ----------
+        output : str
+            What `input_for` takes, of a linkage with one input.
+        value : float
+            What the output is [rad or m].
+        near : float
+            Where the input was [rad or m]; whole turns of a crank are kept.
+
+        Returns
+        -------
+        (float, float)
+            The input [rad or m], between the dead points and extremes of the output that `near` is
+            between, and d output / d input there; NaN if the output has no such value there.
+
+        """
+        (found,), (rate,) = self._held(output, ())[0].follow(value, near)
+        return found, rate
+
+    def inputs_for(self, outputs: Sequence[str], values: ArrayLike,
+                   near: Optional[ArrayLike] = None) -> List[Answer]:
+        """
+        Return all values of the inputs that give as many outputs the values that are wanted.
+
+        Parameters
+        ----------
+        outputs, values
+            As for `inverse` and `Inverse.all`.
+        near : array-like (inputs,), optional
+            Values of the inputs [rad or m] to which the answers are brought by whole turns, the
+            nearest first, a length being counted in parts of about its stroke.
+
+        Returns
+        -------
+        list of Answer
+
+        """
+        return self.inverse(outputs).all(values, near)
+
+    def follow_inputs(self, outputs: Sequence[str], values: ArrayLike,
+                      near: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
+        """Return what `Inverse.follow` does as arrays, (inputs,) and (outputs, inputs)."""
+        inputs, rates = self.inverse(outputs).follow(values, near)
+        return np.array(inputs), np.reshape(rates, (len(inputs), -1)).T
+
+    def extremes(self, output: str, arcs: Optional[Sequence[Arc]] = None) -> list:
+        """
+        Return how far an output goes.
+
+        Parameters
+        ----------
+        output : str
+            What `input_for` takes, of a linkage with one input.
+        arcs : sequence of (float, float), optional
+            Where the input may be [rad or m]. Default: its reach.
+
+        Returns
+        -------
+        list of ((float, float), (float, float))
+            For each arc the least value and the input there, then the greatest; an angle is
+            followed past -pi and pi. By default an arc in which the output jumps, as an angle does
+            where its ends meet, counts as several.
+
+        """
+        return Analysis(self).extremes(output, arcs)
+
+    def transmission_angles(self, theta: Inputs, joints: Optional[Sequence[str]] = None) -> dict:
+        """
+        Return the angle at which each joint passes on its force.
+
+        Parameters
+        ----------
+        theta : float or array-like
+            What `solve` takes.
+        joints : sequence of str, optional
+            The joints wanted: those that a dyad, cylinder, mirror, inversor, slot or slider line
+            places first. Default: all.
+
+        Returns
+        -------
+        dict
+            For each joint an array of theta's shape, rad in [0, pi], best at pi/2; 0 and pi are
+            dead points. For a dyad the angle between its bars, a cylinder being one; for a slider
+            between its rod and the normal of its line; for a slot between its line and the normal
+            of the radius from pivot to pin. NaN where it cannot be assembled.
+
+        Raises
+        ------
+        ValueError
+            If a joint has no transmission angle.
+
+        Notes
+        -----
+        Sources: Norton, "Design of Machinery", sec. 3.3; Balli and Chand, "Transmission angle in
+        mechanisms", Mechanism and Machine Theory 37 (2002).
+
+        """
+        return self._scalars('transmissions', theta, joints)
+
+    def dead_points(self, *others: float) -> list:
+        """
+        Return the values of the first input at which a dyad stretches or folds.
+
+        These are the ends of the reach and the change points: there a transmission angle is 0
+        or pi, and the input alone cannot tell how the linkage goes on.
+
+        Parameters
+        ----------
+        *others : float
+            The values [rad or m] at which further inputs are held, if there are any.
+
+        Returns
+        -------
+        list of float
+            Values [rad or m], ascending; crank angles in [-pi, pi).
+
+        Raises
+        ------
+        ValueError
+            If not every other input is given, or a dimension is an array.
+
+        """
+        return [dead * self.inputs[0].size for dead in Analysis(self, others).dead_points()]
+
+    def distance_to_dead_point(self, theta: ArrayLike, *others: float) -> Any:
+        """
+        Return how far the first input is from the nearest dead point.
+
+        Parameters
+        ----------
+        theta : float or array-like
+            Value of the first input [rad or m].
+        *others : float
+            The values [rad or m] at which further inputs are held, if there are any.
+
+        Returns
+        -------
+        float or array
+            Distance [rad or m] in the shape of theta, of a crank at most pi; infinite without
+            dead points.
+
+        """
+        theta = numbers('theta', theta)
+        away = [self.inputs[0].apart(theta, dead) for dead in self.dead_points(*others)]
+        return np.min([np.full(np.shape(theta), np.inf), *away], axis=0)[()]
+
+    def monotone(self, output: str, most: float) -> Tuple[List[Tuple[float, ...]], Pose]:
+        """
+        Return what an inverse of one's own starts from, of a linkage with one input.
+
+        Parameters
+        ----------
+        output : str
+            What `input_for` takes.
+        most : float
+            By how much the output changes in one piece at most [rad or m].
+
+        Returns
+        -------
+        (list of (float, float, float, float), Pose)
+            Pieces of the reach on which the output rises or falls all along: the input [rad or m]
+            at both ends, and the output there; the code for the output and its rate.
+
+        """
+        size = self.inputs[0].size
+        self.check_output(output)
+        return [(low * size, high * size, *values) for low, high, *values
+                in Analysis(self).branches(output).pieces(most)], self._bound('output', output)
+
+    def check_output(self, output: str) -> None:
+        """Raise ValueError if there is no such output, or it stands still."""
+        self.check_there(output)
+        if not self._structure.moves(output):
+            raise ValueError(f'{plain_text(output)} of {self.type} does not move with the '
+                             f'{self.inputs[0].name}')
+
+    def check_there(self, output: str) -> None:
+        """Raise ValueError if there is no such output."""
+        if not self.has_output(output):
+            allowed = (*self.joints, *(f'{name}.{axis}' for name in self.points for axis in 'xy'),
+                       'distance(A,B)', 'angle(A,B)')
+            raise ValueError(f'{self.type} has no output {quoted(output)}; '
+                             f'allowed: {listed(allowed)}')
+
+    # What inverses and studies of the motion are made from.
+
+    @property
+    def is_accelerated(self) -> bool:
+        """Whether arrays are solved by compiled code."""
+        return self._accelerate
+
+    @property
+    def structure(self) -> Structure:
+        """Its formulas, for any dimensions."""
+        return self._structure
+
+    def geared_to(self, input_: str) -> List[str]:
+        """Return the links that an input drives by gears."""
+        driven = self._structure.built.driven
+        return [name for name in self.geared if driven[name][0].name == input_]
+
+    def moves(self, output: str, by: int = 0) -> bool:
+        """Return whether an output depends on one of the inputs."""
+        return self._structure.moves(output, by)
+
+    def checked(self, outputs: Tuple[str, ...]) -> Pose:
+        """Return the code for outputs, NaN where anything cannot be assembled, and their rates."""
+        return self._bound('checked', outputs)
+
+    def margins(self, *inputs: np.ndarray) -> np.ndarray:
+        """Return each limit's margin, not negative where it is kept: (limits, n)."""
+        return self._bound('margins', ()).searched(*inputs)
+
+    def value(self, length: Real) -> Any:
+        """Return the value of an expression of dimensions alone, lengths in its own unit."""
+        return self._value(length)
+
+    def bound(self, kind: str, names: Any, *by: int) -> Pose:
+        """Return the code for quantities of one kind; see `Structure.program`."""
+        return self._bound(kind, names, *by)
+
     def _vectors(self, kind: str, theta: Inputs, points: Any, *by: int) -> dict:
         names, pose = self._ready(kind, points, *by)
-        values = pose.over(*self._each_input(theta))
+        values = pose.over(*self.each_input(theta))
         pairs = np.moveaxis(values.reshape(len(names), 2, *values.shape[1:]), 1, -1)
         return dict(zip(names, pairs))
 
     def _scalars(self, kind: str, theta: Inputs, joints: Any, *by: int) -> dict:
         names, pose = self._ready(kind, joints, *by)
-        return dict(zip(names, pose.over(*self._each_input(theta))))
+        return dict(zip(names, pose.over(*self.each_input(theta))))
 
-    def _each_input(self, theta: Any) -> Sequence[np.ndarray]:
+    def each_input(self, theta: Any) -> Sequence[np.ndarray]:
         if len(self.inputs) == 1:
             return (numbers('theta', theta),)
         if not hasattr(theta, '__len__') or len(theta) != len(self.inputs):
             raise ValueError(f'{self.type} has {len(self.inputs)} inputs: '
                              'theta must be a sequence of as many values')
         return [numbers('theta', each) for each in theta]
+
+    def _checked_by(self, by: Any) -> int:
+        """Return the number of an input; raise ValueError for what is none."""
+        if isinstance(by, (bool, np.bool_)) or not hasattr(by, '__index__') \
+                or not 0 <= by.__index__() < len(self.inputs):
+            raise ValueError(f'by must be the number of an input, from 0 to '
+                             f'{len(self.inputs) - 1}, got {quoted(by)}')
+        return int(by)
 
     def _ready(self, kind: str, wanted: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
         """Return the names that are wanted and the function that computes them."""

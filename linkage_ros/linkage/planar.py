@@ -487,6 +487,26 @@ class CrankRail(Rail):
             start, end, arctangent(self._turn.y, self._turn.x), self._crank.angle))
 
 
+class TurnedRail(CrankRail):
+    """
+    A ground joint as seen from a line on a crank: as a pin that turns the other way about it.
+
+    `zero` and `origin` are the line's direction and a point of it as seen from the crank's bar.
+    """
+
+    def __init__(self, pin: Complex, crank: Crank, place: Complex, along: Complex, zero: Complex,
+                 origin: Complex, span: Real):
+        Rail.__init__(self, pin, place, along, span)
+        arm = pin - crank.centre
+        self._crank = Crank(crank.centre, arm.length(), arm.direction(), -crank.angle)
+        self._centre = -cross(zero, origin)
+        self._turn = (arm.direction() * (crank.zero * zero).conjugate()).turned()
+
+    def limits(self, rod: Real) -> Tuple[Limit, ...]:
+        """Return the margins whose product is rod^2 - height^2."""
+        return tuple(Limit(limit.margin, limit.tolerance) for limit in super().limits(rod))
+
+
 class Slider(NamedTuple):
     """
     A block on a fixed line: the rod to it, its place along the line [m], and the limits.

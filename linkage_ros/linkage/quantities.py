@@ -35,7 +35,7 @@ from ..formula.program import Program
 
 Names = Tuple[str, ...]
 # Of two joints: how far they are apart, and where the second is seen from the first.
-_PAIR = re.compile(r'(?:distance|angle)\(([A-Za-z]\w*),([A-Za-z]\w*)\)')
+PAIR = re.compile(r'(?:distance|angle)\(([A-Za-z]\w*),([A-Za-z]\w*)\)')
 
 
 class Leg(NamedTuple):
@@ -77,7 +77,8 @@ class Structure:
             'points': self._points, 'velocities': self._velocities, 'angles': self._angles,
             'rates': self._rates, 'parts': self._parts, 'margins': self._margins,
             'transmissions': self._transmissions, 'closures': self._closures,
-            'output': self._output, 'point accelerations': self._point_accelerations,
+            'output': self._output, 'checked': self._checked,
+            'point accelerations': self._point_accelerations,
             'joint accelerations': self._joint_accelerations}
 
     def program(self, kind: str, names: Any, *by: int) -> Program:
@@ -130,13 +131,21 @@ class Structure:
 
     def _arm(self, name: str) -> Optional[Arm]:
         """Return what the name of a distance or an angle is about; None if it is another."""
-        pair = _PAIR.fullmatch(name)
+        pair = PAIR.fullmatch(name)
         return self.built.arm(*pair.groups()) if pair else None
 
     def _parts(self, wanted: Tuple[Names, Names, Names]) -> List[Real]:
         points, joints, rates = wanted
         turning = [self._rates(rates, by) for by in range(len(self.built.inputs))]
         return [*self._points(points), *self._angles(joints), *chain.from_iterable(turning)]
+
+    def _checked(self, names: Names) -> List[Real]:
+        """Return outputs, NaN where not all can be assembled, and their rates by each input."""
+        values = self._angles(names)
+        for limit in self.built.limits:
+            if limit.margin.varies:
+                values = [gated(value, limit.margin, limit.tolerance) for value in values]
+        return [*values, *self._parts(((), (), names))]
 
     def _legs(self, points: Points, joints: Names, moving: Names) -> Program:
         inputs = self.built.inputs
@@ -219,7 +228,7 @@ class Structure:
     def closures(self) -> List[Limit]:
         """What vanishes where a dyad, a slot, a slider or a kite stretches or folds."""
         return [limit for limit in (*self.built.limits, *self.built.folds)
-                if limit.margin.varies]
+                if limit.margin.varies and limit not in self.built.ways]
 
     def _closures(self, _: Names) -> List[Real]:
         """Return each closure and its rate by the first input."""
@@ -234,7 +243,7 @@ class Structure:
     def has(self, output: str) -> bool:
         """Return whether there is an output of this name."""
         joint, _, axis = output.rpartition('.')
-        pair = _PAIR.fullmatch(output)
+        pair = PAIR.fullmatch(output)
         ends = pair.groups() if pair else (joint,) if axis in ('x', 'y') else ()
         return output in self.built.joint_values or bool(ends) and len(set(ends)) == len(
             ends) and set(ends) <= self.built.points.keys()

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 from . import custom
 from ..linkage.arguments import checked_branches, checked_dimensions
 from ..linkage.design import Design
-from ..linkage.servo import Mechanism
+from ..linkage.mechanism import Mechanism
 from ..words import quoted
 
 # What a scene shows when it names no mechanism, and its scale: from 0.5 m to 1.5 m in size.

@@ -12,7 +12,7 @@ Source: Norton, "Design of Machinery", sec. 2.13 (Grashof's condition) and 4.5 (
 
 from math import fsum
 
-from ..linkage import servo
+from ..linkage import mechanism
 from ..linkage.design import Design
 
 DESIGN = Design('four_bar', {'a': 40.0, 'b': 120.0, 'c': 80.0, 'd': 100.0, 'p': 60.0},
@@ -45,7 +45,7 @@ def grashof(crank: float, coupler: float, rocker: float, ground: float) -> str:
     return names[lengths.index(shortest)]
 
 
-class Mechanism(servo.Mechanism):
+class Mechanism(mechanism.Mechanism):
     """A four-bar: also classified."""
 
     def grashof(self) -> str:

@@ -19,7 +19,7 @@ from typing import Any, Optional, Sequence
 
 from numpy.typing import ArrayLike
 
-from ..linkage import servo
+from ..linkage import mechanism
 from ..linkage.design import Design
 from ..linkage.input_range import reachable_arcs
 
@@ -31,7 +31,7 @@ DESIGN = Design('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 0.0}, tracer='L',
     'L slot Q A e out max(1.8*b,a+b)'))
 
 
-class Mechanism(servo.Mechanism):
+class Mechanism(mechanism.Mechanism):
     """A slotted lever: also solved from the lever angle."""
 
     def servo_angle(self, lever_angle: ArrayLike, near: Optional[ArrayLike] = None) -> Any:
@@ -62,8 +62,7 @@ class Mechanism(servo.Mechanism):
 
     def reduction(self, servo_angle: ArrayLike) -> Any:
         """Return d lever / d servo at a crank angle [rad], in its shape."""
-        _, pose = self._ready('rates', ('lever',), 0)
-        return pose(servo_angle)[0]
+        return self.joint_rates(servo_angle, ('lever',))['lever'][()]
 
     def lever_reach(self) -> list:
         """Return the arcs (lo, hi) [rad] of lever angles that the crank can bring about."""

@@ -16,9 +16,9 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from . import joint_state_reader
 from .message_layout import NEVER, pack, unpack, Unreadable, Wire
 from .messages import JointStates
+from ..scene.inverse_request import InverseRequest
 from ..scene.joint_names import JointName
 from ..scene.machine import Machine
-from ..scene.wanted import wanted_of
 from ..words import elided
 
 SECONDS_BETWEEN_WARNINGS, SECONDS_BETWEEN_SEARCHES = 5.0, 0.5
@@ -42,8 +42,8 @@ class Route(NamedTuple):
                 for drive in self.machine.inputs.values()]
 
     def commanded(self, positions, speeds, near, jumps):
-        """Return what `Wanted.commanded` does, for what a message says [rad or m]."""
-        return self.wanted.commanded(
+        """Return what `InverseRequest.command` does, for what a message says [rad or m]."""
+        return self.wanted.command(
             self._meant(positions),
             speeds and [name.sign * speeds[place] for name, place in zip(self.names, self.places)],
             near, jumps)
@@ -146,7 +146,7 @@ class CommandStream:
                                      f'not {called}')
                 places, joints, own = zip(*outputs[:n])
                 routes.append(Route(' and '.join(elided(names[place]) for place in places),
-                                    machine, wanted_of(machine, joints), places, own))
+                                    machine, InverseRequest(machine, joints), places, own))
             except ValueError as error:
                 leave_out(str(error))
         return routes

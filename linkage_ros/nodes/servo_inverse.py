@@ -15,7 +15,7 @@ from .command_stream import CommandStream
 from .message_layout import Unreadable
 from .. import scene
 from ..robot_model import bodies
-from ..scene.wanted import LEVER, present, Wanted, WantedTogether
+from ..scene.inverse_request import InverseRequest, LEVER, present
 from ..words import elided, listed, MESSAGE, quoted
 
 try:
@@ -83,8 +83,9 @@ class ServoInverse(scene_node.SceneNode):
 
     def _answer(self, request, response):
         key = request.mechanism, request.output
-        asked = self._known.get(key) or Wanted(_machine(self.scene, *key), request.output)
-        solve(asked, request, response, self._heard)
+        asked = self._known.get(key) or InverseRequest(
+            _machine(self.scene, *key), [request.output])
+        solve(asked, request, response)
         self._known[key] = asked
 
     def answer_together(self, request, response):
@@ -108,9 +109,9 @@ class ServoInverse(scene_node.SceneNode):
         return response
 
 
-def solve(asked, request, response, heard):
+def solve(asked, request, response):
     """
-    Answer a request for values of an output, near where the input was heard to be last.
+    Answer a request for values of an output: on the working branch, or near where it is asked.
 
     Raises
     ------
@@ -124,22 +125,18 @@ def solve(asked, request, response, heard):
         raise ValueError('lever_angle is empty; give at least one value')
     if n > MOST_VALUES:
         raise ValueError(f'lever_angle has {n} values; give up to {MOST_VALUES} at once')
-    if near and len(near) != n:
-        raise ValueError(f'servo_near must be empty or have one angle for each of the '
+    if len(near) not in (0, 1, n):
+        raise ValueError(f'servo_near must be empty, have one angle, or one for each of the '
                          f'{n} in lever_angle, not {len(near)}')
     # One angle is the usual question, and floats answer it sooner than arrays.
     values = np.array(wanted) if n > 1 else wanted[0]
+    start = None
     if near:
-        start = np.array(near) if n > 1 else near[0]
-        if not np.all(abs(start) <= scene.FARTHEST):
+        start = [np.array(near) if len(near) > 1 else near[0]]
+        if not np.all(np.abs(start[0]) <= scene.FARTHEST):
             raise ValueError(f'servo_near must be finite and within {scene.FARTHEST:g} '
-                             f'{asked.unit} of zero')
-        start = asked.input_of(start)
-    else:
-        start = asked.present(heard)
-        if not abs(start) <= scene.FARTHEST:
-            start = None
-    theta, rate = asked.servo(values, start)
+                             f'{asked.units[0]} of zero')
+    (theta,), (rate,) = asked.positions([values], start)
     if n > 1:
         finite = np.isfinite(theta)
         response.servo_angle = array('d', theta.tobytes())
@@ -178,7 +175,7 @@ def _machine(scene_, name, output):
 
 def solve_together(machine, request, response, heard):
     """Answer a request for several outputs; raise ValueError if it cannot be answered."""
-    asked, values, near = WantedTogether(machine, request.outputs), request.values, request.near
+    asked, values, near = InverseRequest(machine, request.outputs), request.values, request.near
     n = len(machine.inputs)
     if len(values) != n or len(near) not in (0, n):
         raise ValueError(f'values must have {n} numbers and near as many or none, not '
@@ -190,7 +187,8 @@ def solve_together(machine, request, response, heard):
         for place, drive in zip(present(machine, heard), machine.inputs.values())]
     answers = asked.answers(values, start)
     response.names = [drive.source for drive in machine.inputs.values()]
-    response.positions = [place for answer in answers for place in asked.told(answer.inputs)]
+    response.positions = [place for answer in answers
+                          for place in asked.positions_of(answer.inputs)]
     response.modes = [answer.mode for answer in answers]
     response.singular = [answer.is_singular for answer in answers]
     response.success = bool(answers)

@@ -5,14 +5,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 import math
 from typing import Iterable, Optional, Tuple
 
 from .parameters import ALL, DRIVER, Field, SceneError, Values
 from ..linkage.inputs import Arc, Input
-from ..linkage.servo import Mechanism
+from ..linkage.mechanism import Mechanism
 from ..words import quoted
 
 # What an input that swings by default leaves of its reach at each end, as a part of its width.
@@ -62,8 +62,6 @@ class Drive:
         It is ratio * position + offset; so is what is measured instead.
     measures : str
         The output that is measured instead; empty: the input itself.
-    period : int
-        After how many turns the pose is the same.
 
     """
 
@@ -77,7 +75,6 @@ class Drive:
     ratio: float = 1.0
     offset: float = 0.0
     measures: str = ''
-    period: int = 1
 
     @cached_property
     def is_plain(self) -> bool:
@@ -112,7 +109,7 @@ def read_drive(name: str, linkage: Mechanism, input_: Input, reach: Tuple[Arc, .
     """Return how an input of a mechanism moves; `old` is how it did before, if it was there."""
     drive = _read(name, *_scaled(input_, linkage, reach, scale), values, old, strict)
     _check_measures(name, linkage, drive)
-    return replace(drive, period=linkage.period(linkage.inputs.index(input_)))
+    return drive
 
 
 def _read(name: str, input_: Input, reach: Tuple[Arc, ...], values: Values, old: Optional[Drive],

@@ -9,7 +9,7 @@ import re
 from typing import Dict, Iterable, Tuple, Union
 
 from .parameters import SceneError
-from ..linkage.servo import Mechanism
+from ..linkage.mechanism import Mechanism
 from ..words import elided, listed
 
 # A moment [N m], or a force x, y [N].

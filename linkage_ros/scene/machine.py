@@ -26,7 +26,7 @@ from .. import mechanisms
 from ..cache import cached
 from ..linkage.design import Design
 from ..linkage.inputs import Arc
-from ..linkage.servo import Mechanism
+from ..linkage.mechanism import Mechanism
 from ..linkage.walker import Assembly
 from ..words import listed, quoted
 
@@ -108,10 +108,10 @@ class Machine:
         """
         drive, own, unit = self.first, self.scale_of(self.first.input.name), self.scale_of(output)
         ends = drive.ends and (drive.ends[0] / own, drive.ends[1] / own)
-        found, rate = self.linkage.follow(output, value / unit, near / own)
+        inverse = self.linkage.inverse(output)
+        (found,), (rate,) = inverse.follow((value / unit,), (near / own,))
         if not (ends[0] <= found <= ends[1] if ends else found == found):
-            found, rate = map(float, self.linkage.servo_for(
-                output, value / unit, near / own, ends))
+            (found,), (rate,) = inverse.nearest((value / unit,), (near / own,), (ends,))
         return found * own, rate * unit / own
 
     def understood(self, drive: Drive, position: float, speed: Optional[float],

@@ -1,0 +1,323 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Values of the input that bring about a wanted value of any output.
+
+The output is cut into branches on which it rises or falls all along: at its extremes, at the ends
+of the reach, and where the linkage passes a dead point. On a branch a value is found by Newton's
+method kept inside a bracket, to the last digit.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Callable, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+
+import numpy as np
+
+from .curves import LEAST, refined, sampled, turns
+from .inputs import Arc, Input
+
+# Answers that are no further apart than this [rad] are one.
+CLOSE = 1e-13
+# A step to the outermost sample of an arc by more than this part of the output breaks it off.
+BROKEN = 1e-6
+# Newton's method halves its error more than once a step; bisection needs one step a bit.
+STEPS = 200
+# An output jumps that changes by more than this part of half a turn, or of its range, between
+# neighbouring values of the input.
+JUMP = 0.05
+# An output that changes by no more than so many times its rounding stands still.
+STILL = 64.0
+# What a value may miss, as a part of the output's range, before it counts as stepped over.
+MISSED = 1e-9
+
+
+def in_order(answers: np.ndarray, input_: Input) -> np.ndarray:
+    """
+    Return values of an input, shape (candidates, n), as shape (n, answers).
+
+    Each row ascends, holds nothing twice, and is filled up with NaN; angles are in [-pi, pi).
+    """
+    rows = np.sort(input_.wrapped(np.where(np.abs(answers) < LEAST, 0.0, answers)), axis=0)
+    if len(rows) > 1:
+        rows[1:][np.diff(rows, axis=0) <= CLOSE] = np.nan
+        last = np.nanmax(rows, axis=0, initial=-np.inf)
+        again = input_.turns & (rows == last) & (last - rows[0] >= input_.turn - CLOSE)
+        rows = np.sort(np.where(again, np.nan, rows), axis=0)
+    most = int(np.isfinite(rows).sum(axis=0).max(initial=0))
+    rows = rows[:max(most, 1)] if len(rows) else np.full((1, answers.shape[1]), np.nan)
+    return np.moveaxis(rows, 0, -1)
+
+
+def distinct(theta: Iterable[float], input_: Input) -> List[float]:
+    """Return values of an input in order, without those next to another."""
+    found = np.array(list(theta), float)
+    return [x for x in in_order(found[:, None], input_)[0].tolist() if x == x]
+
+
+_Run = Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+class _Branch(NamedTuple):
+    """Samples of an arc on which an output rises, or falls if the sign is -1."""
+
+    theta: np.ndarray
+    value: np.ndarray
+    sign: float
+
+
+class MonotoneBranches:
+    """
+    An output over the reach, in branches on which it rises or falls all along.
+
+    Parameters
+    ----------
+    curve : callable
+        From values of the input, shape (n,), to the output and its rate, shape (2, n).
+    arcs : sequence of (float, float)
+        Where the input may be; nowhere both sides of -pi or pi.
+    marks : sequence of float
+        Values of the input next to which the output may change quickly or break off.
+    angular : bool
+        Whether the output is an angle, compared modulo a turn.
+    rounding : float
+        What the output is rounded to at least; a value so far beyond an extreme is the extreme.
+
+    """
+
+    def __init__(self, curve: Callable, arcs: Iterable[Arc], marks: Sequence[float],
+                 angular: bool, rounding: float):
+        self._curve = curve
+        self._angular = angular
+        self._rounding = rounding
+        arcs = list(arcs)
+        self.jumps = [at for arc in cut(arcs, marks) for at in self._jumps(*arc)]
+        runs = [run for arc in cut(arcs, sorted({*marks, *self.jumps}))
+                for run in self._runs(*arc)]
+        self._range = max((np.ptp(value) for _, value, *_ in runs), default=0.0)
+        self._branches = [branch for run in runs for branch in self._branched(*run)] \
+            if self._moves(runs) else []
+
+    def answers(self, values: np.ndarray) -> np.ndarray:
+        """Return the values of the input for an output's, shape (n,), as (candidates, n)."""
+        asked = [(branch, place, target[place]) for branch in self._branches
+                 for target in self._targets(branch, values)
+                 if len(place := np.flatnonzero(np.isfinite(target)))]
+        found = np.full((max(len(asked), 1), *values.shape), np.nan)
+        if asked:
+            theta = self._solved(*map(np.concatenate, zip(*(
+                _bracketed(branch, target) for branch, _, target in asked))))
+            ends = np.cumsum([len(place) for _, place, _ in asked])[:-1]
+            near = 0.25 * self._rounding
+            for row, (branch, place, target), part in zip(found, asked, np.split(theta, ends)):
+                part = np.where(target <= branch.value[0] + near, branch.theta[0], part)
+                row[place] = np.where(target >= branch.value[-1] - near, branch.theta[-1], part)
+        return found
+
+    def pieces(self, most: float) -> List[Tuple[float, float, float, float]]:
+        """Return the branches, cut where the output has changed by so much: inputs, outputs."""
+        cut = []
+        for theta, value, sign in self._branches:
+            places = [0]
+            for i in range(1, len(theta)):
+                if i + 1 == len(theta) or value[i + 1] - value[places[-1]] > most:
+                    places.append(i)
+            cut += [(float(theta[i]), float(theta[k]), float(sign * value[i]),
+                     float(sign * value[k])) for i, k in zip(places, places[1:])]
+        return cut
+
+    @property
+    def is_one(self) -> bool:
+        """Whether the output rises, or falls, wherever the input may be."""
+        return len(self._branches) == 1
+
+    def follow(self, pose: Callable, size: float, value: float,
+               near: float) -> Tuple[float, float]:
+        """
+        Return the input that gives a value on the branch that another is on, and the rate there.
+
+        `pose` is the curve for a float; inputs are here in rad or m, `size` of them in one. NaN
+        where the branch does not hold the value.
+        """
+        for branch in self._branches:
+            lo, hi = branch.theta[0], branch.theta[-1]
+            if lo <= near / size <= hi:
+                bracket = self._bracket(branch, value)
+                if bracket:
+                    return self._refined(pose, branch.sign, *bracket, size)
+        return math.nan, math.nan
+
+    def _bracket(self, branch: _Branch, value: float) -> Optional[Tuple[float, float, float]]:
+        """Return the samples on both sides of a value, as the branch counts it, and that."""
+        low, high, slack = float(branch.value[0]), float(branch.value[-1]), self._rounding
+        target = branch.sign * value
+        if self._angular and math.isfinite(target):
+            if abs(target) > math.tau:
+                target = math.atan2(math.sin(target), math.cos(target))
+            target += math.tau * math.ceil((low - slack - target) / math.tau)
+        if not low - slack <= target <= high + slack:
+            return None
+        i = min(max(int(branch.value.searchsorted(target)), 1), len(branch.theta) - 1)
+        return float(branch.theta[i - 1]), float(branch.theta[i]), target
+
+    def _refined(self, pose: Callable, sign: float, lo: float, hi: float, target: float,
+                 size: float) -> Tuple[float, float]:
+        """Return what `_solved` does, for one float: arrays would cost more than the search."""
+        lo, hi = lo * size, hi * size
+        theta, last = 0.5 * (lo + hi), math.inf
+        best = theta, math.nan
+        for _ in range(STEPS):
+            now, rate = pose(theta)
+            gap = sign * now - target
+            if self._angular:
+                gap = math.remainder(gap, math.tau)
+            if abs(gap) >= last and last < self._rounding:
+                return best
+            last, best = abs(gap), (theta, rate)
+            lo, hi = (theta, hi) if gap < 0.0 else (lo, theta)
+            guess = theta - sign * gap / rate if rate else math.nan
+            if guess == theta or hi - lo <= math.ulp(max(-lo, hi)):
+                break
+            theta = guess if lo < guess < hi else 0.5 * (lo + hi)
+        return best
+
+    def _jumps(self, lo: float, hi: float) -> List[float]:
+        """Return where the output jumps, as an angle does by pi where its ends meet."""
+        theta = sampled(lo, hi)
+        value, rate = self._curve(theta)
+        with np.errstate(invalid='ignore'):
+            size = math.pi if self._angular else float(
+                np.nanmax(value, initial=-np.inf) - np.nanmin(value, initial=np.inf))
+            # What the rates at both samples do not explain of the values there.
+            places = np.flatnonzero(np.abs(self._difference(np.diff(value)) - np.diff(theta)
+                                           * 0.5 * (rate[1:] + rate[:-1])) > JUMP * size)
+        before, after = theta[places], theta[places + 1]
+        for _ in range(STEPS if len(places) else 0):
+            middle = 0.5 * (before + after)
+            if ((middle <= before) | (middle >= after)).all():
+                break
+            low, mid, high = self._curve(np.concatenate([before, middle, after]))[0].reshape(3, -1)
+            first = np.abs(self._difference(mid - low)) > np.abs(self._difference(high - mid))
+            before, after = np.where(first, before, middle), np.where(first, middle, after)
+        low, high = self._curve(np.concatenate([before, after]))[0].reshape(2, -1)
+        return before[np.abs(self._difference(high - low)) > JUMP * size].tolist()
+
+    def _runs(self, lo: float, hi: float) -> Iterator[_Run]:
+        """Yield samples as angles, values, rates and rounding, cut where there is no value."""
+        theta = sampled(lo, hi)
+        theta[[0, -1]] = self._unbroken(theta[[0, -1]], theta[[1, -2]], theta[len(theta) // 2])
+        digit = 4.0 * np.spacing(np.abs(theta).clip(1e-3))
+        around = (theta + digit * np.array([[0.0], [1.0], [-1.0]])).clip(theta[0], theta[-1])
+        value, rate = self._curve(around.ravel()).reshape(2, *around.shape)
+        with np.errstate(all='ignore'):
+            # What the rate does not explain of the values next to each is rounding.
+            noise = np.abs(self._difference(value[1:] - value[0])
+                           - rate[0] * (around[1:] - theta)).max(axis=0)
+        noise[~np.isfinite(noise)] = 0.0
+        known = np.isfinite(value[0])
+        for run in np.split(np.arange(len(theta)), np.flatnonzero(~known)):
+            run = run[known[run]]
+            if len(run) > 1:
+                values = np.unwrap(value[0, run]) if self._angular else value[0, run]
+                yield theta[run], values, rate[0, run], noise[run]
+
+    def _unbroken(self, ends: np.ndarray, beside: np.ndarray, middle: float) -> np.ndarray:
+        """Return the ends of an arc, or where the output breaks off right before them."""
+        values = self._curve(np.array([*ends, *beside, middle]))[0]
+        start, size = values[2:4], BROKEN * (math.pi if self._angular else np.ptp(values[2:]))
+        with np.errstate(invalid='ignore'):
+            return refined(lambda x: ~(np.abs(self._difference(
+                self._curve(x.ravel())[0].reshape(x.shape) - start[:, None])) > size),
+                beside, np.nextafter(ends, 2.0 * ends - beside))[0]
+
+    def _moves(self, runs: Sequence[_Run]) -> bool:
+        """Return whether the output changes by more than rounding."""
+        if not runs:
+            return False
+        _, values, _, noise = (np.concatenate(part) for part in zip(*runs))
+        noise = STILL * (noise + np.median(noise)) + self._rounding
+        return bool(np.any(np.abs(self._difference(values - np.median(values))) > noise))
+
+    def _branched(self, theta: np.ndarray, value: np.ndarray, rate: np.ndarray,
+                  noise: np.ndarray) -> Iterator[_Branch]:
+        least = 4.0 * (noise + self._rounding)
+        with np.errstate(invalid='ignore'):
+            places = turns(value, rate, least)
+            rising = rate[places] >= 0.0
+            ends, _ = refined(lambda x: (self._curve(x.ravel())[1] >= 0.0).reshape(
+                x.shape) == rising[:, None], theta[places], theta[places + 1])
+        reached = self._curve(ends)[0] if len(ends) else ends
+        # An extreme may be the one angle at which an arm has no length and no direction.
+        known = np.isfinite(reached)
+        ends = np.where(known, ends, theta[places])
+        reached = value[places] + self._difference(np.where(known, reached - value[places], 0.0))
+        theta = np.insert(theta, places + 1, ends)
+        value = np.insert(value, places + 1, reached)
+        cuts = [0, *(places + 1 + np.arange(len(places))).tolist(), len(theta) - 1]
+        for first, last in zip(cuts, cuts[1:]):
+            part = slice(first, last + 1)
+            sign = 1.0 if value[last] >= value[first] else -1.0
+            yield _Branch(theta[part], np.maximum.accumulate(sign * value[part]), sign)
+
+    def _difference(self, gap: Any) -> Any:
+        return gap - math.tau * np.round(gap / math.tau) if self._angular else gap
+
+    def _targets(self, branch: _Branch, values: np.ndarray) -> Iterator[np.ndarray]:
+        """Yield the values as the branch counts them; NaN where it does not hold them."""
+        lo, hi = branch.value[0], branch.value[-1]
+        values, slack = branch.sign * values, self._rounding
+        turn, count = math.tau, int((hi - lo + 2.0 * slack) // math.tau) + 1
+        if not self._angular:
+            turn, count = 0.0, 1
+        else:
+            with np.errstate(invalid='ignore'):
+                # Sine and cosine take off whole turns without loss, however many there are.
+                within = np.arctan2(np.sin(values), np.cos(values))
+            values = np.where(np.abs(values) > math.tau, within, values)
+            values = values + math.tau * np.ceil((lo - slack - values) / math.tau)
+        for i in range(count):
+            target = values + i * turn
+            held = (target >= lo - slack) & (target <= hi + slack)
+            yield np.where(held, np.clip(target, lo, hi), np.nan)
+
+    def _solved(self, lo: np.ndarray, hi: np.ndarray, target: np.ndarray,
+                sign: np.ndarray) -> np.ndarray:
+        """Return where the output meets its targets, by Newton's method inside a bracket."""
+        theta, step = 0.5 * (lo + hi), hi - lo
+        best, least, steepest = theta, np.full(theta.shape, np.inf), np.zeros(theta.shape)
+        done = np.zeros(theta.shape, bool)
+        for _ in range(STEPS):
+            value, rate = self._curve(theta)
+            gap = self._difference(sign * value - target)
+            closer = np.abs(gap) < least
+            best, least = np.where(closer, theta, best), np.where(closer, np.abs(gap), least)
+            steepest = np.where(closer, np.abs(rate), steepest)
+            lo, hi = np.where(gap < 0.0, theta, lo), np.where(gap < 0.0, hi, theta)
+            with np.errstate(all='ignore'):
+                guess = theta - gap / (sign * rate)
+            digit = np.spacing(np.maximum(np.abs(lo), np.abs(hi)))
+            done |= (least == 0.0) | (hi - lo <= digit) | (np.abs(guess - theta) <= digit)
+            if done.all():
+                break
+            good = (lo < guess) & (guess < hi) & (np.abs(guess - theta) < 0.5 * step)
+            following = np.where(good, guess, 0.5 * (lo + hi))
+            theta, step = following, np.abs(following - theta)
+        # Where the output breaks off, its sides enclose values that it never has.
+        far = STILL * np.spacing(math.pi) * steepest + MISSED * self._range + self._rounding
+        return np.where(least <= far, best, np.nan)
+
+
+def cut(arcs: Iterable[Arc], marks: Sequence[float]) -> Iterator[Arc]:
+    """Yield arcs, cut at marks, which may be dead points."""
+    for start, end in arcs:
+        inside = [mark for mark in marks if start < mark < end]
+        yield from zip([start, *inside], [*inside, end])
+
+
+def _bracketed(branch: _Branch, target: np.ndarray) -> tuple:
+    """Return the samples on both sides of targets, the targets, and the sign of the branch."""
+    index = np.clip(np.searchsorted(branch.value, target), 1, len(branch.theta) - 1)
+    return (branch.theta[index - 1], branch.theta[index], target,
+            np.full(target.shape, branch.sign))

@@ -1,0 +1,265 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The inverse of outputs that belong together and do not come apart, by steps on the exact Jacobian.
+
+Outputs that depend on few inputs are solved first, for those alone. Levenberg-Marquardt steps lead
+down from a grid over all that the inputs can be, then from both sides of each solution, as those
+next to a fold come in pairs.
+
+Sources: Nocedal and Wright, "Numerical Optimization", sec. 10.3 (the steps); Gosselin and Angeles,
+"Singularity analysis of closed-loop kinematic chains", IEEE Trans. Robotics and Automation 6
+(1990).
+"""
+
+from __future__ import annotations
+
+from itertools import chain, combinations
+import math
+from typing import Callable, List, Optional, Sequence, Set, Tuple, TYPE_CHECKING
+
+import numpy as np
+
+from .quantities import Names
+from ..words import listed
+
+if TYPE_CHECKING:
+    from .mechanism import Mechanism
+
+# Starts of a search at first and at most, and those of them that can be assembled at least.
+STARTS, MOST_STARTS, ASSEMBLED = 1024, 1 << 16, 250
+# Steps from a start, how far one goes at most, and their damping: at first, at least, and in vain.
+STEPS, LONGEST_STEP = 40, 0.7
+DAMPING, LEAST_DAMPING, HOPELESS, TINY = 1e-3, 1e-14, 1e4, 1e-300
+# Newton steps that polish a solution; halvings of the way to what may lie beside it.
+POLISHING, HALVINGS = 3, 24
+# Below this margin a pose is singular; below it wherever one looks, outputs tell too little.
+SINGULAR, DEPENDENT = 1e-6, 1e-10
+# Rounding of an output, and of an input where the Jacobian is one.
+ROUNDED, CLOSE = 32 * 2.0 ** -53, 1e-13
+# Pieces of a way from pose to pose, the shortest of them, and Newton steps to the end of each.
+PIECES, SHORTEST, REFINED = 40, 1e-10, 30
+
+_Pair = Tuple[np.ndarray, np.ndarray]
+
+
+def blocks(linkage: Mechanism, outputs: Names) -> List[Tuple[List[int], List[int]]]:
+    """
+    Return outputs that are solved one after the other, and the inputs that they tell.
+
+    Raises ValueError if they cannot tell all inputs.
+    """
+    needs = [{by for by in range(len(outputs)) if linkage.moves(name, by)} for name in outputs]
+    left: Set[int] = set(range(len(needs)))
+    known: Set[int] = set()
+    found = []
+    while left:
+        for rows in chain(*(combinations(sorted(left), n + 1) for n in range(len(left)))):
+            columns = set().union(*(needs[row] for row in rows)) - known
+            if len(columns) < len(rows):
+                raise dependent(outputs, rows)
+            if len(columns) == len(rows):
+                found.append((list(rows), sorted(columns)))
+                left, known = left - set(rows), known | columns
+                break
+    return found
+
+
+def dependent(outputs: Names, rows: Sequence[int]) -> ValueError:
+    """Return the error for outputs of which some depend on too few inputs."""
+    return ValueError(f'{listed(outputs)} do not tell all inputs: '
+                      f'{listed(outputs[row] for row in rows)} depends on too few')
+
+
+class Search:
+    """Outputs as functions of the inputs, all of them counted in their sizes inside."""
+
+    def __init__(self, linkage: Mechanism, outputs: Names):
+        self.outputs, self.inputs = outputs, [input_.counted() for input_ in linkage.inputs]
+        self.sizes = np.array([input_.size for input_ in linkage.inputs])
+        self._angular = np.array(list(map(linkage.is_angle, outputs)))
+        self.scale = np.where(self._angular, 1.0, linkage.longest)
+        self._pose, self._margins = linkage.posed((), outputs, outputs), linkage.margins
+        self.blocks = blocks(linkage, outputs)
+        self._check_told()
+
+    def answers(self, values: np.ndarray) -> np.ndarray:
+        """Return all inputs that give outputs their values, in rows."""
+        middle = [0.5 * (input_.low + input_.high) for input_ in self.inputs]
+        found = np.array([middle] if np.isfinite(values).all() else []).reshape(-1, len(middle))
+        for block in self.blocks:
+            found = np.concatenate([found[:0], *(
+                self.solutions(q, values, *block) for q in found)])
+        return (found[self._held(found * self.sizes)]) * self.sizes
+
+    def _held(self, inputs: np.ndarray) -> np.ndarray:
+        """Return for rows of inputs whether all of the linkage can be assembled there."""
+        with np.errstate(invalid='ignore'):
+            return np.asarray((self._margins(*inputs.T) >= 0.0).all(axis=0))
+
+    def over(self, q: np.ndarray, target: np.ndarray) -> _Pair:
+        """Return what outputs miss of their target, and the Jacobian, for each row of q."""
+        return self._missed(self._pose.searched(*(q * self.sizes).T), target)
+
+    def _at(self, q: np.ndarray, target: np.ndarray) -> _Pair:
+        """Return the same for one pose, by code for one."""
+        missed, jacobian = self._missed(
+            np.array(self._pose.at(*(q * self.sizes).tolist()))[:, None], target)
+        return missed[0], jacobian[0]
+
+    def _missed(self, rows: np.ndarray, target: np.ndarray) -> _Pair:
+        n = len(target)
+        missed = rows[:n].T - target
+        missed -= np.where(self._angular, math.tau * np.round(missed / math.tau), 0.0)
+        jacobian = rows[n:].reshape(n, n, rows.shape[1]).transpose(2, 1, 0)
+        return missed / self.scale, jacobian * self.sizes / self.scale[:, None]
+
+    def solutions(self, q: np.ndarray, target: np.ndarray, rows: List[int],
+                  columns: List[int]) -> np.ndarray:
+        """Return where some outputs are what they should be; other inputs are those of q."""
+        def missed(q: np.ndarray) -> Tuple[np.ndarray, ...]:
+            """Return what outputs miss, how much (inf where unknown), the Jacobian, rounding."""
+            gap, jacobian = self.over(q, target)
+            gap, jacobian = gap[:, rows], jacobian[:, rows][:, :, columns]
+            known = np.isfinite(gap).all(axis=1) & np.isfinite(jacobian).all(axis=(1, 2))
+            size = np.where(known, np.linalg.norm(gap, axis=1), np.inf)
+            return gap, size, jacobian, _rounding(q[:, columns], jacobian)
+
+        def moved(q: np.ndarray, step: np.ndarray) -> np.ndarray:
+            """Return inputs after a step, within one turn and their strokes."""
+            q = q.copy()
+            q[:, columns] += step
+            return np.stack([input_.wrapped(x) if input_.turns else x.clip(input_.low, input_.high)
+                             for input_, x in zip(self.inputs, q.T)], axis=-1)
+
+        def beyond(q: np.ndarray) -> np.ndarray:
+            """Return poses on both sides of solutions, where others may lie behind a fold."""
+            weakest = np.linalg.svd(missed(q)[2])[2][:, -1]
+            away = LONGEST_STEP * np.outer([1.0, -1.0], 0.5 ** np.arange(HALVINGS)).ravel()
+            return known(moved(np.repeat(q, len(away), axis=0),
+                               np.kron(weakest, away[:, None])))
+
+        def known(q: np.ndarray) -> np.ndarray:
+            return q[np.isfinite(missed(q)[1])]
+
+        starts = self._starts(q, columns, known)
+        found = starts[:0]
+        while len(starts):
+            before = len(found)
+            ends = np.concatenate([found, _descended(starts, missed, moved)])
+            found = self._distinct(_polished(ends, missed, moved), missed)
+            starts = beyond(found) if len(found) > before else found[:0]
+        return found
+
+    def _starts(self, q: np.ndarray, columns: List[int], known: Callable) -> np.ndarray:
+        """Return poses over all that some inputs can be, more of them where few can be had."""
+        starts, many = np.empty((0, len(q))), STARTS
+        while len(starts) < ASSEMBLED and many <= MOST_STARTS:
+            n = math.ceil(many ** (1.0 / len(columns)) if len(columns) > 1 else many / 4)
+            axes = [np.linspace(input_.low, input_.high, n + 2)[1:-1]
+                    for input_ in (self.inputs[column] for column in columns)]
+            starts = np.tile(q, (n ** len(columns), 1))
+            starts[:, columns] = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(columns))
+            starts, many = known(starts), 4 * many
+        return starts
+
+    def _check_told(self) -> None:
+        """Raise ValueError if the outputs do not tell the inputs in most poses."""
+        n = len(self.inputs)
+        q = self._starts(np.zeros(n), list(range(n)), lambda q: q[np.isfinite(
+            self.over(q, np.zeros(n))[1]).all(axis=(1, 2))])
+        values = np.linalg.svd(self.over(q, np.zeros(n))[1], compute_uv=False)
+        if len(q) and np.median(values[:, -1] / np.fmax(values[:, 0], TINY)) <= DEPENDENT:
+            raise dependent(self.outputs, range(n))
+
+    def _distinct(self, q: np.ndarray, missed: Callable) -> np.ndarray:
+        """Return each solution once, those that are farthest from singular first."""
+        values = np.linalg.svd(missed(q)[2], compute_uv=False)
+        kept: List[Tuple[np.ndarray, float]] = []
+        for i in np.argsort(-values[:, -1]):
+            if all(max(input_.apart(x, y) for input_, x, y in zip(self.inputs, q[i], other)) > near
+                   for other, near in kept):
+                kept.append((q[i], CLOSE * (1.0 + values[i, 0]) / max(values[i, -1], CLOSE)))
+        return np.array([each for each, _ in kept]).reshape(-1, q.shape[1])
+
+    def followed(self, near: np.ndarray, target: np.ndarray) -> _Pair:
+        """Return what `Inverse.follow` does, the rates as d outputs / d inputs."""
+        inputs, jacobian = self._followed(near / self.sizes, target)
+        inputs = inputs * self.sizes
+        if not self._held(inputs[None])[0]:
+            inputs, jacobian = inputs * np.nan, jacobian * np.nan
+        return inputs, jacobian * self.scale[:, None] / self.sizes
+
+    def _followed(self, q: np.ndarray, target: np.ndarray) -> _Pair:
+        start, jacobian = self._at(q, target)
+        side = np.linalg.det(jacobian) if np.isfinite(jacobian).all() else 0.0
+        left = piece = 1.0
+        for _ in range(PIECES if side and np.isfinite(start).all() else 0):
+            if found := self._corrected(q, target, start * max(left - piece, 0.0), side):
+                (q, jacobian), left = found, left - piece
+                if left <= 0.0:
+                    return q, jacobian
+                piece = min(4.0 * piece, left)
+            elif (piece := 0.25 * piece) < SHORTEST:
+                break
+        return np.full(q.shape, np.nan), np.full(jacobian.shape, np.nan)
+
+    def _corrected(self, start: np.ndarray, target: np.ndarray, aim: np.ndarray,
+                   side: float) -> Optional[_Pair]:
+        """Return where outputs miss their target by an aim, near a start on one side of folds."""
+        q, last = start, LONGEST_STEP
+        for _ in range(REFINED):
+            gap, jacobian = self._at(q, target)
+            gap = gap - aim
+            if not (np.isfinite([*gap, *jacobian.ravel()]).all()
+                    and np.linalg.det(jacobian) * side > 0.0):
+                return None
+            if (np.abs(gap) <= _rounding(q, jacobian)).all():
+                return q, jacobian
+            step = np.linalg.solve(jacobian, gap)
+            longest = float(np.abs(step).max())
+            q = q - step
+            if not longest <= last or np.abs(q - start).max() > LONGEST_STEP:
+                return None
+            last = 0.6 * longest
+        return None
+
+
+def _rounding(q: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
+    """Return what rounding makes outputs miss: their own, and that of the inputs."""
+    return ROUNDED * (1.0 + (np.abs(jacobian) @ np.maximum(1.0, np.abs(q))[..., None])[..., 0])
+
+
+def _descended(q: np.ndarray, missed: Callable, moved: Callable) -> np.ndarray:
+    """Return the solutions that Levenberg-Marquardt steps from some poses lead to."""
+    (gap, size, jacobian, rounding), damping, found = missed(q), np.full(len(q), DAMPING), []
+    for _ in range(STEPS):
+        there = (np.abs(gap) <= rounding).all(axis=1)
+        found.append(q[there])
+        going = ~there & (damping < HOPELESS)
+        if not going.any():
+            break
+        q, size, damping = q[going], size[going], damping[going]
+        turned = jacobian[going].swapaxes(1, 2)
+        square = turned @ jacobian[going]
+        weight = damping * np.trace(square, axis1=1, axis2=2) + TINY
+        step = np.linalg.solve(square + weight[:, None, None] * np.eye(gap.shape[1]),
+                               turned @ gap[going, :, None])[..., 0]
+        longest = np.abs(step).max(axis=1, keepdims=True)
+        trial = moved(q, -step * (LONGEST_STEP / np.maximum(longest, LONGEST_STEP)))
+        better = missed(trial)[1] < size
+        damping = np.where(better, 0.1 * damping, 10.0 * damping).clip(LEAST_DAMPING)
+        q = np.where(better[:, None], trial, q)
+        gap, size, jacobian, rounding = missed(q)
+    return np.concatenate(found)
+
+
+def _polished(q: np.ndarray, missed: Callable, moved: Callable) -> np.ndarray:
+    """Return solutions after some steps of Newton's method, where these are better."""
+    for _ in range(POLISHING):
+        gap, size, jacobian, _ = missed(q)
+        trial = moved(q, -(np.linalg.pinv(jacobian) @ gap[..., None])[..., 0])
+        q = np.where((missed(trial)[1] < size)[:, None], trial, q)
+    return q
+

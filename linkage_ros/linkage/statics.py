@@ -1,0 +1,74 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The forces and torques that hold a linkage against loads.
+
+Forces follow from velocities by virtual work: what the inputs give and what the loads take adds up
+to nothing in every motion that the linkage allows.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Iterator, Mapping, TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .arguments import numbers
+from ..words import listed, plain_text, quoted
+
+if TYPE_CHECKING:
+    from .mechanism import Inputs, Mechanism
+
+
+def effort(linkage: Mechanism, theta: Inputs, loads: Mapping[str, ArrayLike]) -> np.ndarray:
+    """Return what `Mechanism.effort` does."""
+    shape = np.broadcast_shapes(*map(np.shape, linkage.each_input(theta)))
+    efforts = [np.zeros(shape) for _ in linkage.inputs]
+    for by in range(len(linkage.inputs)):
+        with np.errstate(invalid='ignore', over='ignore'):
+            for power in _powers(linkage, theta, loads, by):
+                efforts[by] = efforts[by] - power
+    return np.stack(np.broadcast_arrays(*efforts), -1)
+
+
+def _powers(linkage: Mechanism, theta: Inputs, loads: Mapping[str, ArrayLike],
+            by: int) -> Iterator[np.ndarray]:
+    """Yield what each load gives for each unit that an input moves."""
+    for name, load in loads.items():
+        name = plain_text(name)
+        force = numbers(f'the load on {name}', load)
+        if name in linkage.points:
+            if force.shape[-1:] != (2,):
+                raise ValueError(f'the load on the joint {name} must be a force x, y [N], not '
+                                 f'{quoted(load)}')
+            velocity = linkage.velocity(theta, (name,), by)[name]
+            # A load of nothing takes nothing, however fast its joint moves.
+            yield np.where(force == 0.0, 0.0, force * velocity).sum(axis=-1)
+        elif name in linkage.joints:
+            chain = list(_chain(linkage, name))
+            rates = linkage.joint_rates(theta, chain, by)
+            turning = sum((rates[link] for link in chain), np.zeros(()))
+            yield np.where(force == 0.0, 0.0, force * turning)
+        else:
+            raise ValueError(f'{linkage.type} has no joint or link {quoted(name)} to load; '
+                             f'allowed: {listed((*linkage.points, *linkage.joints))}')
+
+
+def _chain(linkage: Mechanism, name: str) -> Iterator[str]:
+    """Yield the links that turn a link, itself first, down to the ground."""
+    links = {link.name: link for link in linkage.links}
+    while name in links:
+        if links[name].kind != 'prismatic':
+            yield name
+        name = links[name].parent
+
+
+def output_effort(linkage: Mechanism, output: str, theta: Inputs, effort: ArrayLike) -> Any:
+    """Return what `Mechanism.output_effort` does."""
+    if len(linkage.inputs) > 1:
+        raise ValueError(f'{linkage.type} has several inputs; the effort of an output is there '
+                         'for one')
+    with np.errstate(divide='ignore', invalid='ignore'):
+        return (numbers('effort', effort) / linkage.joint_rates(theta, (output,))[output])[()]
