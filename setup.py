@@ -20,7 +20,7 @@ commands = {
     'c_code': 'c_code.command', 'crank_driver': 'nodes.crank_driver',
     'from_robot': 'robot_files.command', 'kinematics': 'nodes.kinematics',
     'render': 'render', 'scene': 'nodes.together', 'servo_inverse': 'nodes.servo_inverse',
-    'urdf': 'nodes.urdf_command', 'viewer': 'web.viewer'}
+    'transmission': 'c_code.transmission', 'urdf': 'nodes.urdf_command', 'viewer': 'web.viewer'}
 
 
 def build_interfaces():
@@ -59,7 +59,8 @@ setup(
     name=package_name,
     version='0.1.0',
     packages=find_packages(include=[f'{package_name}*']),
-    package_data={package_name: ['py.typed'], f'{package_name}.web': ['page/*', 'page/vendor/*']},
+    package_data={package_name: ['py.typed'], f'{package_name}.c_code': ['templates/*'],
+                  f'{package_name}.web': ['page/*', 'page/vendor/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
