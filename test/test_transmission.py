@@ -274,6 +274,14 @@ def test_random_linkages_go_both_ways(tmp_path, seeds):
     assert back > 20 * len(machines)
 
 
+def test_all_ground_links_of_the_catalogue_but_one_are_closed_forms():
+    linkages = [mechanisms.create(name) for name in mechanisms.TYPES]
+    closed = {(linkage.type, link.name): linkage.inverse(link.name).closed is not None
+              for linkage in linkages if len(linkage.inputs) == 1 for link in linkage.links
+              if link.parent == 'ground' and link.name != linkage.inputs[0].name}
+    assert len(closed) == 16 and [key for key in closed if not closed[key]] == [('klann', 'CF')]
+
+
 def test_names_of_any_letters_are_texts(tmp_path):
     source = 'a*/ "b"\\ ??/\n%s é'
     machine, = scene.read({
