@@ -20,8 +20,8 @@ commands = {
     'c_code': 'c_code.command:main', 'crank_driver': 'executables:crank_driver',
     'from_robot': 'robot_files.command:main', 'kinematics': 'executables:kinematics',
     'render': 'render:main', 'scene': 'executables:scene',
-    'servo_inverse': 'executables:servo_inverse', 'urdf': 'nodes.urdf_command:main',
-    'viewer': 'executables:viewer'}
+    'servo_inverse': 'executables:servo_inverse', 'transmission': 'c_code.transmission:main',
+    'urdf': 'nodes.urdf_command:main', 'viewer': 'executables:viewer'}
 
 
 def build_interfaces():
@@ -60,7 +60,8 @@ setup(
     name=package_name,
     version='0.1.0',
     packages=find_packages(include=[f'{package_name}*']),
-    package_data={package_name: ['py.typed'], f'{package_name}.web': ['page/*', 'page/vendor/*']},
+    package_data={package_name: ['py.typed'], f'{package_name}.c_code': ['templates/*'],
+                  f'{package_name}.web': ['page/*', 'page/vendor/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),

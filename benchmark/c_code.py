@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-How much code and stack a linkage takes on microcontrollers.
+What a linkage in C takes: code, stack and cycles on microcontrollers, and time in a controller.
 
     python -m benchmark.c_code [--document]
 
-Compilers that are not installed are left out (apt install gcc-avr avr-libc gcc-arm-none-eabi
-libnewlib-arm-none-eabi). With --document the table goes into docs/c-code.md.
+Compilers that are not installed are left out (apt install gcc-avr avr-libc simavr
+gcc-arm-none-eabi libnewlib-arm-none-eabi). With --document the tables go into docs/c-code.md.
 """
 
 import argparse
@@ -19,6 +19,7 @@ import tempfile
 
 from linkage_ros import scene
 from linkage_ros.c_code import header
+import numpy as np
 
 from . import document
 from .nodes.report import table
@@ -28,46 +29,173 @@ TARGETS = {
     'Cortex-M4F, arm-none-eabi-gcc': ('arm-none-eabi', [
         '-mcpu=cortex-m4', '-mthumb', '-mfloat-abi=hard', '-mfpu=fpv4-sp-d16',
         '--specs=nosys.specs'])}
-CASES = {'slotted_lever': 'lever', 'four_bar': 'QB', 'jansen': 'EF'}
-EMPTY = 'volatile float in, out; int main(void) { out = in; return 0; }\n'
+CASES = {'slotted_lever': 'lever', 'four_bar': 'QB', 'jansen': 'BC'}
+SCENES = ('config/slotted_lever', 'config/jansen', 'config/excavator', 'examples/leg')
+# Poses at which cycles and times are taken.
+POSES, CALLS = 16, 20_000
 USES = {
-    'pose': '{name}_pose p; {name}_solve(in, &p); out = p.{field};',
-    'inverse': 'float x = in; {name}_crank_for_{field}(in, x, &x); out = x;'}
+    'pose': '{name}_pose p; {name}_solve(given[k], &p); out = p.angle_{output};',
+    'inverse': 'float x = given[k] + 0.05f; {name}_crank_for_angle_{output}(found[k], x, &x); '
+               'out = x;',
+    'actuators to joints': 'side.position[0] = given[k]; out = side.velocity[0] = 1.0f; '
+                           '{name}_actuators_to_joints(&memory, &side, &other); '
+                           'out = other.effort[0];',
+    'joints to actuators': 'side.position[0] = found[k]; out = side.velocity[0] = 1.0f; '
+                           '{name}_joints_to_actuators(&memory, &side, &other); '
+                           'out = other.effort[0];'}
+MAIN = """
+static const float given[] = {{ {given} }}, found[] = {{ {found} }};
+static {name}_memory memory;
+static {name}_side side, other;
+volatile float out;
+volatile int from;
+int main(void) {{ int k = from; {begin} {body} return (int)(given[k] + found[k]); }}
+"""
+# The cycles of each call on the serial line, which simavr prints.
+CYCLES = """
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <avr/sleep.h>
+static volatile unsigned int turns;
+ISR(TIMER1_OVF_vect) {{ turns++; }}
+static unsigned long now(void)
+{{
+    cli();
+    unsigned long t = TCNT1;
+    if (TIFR1 & 1)
+        t = 65536ul + TCNT1;
+    t += 65536ul * turns;
+    sei();
+    return t;
+}}
+static void put(char c) {{ while (!(UCSR0A & (1 << UDRE0))) ; UDR0 = c; }}
+static void say(unsigned long n) {{ if (n > 9) say(n / 10); put('0' + n % 10); }}
+static const float given[] = {{ {given} }}, found[] = {{ {found} }};
+static {name}_memory memory;
+static {name}_side side, other;
+volatile float out;
+volatile int from;
+int main(void)
+{{
+    UCSR0B = 1 << TXEN0; TCCR1B = 1; TIMSK1 = 1; sei();
+    {name}_begin(&memory);
+    for (int k = from; k < {count}; k++) {{
+        side.position[0] = given[k];
+        {name}_actuators_to_joints(&memory, &side, &other);
+        unsigned long start = now();
+        {{ {body} }}
+        unsigned long end = now();
+        say(end - start); put('\\n');
+    }}
+    cli(); sleep_enable(); sleep_cpu();
+}}
+"""
+# Nanoseconds of each call, the least of some tries, in a controller's double precision.
+TIMES = """
+#include <stdio.h>
+#include <time.h>
+static double now(void) {{ struct timespec t; clock_gettime(CLOCK_MONOTONIC, &t);
+    return 1e9 * (double)t.tv_sec + (double)t.tv_nsec; }}
+int main(void)
+{{
+    static {name}_memory m;
+    {name}_begin(&m);
+    for (long k = 1; k <= {count}; k++) {{
+        double q[{n}], best[2] = {{ 1e30, 1e30 }};
+        {name}_point p;
+        {name}_side a = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, j = a, b = a;
+        {name}_sample(k, q);
+        if (!{name}_at(q, &p)) continue;
+        for (int i = 0; i < {n}; i++) {{
+            a.position[i] = p.position[0][i];
+            a.velocity[i] = a.effort[i] = 1;
+        }}
+        for (int tries = 0; tries < 5; tries++) {{
+            double t0 = now(); {name}_actuators_to_joints(&m, &a, &j);
+            double t1 = now(); {name}_joints_to_actuators(&m, &j, &b);
+            double t2 = now();
+            best[0] = t1 - t0 < best[0] ? t1 - t0 : best[0];
+            best[1] = t2 - t1 < best[1] ? t2 - t1 : best[1];
+        }}
+        printf("%.0f %.0f\\n", best[0], best[1]);
+    }}
+    return 0;
+}}
+"""
 
 
 def main():
-    """Compile and print."""
+    """Compile, run and print."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
-    parser.add_argument('--document', action='store_true', help='write the table to docs/')
+    parser.add_argument('--document', action='store_true', help='write the tables to docs/')
     rows = [[f'{name}, {use}', target, *measured(compiler, flags, name, output, use)]
             for target, (compiler, flags) in TARGETS.items() if shutil.which(f'{compiler}-gcc')
             for name, output in CASES.items() for use in USES]
-    text = table(['linkage', 'target', 'code [bytes]', 'of it the C library', 'stack [bytes]'],
-                 rows)
+    text = table(['linkage', 'target', 'code [bytes]', 'of it the C library', 'stack [bytes]',
+                  'cycles, median', 'at most'], rows)
+    text += '\n\n' + table(
+        ['linkage', 'actuators to joints [us], median', 'at most', 'joints to actuators [us], '
+         'median', 'at most'], [[name, *times] for name, times in timed()])
     print(text)
     if parser.parse_args().document:
         document.write('c-code.md', text)
 
 
 def measured(compiler, flags, name, output, use):
-    """Return code in bytes, that of the C library, and the stack of the linkage's own code."""
+    """Return code, that of the C library, the stack of the linkage's own code, and cycles."""
     machine = scene.read({'mechanisms': [name], f'{name}.type': name}).machines[name]
-    text = header.written(machine, (output,), single=True)
-    body = USES[use].format(name=name, field=f'angle_{output}')
+    given = np.linspace(*machine.first.reach[0], POSES + 2)[1:-1]
+    found = machine.linkage.joint_angles(given, [output])[output]
+    values = {'name': name, 'count': POSES, **{
+        key: ', '.join(f'{value:.7g}f' for value in each)
+        for key, each in (('given', given + 1e-7), ('found', found))}}
+    body = USES[use].format(name=name, output=output)
+    begin = f'{name}_begin(&memory);' if 'memory' in body else ''
+    text = header.written(machine, (output,), True, [f'{name}_{output}'])
     with tempfile.TemporaryDirectory() as folder:
-        linked, _ = built(Path(folder), compiler, flags, text + EMPTY.replace('out = in;', body))
-        empty, _ = built(Path(folder), compiler, flags, EMPTY)
-        own, stack = built(Path(folder), compiler, [*flags, '-c'],
-                           text + EMPTY.replace('out = in;', body))
-        idle, _ = built(Path(folder), compiler, [*flags, '-c'], EMPTY)
-    return linked - empty, linked - empty - (own - idle), stack
+        sizes = [built(Path(folder), compiler, [*flags, *extra], text + MAIN.format(
+            **values, begin=each and begin, body=each)) for extra in ((), ('-c',))
+            for each in ('', body)]
+        (idle, _), (linked, _), (empty, _), (own, stack) = sizes
+        return [linked - idle, linked - idle - (own - empty), stack,
+                *cycles(Path(folder), compiler, flags, text + CYCLES.format(**values, body=body))]
+
+
+def cycles(folder, compiler, flags, text):
+    """Return the median and the most cycles of a call, where there is a simulator."""
+    if compiler != 'avr' or not shutil.which('simavr'):
+        return ['not measured'] * 2
+    built(folder, compiler, flags, text)
+    printed = subprocess.run(['timeout', '60', 'simavr', '-m', 'atmega328p', '-f', '16000000',
+                              folder / 'main.o'], text=True, capture_output=True)
+    taken = [int(number) for number in re.findall(r'(\d{3,})\.', printed.stdout + printed.stderr)]
+    assert len(taken) == POSES, printed
+    return [int(np.median(taken)), max(taken)]
+
+
+def timed():
+    """Yield the time both ways of each mechanism: median and most [us]."""
+    root = Path(__file__).parents[1]
+    for path in SCENES:
+        for name, machine in scene.load(str(root / f'{path}.yaml')).machines.items():
+            with tempfile.TemporaryDirectory() as folder:
+                source, program = Path(folder) / 'main.c', Path(folder) / 'main'
+                source.write_text(header.written(machine) + TIMES.format(
+                    name=name, n=len(machine.inputs), count=CALLS))
+                subprocess.run(['cc', '-O2', source, '-o', program, '-lm'], check=True)
+                rows = np.array(subprocess.run([program], capture_output=True, text=True)
+                                .stdout.split(), float).reshape(-1, 2) / 1000.0
+            yield name, [f'{value:.2f}' for row in rows.T
+                         for value in (np.median(row), row.max())]
 
 
 def built(folder, compiler, flags, text):
     """Return the size of the code and the largest frame."""
     source, made = folder / 'main.c', folder / 'main.o'
     source.write_text(text)
-    subprocess.run([f'{compiler}-gcc', '-std=c99', '-Os', '-Wall', '-Wextra', '-Werror',
+    for usage in folder.glob('*.su'):
+        usage.unlink()
+    subprocess.run([f'{compiler}-gcc', '-std=gnu99', '-Os', '-Wall', '-Wextra', '-Wno-unused',
                     '-fstack-usage', *flags, str(source), '-o', str(made), '-lm'],
                    check=True, cwd=folder)
     size = subprocess.run([f'{compiler}-size', str(made)], check=True, text=True,

@@ -175,6 +175,33 @@ def test_the_inverse_finds_the_nearest_input(library, machines, name, output):
         assert invert(given, ctypes.byref(found)) == 0 and found.value == 7.0
 
 
+def test_several_inputs_are_found_for_as_many_outputs(machines, tmp_path):
+    machine, rng = machines['five_bar'], np.random.default_rng(5)
+    text = header.written(machine, ('P.x', 'P.y'))
+    (tmp_path / 'leg.c').write_text(text + """
+int found(const double *value, const double *near, double *inputs)
+{
+    return five_bar_inputs_for_P_x_P_y(value, near, inputs);
+}
+""")
+    subprocess.run([COMPILER, *STRICT, '-shared', '-fPIC', tmp_path / 'leg.c', '-o',
+                    tmp_path / 'leg.so', '-lm'], check=True)
+    library = ctypes.CDLL(str(tmp_path / 'leg.so'))
+    inverse = machine.linkage.inverse(['P.x', 'P.y'])
+    for _ in range(100):
+        near, place = rng.uniform(-2.0, 2.0, 2), rng.uniform(-0.1, 0.2, 2)
+        answers, made = inverse.all(place, near), (ctypes.c_double * 2)(7.0, 7.0)
+        ended = library.found((ctypes.c_double * 2)(*place), (ctypes.c_double * 2)(*near), made)
+        assert ended == bool(answers)
+        if not answers:
+            assert list(made) == [7.0, 7.0]
+            continue
+        away = [np.abs(np.array(answer.inputs) - near).sum() for answer in answers]
+        assert np.abs(np.array(made) - near).sum() == pytest.approx(min(away), abs=1e-8)
+        reached = machine.linkage.solve(list(made), ['P'])['P']
+        np.testing.assert_allclose(reached, place, atol=1e-14)
+
+
 def test_single_precision_is_as_good_as_it_says(machines, tmp_path):
     chosen = [machines[name] for name in ('jansen', 'slotted_lever', 'boom', 'bent')]
     library = compiled(tmp_path, chosen, single=True)
@@ -209,7 +236,8 @@ def test_a_scene_file_is_printed_as_c(capsys):
 @pytest.mark.parametrize('arguments, said', [
     (['all', '--mechanism', 'arm'], "there is no mechanism 'arm'; allowed: water_drop"),
     (['all', '--mechanism', 'jansen', '--output', 'arm'], 'jansen has no'),
-    (['excavator', '--output', 'C.x'], 'has several inputs'), (['nowhere'], 'No such file'),
+    (['excavator', '--output', 'C.x'], 'has 3 inputs: as many outputs are needed'),
+    (['nowhere'], 'No such file'),
     ([], 'the following arguments are required: SCENE')])
 def test_what_cannot_be_is_one_sentence(capsys, arguments, said):
     scenes = [str(ROOT / 'config' / f'{arguments[0]}.yaml')] if arguments else []

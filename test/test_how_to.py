@@ -22,6 +22,7 @@ yaml = pytest.importorskip('yaml')
 
 from linkage_ros import scene  # noqa: E402
 from linkage_ros.c_code.command import main as c_code  # noqa: E402
+from linkage_ros.c_code.transmission import main as transmission  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
@@ -40,7 +41,8 @@ FOLLOWED = ['first-ten-minutes', 'tutorial', 'commands', *(
 BLOCK = re.compile(r'(?:^`([\w.]+)`:\n\n)?^```(\w+)\n(.*?)^```', re.MULTILINE | re.DOTALL)
 NODES = {'kinematics': Kinematics, 'crank_driver': CrankDriver, 'servo_inverse': ServoInverse}
 COMMANDS = {'from_robot': from_robot, 'linkage_ros.robot_model': urdf,
-            'linkage_ros.c_code': c_code, 'linkage_ros.render': render}
+            'linkage_ros.c_code': c_code, 'linkage_ros.render': render,
+            'transmission': transmission}
 
 
 class Reader:
@@ -167,6 +169,29 @@ def test_an_encoder_behind_a_belt(graph, follow):
         assert 0.6 <= joints['press_crank'] <= 2.6
         if told := by_stamp('belt_encoder').get(stamp):
             assert joints['press_QB'] == pytest.approx(told.position[0] / 3.0 + 1.8, abs=1e-12)
+
+
+def test_a_knee_under_a_trajectory_controller(graph, follow):
+    states = graph.listen(JointState, 'joint_states', 100)
+    follow('how-to/transmission')
+    control = ElementTree.parse('control.urdf')
+    pasted = ElementTree.fromstring(
+        f'<all>{Path("leg_transmissions/urdf/transmissions.xml").read_text()}</all>')
+    assert [ElementTree.tostring(each).split() for each in control.iter('transmission')] == [
+        ElementTree.tostring(each).split() for each in pasted]
+    commanded = yaml.safe_load(Path('controllers.yaml').read_text())
+    joints = commanded['leg']['ros__parameters']['joints']
+    assert joints == [joint.get('name') for joint in control.getroot().findall('joint')]
+    # Of the knee that the controller says, the passive joints are those of the motor's scene.
+    knee = scene.load(str(ROOT / 'examples/leg.yaml')).machines['knee']
+    angles = knee.linkage.joint_angles(0.3)
+    publisher = graph.node.create_publisher(JointState, 'joint_states', 10)
+    position = [knee.joints['QB'].of(float(angles['QB']))]
+    graph.until(lambda: [state for state in states if 'knee_rod' in state.name] or
+                publisher.publish(JointState(name=['knee'], position=position)))
+    found = next(state for state in states if 'knee_rod' in state.name)
+    rod = dict(zip(found.name, found.position))['knee_rod']
+    assert rod == pytest.approx(knee.joints['AB'].of(float(angles['AB'])), abs=1e-12)
 
 
 def test_a_flap_is_put_where_a_planner_wants_it(reader, follow):

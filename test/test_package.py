@@ -149,7 +149,7 @@ print(node.__file__, node.ServoInverseType.__module__)' && echo $AMENT_PREFIX_PA
     executables = {file.name for prefix in prefixes.split(':')
                    for file in Path(prefix, 'lib', 'linkage_ros').glob('*')}
     assert executables == {'c_code', 'crank_driver', 'from_robot', 'kinematics', 'render', 'scene',
-                           'servo_inverse', 'urdf', 'viewer'}
+                           'servo_inverse', 'transmission', 'urdf', 'viewer'}
 
 
 @pytest.mark.skipif(not shutil.which('colcon'), reason='colcon is not installed')

@@ -2,12 +2,14 @@
  * lever: slotted_lever, written by linkage_ros.
  * Lengths [m]: a = 0.02, b = 0.045, e = 0.
  * Input: crank [rad]. Angles [rad] count counterclockwise.
- * C99 without heap; compile without -ffast-math, which drops the checks.
  * float: joints are off by up to 1e-07 of the longest bar at 2001 poses over the reach, without its outermost hundredth.
+ * C99 and C++17 without heap, lock or recursion; compile without -ffast-math, which drops the checks.
+ * A call of the transmission takes at most 8 poses.
  */
 #ifndef LEVER_LINKAGE_H
 #define LEVER_LINKAGE_H
 
+#include <float.h>
 #include <math.h>
 
 /* A limit that is missed by rounding counts as reached. */
@@ -120,68 +122,491 @@ static inline int lever_reaches(float crank)
     return isfinite(crank);
 }
 
-/* lever and its rate. */
-static inline void lever_angle_lever_of(float crank, float *value, float *rate)
+/* What a call returns: 0, or a sum of these. OUT_OF_REACH: the linkage cannot get there, or may
+   not. SINGULAR: it would take an infinite velocity or effort. NOT_KNOWN: a number is missing. */
+enum { LEVER_OK = 0, LEVER_OUT_OF_REACH = 1, LEVER_SINGULAR = 2, LEVER_NOT_KNOWN = 4 };
+enum { LEVER_ACTUATOR_LEVER_CRANK = 0 };
+enum { LEVER_JOINT_LEVER_LEVER = 0 };
+/* Actuators: lever_crank [rad]; joints: lever_lever [rad]. */
+typedef struct { float position[1], velocity[1], effort[1]; } lever_side;
+typedef lever_side lever_actuators;
+typedef lever_side lever_joints;
+
+/* A pose: positions of the actuators [0] and joints [1], their rates by each input, and what the
+   inputs give against the loads. */
+typedef struct { float position[2][1], rate[2][1][1], load[1]; } lever_point;
+
+/* What is remembered between calls: where the actuators were, where the joints were to be, and the
+   last valid values of both. lever_begin fills it. */
+typedef struct {
+    lever_point point[2];
+    float input[2][1];
+    int is_known[2], is_held[2];
+    lever_side held[2];
+} lever_memory;
+
+/* The scene's names. */
+static inline const char *lever_name(int side, int i)
+{
+    static const char *const name[2][1] = { { "lever_crank" }, { "lever_lever" } };
+    return name[side][i];
+}
+
+/* Place it at inputs, each in rad or in its size; 0 if it cannot be assembled. */
+static inline int lever_at(const float *q, lever_point *p)
+{
+    const float k2 = 0.02f;
+    const float k5 = 0.025f;
+    const float k16 = 0.000625f;
+    const float k19 = 0.0036f;
+    const float k31 = 0.0f;
+    const float k34 = 0.04f;
+    const float k54 = (-0.025f);
+    const float k55 = 0.09f;
+    const float k59 = 0.000625f;
+    const float x0 = q[0];
+    const float v21 = (0.5f * x0);
+    const float v22 = cosf(v21);
+    const float v23 = (v22 * v22);
+    const float v24 = (k19 * v23);
+    const float v25 = (k16 + v24);
+    const float v38 = (-((k34 * sinf(v21)) * v22));
+    const float v41 = (k5 + (k34 * v23));
+    const float v44 = sqrtf(((v38 * v38) + (v41 * v41)));
+    if (!isfinite(lever_gated(x0, v25, k31) + lever_gated(atan2f((-(v38 / v44)), (v41 / v44)), v25, k31)))
+        return 0;
+    p->position[0][0] = lever_gated(x0, v25, k31);
+    p->rate[0][0][0] = lever_gated(1.0f, fabsf(x0), 0.0f);
+    p->position[1][0] = lever_gated(atan2f((-(v38 / v44)), (v41 / v44)), v25, k31);
+    p->rate[1][0][0] = (((k2 * (k54 + (k55 * v23))) / (k59 + v24)) + 0.0f);
+    p->load[0] = 0.0f;
+    return 1;
+}
+
+/* Place it at inputs, each in rad or in its size; 0 if it cannot be assembled. */
+static inline int lever_at_angle_lever(const float *q, lever_point *p)
 {
     const float k1 = 0.02f;
     const float k2 = 0.04f;
     const float k13 = 0.025f;
-    const float k24 = (-0.025f);
-    const float k25 = 0.09f;
-    const float k29 = 0.000625f;
-    const float k32 = 0.0036f;
-    const float x0 = crank;
+    const float k36 = 0.000625f;
+    const float k39 = 0.0036f;
+    const float k47 = 0.0f;
+    const float k49 = (-0.025f);
+    const float k50 = 0.09f;
+    const float k54 = 0.000625f;
+    const float x0 = q[0];
     const float v5 = (0.5f * x0);
     const float v8 = cosf(v5);
     const float v10 = (-((k2 * sinf(v5)) * v8));
     const float v14 = (v8 * v8);
     const float v16 = (k13 + (k2 * v14));
     const float v19 = sqrtf(((v10 * v10) + (v16 * v16)));
-    *value = atan2f((-(v10 / v19)), (v16 / v19));
-    *rate = (((k1 * (k24 + (k25 * v14))) / (k29 + (k32 * v14))) + 0.0f);
+    const float v40 = (k39 * v14);
+    if (!isfinite(lever_gated(atan2f((-(v10 / v19)), (v16 / v19)), (k36 + v40), k47)))
+        return 0;
+    p->position[0][0] = lever_gated(atan2f((-(v10 / v19)), (v16 / v19)), (k36 + v40), k47);
+    p->rate[0][0][0] = (((k1 * (k49 + (k50 * v14))) / (k54 + v40)) + 0.0f);
+    p->position[1][0] = lever_gated(atan2f((-(v10 / v19)), (v16 / v19)), (k36 + v40), k47);
+    p->rate[1][0][0] = (((k1 * (k49 + (k50 * v14))) / (k54 + v40)) + 0.0f);
+    p->load[0] = 0.0f;
+    return 1;
 }
 
-/* The crank for lever = value [rad], the one nearest to `near`, whole turns included.
-   Returns 0, and leaves *crank alone, where there is none. */
-static inline int lever_crank_for_angle_lever(float value, float near, float *crank)
+/* How large a position is, and after how much it is the same again, or 0. */
+static inline float lever_scale(int side, int i, int is_turn)
 {
-    /* Where lever rises or falls all along: crank and lever at both ends of each piece. */
-    static const float piece[3][4] = {
-        {(-3.1415927f), (-2.0313504f), 2.5729962e-16f, (-0.460554f)},
-        {(-2.0313504f), 2.0313504f, (-0.460554f), 0.460554f},
-        {2.0313504f, 3.1415927f, 0.460554f, (-2.5729962e-16f)}
-    };
-    float best = (float)INFINITY;
-    int i, step;
-    for (i = 0; i < 3; i++) {
-        const float *p = piece[i];
-        float least = p[2] < p[3] ? p[2] : p[3], most = p[2] < p[3] ? p[3] : p[2];
-        float low = p[0], high = p[1], x = 0.5f * (low + high), target = value;
-        target += 6.2831855f * ceilf((least - 1.1984225e-05f - target) / 6.2831855f);
-        if (!(target >= least - 1.1984225e-05f && target <= most + 1.1984225e-05f))
-            continue;
-        for (step = 0; step < 60; step++) {
-            float now, rate, next, gap;
-            lever_angle_lever_of(x, &now, &rate);
-            gap = now - target - 6.2831855f * floorf((now - target) / 6.2831855f + 0.5f);
-            if ((gap < 0.0f) == (p[2] < p[3]))
-                low = x;
-            else
-                high = x;
-            next = x - gap / rate;
-            if (!(next > low && next < high))
-                next = 0.5f * (low + high);
-            if (next == x)
-                break;
-            x = next;
+    static const float scale[3][1][2] = { { { 1.0f, 0.0f } }, { { 1.0f, 6.2831855f } }, { { 1.0f, 6.2831855f } } };
+    return scale[side][i][is_turn];
+}
+
+/* From a pose to positions, the shorter way; returns the largest, in sizes. */
+static inline float lever_gap(const float to[1], const lever_point *p, int side, float gap[1])
+{
+    float most = 0.0f;
+    int i;
+    for (i = 0; i < 1; i++) {
+        const float turn = lever_scale(side, i, 1);
+        gap[i] = to[i] - p->position[side > 0][i];
+        gap[i] -= turn > 0.0f ? turn * floorf(gap[i] / turn + 0.5f) : 0.0f;
+        most = fmaxf(most, fabsf(gap[i]) / lever_scale(side, i, 0));
+    }
+    return most;
+}
+
+/* Solve rate x = b, or transposed; returns the determinant's sign, 0 where that is singular. */
+static inline int lever_solved(const lever_point *p, int side, int transposed, float least,
+    const float b[1], float x[1])
+{
+    float a[1][1 + 1], most = 1.0f, t;
+    int i, j, k, best, sign = 1;
+    for (i = 0; i < 1; i++) {
+        for (j = 0; j < 1; j++) {
+            a[i][j] = transposed ? p->rate[side > 0][j][i] / lever_scale(side, j, 0)
+                : p->rate[side > 0][i][j] / lever_scale(side, i, 0);
+            if (!isfinite(a[i][j]))
+                return 0;
+            most = fmaxf(most, fabsf(a[i][j]));
         }
-        x += 6.2831855f * floorf((near - x) / 6.2831855f + 0.5f);
-        if (fabsf(x - near) < best) {
-            best = fabsf(x - near);
-            *crank = x;
+        a[i][1] = transposed ? b[i] : b[i] / lever_scale(side, i, 0);
+    }
+    for (k = 0; k < 1; k++) {
+        for (best = k, i = k + 1; i < 1; i++)
+            best = fabsf(a[i][k]) > fabsf(a[best][k]) ? i : best;
+        if (!(fabsf(a[best][k]) > least * most))
+            return 0;
+        for (j = k; j <= 1; j++) {
+            t = a[k][j];
+            a[k][j] = a[best][j];
+            a[best][j] = t;
+        }
+        sign = (best == k) == (a[k][k] > 0.0f) ? sign : -sign;
+        for (i = k + 1; i < 1; i++)
+            for (t = a[i][k] / a[k][k], j = k; j <= 1; j++)
+                a[i][j] -= t * a[k][j];
+    }
+    for (i = 1 - 1; i >= 0; i--) {
+        for (x[i] = a[i][1], j = i + 1; j < 1; j++)
+            x[i] -= a[i][j] * x[j];
+        x[i] /= a[i][i];
+    }
+    for (i = 0; i < 1; i++) {
+        x[i] /= transposed ? lever_scale(side, i, 0) : 1.0f;
+        if (!isfinite(x[i]))
+            return 0;
+    }
+    return sign;
+}
+
+/* Newton steps from inputs q to positions; each comes nearer, and stays on
+   its side of singular poses. Returns 0, with q anywhere, where they do not get there. */
+static inline int lever_reached(int side, int (*at)(const float *, lever_point *),
+    int steps, const float position[1], float q[1], lever_point *p)
+{
+    lever_point next;
+    float gap[1], x[1] = { 0.0f }, y[1] = { 0.0f }, to[1], share = 1.0f, longest, left, now;
+    float steepest = 1.0f;
+    int i, j, sign, other = 0;
+    if (!at(q, p))
+        return 0;
+    left = lever_gap(position, p, side, gap);
+    sign = lever_solved(p, side, 0, 1e-05f, gap, x);
+    while (--steps > 0 && sign && left > 2e-06f && share > 0.00024414062f) {
+        for (longest = 1.0f, i = 0; i < 1; i++)
+            longest = fmaxf(longest, fabsf(x[i]) / 0.5f);
+        for (i = 0; i < 1; i++)
+            to[i] = q[i] + share / longest * x[i];
+        now = at(to, &next) ? lever_gap(position, &next, side, gap) : left;
+        if (now < left)
+            other = lever_solved(&next, side, 0, 1e-05f, gap, y);
+        if (now < left && (other == sign || now <= 4e-06f)) {
+            *p = next;
+            left = now;
+            sign = other;
+            share = 1.0f;
+            for (i = 0; i < 1; i++) {
+                q[i] = to[i];
+                x[i] = y[i];
+            }
+        } else
+            share = left <= 4e-06f ? 0.0f : 0.5f * share;
+    }
+    for (i = 0; i < 1; i++)
+        for (j = 0; j < 1; j++)
+            steepest = fmaxf(steepest, fabsf(p->rate[side > 0][i][j]) / lever_scale(side, i, 0));
+    return left <= 4e-06f * steepest;
+}
+
+/* Whether inputs are within the sweeps that are set. */
+static inline int lever_inside(const float q[1])
+{
+    static const float end[1][2] = {  { (-INFINITY), (INFINITY) }  };
+    int i;
+    for (i = 0; i < 1; i++)
+        if (!(q[i] >= end[i][0] - 1e-05f && q[i] <= end[i][1] + 1e-05f))
+            return 0;
+    return 1;
+}
+
+/* From positions to the inputs nearest to q. By its gear, 4 poses at most. */
+static inline int lever_from_actuators(const float position[1], float q[1], lever_point *p)
+{
+    float start[1][1], away[1], far, best = (INFINITY), near[1];
+    lever_point found;
+    int i, k, tried, next;
+    for (i = 0; i < 1; i++)
+        near[i] = q[i];
+    start[0][0] = near[0];
+    for (k = 0; k < 1; k++)
+        start[k][0] = position[0];
+    for (k = 0; k < 1; k++)
+        for (away[k] = 0.0f, i = 0; i < 1; i++)
+            away[k] += fabsf(start[k][i] - near[i]);
+    for (tried = 0; tried < 1; tried++) {
+        for (next = 0, k = 1; k < 1; k++)
+            next = away[k] < away[next] || !isfinite(away[next]) ? k : next;
+        if (!isfinite(away[next]))
+            break;
+        away[next] = (INFINITY);
+        if (lever_reached(0, lever_at, 4, position, start[next], &found)) {
+            for (far = 0.0f, i = 0; i < 1; i++)
+                far += fabsf(start[next][i] - near[i]);
+            if (far < best) {
+                *p = found;
+                for (best = far, i = 0; i < 1; i++)
+                    q[i] = start[next][i];
+            }
+            break;
         }
     }
-    return best < (float)INFINITY;
+    return best < (INFINITY);
+}
+
+/* The inputs in each assembly mode, next to others; NAN where there is none. */
+static inline void lever_modes_joints(const float position[1],
+    const float near[1], float start[2][1])
+{
+    const float k30 = 0.0f;
+    const float k36 = 1.0f;
+    const float x0 = position[0];
+    const float v6 = (0.5f * (x0 + 1.5707964f));
+    const float v7 = sinf(v6);
+    const float v12 = ((1.0f - (2.0f * (v7 * v7))) * 0.081f);
+    const float v17 = (((2.0f * v7) * cosf(v6)) * 0.081f);
+    const float v20 = sqrtf(((v12 * v12) + (v17 * v17)));
+    const float v21 = (v12 / v20);
+    const float v24 = (-v6);
+    const float v25 = sinf(v24);
+    const float v32 = cosf(v24);
+    const float v38 = ((v25 * k30) + (v32 * k36));
+    const float v46 = ((v32 * k30) - (v25 * k36));
+    const float v51 = (lever_root(((-0.025f) + (0.09f * (v38 * v38))), 5.7731595e-17f) * lever_root(((-0.025f) + (0.09f * (v46 * v46))), 5.7731595e-17f));
+    const float v52 = (v21 * v51);
+    const float v54 = (v21 * 0.045f);
+    const float v55 = (v17 / v20);
+    const float v56 = (v54 * v55);
+    const float v60 = (-(v54 * v21));
+    const float v61 = (v55 * v51);
+    (void)near;
+    start[0][0] = atan2f((-(v52 + v56)), (v60 + v61));
+    start[0][0] = start[0][0] + 6.2831855f * floorf((near[0] - start[0][0]) / 6.2831855f + 0.5f);
+    start[1][0] = atan2f((-((-v52) + v56)), (v60 - v61));
+    start[1][0] = start[1][0] + 6.2831855f * floorf((near[0] - start[1][0]) / 6.2831855f + 0.5f);
+}
+/* From positions to the inputs nearest to q. In closed form, 8 poses at most. */
+static inline int lever_from_joints(const float position[1], float q[1], lever_point *p)
+{
+    float start[2][1], away[2], far, best = (INFINITY), near[1];
+    lever_point found;
+    int i, k, tried, next;
+    for (i = 0; i < 1; i++)
+        near[i] = q[i];
+    lever_modes_joints(position, near, start);
+    for (k = 0; k < 2; k++)
+        for (away[k] = 0.0f, i = 0; i < 1; i++)
+            away[k] += fabsf(start[k][i] - near[i]);
+    for (tried = 0; tried < 2; tried++) {
+        for (next = 0, k = 1; k < 2; k++)
+            next = away[k] < away[next] || !isfinite(away[next]) ? k : next;
+        if (!isfinite(away[next]))
+            break;
+        away[next] = (INFINITY);
+        if (lever_reached(1, lever_at, 4, position, start[next], &found)) {
+            for (far = 0.0f, i = 0; i < 1; i++)
+                far += fabsf(start[next][i] - near[i]);
+            if (far < best) {
+                *p = found;
+                for (best = far, i = 0; i < 1; i++)
+                    q[i] = start[next][i];
+            }
+            break;
+        }
+    }
+    return best < (INFINITY);
+}
+
+/* The inputs in each assembly mode, next to others; NAN where there is none. */
+static inline void lever_modes_angle_lever(const float position[1],
+    const float near[1], float start[2][1])
+{
+    const float k30 = 0.0f;
+    const float k36 = 1.0f;
+    const float x0 = position[0];
+    const float v6 = (0.5f * (x0 + 1.5707964f));
+    const float v7 = sinf(v6);
+    const float v12 = ((1.0f - (2.0f * (v7 * v7))) * 0.081f);
+    const float v17 = (((2.0f * v7) * cosf(v6)) * 0.081f);
+    const float v20 = sqrtf(((v12 * v12) + (v17 * v17)));
+    const float v21 = (v12 / v20);
+    const float v24 = (-v6);
+    const float v25 = sinf(v24);
+    const float v32 = cosf(v24);
+    const float v38 = ((v25 * k30) + (v32 * k36));
+    const float v46 = ((v32 * k30) - (v25 * k36));
+    const float v51 = (lever_root(((-0.025f) + (0.09f * (v38 * v38))), 5.7731595e-17f) * lever_root(((-0.025f) + (0.09f * (v46 * v46))), 5.7731595e-17f));
+    const float v52 = (v21 * v51);
+    const float v54 = (v21 * 0.045f);
+    const float v55 = (v17 / v20);
+    const float v56 = (v54 * v55);
+    const float v60 = (-(v54 * v21));
+    const float v61 = (v55 * v51);
+    (void)near;
+    start[0][0] = atan2f((-(v52 + v56)), (v60 + v61));
+    start[0][0] = start[0][0] + 6.2831855f * floorf((near[0] - start[0][0]) / 6.2831855f + 0.5f);
+    start[1][0] = atan2f((-((-v52) + v56)), (v60 - v61));
+    start[1][0] = start[1][0] + 6.2831855f * floorf((near[0] - start[1][0]) / 6.2831855f + 0.5f);
+}
+/* From positions to the inputs nearest to q. In closed form, 8 poses at most. */
+static inline int lever_from_angle_lever(const float position[1], float q[1], lever_point *p)
+{
+    float start[2][1], away[2], far, best = (INFINITY), near[1];
+    lever_point found;
+    int i, k, tried, next;
+    for (i = 0; i < 1; i++)
+        near[i] = q[i];
+    lever_modes_angle_lever(position, near, start);
+    for (k = 0; k < 2; k++)
+        for (away[k] = 0.0f, i = 0; i < 1; i++)
+            away[k] += fabsf(start[k][i] - near[i]);
+    for (tried = 0; tried < 2; tried++) {
+        for (next = 0, k = 1; k < 2; k++)
+            next = away[k] < away[next] || !isfinite(away[next]) ? k : next;
+        if (!isfinite(away[next]))
+            break;
+        away[next] = (INFINITY);
+        if (lever_reached(2, lever_at_angle_lever, 4, position, start[next], &found)) {
+            for (far = 0.0f, i = 0; i < 1; i++)
+                far += fabsf(start[next][i] - near[i]);
+            if (far < best) {
+                *p = found;
+                for (best = far, i = 0; i < 1; i++)
+                    q[i] = start[next][i];
+            }
+            break;
+        }
+    }
+    return best < (INFINITY);
+}
+
+/* Inputs all over their ways for i = 1, 2, ...; for 0 where they start. */
+static inline void lever_sample(long i, float q[1])
+{
+    static const float way[1][4] = {  { 0.0f, (-3.1415927f), 6.2831855f, 0.41421357f }  };
+    int k;
+    for (k = 0; k < 1; k++) {
+        const float x = way[k][3] * (float)i;
+        q[k] = i ? way[k][1] + way[k][2] * (x - floorf(x)) : way[k][0];
+    }
+}
+
+/* Forget all that was, and find a pose to start from; returns 0 if there is none. */
+static inline int lever_begin(lever_memory *m)
+{
+    static const lever_side none = { { 0.0f }, { 0.0f }, { 0.0f } };
+    int i;
+    m->is_known[0] = m->is_known[1] = m->is_held[0] = m->is_held[1] = 0;
+    m->held[0] = m->held[1] = none;
+    for (i = 0; i < 4096; i++) {
+        lever_sample(i, m->input[1]);
+        if (lever_at(m->input[1], &m->point[1]))
+            return 1;
+    }
+    return 0;
+}
+
+static inline int lever_transmit(lever_memory *m, int side, const lever_side *from, lever_side *to)
+{
+    const int other = 1 - side;
+    lever_side *held = &m->held[other];
+    lever_point found;
+    const lever_point *at;
+    float q[1], x[1], y[1] = { 0.0f };
+    int i, j, status = LEVER_OK, all;
+    for (i = 0; i < 1; i++) {
+        q[i] = m->input[!m->is_known[0]][i];
+        status = isfinite(from->position[i]) ? status : LEVER_NOT_KNOWN;
+    }
+    if (status == LEVER_OK && !(side ? lever_from_joints(from->position, q, &found)
+            : lever_from_actuators(from->position, q, &found)))
+        status = LEVER_OUT_OF_REACH;
+    /* A command stays within the sweep that is set; a measurement is what it is. */
+    if (status == LEVER_OK && side && !lever_inside(q))
+        status = LEVER_OUT_OF_REACH;
+    for (i = 0; status == LEVER_OK && i < 1; i++)
+        status = isfinite(found.position[other][i]) ? LEVER_OK : LEVER_OUT_OF_REACH;
+    if (status == LEVER_OK) {
+        m->point[side] = found;
+        for (i = 0; i < 1; i++) {
+            m->input[side][i] = q[i];
+            held->position[i] = found.position[other][i];
+            m->held[side].position[i] = m->is_held[side] ? m->held[side].position[i] : from->position[i];
+        }
+        m->is_known[side] = m->is_held[0] = m->is_held[1] = 1;
+    } else if (side && status == LEVER_NOT_KNOWN)
+        m->is_known[1] = 0;
+    all = status;
+
+    /* Velocities at the pose that is asked for, or else where it is; what is held stands still. */
+    at = &m->point[m->is_known[side] ? side : other];
+    if (status == LEVER_NOT_KNOWN && (m->is_known[0] || m->is_known[1]))
+        status = LEVER_OK;
+    for (i = 0; i < 1; i++)
+        status |= isfinite(from->velocity[i]) ? LEVER_OK : LEVER_NOT_KNOWN;
+    if (status == LEVER_OK && !lever_solved(at, side, 0, 0.001f, from->velocity, x))
+        status = LEVER_SINGULAR;
+    for (i = 0; status == LEVER_OK && i < 1; i++)
+        for (j = 0; j < 1; j++)
+            y[i] += at->rate[other][i][j] * x[j];
+    for (i = 0; i < 1; i++)
+        status |= isfinite(y[i]) ? LEVER_OK : LEVER_SINGULAR;
+    for (i = 0; i < 1; i++)
+        held->velocity[i] = status == LEVER_OK ? y[i] : 0.0f;
+    all |= status;
+
+    /* Efforts where the actuators are: power in is power out, but for what the loads take. */
+    at = &m->point[m->is_known[0] ? 0 : 1];
+    status = m->is_known[0] || m->is_known[1] ? LEVER_OK : LEVER_NOT_KNOWN;
+    for (i = 0; status == LEVER_OK && i < 1; i++) {
+        status = isfinite(from->effort[i]) ? LEVER_OK : LEVER_NOT_KNOWN;
+        x[i] = side ? at->load[i] : -at->load[i];
+        for (j = 0; j < 1; j++)
+            x[i] += at->rate[side][j][i] * from->effort[j];
+    }
+    if (status == LEVER_OK && !lever_solved(at, other, 1, 0.001f, x, y))
+        status = LEVER_SINGULAR;
+    for (i = 0; i < 1; i++) {
+        held->effort[i] = status == LEVER_OK ? y[i] : held->effort[i];
+        to->position[i] = m->is_held[other] ? held->position[i] : to->position[i];
+        to->velocity[i] = held->velocity[i];
+        to->effort[i] = held->effort[i];
+    }
+    return all | status;
+}
+
+/* From the actuators' positions, velocities and efforts to the joints'. Returns a status; what it
+   is not OK about is held: positions and efforts as they were last, velocities at zero. */
+static inline int lever_actuators_to_joints(lever_memory *m, const lever_actuators *from, lever_joints *to)
+{
+    return lever_transmit(m, 0, from, to);
+}
+
+/* The same from the joints to the actuators, which go to the answer nearest to where they are. */
+static inline int lever_joints_to_actuators(lever_memory *m, const lever_joints *from, lever_actuators *to)
+{
+    return lever_transmit(m, 1, from, to);
+}
+
+/* The crank for lever [rad], nearest to `near`, whole turns included. Returns 0, and
+   leaves crank alone, where there is none. */
+static inline int lever_crank_for_angle_lever(float value, float near, float *crank)
+{
+    float q[1];
+    lever_point p;
+    q[0] = near;
+    if (!(isfinite(value) && isfinite(near)) || !lever_from_angle_lever(&value, q, &p))
+        return 0;
+    *crank = q[0];
+    return 1;
 }
 
 #endif /* LEVER_LINKAGE_H */

@@ -4,10 +4,13 @@
 """Command that prints the mechanisms of a scene as C; it needs no ROS."""
 
 import sys
-from typing import List, Optional
+from typing import List, Optional, Sequence, Tuple
 
 from . import header
+from .axes import output_of
 from .. import command, scene
+from ..scene import Machine
+from ..words import listed
 
 NAME = 'c_code'
 NEEDS = 'pip install pyyaml, or apt install python3-yaml'
@@ -20,23 +23,42 @@ def main(args: Optional[List[str]] = None) -> int:
 
 def show(args: Optional[List[str]]) -> None:
     """Print what a command line asks for."""
-    asked = parser().parse_args(args)
+    asked = arguments().parse_args(args)
     machines = command.chosen(scene.load(asked.scene).machines, asked.mechanism)
     try:
-        print('\n'.join(header.written(machine, asked.output, asked.float)
-                        for machine in machines))
+        print('\n'.join(header.written(machine, asked.output, asked.float, own)
+                        for machine, own in with_joints(machines, asked.joints)))
     except ValueError as error:
         raise command.RequestError(str(error)) from None
 
 
-def parser() -> command.Parser:
-    """Return the parser of the command line."""
-    made = command.Parser(
-        NAME, description='Print the mechanisms of a scene as C99: a header each, one after the '
-                          'other, without heap and with no dependency but math.h.')
+def with_joints(machines: Sequence[Machine], names: Sequence[str]
+                ) -> List[Tuple[Machine, List[str]]]:
+    """Return each machine with those of some joints that are its own."""
+    own = [(machine, [name for name in names if output_of(machine, name)])
+           for machine in machines]
+    for name in names:
+        if not any(name in chosen for _, chosen in own):
+            raise command.RequestError(f'no mechanism has a joint {name!r}; allowed: ' + listed(
+                (joint.name for machine in machines for joint in machine.joints.values()), 200))
+    return own
+
+
+def parser(name: str, description: str) -> command.Parser:
+    """Return the parser of a command on the mechanisms of a scene."""
+    made = command.Parser(name, description=description)
     made.add_argument('scene', metavar='SCENE', help="the scene's parameter file")
     made.add_argument('--mechanism', nargs='+', default=[], metavar='NAME',
                       help='only these mechanisms of the scene')
+    made.add_argument('--joints', nargs='+', default=[], metavar='JOINT',
+                      help='what a controller commands, by its name in the scene')
+    return made
+
+
+def arguments() -> command.Parser:
+    """Return the parser of the command line."""
+    made = parser(NAME, 'Print the mechanisms of a scene as C99: a header each, one after the '
+                        'other, without heap and with no dependency but math.h.')
     made.add_argument('--output', nargs='+', default=[], metavar='OUTPUT',
                       help='an inverse for each of these: a link, A.x, distance(A,B), angle(A,B)')
     made.add_argument('--float', action='store_true', help='float instead of double')

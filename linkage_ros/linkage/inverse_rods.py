@@ -11,13 +11,12 @@ assembly mode for each choice of sides, the first as drawn.
 from __future__ import annotations
 
 from itertools import product
-from typing import Any, Dict, List, Optional, TYPE_CHECKING
+from typing import Dict, List, Optional, TYPE_CHECKING
 
 from .inverse_linkage import Mode, MOST_SIDES
 from .quantities import Names, Structure
 from .rod_lines import turning_rods
 from ..formula.expression import derivative, Real
-from ..formula.program import Program
 
 if TYPE_CHECKING:
     from .mechanism import Mechanism
@@ -32,7 +31,7 @@ class InverseRods:
 
     def __init__(self, linkage: Mechanism, outputs: Names):
         driven = linkage.driven_by(*outputs)
-        self.outputs, self.design, self._lengths = outputs, driven.design, linkage.lengths
+        self.outputs, self.design = outputs, driven.design
         self.lines = self.design.joints
         rods = turning_rods(self.design.lines, outputs)
         if len(rods) > MOST_SIDES:
@@ -42,8 +41,6 @@ class InverseRods:
         names = [input_.name for input_ in linkage.inputs]
         self.modes = tuple(self._mode({**linkage.branches, **dict(zip(rods, sides))}, names)
                            for sides in product((1, -1), repeat=len(rods)))
-        self.program = Program([value for mode in self.modes for value in mode.inputs],
-                               len(outputs))
 
     def _mode(self, sides: Dict[str, int], names: List[str]) -> Mode:
         structure = Structure(self.design, sides)
@@ -52,15 +49,6 @@ class InverseRods:
         return Mode(structure, tuple(rows), tuple(
             tuple(derivative(value, {by: 1.0}, each) for by, each in enumerate(known))
             for value in rows))
-
-    @property
-    def count(self) -> int:
-        """How many assembly modes it has."""
-        return len(self.modes)
-
-    def bind(self, accelerate: bool = False) -> Any:
-        """Return its program as a function of the outputs."""
-        return self.program.bind(self._lengths, {}, accelerate)
 
     def __str__(self) -> str:
         return '\n'.join(f'{line}    # at {name}' if name in self.outputs else line

@@ -1,0 +1,140 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The actuators and the joints of a mechanism, as many of each as it has inputs."""
+
+import math
+from typing import List, NamedTuple, Optional, Sequence
+
+import numpy as np
+
+from ..linkage.builder import GROUND, Link
+from ..scene import Machine
+from ..scene.joint_names import JointName
+from ..scene.motion import Motion
+from ..words import listed
+
+# Outputs whose Jacobian has a smaller part of its size left do not tell the inputs.
+DEPENDENT = 1e-9
+
+
+class Axis(NamedTuple):
+    """
+    An actuator or a joint, whose position [rad or m] is factor * output + offset.
+
+    `output` is one of the linkage, in its own units. A change of the position by `size` is large,
+    one by `turn` is none, if that is not 0. `wraps` if it is published within half a turn of zero.
+    """
+
+    name: str
+    output: str
+    factor: float
+    offset: float
+    size: float
+    turn: float
+    wraps: bool
+
+
+def axis(machine: Machine, output: str, name: str = '', factor: float = 1.0, offset: float = 0.0,
+         wraps: bool = False) -> Axis:
+    """Return the axis of an output, from its value in the scene by a factor and an offset."""
+    linkage = machine.linkage
+    factor *= machine.scale_of(output)
+    counts_turns = output in (*machine.inputs, *linkage.geared)
+    angular = linkage.is_angle(output)
+    return Axis(name, output, factor, offset, abs(factor) * (1.0 if angular else linkage.longest),
+                math.tau * abs(factor) if angular and not counts_turns else 0.0, wraps)
+
+
+def actuators(machine: Machine) -> List[Axis]:
+    """Return what the sources of a mechanism's inputs tell."""
+    return [axis(machine, drive.measures or name, drive.source, 1.0 / drive.ratio,
+                 -drive.offset / drive.ratio) for name, drive in machine.inputs.items()]
+
+
+def joints(machine: Machine, names: Sequence[str] = ()) -> List[Axis]:
+    """
+    Return the joints that a controller commands, as many as there are inputs.
+
+    Parameters
+    ----------
+    machine : Machine
+        Of several legs it is the first.
+    names : sequence of str
+        Joints by their names in the scene, or outputs after the mechanism's name: 'leg_P.x'.
+        Default: a chain of links from the ground, those that `joint_names` names first.
+
+    Raises
+    ------
+    ValueError
+        If one does not exist, or they do not tell all inputs.
+
+    """
+    for name in names:
+        if output_of(machine, name) is None:
+            raise ValueError(f'{machine.name} has no joint {name!r}; allowed: ' + listed(
+                (called.name for called in machine.joints.values()), 200))
+    outputs = [output_of(machine, name) or '' for name in names] or _chain(machine)
+    if len({*outputs}) != len(machine.inputs):
+        raise ValueError(f'{machine.name} has {len(machine.inputs)} inputs: as many joints are '
+                         f'needed, not {listed(names)}')
+    machine.linkage.inverse(tuple(outputs))
+    named = [machine.joints.get(_key(machine, output)) or JointName(f'{machine.name}_{output}')
+             for output in outputs]
+    return [axis(machine, output, called.name, called.sign, called.offset, called.taken)
+            for output, called in zip(outputs, named)]
+
+
+def output_of(machine: Machine, name: str) -> Optional[str]:
+    """Return the output that a name in the scene stands for, None if it is none."""
+    for link in machine.linkage.joints:
+        called = machine.joints.get(_key(machine, link))
+        if called and called.name == name:
+            return link
+    output = name.removeprefix(f'{machine.name}_')
+    return output if output != name and machine.linkage.has_output(output) else None
+
+
+def start(machine: Machine) -> List[float]:
+    """Return where the inputs start, in the linkage's own units."""
+    return [Motion.of(drive).at(0)[0] / machine.scale_of(name)
+            for name, drive in machine.inputs.items()]
+
+
+def _key(machine: Machine, link: str) -> str:
+    """Return by what a link of the first leg is found among the joints' names."""
+    return link if link in machine.inputs else next(iter(machine.assembly().legs)) + link
+
+
+def _chain(machine: Machine) -> List[str]:
+    """Return links, each on the one before it, that tell the inputs."""
+    links = machine.linkage.links
+    barrels = {link.parent for link in links if link.name in machine.inputs}
+    chosen: List[str] = []
+
+    def rank(link: Link) -> tuple:
+        key = _key(machine, link.name)
+        called = machine.joints.get(key, JointName(link.name))
+        return (not called.published, link.parent != (chosen[-1] if chosen else GROUND),
+                link.name in barrels, link.name in machine.inputs,
+                called.name == f'{machine.name}_{key}')
+
+    while len(chosen) < len(machine.inputs) and (telling := [
+            link for link in links if link.name not in chosen
+            and _tell(machine, [*chosen, link.name])]):
+        chosen.append(min(telling, key=rank).name)
+    try:
+        machine.linkage.inverse(tuple(chosen))
+        return chosen
+    except ValueError:
+        return list(machine.inputs)
+
+
+def _tell(machine: Machine, outputs: Sequence[str]) -> bool:
+    """Return whether outputs change independently of each other at the start."""
+    pose = machine.linkage.posed((), (), tuple(outputs))
+    rates = np.reshape(pose.over(*start(machine)), (-1, len(outputs)))
+    if not np.isfinite(rates).all():
+        return True
+    values = np.linalg.svd(rates, compute_uv=False)
+    return len(values) == len(outputs) and bool(values[-1] > DEPENDENT * values[0])

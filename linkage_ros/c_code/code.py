@@ -1,0 +1,177 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Poses of a linkage as C functions, for dimensions that are set or that may be changed."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Callable, Dict, Iterable, List, Sequence
+
+import numpy as np
+
+from .names import literal as texts
+from ..formula.expression import Real, unknown
+from ..formula.operations import OPERATIONS
+from ..formula.program import Dialect, Pose
+from ..linkage.mechanism import Mechanism
+
+# Expressions that are true or false.
+_CONDITIONS = ('less', 'less_equal')
+
+
+class Code:
+    """
+    Writes C for one linkage.
+
+    Parameters
+    ----------
+    name : str
+        What its functions' names begin with.
+    linkage : Mechanism
+        What is written; of an open one every dimension is an array of one, see `open_linkage`.
+    single : bool
+        Whether it computes with float instead of double.
+    is_open : bool
+        Whether the constants stand in a struct, to be set for other dimensions.
+
+    """
+
+    def __init__(self, name: str, linkage: Mechanism, single: bool = False,
+                 is_open: bool = False):
+        self.name, self.linkage, self.is_open = name, linkage, is_open
+        self.number, self.suffix = ('float', 'f') if single else ('double', '')
+        self.dialect = _dialect(single, name)
+        self.literal = self.dialect.number
+        self._constants: Dict[Real, int] = {}
+
+    def row(self, values: Iterable[float]) -> str:
+        """Return numbers as an initializer."""
+        return ', '.join(map(self.literal, values))
+
+    def times(self, code: str, factor: float) -> str:
+        """Return code times a number."""
+        return code if factor == 1.0 else f'{self.literal(factor)} * ({code})'
+
+    def function(self, head: str, pose: Pose, arguments: Sequence[str],
+                 ending: Callable[[List[str]], List[str]]) -> str:
+        """Return a C function that does what some Python code does, from codes of its inputs."""
+        constants, lines, outputs = pose.statements(self.dialect)
+        ends = ending(outputs)
+        text = '\n'.join([code for _, code in lines] + ends)
+        used = set(re.findall(r'\b[kx]\d+\b', text))
+        nodes = dict(zip(constants, pose.variant.constants))
+        body = [f'    const {_kind(nodes[name], self.number)} {name} = '
+                f'{self.constant(nodes[name], value)};'
+                for name, value in constants.items() if name in used]
+        body += [f'    const {self.number} x{i} = {code};' for i, code in enumerate(arguments)
+                 if f'x{i}' in used]
+        body += [f'    const {self.number} {name} = {code};' for name, code in lines]
+        body += [f'    (void){code};' for i, code in enumerate(arguments)
+                 if f'x{i}' not in used and code.isidentifier()]
+        if self.is_open and not any('c->' in line for line in (*body, *ends)):
+            body.append('    (void)c;')
+        return '\n'.join([head, '{', *body, *ends, '}', ''])
+
+    def constant(self, node: Real, value: float) -> str:
+        """Return the code of an expression of dimensions that has a value."""
+        if not self.is_open:
+            return self.literal(value)
+        code = f'c->k[{self._constants.setdefault(node, len(self._constants))}]'
+        return f'{code} > 0.5' if node.op in _CONDITIONS else code
+
+    def helpers(self) -> str:
+        """Return the roots and gates that decide whether a linkage can be assembled."""
+        n, number, f, zero = self.name, self.number, self.suffix, self.literal(0.0)
+        return '\n'.join([
+            '/* A limit that is missed by rounding counts as reached. */',
+            f'static inline {number} {n}_root({number} x, {number} tolerance)', '{',
+            f'    return x > {zero} ? sqrt{f}(x) : x >= -tolerance ? {zero} : ({number})NAN;', '}',
+            '',
+            f'static inline {number} {n}_gated({number} x, {number} margin, {number} tolerance)',
+            '{', f'    return margin >= -tolerance ? x : ({number})NAN;', '}', ''])
+
+    def struct(self) -> str:
+        """Return the struct of constants; it is complete once all functions are written."""
+        return '\n'.join(['/* What follows from the dimensions. */', 'typedef struct {',
+                          f'    double k[{max(len(self._constants), 1)}];', '    int is_own;',
+                          f'}} {self.name}_linkage;', ''])
+
+    def setter(self, checks: Sequence[tuple]) -> str:
+        """
+        Return the function that fills the struct of constants from dimensions.
+
+        `checks` are pairs of an expression that has to be above zero and of what is said else.
+        """
+        names = {name: i for i, name in enumerate(self.linkage.dimensions)}
+        number: Dict[Real, int] = {}
+        for root in (*self._constants, *(node for node, _ in checks)):
+            for node in unknown(root, lambda node: node.operands, number):
+                number[node] = len(number)
+        nodes = list(number)
+
+        def value(node: Real) -> str:
+            if node.op == 'constant':
+                return self.literal(node.args[0])
+            if node.op == 'dimension':
+                return f'dimension[{names[node.args[0]]}]' if node.args[0] in names else '1.0'
+            args = [f'd{number[x]}' for x in node.operands]
+            return self.dialect.templates[node.op].format(*args)
+
+        body = []
+        for node in nodes:
+            body.append(f'    const {_kind(node, "double")} d{number[node]} = {value(node)};')
+        tests = [(f'd{number[node]}', '%s > 0.0 && ', text) for node, text in checks]
+        for node in nodes:
+            if node.op == 'dimension' and node.args[0] in names:
+                sign, text = ('%s > 0.0 && ', 'positive ') if node.positive else ('', '')
+                tests.insert(0, (f'd{number[node]}', sign,
+                                 f'{node.args[0]} must be a {text}number [m]'))
+        refusals = [f'    if (!({sign.replace("%s", value)}isfinite({value})))\n'
+                    f'        return {texts(text)};' for value, sign, text in tests]
+        own = ' && '.join(f'dimension[{i}] == {self.literal(float(np.ravel(value)[0]))}'
+                          for i, value in enumerate(self.linkage.dimensions.values())) or '1'
+        fills = [f'    c->k[{i}] = d{number[node]};' for node, i in self._constants.items()]
+        return '\n'.join([
+            '/* Take dimensions; returns 0, or what is wrong with them. */',
+            f'static inline const char *{self.name}_set({self.name}_linkage *c, '
+            'const double *dimension)', '{',
+            *body, *refusals, *fills, f'    c->is_own = {own};',
+            *([] if names else ['    (void)dimension;']),
+            '    return 0;', '}', ''])
+
+
+def open_linkage(linkage: Mechanism) -> Mechanism:
+    """Return a linkage whose code decides nothing by its dimensions, which may change."""
+    return linkage.with_dimensions(**{
+        name: np.array([value]) for name, value in linkage.dimensions.items()})
+
+
+def _kind(node: Real, number: str) -> str:
+    return 'int' if node.op in _CONDITIONS else number
+
+
+def _dialect(single: bool, name: str) -> Dialect:
+    f = 'f' if single else ''
+
+    def literal(value: float) -> str:
+        if math.isnan(value):
+            return f'({"float" if single else "double"})NAN'
+        if single:
+            value = float(np.float32(value)) if abs(value) <= 3.4e38 else math.copysign(
+                math.inf, value)
+            value = value if abs(value) > 1.2e-38 else 0.0
+        if math.isinf(value):
+            return f'({"-" * (value < 0.0)}INFINITY)'
+        text = _shortest(value) if single else repr(float(value))
+        return f'({text}{f})' if value < 0.0 else text + f
+
+    return Dialect({operation: row.c.replace('{f}', f).replace('{name}', name)
+                    for operation, row in OPERATIONS.items()}, {}, literal)
+
+
+def _shortest(value: float) -> str:
+    """Return the shortest text of a float32."""
+    text = str(np.float32(value))
+    return text if re.search(r'[.e]', text) else text + '.0'

@@ -1,0 +1,52 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Names of a scene as C identifiers, comments and texts, whatever letters they have."""
+
+import re
+from typing import Iterable, List, Mapping
+
+from ..linkage.mechanism import Mechanism
+
+_PLACE = re.compile(r'@(\w+)@')
+
+
+def filled(template: str, values: Mapping[str, object]) -> str:
+    """Return a template with @name@ replaced by values; lines that become empty are dropped."""
+    lines = []
+    for line in template.splitlines():
+        text = _PLACE.sub(lambda place: str(values[place[1]]), line)
+        if text.strip() or not line.strip():
+            lines.append(text)
+    return '\n'.join(lines) + '\n'
+
+
+def constants(names: Iterable[str]) -> List[str]:
+    """Return names as ends of upper-case C constants, each distinct."""
+    made: List[str] = []
+    for name in names:
+        plain = re.sub(r'[^A-Z0-9]+', '_', name.upper()).strip('_') or 'UNNAMED'
+        made.append(next(text for text in (plain, *(f'{plain}_{i}' for i in range(2, 1000)))
+                         if text not in made))
+    return made
+
+
+def field(linkage: Mechanism, output: str) -> str:
+    """Return what an output is called in C."""
+    plain = re.sub(r'\W+', '_', output).strip('_')
+    if '.' in output or '(' in output:
+        return plain
+    return ('angle_' if linkage.is_angle(output) else 'slide_') + plain
+
+
+def comment(text: str) -> str:
+    """Return a text that ends no comment and no line."""
+    return re.sub(r'[^ -~]', '?', text).replace('*/', '* /').replace('/*', '/ *').replace(
+        '\\', '/').replace('??', '? ?')
+
+
+def literal(text: str) -> str:
+    """Return a text as a string literal of C."""
+    return '"' + ''.join(
+        chr(byte) if 32 <= byte < 127 and chr(byte) not in '"\\?' else f'\\{byte:03o}'
+        for byte in text.encode('utf-8', 'replace')) + '"'

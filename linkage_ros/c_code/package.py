@@ -1,0 +1,97 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A ROS 2 package with mechanisms of a scene as transmissions of ros2_control."""
+
+from pathlib import Path
+import re
+from typing import Dict, Mapping, Sequence, Tuple
+from xml.sax.saxutils import escape, quoteattr
+
+from . import header
+from .axes import actuators, Axis, joints
+from .names import comment, constants, filled, literal
+from .sides import template
+from ..scene import Machine
+
+# What a package may be called.
+PACKAGE = re.compile(r'(?=.{2,64}$)[a-z](_?[a-z0-9])*', re.ASCII)
+
+
+def package(name: str, scene: str, machines: Sequence[Tuple[Machine, Sequence[str]]]
+            ) -> Dict[Path, str]:
+    """
+    Return the files of a package, by their path in it.
+
+    Parameters
+    ----------
+    name : str
+        The package's.
+    scene : str
+        The name of the scene's file.
+    machines : sequence of (Machine, sequence of str)
+        The mechanisms and the joints that are commanded of each; see `axes.joints`.
+
+    Raises
+    ------
+    ValueError
+        If a joint does not exist, or joints do not tell all inputs.
+
+    """
+    classes = [text.title().replace('_', '') for text in constants(
+        re.sub(r'(?<=[a-z])(?=[A-Z])', '_', machine.name) for machine, _ in machines)]
+    parts = [_values(name, class_, machine, joints(machine, chosen))
+             for class_, (machine, chosen) in zip(classes, machines)]
+    common = {
+        'package': name, 'namespace': f'{name}_plugins', 'scene': escape(comment(scene)),
+        'mechanisms': ' '.join(part['name'] for part in parts),
+        'table': '\n'.join(part['row'] for part in parts)}
+    files = {Path(path): filled(template(Path(path).name), common) for path in (
+        'CMakeLists.txt', 'package.xml', 'README.md', 'src/linkage_transmission.hpp')}
+    files[Path('plugins.xml')] = f'<library path="{name}">\n' + ''.join(
+        filled(template('plugin.xml'), part) for part in parts) + '</library>\n'
+    files[Path('urdf/transmissions.xml')] = '<!-- Written by linkage_ros. -->\n' + ''.join(
+        filled(template('transmission.xml'), part) for part in parts)
+    files[Path('src/plugins.cpp')] = '\n'.join([
+        '// Written by linkage_ros. SPDX-License-Identifier: Apache-2.0',
+        *(f'#include "{part["name"]}.hpp"' for part in parts),
+        '#include "pluginlib/class_list_macros.hpp"\n',
+        *(f'PLUGINLIB_EXPORT_CLASS(\n  {name}_plugins::{class_}Loader, '
+          'transmission_interface::TransmissionLoader)' for class_ in classes), ''])
+    for part, (machine, chosen) in zip(parts, machines):
+        own = part['name']
+        files[Path(f'src/{own}_linkage.h')] = header.opened(machine, chosen)
+        files[Path(f'src/{own}.hpp')] = filled(template('mechanism.hpp'), part)
+        files[Path(f'test/test_{own}.cpp')] = filled(template('test.cpp'), part)
+    return files
+
+
+def _values(package_name: str, class_: str, machine: Machine,
+            commanded: Sequence[Axis]) -> Mapping[str, str]:
+    driven = actuators(machine)
+    roles = list(machine.inputs), [axis.output for axis in commanded]
+
+    def rows(axes: Sequence[Axis], own: Sequence[str]) -> str:
+        return ', '.join(f'{{{literal(axis.name)}, {literal(role)}}}'
+                         for axis, role in zip(axes, own))
+
+    def said(axes: Sequence[Axis]) -> str:
+        return escape(comment(', '.join(axis.name for axis in axes)))
+
+    dimensions = machine.linkage.dimensions
+    lines = [f'  <{kind} name={quoteattr(axis.name)} role={quoteattr(role)}/>'
+             for kind, axes, own in zip(('actuator', 'joint'), (driven, commanded), roles)
+             for axis, role in zip(axes, own)]
+    if dimensions:
+        some, value = next(iter(dimensions.items()))
+        lines.append(f'  <!-- <param name="{some}">{value!r}</param> for another length [m] -->')
+    return {
+        'package': package_name, 'namespace': f'{package_name}_plugins', 'class': class_,
+        'name': machine.name, 'n': str(len(driven)), 'actuators': rows(driven, roles[0]),
+        'joints': rows(commanded, roles[1]), 'said': f'{said(driven)} and {said(commanded)}',
+        'lines': '\n'.join(lines),
+        'dimension_count': str(len(dimensions)),
+        'dimensions': dimensions and '{%s}' % ', '.join(
+            f'{{"{key}", {value!r}}}' for key, value in dimensions.items()) or '',
+        'row': f'| `{package_name}/{class_}` | {said(driven)} | {said(commanded)} | '
+               f'{", ".join(dimensions) or "none"} |'}

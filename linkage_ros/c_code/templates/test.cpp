@@ -1,0 +1,51 @@
+// Written by linkage_ros. SPDX-License-Identifier: Apache-2.0
+// Actuators all over their ways are taken to the joints and back.
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+#include "@name@.hpp"
+
+int main()
+{
+  using Code = @namespace@::@class@Code;
+  hardware_interface::TransmissionInfo info;
+  std::vector<transmission_interface::JointHandle> joint_handles;
+  std::vector<transmission_interface::ActuatorHandle> actuator_handles;
+  double actuator[Code::size] = {}, joint[Code::size] = {}, dimensions[@dimension_count@ + 1] = {};
+  for (std::size_t i = 0; i < Code::size; ++i) {
+    info.actuators.emplace_back();
+    info.actuators.back().name = Code::actuators[i].name;
+    info.joints.emplace_back();
+    info.joints.back().name = Code::joints[i].name;
+    actuator_handles.emplace_back(Code::actuators[i].name, "position", &actuator[i]);
+    joint_handles.emplace_back(Code::joints[i].name, "position", &joint[i]);
+  }
+  @namespace@::@class@Transmission transmission(info);
+  transmission.configure(joint_handles, actuator_handles);
+
+  @name@_linkage c;
+  for (std::size_t i = 0; i < Code::dimensions.size(); ++i) {
+    dimensions[i] = Code::dimensions[i].value;
+  }
+  int tried = Code::set(c, dimensions) ? -1 : 0;
+  for (long state = 1; tried >= 0 && state <= 2000; ++state) {
+    double q[Code::size], singular[Code::size], gap[Code::size];
+    @name@_point p;
+    @name@_sample(state, q);
+    if (!@name@_at(&c, q, &p) || !@name@_solved(&p, 1, 0, 1e-3, p.load, singular)) {
+      continue;
+    }
+    for (std::size_t i = 0; i < Code::size; ++i) {
+      actuator[i] = p.position[0][i];
+    }
+    transmission.actuator_to_joint();
+    transmission.joint_to_actuator();
+    if (transmission.status() || !(@name@_gap(actuator, &p, 0, gap) <= 1e-9)) {
+      std::printf("state %ld does not come back\n", state);
+      return 1;
+    }
+    ++tried;
+  }
+  return tried > 1000 ? 0 : 1;
+}

@@ -1,0 +1,60 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Command that writes a scene as a package of transmissions for ros2_control; it needs no ROS."""
+
+from pathlib import Path
+import sys
+from typing import List, Optional
+
+from .command import NEEDS, parser, with_joints
+from .package import PACKAGE, package
+from .. import command, scene
+
+NAME = 'transmission'
+
+
+def main(args: Optional[List[str]] = None) -> int:
+    """Write the package; return the exit code."""
+    return command.run(NAME, write, args, NEEDS)
+
+
+def write(args: Optional[List[str]]) -> None:
+    """Write what a command line asks for."""
+    asked = arguments().parse_args(args)
+    out = Path(asked.out).absolute()
+    if not PACKAGE.fullmatch(out.name):
+        raise command.RequestError(
+            '--out must end in the name of a package, of 2 to 64 small letters, digits and single '
+            f'underscores, a letter first, not {out.name!r}')
+    if out.exists() and any(out.iterdir()) and not is_ours(out):
+        raise command.RequestError('--out must be a new folder, or one that this command wrote, '
+                                   f'but there are other files in {out}')
+    machines = command.chosen(scene.load(asked.scene).machines, asked.mechanism)
+    try:
+        files = package(out.name, Path(asked.scene).name, with_joints(machines, asked.joints))
+    except ValueError as error:
+        raise command.RequestError(str(error)) from None
+    for path, text in files.items():
+        (out / path).parent.mkdir(parents=True, exist_ok=True)
+        (out / path).write_text(text, encoding='utf-8')
+    print(f'{out}: {", ".join(machine.name for machine in machines)}; see README.md')
+
+
+def is_ours(folder: Path) -> bool:
+    """Return whether a folder is a package of this command."""
+    xml = folder / 'package.xml'
+    return xml.is_file() and 'written by linkage_ros' in xml.read_text(errors='replace')
+
+
+def arguments() -> command.Parser:
+    """Return the parser of the command line."""
+    made = parser(NAME, 'Write the mechanisms of a scene as a ROS 2 package of transmissions for '
+                        'ros2_control.')
+    made.add_argument('--out', required=True, metavar='DIR',
+                      help='the folder; its name is that of the package')
+    return made
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,237 @@
+// Copyright 2026 linkage_ros contributors
+// SPDX-License-Identifier: Apache-2.0
+// A generated transmission, its names in NAME, CLASS and NAMESPACE, is proved: both ways at many states: positions there and back, velocities against differences, power, and
+// nothing allocated nor anything written that is not finite. Takes how many states.
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+#include <new>
+#include <vector>
+
+#define JOINED_(a, b) a##b
+#define JOINED(a, b) JOINED_(a, b)
+#define OF(part) JOINED(NAME, part)
+#define TEXT_(text) #text
+#define TEXT(text) TEXT_(text)
+#include TEXT(NAME.hpp)
+
+namespace
+{
+using Code = NAMESPACE::JOINED(CLASS, Code);
+constexpr int n = static_cast<int>(Code::size);
+constexpr double nan_ = std::numeric_limits<double>::quiet_NaN();
+constexpr double inf = std::numeric_limits<double>::infinity();
+bool may_allocate = true;
+
+void check(bool holds, const char * what, long state)
+{
+  if (!holds) {
+    std::printf(TEXT(NAME) ": %s at state %ld\n", what, state);
+    std::exit(1);
+  }
+}
+
+/// The memory of a hardware component, one for states and commands, and a transmission on it.
+struct Robot
+{
+  double actuator[3][n], joint[3][n];
+  NAMESPACE::JOINED(CLASS, Transmission) transmission;
+
+  static hardware_interface::TransmissionInfo info()
+  {
+    hardware_interface::TransmissionInfo made;
+    made.name = TEXT(NAME);
+    for (int i = n - 1; i >= 0; --i) {
+      const std::size_t k = static_cast<std::size_t>(i);
+      made.actuators.emplace_back();
+      made.actuators.back().name = Code::actuators[k].name;
+      made.actuators.back().role = Code::actuators[k].role;
+      made.joints.emplace_back();
+      made.joints.back().name = Code::joints[k].name;
+      made.joints.back().role = Code::joints[k].role;
+    }
+    return made;
+  }
+
+  Robot() : transmission(info())
+  {
+    const char * const kinds[3] = {"position", "velocity", "effort"};
+    std::vector<transmission_interface::JointHandle> joints;
+    std::vector<transmission_interface::ActuatorHandle> actuators;
+    for (int kind = 2; kind >= 0; --kind) {
+      for (int i = 0; i < n; ++i) {
+        const std::size_t k = static_cast<std::size_t>(i);
+        actuator[kind][i] = joint[kind][i] = 0.0;
+        actuators.emplace_back(Code::actuators[k].name, kinds[kind], &actuator[kind][i]);
+        joints.emplace_back(Code::joints[k].name, kinds[kind], &joint[kind][i]);
+      }
+    }
+    transmission.configure(joints, actuators);
+  }
+};
+
+/// What of a pose is needed: where both sides are, and how well each tells the inputs.
+struct Pose
+{
+  OF(_point) point;
+  bool placed, good;
+};
+
+Pose pose(const OF(_linkage) & c, const double (&q)[n])
+{
+  Pose made{};
+  double zero[n] = {}, x[n];
+  made.placed = OF(_at)(&c, q, &made.point) != 0;
+  made.good = made.placed;
+  for (int side = 0; side < 2; ++side) {
+    made.good = made.good && OF(_solved)(&made.point, side, 0, 1e-2, zero, x) != 0;
+  }
+  return made;
+}
+
+double apart(int side, int i, double one, double other)
+{
+  double gap[n], to[n];
+  OF(_point) p{};
+  for (int k = 0; k < n; ++k) {
+    to[k] = p.position[side][k] = other;
+  }
+  to[i] = one;
+  (void)OF(_gap)(to, &p, side, gap);
+  return std::fabs(gap[i]) / OF(_scale)(side, i, 0);
+}
+
+void at(Robot & robot, const Pose & where)
+{
+  for (int i = 0; i < n; ++i) {
+    robot.actuator[0][i] = where.point.position[0][i];
+    robot.actuator[1][i] = 0.0;
+    for (int k = 0; k < n; ++k) {
+      robot.actuator[1][i] += where.point.rate[0][i][k] * (k + 1);
+    }
+    robot.actuator[2][i] = 1.0 + i;
+  }
+  robot.transmission.actuator_to_joint();
+}
+
+/// Returns whether the state is far enough from singular poses and ends to be tried.
+bool there_and_back(Robot & robot, const OF(_linkage) & c, const double (&q)[n], long state)
+{
+  constexpr double h = 1e-6;
+  double before[n], after[n], beside[n], joints[n], power[2] = {}, size = 1e-300;
+  for (int i = 0; i < n; ++i) {
+    before[i] = q[i] - h * (i + 1);
+    after[i] = q[i] + h * (i + 1);
+    beside[i] = q[i] + 1e-2 * (state % 2 ? 1 : -1);
+  }
+  const Pose here = pose(c, q), low = pose(c, before), high = pose(c, after);
+  const Pose near = pose(c, beside);
+  if (!here.good || !low.good || !high.good || !near.good) {
+    return false;
+  }
+  at(robot, here);
+  check(robot.transmission.status() == 0, "joints are not OK", state);
+  for (int i = 0; i < n; ++i) {
+    const double difference = apart(1, i, high.point.position[1][i], low.point.position[1][i]);
+    const double rate = std::fabs(robot.joint[1][i]) / OF(_scale)(1, i, 0);
+    // What a difference misses grows so next to a pose where the rate is infinite.
+    check(std::fabs(difference / (2.0 * h) - rate) <= 1e-7 * (1.0 + rate) + 1e-10 * std::pow(rate, 5),
+      "a velocity differs from the difference of positions", state);
+    const double in = robot.actuator[1][i] * robot.actuator[2][i];
+    const double out = robot.joint[1][i] * robot.joint[2][i];
+    power[0] += in - here.point.load[i] * (i + 1);
+    power[1] += out;
+    size += std::fabs(in) + std::fabs(out) + std::fabs(here.point.load[i] * (i + 1));
+    joints[i] = robot.joint[0][i];
+  }
+  check(std::fabs(power[0] - power[1]) <= 1e-12 * size, "power is lost", state);
+
+  // One memory for both ways: the joints are commanded to be where they are.
+  robot.transmission.joint_to_actuator();
+  check(robot.transmission.status() == 0, "actuators are not OK", state);
+  for (int i = 0; i < n; ++i) {
+    check(apart(0, i, robot.actuator[0][i], here.point.position[0][i]) <= 1e-10,
+      "an actuator does not come back", state);
+    check(std::fabs(robot.actuator[2][i] - 1.0 - i) <= 1e-9, "an effort does not come back", state);
+  }
+
+  // The joints are commanded to there from beside it.
+  at(robot, near);
+  for (int i = 0; i < n; ++i) {
+    robot.joint[0][i] = joints[i];
+  }
+  robot.transmission.joint_to_actuator();
+  check(robot.transmission.status() == 0, "it cannot get there from beside it", state);
+  robot.transmission.actuator_to_joint();
+  for (int i = 0; i < n; ++i) {
+    check(apart(1, i, robot.joint[0][i], joints[i]) <= 1e-12, "a joint does not come back", state);
+  }
+  return true;
+}
+
+void hostile(Robot & robot, long state)
+{
+  const double values[] = {nan_, inf, -inf, 1e300, -1e300, 1e9, 0.0, -0.0, 5e-324, 3.0};
+  const long count = static_cast<long>(sizeof values / sizeof *values);
+  for (int kind = 0; kind < 3; ++kind) {
+    for (int i = 0; i < n; ++i) {
+      double (&side)[3][n] = state % 2 ? robot.joint : robot.actuator;
+      side[kind][i] = values[(state / 2 + kind * 7 + i * 3 + state / 11) % count];
+    }
+  }
+  double (&other)[3][n] = state % 2 ? robot.actuator : robot.joint;
+  for (auto & kind : other) {
+    for (double & value : kind) {
+      value = nan_;
+    }
+  }
+  state % 2 ? robot.transmission.joint_to_actuator() : robot.transmission.actuator_to_joint();
+  for (auto & kind : other) {
+    for (double value : kind) {
+      check(std::isfinite(value), "something is written that is not finite", state);
+    }
+  }
+}
+}  // namespace
+
+// Not inlined: gcc takes what it sees of one of them alone for a mismatch.
+[[gnu::noinline]] void * operator new(std::size_t size)
+{
+  if (!may_allocate) {
+    std::abort();
+  }
+  if (void * memory = std::malloc(size)) {
+    return memory;
+  }
+  throw std::bad_alloc();
+}
+
+[[gnu::noinline]] void operator delete(void * memory) noexcept { std::free(memory); }
+
+[[gnu::noinline]] void operator delete(void * memory, std::size_t) noexcept { std::free(memory); }
+
+int main(int argc, char ** argv)
+{
+  const long states = argc > 1 ? std::atol(argv[1]) : 2000;
+  OF(_linkage) c;
+  double dimensions[Code::dimensions.size() + 1] = {}, q[n];
+  for (std::size_t i = 0; i < Code::dimensions.size(); ++i) {
+    dimensions[i] = Code::dimensions[i].value;
+  }
+  check(!Code::set(c, dimensions), "its own dimensions are refused", 0);
+  Robot robot;
+  may_allocate = false;
+  long tried = 0;
+  for (long i = 1; i <= states; ++i) {
+    OF(_sample)(i, q);
+    tried += there_and_back(robot, c, q, i);
+  }
+  check(2 * tried > states, "most states are singular", tried);
+  for (long i = 0; i < states; ++i) {
+    hostile(robot, i);
+  }
+  may_allocate = true;
+  std::printf(TEXT(NAME) ": %ld states, %ld of them there and back\n", states, tried);
+  return 0;
+}

@@ -1,0 +1,493 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Actuators to joints and back, in C and as transmissions of ros2_control.
+
+ros2_control is not on the Python package index: what is generated is compiled against a stand-in
+of its interface, `test/ros2_control`, written for these tests. No controller manager is run.
+"""
+
+from contextlib import suppress
+import ctypes
+import math
+from pathlib import Path
+import re
+import shutil
+import subprocess
+import sys
+from xml.etree import ElementTree
+
+from linkage_ros import mechanisms, scene
+from linkage_ros.c_code import header, transmission
+from linkage_ros.c_code.axes import actuators, joints
+import numpy as np
+import pytest
+from truth import random_linkages
+
+ROOT = Path(__file__).parents[1]
+STAND_IN = ROOT / 'test' / 'ros2_control'
+STRICT = ('-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wshadow', '-Werror', '-O2')
+SANITIZED = ('-g', '-O1', '-fsanitize=address,undefined', '-fno-sanitize-recover=all')
+COMPILERS = [pytest.param(name, marks=pytest.mark.skipif(
+    not shutil.which(name), reason=f'{name} is not installed')) for name in ('g++', 'clang++')]
+SCENES = [*sorted((ROOT / 'config').glob('*.yaml')), ROOT / 'examples' / 'leg.yaml']
+COMPILER = shutil.which('cc') or shutil.which('gcc')
+
+# All that a scene may say of actuators and joints.
+SCENE = {
+    'mechanisms': ['lever', 'leg', 'boom', 'lift', 'rocker', 'beast'],
+    'lever.type': 'slotted_lever', 'lever.scale': 1e-3, 'lever.crank.source': 'servo',
+    'lever.crank.ratio': -0.5, 'lever.crank.offset': 0.3, 'lever.crank.sweep': [-0.4, 0.4],
+    'lever.joint_names': ['lever=-flap+0.1'], 'lever.loads': ['L=0 -9.81', 'lever=0.02'],
+    'leg.type': 'five_bar', 'leg.crank.start': 1.9, 'leg.crank2.start': 1.24,
+    'leg.crank.ratio': 0.1, 'leg.crank2.offset': -0.2, 'leg.loads': ['P=3 -20'],
+    'boom.type': 'custom', 'boom.scale': 2.0, 'boom.joints': [
+        'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C rigid O B 2 1.4 left'],
+    'boom.cylinder.ratio': 0.001, 'boom.loads': ['C=0 -100'],
+    'lift.type': 'custom', 'lift.joints': [
+        'O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left'],
+    'lift.crank.measures': 'QB', 'lift.crank.ratio': -2.0, 'lift.crank.start': 0.5,
+    'lift.crank.sweep': [0.2, 2.2],
+    'rocker.type': 'four_bar', 'rocker.crank.start': 1.0, 'rocker.loads': ['P=1 2'],
+    'beast.type': 'jansen', 'beast.leg_pairs': 3}
+CALLER = """
+static {name}_memory {name}_m;
+int {name}_started(void) {{ return {name}_begin(&{name}_m); }}
+int {name}_sent(int side, const double *from, double *to)
+{{
+    return {name}_transmit(&{name}_m, side, (const {name}_side *)from, ({name}_side *)to);
+}}
+"""
+
+
+@pytest.fixture(scope='module')
+def machines():
+    """Return the mechanisms of the scene."""
+    return scene.read(SCENE).machines
+
+
+@pytest.fixture(scope='module')
+def library(machines, tmp_path_factory):
+    """Return them in C."""
+    return compiled(tmp_path_factory.mktemp('c'), machines.values())
+
+
+def compiled(folder, machines, *names):
+    """Return a library with the actuators and joints of mechanisms."""
+    if not COMPILER:
+        pytest.skip('there is no C compiler')
+    source = folder / 'all.c'
+    source.write_text(''.join(header.written(machine, joints=names) + CALLER.format(
+        name=machine.name) for machine in machines))
+    built = folder / 'all.so'
+    subprocess.run([COMPILER, '-std=c99', *STRICT, '-shared', '-fPIC', source, '-o', built, '-lm'],
+                   check=True)
+    return ctypes.CDLL(str(built))
+
+
+class Memory:
+    """The memory of one mechanism in C."""
+
+    def __init__(self, library, name, n):
+        self._send, self._n = library[f'{name}_sent'], n
+        assert library[f'{name}_started']() == 1
+
+    def send(self, side, position, velocity=None, effort=None):
+        """Return the status and the other side's positions, velocities and efforts."""
+        n = self._n
+        given = np.array([position, np.zeros(n) if velocity is None else velocity,
+                          np.zeros(n) if effort is None else effort], float).reshape(3 * n)
+        found = np.full(3 * n, np.nan)
+        status = self._send(side, *(ctypes.c_void_p(x.ctypes.data) for x in (given, found)))
+        return status, found.reshape(3, n)
+
+
+def states(machine, count, seed=1):
+    """Return values of all inputs in the scene's units that can be assembled, not at the ends."""
+    rng, found = np.random.default_rng(seed), []
+    while len(found) < count:
+        own = []
+        for drive in machine.inputs.values():
+            low, high = drive.ends or drive.reach[0]
+            own.append(rng.uniform(low + 0.02 * (high - low), high - 0.02 * (high - low)))
+        values = outputs(machine, own, [each.output for each in joints(machine)])
+        if np.isfinite(values).all():
+            found.append(own)
+    return found
+
+
+def outputs(machine, inputs, names, by=None):
+    """Return outputs, or their rates by an input, in the scene's units, at such inputs."""
+    units = [machine.scale_of(name) for name in machine.inputs]
+    own = [value / unit for value, unit in zip(inputs, units)]
+    ask = machine.linkage.joint_angles if by is None else machine.linkage.joint_rates
+    values = ask(own if len(own) > 1 else own[0], names, *([] if by is None else [by]))
+    return np.array([float(values[name]) * machine.scale_of(name) / (
+        1.0 if by is None else units[by]) for name in names])
+
+
+def expected(machine, inputs):
+    """Return positions of actuators and joints at inputs, and their Jacobians, from the scene."""
+    n, drives = len(machine.inputs), list(machine.inputs.values())
+    told = [drive.measures or name for name, drive in machine.inputs.items()]
+    ratio, offset = (np.array([getattr(drive, key) for drive in drives])
+                     for key in ('ratio', 'offset'))
+    position = (outputs(machine, inputs, told) - offset) / ratio
+    rates = np.array([outputs(machine, inputs, told, by) for by in range(n)]).T / ratio[:, None]
+    chosen = [each.output for each in joints(machine)]
+    prefix = next(iter(machine.assembly().legs))
+    called = [machine.joints[name if name in machine.inputs else prefix + name]
+              for name in chosen]
+    joint = np.array([name.of(value) for name, value in zip(
+        called, outputs(machine, inputs, chosen))])
+    signs = np.array([name.sign for name in called])
+    turning = np.array([outputs(machine, inputs, chosen, by) for by in range(n)]).T
+    return position, rates, joint, signs[:, None] * turning
+
+
+@pytest.mark.parametrize('name', SCENE['mechanisms'])
+def test_both_ways_are_those_of_the_scene(library, machines, name):
+    machine = machines[name]
+    n = len(machine.inputs)
+    memory = Memory(library, name, n)
+    for inputs in states(machine, 100):
+        actuator, by, joint, turning = expected(machine, inputs)
+        speeds, torques = np.arange(1.0, n + 1.0), np.arange(2.0, n + 2.0)
+        loads = np.array(machine.efforts(inputs)) if machine.loads else np.zeros(n)
+        if np.linalg.cond(by) > 1e3 or np.linalg.cond(turning) > 1e3:
+            continue
+        status, (position, velocity, effort) = memory.send(0, actuator, by @ speeds, torques)
+        assert status == 0
+        np.testing.assert_allclose(position, joint, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(velocity, turning @ speeds, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(
+            effort, np.linalg.solve(turning.T, by.T @ torques - loads), rtol=1e-9)
+        status, (position, velocity, held) = memory.send(1, joint, turning @ speeds)
+        assert status == 0
+        np.testing.assert_allclose(position, actuator, rtol=1e-9, atol=1e-11)
+        np.testing.assert_allclose(velocity, by @ speeds, rtol=1e-9)
+        np.testing.assert_allclose(held, np.linalg.solve(by.T, loads), rtol=1e-9, atol=1e-12)
+
+
+def test_a_command_beyond_the_sweep_is_held_and_stands_still(library, machines):
+    machine, memory = machines['lever'], Memory(library, 'lever', 1)
+    (inside, *_), (outside, *_) = (expected(machine, [angle])[2] for angle in (0.3, 0.45))
+    _, (good, *_) = memory.send(1, [inside], [1.0])
+    status, (position, velocity, _) = memory.send(1, [outside], [1.0])
+    assert status == 1 and position == good and velocity == 0.0
+    # What is measured there is what it is.
+    actuator, _, joint, _ = expected(machine, [0.45])
+    status, (position, *_) = memory.send(0, actuator)
+    assert status == 0 and position == pytest.approx(joint)
+
+
+def test_what_is_missing_is_held_and_said(library, machines):
+    machine, memory, nan = machines['rocker'], Memory(library, 'rocker', 1), math.nan
+    actuator, _, joint, _ = expected(machine, [1.0])
+    status, (position, velocity, effort) = memory.send(1, [nan], [1.0], [2.0])
+    assert status == 4 and np.isnan(position) and velocity == 0.0 and effort == 0.0
+    assert memory.send(0, actuator)[0] == 0
+    # Only an effort is commanded: it is held against where the actuators are.
+    status, (position, velocity, effort) = memory.send(1, [nan], [0.0], [2.0])
+    assert status == 4 and position == actuator and effort != 0.0
+    status, (_, velocity, held) = memory.send(1, joint, [math.inf], [nan])
+    assert status == 4 and velocity == 0.0 and held == effort
+
+
+def test_a_singular_pose_is_said(library, machines):
+    machine, memory = machines['rocker'], Memory(library, 'rocker', 1)
+    dead = machine.linkage.extremes('QB')[0][0][1]
+    _, (_, _, held) = memory.send(0, [1.0], [1.0], [1.0])
+    status, (_, velocity, effort) = memory.send(0, [dead], [1.0], [2.0])
+    assert status == 2 and abs(velocity) < 1e-6 and effort == held
+    status, (position, velocity, _) = memory.send(1, expected(machine, [dead])[2], [1.0], [1.0])
+    assert status == 2 and velocity == 0.0 and np.isfinite(position)
+
+
+@pytest.mark.parametrize('name', SCENE['mechanisms'])
+def test_nothing_that_comes_in_gets_out_as_no_number(library, machines, name):
+    machine, rng = machines[name], np.random.default_rng(4)
+    n = len(machine.inputs)
+    memory = Memory(library, name, n)
+    assert memory.send(0, expected(machine, states(machine, 1)[0])[0])[0] == 0
+    values = [math.nan, math.inf, -math.inf, 1e308, -1e300, 5e-324, 0.0, 1.0, 1e-3, 3.0]
+    for _ in range(3000):
+        status, found = memory.send(int(rng.integers(2)), *rng.choice(values, (3, n)))
+        assert 0 <= status < 8 and np.isfinite(found).all()
+
+
+def test_the_joints_are_chosen_by_their_names(machines, tmp_path):
+    leg, boom = machines['leg'], machines['boom']
+    assert [each.name for each in joints(leg)] == ['leg_crank', 'leg_AP']
+    assert [each.output for each in joints(leg, ['leg_P.x', 'leg_P.y'])] == ['P.x', 'P.y']
+    assert [each.name for each in joints(boom)] == ['boom_OB']
+    assert [each.name for each in actuators(machines['lever'])] == ['servo']
+    for names, said in ((['knee'], "leg has no joint 'knee'; allowed: leg_crank"),
+                        (['leg_AP'], 'leg has 2 inputs'), (['leg_AP', 'leg_AP'], 'as many')):
+        with pytest.raises(ValueError, match=said):
+            joints(leg, names)
+    library = compiled(tmp_path, [leg], 'leg_P.x', 'leg_P.y')
+    memory = Memory(library, 'leg', 2)
+    for inputs in states(leg, 50):
+        place = outputs(leg, inputs, ['P.x', 'P.y'])
+        memory.send(0, expected(leg, inputs)[0])
+        status, (position, *_) = memory.send(1, place)
+        assert status == 0
+        np.testing.assert_allclose(position, expected(leg, inputs)[0], atol=1e-9)
+
+
+@pytest.mark.parametrize('seeds', [
+    range(10), pytest.param(range(10, 100), marks=pytest.mark.long)])
+def test_random_linkages_go_both_ways(tmp_path, seeds):
+    machines = []
+    for seed in seeds:
+        drawn, name = random_linkages.design(np.random.default_rng(seed)), f'm{seed}'
+        given = {'mechanisms': [name], f'{name}.type': 'custom', f'{name}.joints': drawn.joints,
+                 **{f'{name}.dimensions.{key}': float(value)
+                    for key, value in drawn.dimensions.items()}}
+        with suppress(scene.SceneError):  # of lengths that allow no pose
+            machines += scene.read(given).machines.values()
+    library, rng, back = compiled(tmp_path, machines), np.random.default_rng(1), 0
+    for machine in machines:
+        n, sizes = len(machine.inputs), np.array([each.size for each in joints(machine)])
+        if library[f'{machine.name}_started']() == 0:
+            continue
+        memory = Memory(library, machine.name, n)
+        for _ in range(40):
+            inputs = [rng.uniform(*(drive.ends or drive.reach[0]))
+                      for drive in machine.inputs.values()]
+            actuator, by, joint, turning = expected(machine, inputs)
+            own = [value / machine.scale_of(name) for value, name in zip(inputs, machine.inputs)]
+            places = machine.linkage.solve(own if n > 1 else own[0]).values()
+            status, (position, *motion) = memory.send(0, actuator, by @ np.ones(n), np.ones(n))
+            # All of it can be assembled, or it is said that it cannot.
+            assert (status & 1 == 0) == np.isfinite(list(places)).all(), (machine.name, inputs)
+            if status == 0:
+                gap = np.abs(position - joint)
+                assert np.minimum(gap, np.abs(gap - math.tau)).max() < 1e-11
+                margin = np.linalg.svd(turning / sizes[:, None], compute_uv=False)
+                status, (again, *_) = memory.send(1, position, *motion)
+                if margin[-1] > 1e-3 * max(1.0, margin[0]):
+                    assert status == 0 and np.abs(again - actuator).max() < 1e-8
+                    back += 1
+    assert back > 20 * len(machines)
+
+
+def test_all_ground_links_of_the_catalogue_but_one_are_closed_forms():
+    linkages = [mechanisms.create(name) for name in mechanisms.TYPES]
+    closed = {(linkage.type, link.name): linkage.inverse(link.name).closed is not None
+              for linkage in linkages if len(linkage.inputs) == 1 for link in linkage.links
+              if link.parent == 'ground' and link.name != linkage.inputs[0].name}
+    assert len(closed) == 16 and [key for key in closed if not closed[key]] == [('klann', 'CF')]
+
+
+def test_names_of_any_letters_are_texts(tmp_path):
+    source = 'a*/ "b"\\ ??/\n%s é'
+    machine, = scene.read({
+        'mechanisms': ['int'], 'int.type': 'four_bar', 'int.crank.source': source,
+        'int.joint_names': ['QB=while/1:x']}).machines.values()
+    library = compiled(tmp_path, [machine])
+    text = (tmp_path / 'all.c').read_text()
+    assert 'INT_JOINT_WHILE_1_X = 0' in text and 'INT_ACTUATOR_A_B_S' in text
+    named = subprocess.run(
+        [COMPILER, '-x', 'c', '-', '-o', tmp_path / 'names', '-lm'], check=True, input=(
+            text + '#include <stdio.h>\nint main(void) { fputs(int_name(0, 0), stdout); }\n'
+        ).encode())
+    assert named.returncode == 0 and library
+    assert subprocess.run([tmp_path / 'names'], capture_output=True).stdout.decode() == source
+
+
+@pytest.mark.skipif(not shutil.which('avr-gcc'), reason='avr-gcc is not installed')
+def test_where_a_double_is_a_float_it_says_so(machines, tmp_path):
+    for single, said in ((False, 'print the header again with --float'), (True, '')):
+        file = tmp_path / 'lever.c'
+        file.write_text(header.written(machines['lever'], (), single) + 'int main(void) { }\n')
+        ended = subprocess.run(['avr-gcc', '-mmcu=atmega328p', '-std=c99', '-c', file, '-o',
+                                tmp_path / 'lever.o'], capture_output=True, text=True)
+        assert (ended.returncode != 0) == bool(said) and said in ended.stderr
+
+
+def written(folder, path, *arguments):
+    """Return the folder of a package for a scene."""
+    made = folder / f'{path.stem}_transmissions'
+    assert transmission.main([str(path), '--out', str(made), *arguments]) == 0
+    return made
+
+
+def proved(package, name, compiler, count, *flags):
+    """Compile the proof for a mechanism of a package and run it at so many states."""
+    code = (package / 'src' / f'{name}.hpp').read_text()
+    class_, space = re.search(r'struct (\w+)Code', code)[1], re.search(r'namespace (\w+)', code)[1]
+    program = package / f'proof_{name}'
+    subprocess.run([compiler, '-std=c++17', *STRICT, *flags, f'-DNAME={name}', f'-DCLASS={class_}',
+                    f'-DNAMESPACE={space}', '-isystem', STAND_IN / 'include', '-I',
+                    package / 'src', STAND_IN / 'proof.cpp', '-o', program], check=True)
+    ended = subprocess.run([program, str(count)], capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    tried, good = map(int, re.search(r'(\d+) states, (\d+)', ended.stdout).groups())
+    assert tried == count and good > 0.9 * count
+
+
+@pytest.mark.parametrize('compiler', COMPILERS)
+def test_a_transmission_is_proved(tmp_path, compiler):
+    proved(written(tmp_path, ROOT / 'examples' / 'leg.yaml'), 'knee', compiler, 5000)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('compiler', COMPILERS)
+@pytest.mark.parametrize('path', SCENES, ids=lambda path: path.stem)
+def test_every_scene_is_proved_at_a_hundred_thousand_states(tmp_path, path, compiler):
+    package = written(tmp_path, path)
+    for name in scene.load(path).machines:
+        proved(package, name, compiler, 100_000)
+        proved(package, name, compiler, 5000, *SANITIZED)
+
+
+@pytest.fixture(scope='module')
+def refusals(tmp_path_factory):
+    """Return what says how a slotted lever is configured, compiled."""
+    folder = tmp_path_factory.mktemp('refusals')
+    package = written(folder, ROOT / 'config' / 'slotted_lever.yaml')
+    if not shutil.which('g++'):
+        pytest.skip('g++ is not installed')
+    subprocess.run(['g++', '-std=c++17', *STRICT, '-isystem', STAND_IN / 'include', '-I',
+                    package / 'src', STAND_IN / 'configure.cpp', '-o', folder / 'configure'],
+                   check=True)
+    return folder / 'configure'
+
+
+@pytest.mark.parametrize('words, said', [
+    (['parameter', 'a', '90'], ''),
+    (['parameter', 'a', 'wide'], "must be a number [m], not 'wide'"),
+    (['parameter', 'a', '-1'], 'a must be a positive number'),
+    (['parameter', 'a', '1e999'], 'a must be a'), (['parameter', 'a', '1 2'], 'must be a number'),
+    (['parameter', 'e', '1e6'], 'it cannot be assembled'), (['parameter', 'e', '-3'], ''),
+    (['parameter', 'x', '1'], "there is no parameter 'x'; allowed: a b e"),
+    (['joint', 'left_flap', 'lever'], ''), (['joint', 'left_flap', 'rod'], ''),
+    (['twice', '', ''], "'slotted_lever_lever', role 'lever', is none of"),
+    (['none', '', ''], "joint 'slotted_lever_lever' is missing"),
+    (['reduction', '', ''], 'must have no mechanical_reduction'),
+    (['handle', 'elbow', ''], "handle 'elbow' belongs to no joint"),
+    (['interface', 'effort', ''], 'need a position interface'),
+    (['interface', 'temperature', ''], 'one interface in common')])
+def test_what_cannot_be_configured_is_refused_in_words(refusals, words, said):
+    ended = subprocess.run([refusals, *words], capture_output=True, text=True)
+    assert (ended.returncode == 0) == (not said), ended.stdout
+    assert said in ended.stdout
+
+
+def test_other_dimensions_are_those_of_another_linkage(refusals):
+    for a, angle in ((90.0, 0.4), (80.0, 1.1), (120.0, -2.0)):
+        ended = subprocess.run([refusals, 'parameter', 'a', str(a), str(angle)],
+                               capture_output=True, text=True)
+        joint, back = map(float, ended.stdout.split())
+        lever = mechanisms.create('slotted_lever', a=a)
+        assert joint == pytest.approx(float(lever.joint_angles(angle)['lever']), abs=1e-14)
+        assert back == pytest.approx(angle, abs=1e-12)
+
+
+@pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
+def test_any_dimensions_are_those_of_python(tmp_path):
+    given = {'mechanisms': [*mechanisms.TYPES, 'odd'],
+             **{f'{name}.type': name for name in mechanisms.TYPES}, 'odd.type': 'custom',
+             'odd.dimensions.u': 0.5, 'odd.dimensions.w': 0.7, 'odd.joints': [
+                 'O ground 0 0', 'H ground w 0', 'R carriage O along H 0.1*w 0.9*w',
+                 'Q ground 0 w', 'B dyad R Q u+w 0.9 left', 'C rigid R B u w left']}
+    machines = scene.read(given).machines
+    source, built = tmp_path / 'open.c', tmp_path / 'open.so'
+    source.write_text(''.join(header.opened(machine) + f"""
+const char *{name}_placed(const double *dimension, const double *q, double *position)
+{{
+    static {name}_linkage c;
+    {name}_point p;
+    const char *wrong = {name}_set(&c, dimension);
+    if (!wrong)
+        position[0] = {name}_at(&c, q, &p) ? p.position[1][0] : NAN;
+    return wrong;
+}}
+""" for name, machine in machines.items()))
+    subprocess.run([COMPILER, '-std=c99', *STRICT, '-shared', '-fPIC', source, '-o', built, '-lm'],
+                   check=True)
+    library, rng, tried = ctypes.CDLL(str(built)), np.random.default_rng(7), 0
+    for name, machine in machines.items():
+        place, linkage = library[f'{name}_placed'], machine.linkage
+        place.restype, output = ctypes.c_char_p, joints(machine)[0].output
+        for _ in range(60):
+            own = {key: value * rng.choice([1.0, 1.0, rng.uniform(0.4, 2.0), -1.0],
+                                           p=[0.3, 0.2, 0.45, 0.05])
+                   for key, value in linkage.dimensions.items()}
+            q = [rng.uniform(input_.low, input_.high) for input_ in linkage.inputs]
+            counted = np.array(q) / [input_.size for input_ in linkage.inputs]
+            position = ctypes.c_double(math.inf)
+            wrong = place((ctypes.c_double * 20)(*own.values()),
+                          (ctypes.c_double * 4)(*counted), ctypes.byref(position))
+            try:
+                other = linkage.with_dimensions(**own)
+            except ValueError:
+                assert wrong
+                continue
+            expected = other.bound('checked', (output,))(*q)[0]
+            if wrong:
+                assert b'triangle' in wrong and not all(other.triangles().values())
+                continue
+            if not all(input_.turns or input_.low <= value <= input_.high
+                       for input_, value in zip(other.inputs, q)):
+                expected = math.nan
+            assert position.value == pytest.approx(
+                expected, abs=1e-14, rel=1e-14, nan_ok=True), (name, own)
+            tried += math.isfinite(position.value)
+    assert tried > 200
+
+
+@pytest.mark.skipif(not shutil.which('cmake'), reason='cmake is not installed')
+def test_a_package_is_built_and_tests_itself(tmp_path):
+    if not (Path(sys.prefix) / 'share' / 'ament_cmake').is_dir():
+        pytest.skip('ament_cmake is not installed')
+    package = written(tmp_path, ROOT / 'examples' / 'leg.yaml', '--mechanism', 'knee', 'hip')
+    build = tmp_path / 'build'
+    for command in (
+            ['cmake', '-S', package, '-B', build, f'-DCMAKE_INSTALL_PREFIX={tmp_path / "install"}',
+             f'-DCMAKE_PREFIX_PATH={STAND_IN / "cmake"};{sys.prefix}',
+             f'-DPython3_EXECUTABLE={sys.executable}'],
+            ['cmake', '--build', build, '--target', 'install'], ['ctest', '--test-dir', build]):
+        ended = subprocess.run(command, capture_output=True, text=True)
+        assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert '2 tests' in ended.stdout or 'out of 2' in ended.stdout
+    assert (tmp_path / 'install' / 'lib' / 'libleg_transmissions.so').is_file()
+
+
+def test_a_package_names_what_the_scene_names(tmp_path):
+    package = written(tmp_path, ROOT / 'examples' / 'leg.yaml')
+    described = ElementTree.parse(package / 'plugins.xml')
+    plugins = {each.get('name') for each in described.iter('class')}
+    pasted = ElementTree.fromstring(
+        f'<all>{(package / "urdf" / "transmissions.xml").read_text()}</all>')
+    assert {each.findtext('plugin') for each in pasted} == plugins and len(plugins) == 3
+    assert [each.find('actuator').get('name') for each in pasted] == [
+        'abduction_motor', 'hip_motor', 'knee_motor']
+    assert [each.find('joint').get('name') for each in pasted] == ['hip_roll', 'hip_pitch', 'knee']
+    assert ElementTree.parse(package / 'package.xml').findtext('name') == package.name
+    assert len((package / 'README.md').read_text().splitlines()) <= 30
+
+
+@pytest.mark.parametrize('arguments, said', [
+    (['--out', '{0}/My-Package'], 'must end in the name of a package'),
+    (['--out', '{0}'], 'or one that this command wrote'), ([], 'required: --out'),
+    (['--out', '{0}/legs', '--joints', 'elbow'], "no mechanism has a joint 'elbow'")])
+def test_what_cannot_be_written_is_one_sentence(tmp_path, capsys, arguments, said):
+    folder = tmp_path / 'mine'
+    folder.mkdir()
+    (folder / 'notes.txt').write_text('keep')
+    assert transmission.main([str(ROOT / 'examples' / 'leg.yaml'),
+                              *(text.format(folder) for text in arguments)]) == 1
+    printed = capsys.readouterr().err
+    assert printed.startswith('transmission: ') and printed.count('\n') == 1 and said in printed
+    assert (folder / 'notes.txt').read_text() == 'keep'
+
+
+def test_a_package_is_written_again(tmp_path):
+    package = written(tmp_path, ROOT / 'config' / 'jansen.yaml')
+    before = {path: path.read_text() for path in package.rglob('*.*')}
+    assert written(tmp_path, ROOT / 'config' / 'jansen.yaml') == package
+    assert {path: path.read_text() for path in package.rglob('*.*')} == before
