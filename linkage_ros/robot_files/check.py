@@ -138,6 +138,12 @@ def _differences(machine: scene.Machine, component: Component, sources: List[str
     """Return the worst difference in each pose, and of which joint."""
     values = [drive.ratio * track.motors[..., sources.index(drive.source)] + drive.offset
               for drive in machine.inputs.values()]
+    if output := machine.first.measures:
+        for path in values[0]:
+            near = machine.first.start
+            for i, value in enumerate(path):
+                path[i] = machine.measured(output, value, near)[0]
+                near = near if math.isnan(path[i]) else path[i]
     angles = machine.linkage.joint_angles(values if len(values) > 1 else values[0])
     slides = {joint.name for joint in component.joints if joint.kind == SLIDE}
     apart = {}

@@ -25,6 +25,8 @@ from ..words import elided
 
 NAME = 'from_robot'
 NEEDS = 'pip install pyyaml, and mujoco for MJCF'
+# Of more joints no pairs are tried as motors.
+MANY = 30
 # What is said of a mechanism that is not its robot's, or could not be held against it.
 WRONG = 'held against the robot'
 _OTHER = {'left': 'right', 'right': 'left', 'out': 'in', 'in': 'out'}
@@ -137,7 +139,8 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
     tries: List[Sequence[str]] = [motors, [name for name in names
                                            if name in motors or name in robot.follows]]
     if not robot.driven:
-        tries += (pair for count in (1, 2) for pair in combinations(names, count))
+        tries += (pair for count in (1, 2)[:1 + (len(names) <= MANY)]
+                  for pair in combinations(names, count))
     drawings: List[Drawing] = []
     for drives in tries:
         loop = loops.flat(robot, group, drives)
@@ -145,6 +148,15 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
         if not drawings[-1].left:
             break
     best = min(drawings, key=lambda drawing: len(drawing.left))
+    if len(motors) == 1 and best.left:
+        # A motor between two moving links is measured by what moves instead, a link on the ground.
+        for joint in group.joints:
+            if group.ground in joint.bodies and joint.position is not None:
+                other = Drawing(robot, loops.flat(robot, group, [joint.name]), [joint.name])
+                if not other.left and [each.source for each in other.drives] == [joint.name]:
+                    other.measured = next(each for each in other.loop.joints
+                                          if each.name == motors[0])
+                    return other
     if not best.drives:
         raise _NotPlaced(best) if best.left else ValueError('no motor moves it')
     for i, line in enumerate(best.lines):
@@ -172,7 +184,7 @@ def _why(drawing: Drawing) -> str:
 def _checked(robot: Robot, drawing: Drawing, taken: Sequence[str]
              ) -> Tuple[str, Dict[str, Any], List[str]]:
     """Return a mechanism's name and parameters, and what is to be said, once it has its pose."""
-    name = re.sub('[^A-Za-z0-9]+', '_', drawing.drives[0].source).strip('_')[:60]
+    name = re.sub('[^A-Za-z0-9]+', '_', drawing.moved_by[0].name).strip('_')[:60]
     name = name if name[:1].isalpha() else f'joint_{name}'.rstrip('_')
     name = f'{name}_{len(taken)}' if name in taken else name
     loop, given = drawing.loop, {
@@ -182,13 +194,13 @@ def _checked(robot: Robot, drawing: Drawing, taken: Sequence[str]
         raise _NotPlaced(drawing)
     for drive in drawing.drives:
         start = f'{name}.{drive.name}.start'
-        if sweep := _sweep(drive, machine.inputs[drive.name]):
+        if sweep := None if drawing.measured else _sweep(drive, machine.inputs[drive.name]):
             given[f'{name}.{drive.name}.sweep'] = [*sweep]
             given[start] = min(max(given[start], sweep[0]), sweep[1])
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if _apart(machine.linkage, drawing) > drawing.allowed:
         raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
-    found = check.compared(robot, machine, [joint.name for joint in drawing.driven],
+    found = check.compared(robot, machine, [joint.name for joint in drawing.moved_by],
                            _ends(drawing), loop.lean + loop.gap / loop.size)
     if found.wrong:
         raise ValueError(f'{WRONG}: {found.wrong}')
@@ -201,7 +213,7 @@ def _checked(robot: Robot, drawing: Drawing, taken: Sequence[str]
     said += [f'{joint} has its ends {gap:.2g} m apart along its axis, on which no angle depends.'
              for joint, gap in loop.across.items()]
     told = {called.name for called in machine.joints.values() if called.published}
-    told |= {joint.name for joint in drawing.driven}
+    told |= {joint.name for joint in drawing.moved_by}
     own = [part for joint in loop.joints for part in joint.name.split('+')
            if drawing.parts.keys() >= {*joint.bodies}]
     if lost := [joint for joint in robot.positions if joint in own and joint not in told]:
@@ -242,6 +254,9 @@ def _apart(linkage: Mechanism, drawing: Drawing, *names: str) -> float:
 def _ends(drawing: Drawing) -> Dict[str, Tuple[float, float]]:
     """Return between which positions each source moves in a check."""
     found: Dict[str, Tuple[float, float]] = {}
+    if joint := drawing.measured:
+        start = joint.position or 0.0
+        return {joint.name: joint.limits or (start - 0.5 * math.pi, start + 0.5 * math.pi)}
     for drive in drawing.drives:
         around = math.pi if drive.name[:5] == 'crank' else 0.5 * drawing.loop.size
         low, high = drive.value - around, drive.value + around
@@ -255,23 +270,40 @@ def _ends(drawing: Drawing) -> Dict[str, Tuple[float, float]]:
 
 def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
     seen = [(joint, found) for joint in drawing.loop.joints if joint.position is not None
-            and joint not in drawing.driven and (found := drawing.measured_by(joint))]
+            and joint not in drawing.moved_by and joint not in drawing.driven
+            and (found := drawing.measured_by(joint))]
     frame = drawing.loop.frame
+    measured = drawing.measured and drawing.measured_by(drawing.measured)
     yield 'type', 'custom'
     yield 'joints', drawing.lines
     yield 'frame_id', drawing.loop.frame_id
     yield 'pose', [float(short(value)) for value in (*frame[:3, 3], *model.rpy(frame[:3, :3]))]
-    for drive in drawing.drives:
-        yield f'{drive.name}.source', drive.source
-        yield f'{drive.name}.ratio', drive.ratio
-        yield f'{drive.name}.offset', float(short(drive.offset))
-        yield f'{drive.name}.start', float(short(drive.value, 1e-15))
-    names, links = [], {link.name: link for link in _linkage(drawing).links}
-    for joint, (link, sign, angle) in seen:
+    links = {link.name: link for link in _linkage(drawing).links}
+    names = []
+
+    def zero_of(joint: Joint, link: str, sign: float, angle: float) -> float:
         if links[link].kind != 'prismatic':
             angle = math.remainder(angle - float(np.asarray(links[link].zero)), math.tau)
-        zero = float(short((joint.position or 0.0) - sign * angle))
-        names.append(f'{link}={"-" * (sign < 0.0)}{quoted_name(joint.name)}'
-                     + (f'{zero:+}' if zero else ''))
+        return float(short((joint.position or 0.0) - sign * angle))
+
+    for drive in drawing.drives:
+        source, ratio, offset = drive.source, drive.ratio, float(short(drive.offset))
+        if measured and drawing.measured:
+            names.append(_line(drive.name, ratio, source, -ratio * offset))
+            link, ratio, angle = measured
+            source, offset = drawing.measured.name, -ratio * zero_of(
+                drawing.measured, link, ratio, angle)
+            yield f'{drive.name}.measures', link
+        yield f'{drive.name}.source', source
+        yield f'{drive.name}.ratio', ratio
+        yield f'{drive.name}.offset', offset
+        yield f'{drive.name}.start', float(short(drive.value, 1e-15))
+    names += [_line(found[0], found[1], joint.name, zero_of(joint, *found))
+              for joint, found in seen]
     yield 'joint_names', names
     yield 'only_named', True
+
+
+def _line(link: str, sign: float, name: str, zero: float) -> str:
+    """Return how a link is published, for joint_names."""
+    return f'{link}={"-" * (sign < 0.0)}{quoted_name(name)}' + (f'{zero:+}' if zero else '')

@@ -33,13 +33,16 @@ class Drawing(Dyads):
     ----------
     drives : list of Drive
     driven : list of Joint
-        The joints that motors move.
+        The joints that drive the lines.
+    measured : Joint, optional
+        The motor between two moving links that tells where what drives is.
 
     """
 
     def __init__(self, robot: Robot, loop: Loop, drives: Sequence[str]):
         self.loop, self._robot = loop, robot
         self.drives: List[Drive] = []
+        self.measured: Optional[Joint] = None
         self.driven = [joint for joint in loop.joints if joint.name in drives]
         pins: List[Dict[str, complex]] = []
         for joint in loop.joints:
@@ -61,6 +64,11 @@ class Drawing(Dyads):
             [each for each in moved if isinstance(each, Slide) and each.joint not in self.driven],
             [each for each in moved if each.joint in self.driven], loop.size, loop.near)
         self.take_apart()
+
+    @property
+    def moved_by(self) -> List[Joint]:
+        """The joints that move it: where its motor is between moving links, that."""
+        return [self.measured] if self.measured else self.driven
 
     @property
     def allowed(self) -> float:

@@ -17,9 +17,12 @@ from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Seq
 import numpy as np
 
 from .robot import BALL, FIXED, FREE, HINGE, Joint, Robot, SLIDE, UNIVERSAL
+from ..command import RequestError
 
 # A pose moves by no more than this in a step [rad, or parts of the size].
 STRIDE = 0.5
+# Bodies in loops that are closed together.
+MOST = 100
 # Hinges nearer to each other [m] cross in a point.
 TOGETHER = 1e-6
 # In which order joints are taken into the tree, so that hinges and balls are left to close it.
@@ -120,6 +123,9 @@ def components(robot: Robot) -> Iterator['Component']:
     """Yield the loops that share joints, each lot on its own."""
     found, cuts = trees(robot)
     for bodies, own in blocks(found, cuts):
+        if len(bodies) > MOST:
+            raise RequestError(f'{len(bodies)} bodies are in loops that share joints: no more '
+                               f'than {MOST} are closed at once')
         yield Component(robot, found, bodies, own)
 
 
