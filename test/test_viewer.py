@@ -350,6 +350,24 @@ def test_what_kinematics_does_not_show_is_set_on_the_node_that_does(graph, show)
             for name in ('dimensions.b', 'spring')] == [1.0, 3.0, 2.0, 2.0]
 
 
+def test_what_every_node_is_given_is_of_the_node_that_reads_it(show):
+    running = show({**LEG, 'leg.crank.speed': 1.0, 'rate': 30.0})
+    driver, = (node for node in running.nodes if isinstance(node, CrankDriver))
+    driver.set_parameters([Parameter('rate', value=20.0)])
+
+    async def use(url):
+        async with Page(url) as page:
+            cast = await page.cast('/leg')
+            assert await page.set('/leg', crank__speed=-2.5) == ''
+            return cast['/leg']['settings'], (await page.ask('save', '/leg'))['text']
+
+    settings_, saved = asyncio.run(use(running.viewer.url))
+    speed, = (one for one in settings_ if one['name'] == 'crank.speed')
+    assert (speed['low'], speed['high']) == (-100.0, 100.0) and '[rad/s]' in speed['meaning']
+    assert running.value(CrankDriver, 'leg.crank.speed') == -2.5
+    assert 'rate: 20.0' in saved
+
+
 def test_a_change_that_somebody_else_makes_is_shown(show):
     running = show(LEVER)
 

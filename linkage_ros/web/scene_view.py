@@ -363,25 +363,26 @@ class SceneView:
         sources = {topic for topics in heard.values() for topic in topics}
         await self._bridge.ask(self._open, list(owners), nodes, sources)
         names = sorted({*GENERAL, *(key.rsplit('/', 1)[1] for key in owners)})
-        # What the nodes that draw have is theirs, and asked of no other.
+        # What the nodes that draw describe is theirs, and asked of no other. A parameter without a
+        # description was given to a node that does not read it.
         found: dict[str, Optional[Described]] = {}
         for part in ([node for node in nodes if node in heard],
                      [node for node in nodes if node not in heard]):
             known = {space: {name for node, own in found.items() if _space(node) == space
-                             for name in own or ()} for space in spaces}
+                             for name, (about, _) in (own or {}).items() if about.description}
+                     for space in spaces}
             found.update(zip(part, await asyncio.gather(
                 *(self._parameters(node, names, known[_space(node)]) for node in part))))
         self._found = found
         self._mechanisms = {key: self._mechanism(key, own_nodes, found, heard)
                             for key, own_nodes in owners.items()}
         self._general = {}
-        for node, given in found.items():
-            own = given or {}
-            for name in own.keys() & set(GENERAL):
-                descriptor, value = own[name]
-                with suppress(ValueError):
-                    self._general.setdefault(_space(node), {}).setdefault(
-                        name, Setting(name, node, descriptor, value).value)
+        told = [(node, name, *own[name]) for node, given in found.items()
+                for own in [given or {}] for name in GENERAL if name in own]
+        for node, name, about, value in sorted(told, key=lambda one: not one[2].description):
+            with suppress(ValueError):
+                self._general.setdefault(_space(node), {}).setdefault(
+                    name, Setting(name, node, about, value).value)
         for client in self.clients:
             self._show(client)
 
@@ -407,7 +408,9 @@ class SceneView:
         for node in sorted(near, key=lambda node: node not in own_nodes):
             for full, (descriptor, value) in (found[node] or {}).items():
                 name = full[len(prefix):]
-                if full.startswith(prefix) and name not in mechanism.settings:
+                before = mechanism.settings.get(name)
+                if full.startswith(prefix) and (not before or not before.descriptor.description
+                                                and descriptor.description):
                     with suppress(ValueError):
                         mechanism.settings[name] = Setting(name, node, descriptor, value)
         return mechanism
