@@ -14,7 +14,17 @@ from __future__ import annotations
 
 from functools import reduce
 import operator
-from typing import Callable, Iterable, Iterator, List, NamedTuple, Optional, Tuple, Union
+from typing import (
+    Callable,
+    Iterable,
+    Iterator,
+    List,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Tuple,
+    Union,
+)
 
 from .operations import OPERATIONS, STEPS
 
@@ -362,6 +372,20 @@ def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
         else:
             known[x] = OPERATIONS[x.op].rate(operation, x, *map(known.get, x.operands))
     return known[node]
+
+
+def substituted(outputs: Sequence[Real], arguments: Sequence[Real]) -> List[Real]:
+    """Return expressions whose arguments are other expressions; rates of their own are lost."""
+    known: dict = {}
+    for x in in_order(outputs, lambda x: x.operands if x.varies else ()):
+        if x.op == 'argument':
+            known[x] = arguments[x.args[0]]
+        elif not x.varies:
+            known[x] = x
+        else:
+            known[x] = known[x.args[0]] if x.op == 'rated' else Real(
+                x.op, tuple(known[arg] for arg in x.args), positive=x.positive)
+    return [known[x] for x in outputs]
 
 
 class Rate(NamedTuple):

@@ -17,7 +17,6 @@ from itertools import chain, combinations, islice, product
 import math
 from typing import (
     Any,
-    Iterable,
     Iterator,
     List,
     Mapping,
@@ -48,6 +47,7 @@ from ..formula.expression import (
     real,
     square,
     square_root,
+    substituted,
     where,
 )
 from ..formula.program import Pose, Program
@@ -66,9 +66,8 @@ ENDED = 1e-7
 OTHER = 1e-2
 # Newton steps that may take a closed form's rounding away; each doubles the digits.
 POLISHING = 5
-# What an output misses [its size] that is no more than this is not made less. Outputs tell inputs
-# badly where the inputs move by more than their rounding through this.
-TINY, SOUND = 2.0 ** -54, 0.1
+# Where rates are smaller than this, outputs tell inputs worse than a step of Newton's can mend.
+SOUND = 0.1
 # Answers that are no further apart than this [rad, sizes], or than what rounding of the outputs
 # makes of it where that is no more than the second, are one.
 SAME, NEIGHBOURS = 1e-13, 1e-4
@@ -78,8 +77,6 @@ STEP, ALIKE = 0.3, 1e-5
 # An input is at an end of its sweep if the outputs do not tell by rounding, or by this, and by
 # this part of the end.
 CLOSE, ULPS = 1e-7, 4 * 2.0 ** -52
-# Of so many values at once the last rounding is left in the answers.
-MANY = 1024
 # More than any input.
 LARGE = 1e300
 
@@ -159,13 +156,18 @@ class Inverse:
         self._angular = [linkage.is_angle(name) for name in outputs]
         self._scales = [1.0 if angular else linkage.longest for angular in self._angular]
         self._sizes = [input_.size for input_ in linkage.inputs]
+        # Of each input half a period, the period, and below what it is zero.
+        self._turned = [(0.5 * input_.turn, input_.turn, LEAST) if input_.turns else
+                        (math.inf, math.inf, LEAST * input_.size) for input_ in linkage.inputs]
         self._check = linkage.checked(outputs)
         self._rated = linkage.posed((), outputs, outputs)
         self.closed: Union[InverseLinkage, InverseRods, None] = (
             taken_apart if linkage.axes == 'xy' else rods_taken_apart)(linkage, outputs)
         if self.closed:
-            self._solve = self.closed.bind(linkage.is_accelerated)
-            self._turns = list(product(*self.closed.turns))
+            # For each mode: 1 if it is an answer, 0 if not, between if that is to be looked at
+            # closer; the inputs and rates.
+            self._solve, self._row = linkage.bind(self._program(self.closed)), 1 + self._n * (
+                self._n + 1)
         else:
             self._search: Any = Analysis(linkage).branches(*outputs) if self._n == 1 else Search(
                 linkage, outputs)
@@ -234,23 +236,68 @@ class Inverse:
         values = self._reduced(values)
         if not self.closed:
             return _columns(*self._searched(np.array(values)[:, None]))
-        n, flat, found = self._n, self._solve(*values), []
-        for start in range(0, len(flat), n):
-            for inputs in self._turned(flat[start:start + n]):
-                if own := self._own(inputs, values):
-                    found.append(own)
+        found, n = [], 1 + self._n
+        for row in self._rows(values):
+            if row[0] == 1.0:
+                found.append((self._within(row[1:n]), row[n:]))
+            elif row[0] > 0.0 and (own := self._own(row[1:n], values)):
+                found.append(own)
         return self._distinct(found) if len(found) > 1 else found
+
+    def _rows(self, values: Sequence[float]) -> List[Tuple[float, ...]]:
+        """Return what each assembly mode has to say of values; see `_program`."""
+        flat, size = self._solve.at(*values), self._row
+        return [flat[start:start + size] for start in range(0, len(flat), size)]
+
+    def _program(self, closed: InverseLinkage) -> Program:
+        """Return the code for all modes, held to the forward formula and polished by it."""
+        n, check, parts = self._n, self.linkage.structure.checked(self.outputs), []
+        for mode in closed.modes:
+            for turns in product(*closed.turns):
+                inputs = [value + turn for value, turn in zip(mode.inputs, turns)]
+                # What is wanted of a linkage's inputs is told of the inverse's by their place.
+                row = substituted(check, inputs)
+                parts += self._judged(inputs, row[:n], row[n:])
+        return Program(parts, n, closed.given)
+
+    def _judged(self, inputs: Sequence[Real], reached: Sequence[Real],
+                rates: Sequence[Real]) -> List[Real]:
+        """Return whether inputs are an answer, these after a step of Newton's, and their rates."""
+        n, verdict, gaps, close = self._n, real(1.0), [], real(1.0)
+        for i, (angular, scale) in enumerate(zip(self._angular, self._scales)):
+            gap = reached[i] - argument(i)
+            if angular and self.outputs[i] in self.linkage.structure.built.driven:
+                # What is given is what is had, in whatever turn.
+                gap = 0.0 * gap
+            elif angular:
+                gap = where(math.pi < gap, gap - math.tau, where(gap < -math.pi, gap + math.tau,
+                                                                 gap))
+            gaps.append(gap)
+            allowed = ROUNDING * (scale + sum((
+                abs(rate) * where(abs(x) < size, size, abs(x))
+                for rate, x, size in zip(rates[i::n], inputs, self._sizes)), real(0.0)))
+            verdict = where(abs(gaps[-1]) <= allowed, where(
+                abs(gaps[-1]) <= ENDED * scale, verdict, 0.5), 0.5)
+            close = where(OTHER * scale < abs(gaps[-1]), 0.0, close)
+        return [verdict * gated(close, abs(inputs[0]), 0.0),
+                *(x - step for x, step in zip(inputs, self._steps(gaps, rates))), *rates]
+
+    def _steps(self, gaps: Sequence[Real], rates: Sequence[Real]) -> Sequence[Real]:
+        """Return the steps of Newton's method where outputs tell inputs well, elsewhere 0."""
+        if self._n > 2:
+            return [real(0.0)] * self._n
+        det = rates[0] if self._n == 1 else rates[0] * rates[3] - rates[1] * rates[2]
+        sound = SOUND * math.prod(self._scales) / math.prod(self._sizes) < abs(det)
+        det = where(sound, det, math.inf)
+        if self._n == 1:
+            return [gaps[0] / det]
+        return [(gaps[0] * rates[3] - gaps[1] * rates[2]) / det,
+                (gaps[1] * rates[0] - gaps[0] * rates[1]) / det]
 
     def _reduced(self, values: Tuple[float, ...]) -> Tuple[float, ...]:
         """Return values with angles beyond a turn within one: sine and cosine lose no digit."""
         return tuple(math.atan2(math.sin(x), math.cos(x)) if angular and abs(x) > math.tau else x
                      for x, angular in zip(values, self._angular))
-
-    def _turned(self, inputs: Tuple[float, ...]) -> Iterable[Tuple[float, ...]]:
-        """Return inputs in all turns that may differ; none if they have no value."""
-        if any(x != x for x in inputs):
-            return ()
-        return [tuple(x + turn for x, turn in zip(inputs, turns)) for turns in self._turns]
 
     def _own(self, inputs: Tuple[float, ...], values: Sequence[float],
              within: bool = True) -> Optional[Found]:
@@ -268,26 +315,15 @@ class Inverse:
                 return None
         for _ in range(POLISHING):
             gaps, sure, away = self._missed(row, inputs, values, slack)
-            if not sure and not away <= OTHER:
-                return None
-            stepped = self._stepped(inputs, row[n:], gaps) if away > TINY else (math.nan,)
-            if sure and not self._is_near(stepped, inputs):
-                return self._within(inputs) if within else inputs, row[n:]
-            if any(x != x for x in stepped):
-                return None
-            after = at(*stepped)
             if sure:
-                # The step takes rounding away, or there is none that it could.
-                better = self._missed(after, stepped, values, slack)[2] < away
-                inputs, row = (stepped, after) if better else (inputs, row)
                 return self._within(inputs) if within else inputs, row[n:]
-            inputs, row = stepped, after
+            if not away <= OTHER:
+                break
+            inputs = self._stepped(inputs, row[n:], gaps)
+            if any(x != x for x in inputs):
+                break
+            row = at(*inputs)
         return None
-
-    def _is_near(self, stepped: Sequence[float], inputs: Sequence[float]) -> bool:
-        """Return whether a step is one that rounding makes where outputs tell inputs well."""
-        return all(abs(x - y) <= ROUNDING * size / SOUND
-                   for x, y, size in zip(stepped, inputs, self._sizes))
 
     def _beside(self, inputs: Tuple[float, ...]) -> Iterator[Tuple[float, ...]]:
         """Yield inputs that differ by rounding, one a little."""
@@ -326,9 +362,12 @@ class Inverse:
 
     def _within(self, inputs: Sequence[float]) -> Tuple[float, ...]:
         """Return inputs as they are counted: angles in the turns from -pi."""
-        return tuple(0.0 if abs(x) < LEAST * size else x - turns if (
-            turns := input_.turns_of(x)) else x
-            for input_, size, x in zip(self._inputs, self._sizes, inputs))
+        found = []
+        for x, (half, turn, least) in zip(inputs, self._turned):
+            if not -half <= x < half:
+                x -= turn * math.floor(x / turn + 0.5)
+            found.append(0.0 if -least < x < least else x)
+        return tuple(found)
 
     def _distinct(self, found: Sequence[Found]) -> List[Found]:
         """Return answers in order, without those that rounding does not tell from another."""
@@ -339,10 +378,14 @@ class Inverse:
         return kept
 
     def _are_one(self, answer: Found, other: Found) -> bool:
-        apart = max(abs(math.remainder(x - y, input_.turn) if input_.turns else x - y) / size
-                    for input_, size, x, y in zip(self._inputs, self._sizes, answer[0], other[0]))
-        if apart <= SAME or not apart <= NEIGHBOURS:
-            return apart <= SAME
+        apart = 0.0
+        for x, y, size, (_, turn, _) in zip(answer[0], other[0], self._sizes, self._turned):
+            gap = abs(x - y)
+            if NEIGHBOURS * size < gap < turn - NEIGHBOURS * size:
+                return False
+            apart = max(apart, min(gap, abs(turn - gap)) / size)
+        if apart <= SAME:
+            return True
         values = np.linalg.svd(self._jacobian(answer[1]), compute_uv=False)
         rounding = 8 * 2.0 ** -53 if self.closed or self._n == 1 else SAME
         return bool(apart <= rounding * (1.0 + values[0]) / max(values[-1], SAME))
@@ -364,37 +407,27 @@ class Inverse:
         if not self.closed:
             return self._searched(values)
         n, count = self._n, values.shape[1]
-        with np.errstate(all='ignore'):
-            found = self._solve.over(*values).reshape(self.closed.count, n, count)
-            if len(self._turns) > 1:
-                found = np.concatenate([found + np.reshape(turns, (n, 1))
-                                        for turns in self._turns])
-            flat = found.transpose(1, 0, 2).reshape(n, len(found) * count)
-            rows = self._check.over(*flat)
-            wanted = np.tile(values, (1, len(found)))
-            gaps = rows[:n] - wanted
-            gaps[self._angular] -= math.tau * np.round(gaps[self._angular] / math.tau)
-            gaps, scales = np.abs(gaps), np.reshape(self._scales, (-1, 1))
-            speeds = np.abs(rows[n:].reshape(n, n, flat.shape[1]))
-            allowed = ROUNDING * (scales + (speeds * np.maximum(
-                np.abs(flat), np.reshape(self._sizes, (-1, 1)))[:, None]).sum(axis=0))
-            allowed = np.minimum(allowed, ENDED * scales)
-            sure = ~(gaps > allowed).any(axis=0) & np.isfinite(gaps).all(axis=0)
-            # What is not only rounding, and what of it a step may take away.
-            near = (gaps <= OTHER * scales).all(axis=0) & (~sure | (
-                gaps > TINY * scales).any(axis=0) & (count <= MANY))
-            ended = np.isnan(gaps).any(axis=0) & np.isfinite(flat).all(axis=0)
-            places = np.flatnonzero(ended)
-            for beside in self._beside(tuple(flat[:, places])) if len(places) else ():
-                near[places] |= np.isfinite(self._check.over(*beside)[:n]).all(axis=0)
-        closed = flat
-        flat, rates = np.where(sure, flat, np.nan), np.where(sure, rows[n:], np.nan)
-        for place in np.flatnonzero(near):
-            if own := self._own(tuple(closed[:, place].tolist()),
-                                tuple(wanted[:, place].tolist())):
-                flat[:, place], rates[:, place] = own
-        return self._single(flat.reshape(n, len(found), count).swapaxes(0, 1),
-                            rates.reshape(n * n, len(found), count).swapaxes(0, 1))
+        rows = self._solve.over(*values).reshape(-1, self._row, count) if count else np.empty(
+            (1, self._row, 0))
+        verdict, inputs, rates = rows[:, 0], rows[:, 1:n + 1].copy(), rows[:, n + 1:].copy()
+        with np.errstate(invalid='ignore'):
+            closer = (verdict > 0.0) & (verdict < 1.0)
+        for mode, place in zip(*np.nonzero(closer & self._may_be(inputs, rows))):
+            if own := self._own(tuple(inputs[mode, :, place].tolist()),
+                                tuple(values[:, place].tolist())):
+                inputs[mode, :, place], rates[mode, :, place] = own
+                closer[mode, place] = False
+        none = closer | ~(verdict > 0.0)
+        return self._single(np.where(none[:, None], np.nan, inputs),
+                            np.where(none[:, None], np.nan, rates))
+
+    def _may_be(self, inputs: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Return what may be an answer: what can be assembled, or a little beside."""
+        found = np.isfinite(rows[:, self._n + 1:]).all(axis=1)
+        places = np.nonzero(~found & np.isfinite(inputs).all(axis=1))
+        for beside in self._beside(tuple(inputs.swapaxes(0, 1)[:, places[0], places[1]])):
+            found[places] |= np.isfinite(self._check.over(*beside)[:self._n]).all(axis=0)
+        return found
 
     def _single(self, inputs: np.ndarray, rates: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return answers as they are counted, NaN what rounding does not tell from another."""
@@ -568,9 +601,8 @@ class Inverse:
     def _modes(self, values: Sequence[float], near: Sequence[float]
                ) -> Iterator[Tuple[int, Tuple[float, ...]]]:
         """Yield what each assembly mode answers that has an answer, next to other inputs."""
-        n, flat = self._n, self._solve(*map(float, values))
-        for mode in range(len(flat) // n):
-            inputs = flat[mode * n:mode * n + n]
+        for mode, row in enumerate(self._rows(values)):
+            inputs = row[1:self._n + 1]
             if not any(x != x for x in inputs):
                 yield mode, self._next_to(inputs, near)
 

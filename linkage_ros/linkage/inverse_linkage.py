@@ -46,8 +46,8 @@ if TYPE_CHECKING:
 MOST_SIDES = 5
 # Of the linkage's size, what is at one place; and how often it is looked for a pose.
 NEAR, TRIES = 1e-9, 400
-# Lengths [m] that joint lines can have.
-SMALLEST, LARGEST = 1e-60, 1e60
+# Assembly modes, in all turns, at most.
+MOST_MODES = 64
 
 
 class Mode(NamedTuple):
@@ -110,15 +110,18 @@ class InverseLinkage:
             raise ValueError(f'more than {2 ** MOST_SIDES} assembly modes')
         self.design = Design('inverse', {}, self.lines, lines[-1].names[0])
         self.turns = tuple(read.turns for read in sketch.reads)
+        if 2 ** len(self.branches) * math.prod(map(len, self.turns)) > MOST_MODES:
+            raise ValueError('too many turns')
         self.modes = tuple(self._mode(sketch, dict(zip(self.branches, signs)))
                            for signs in product((1, -1), repeat=len(self.branches)))
         given = [ratio * argument(outputs.index(name)) + offset
                  for name, ratio, offset in self.driving]
         # An argument is told from others by its place.
+        self.given = {leaf: value for mode in self.modes for leaf, value in zip(
+            mode.linkage.built.arguments, given)}
         self.program = Program(
-            [value for mode in self.modes for value in mode.inputs], len(outputs), {
-                leaf: value for mode in self.modes for leaf, value in zip(
-                    mode.linkage.built.arguments, given)})
+            [value for mode in self.modes for value in mode.inputs], len(outputs),
+            self.given)
 
     def _mode(self, sketch: _Sketch, signs: Dict[str, int]) -> Mode:
         structure = Structure(self.design, signs)
@@ -135,15 +138,6 @@ class InverseLinkage:
             inputs.append((value - read.offset) / read.ratio)
             rates.append(tuple(rate / read.ratio for rate in row))
         return Mode(structure, tuple(inputs), tuple(rates))
-
-    @property
-    def count(self) -> int:
-        """How many assembly modes it has."""
-        return len(self.modes)
-
-    def bind(self, accelerate: bool = False) -> Any:
-        """Return its program as a function of the outputs."""
-        return self.program.bind({UNIT.args[0]: 1.0}, {}, accelerate)
 
     def __str__(self) -> str:
         said = {name: f'{name}' if (ratio, offset) == (1.0, 0.0) else
@@ -177,7 +171,8 @@ class _Read(NamedTuple):
 
 def taken_apart(linkage: Mechanism, outputs: Names) -> Optional[InverseLinkage]:
     """Return the inverse linkage for outputs, None where no closed form is known."""
-    if not SMALLEST < linkage.longest < LARGEST or len(set(outputs)) < len(outputs):
+    # Joint lines have their lengths in metres.
+    if linkage.value(UNIT) != 1.0 or len(set(outputs)) < len(outputs):
         return None
     pose = _pose(linkage)
     if pose is None:

@@ -27,7 +27,7 @@ from .inverse import Answer, Inverse
 from .quantities import Points, Spot, Structure, structure_of
 from ..cache import Cache
 from ..formula.expression import derivative, Real
-from ..formula.program import Batch, evaluate, Pose
+from ..formula.program import Batch, evaluate, Pose, Program
 from ..words import listed, meant, plain_text, quoted
 
 # Lengths beyond these are counted in a power of two of their own, which changes no bit of a
@@ -906,6 +906,10 @@ class Mechanism:
     def moves(self, output: str, by: int = 0) -> bool:
         """Return whether an output depends on one of the inputs."""
         return self._structure.moves(output, by)
+
+    def bind(self, program: Program) -> Pose:
+        """Return a program of its formulas as a function of its arguments."""
+        return program.bind(self._lengths, self._evaluated, self._accelerate)
 
     def checked(self, outputs: Tuple[str, ...]) -> Pose:
         """Return the code for outputs, NaN where anything cannot be assembled, and their rates."""

@@ -79,7 +79,7 @@ class Structure:
             'points': self._points, 'velocities': self._velocities, 'angles': self._angles,
             'rates': self._rates, 'parts': self._parts, 'margins': self._margins,
             'transmissions': self._transmissions, 'closures': self._closures,
-            'output': self._output, 'checked': self._checked,
+            'output': self._output, 'checked': self.checked,
             'point accelerations': self._point_accelerations,
             'joint accelerations': self._joint_accelerations}
 
@@ -141,7 +141,7 @@ class Structure:
         turning = [self._rates(rates, by) for by in range(len(self.built.inputs))]
         return [*self._points(points), *self._angles(joints), *chain.from_iterable(turning)]
 
-    def _checked(self, names: Names) -> List[Real]:
+    def checked(self, names: Names) -> List[Real]:
         """Return outputs, NaN where not all can be assembled, and their rates by each input."""
         values = self._angles(names)
         for limit in self.built.limits:
