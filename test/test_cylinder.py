@@ -218,3 +218,15 @@ def test_a_picture_follows_the_stroke_there_and_back():
     assert cycle.pose(cycle.first.turns_to(1.0)).inputs[0] == pytest.approx(1.0)
     with pytest.raises(scene.SceneError, match='the cylinder length never is 9 m'):
         cycle.first.turns_to(9.0)
+
+
+@pytest.mark.parametrize('length', [1e-1, 1e-4, 1e-8])
+def test_the_barrel_of_an_isosceles_cylinder_keeps_its_digits_as_it_gets_short(length):
+    linkage = mechanisms.create('custom', joints=(
+        'P ground 0 0', 'O ground 1.25 0', 'B cylinder P O 1.25 left'))
+    # The barrel is at alpha from P -> O, cos alpha = c / 2 d: alpha' = -1 / (2 d sin alpha).
+    sine = math.sqrt((1.0 - length / 2.5) * (1.0 + length / 2.5))
+    assert linkage.joint_rates(length, ('barrel',))['barrel'] == pytest.approx(
+        -1.0 / (2.5 * sine), rel=4e-16)
+    assert linkage.joint_accelerations(length, 1.0, 0.0, ('barrel',))['barrel'] == pytest.approx(
+        -length / (2.5 * sine) ** 3, rel=1e-6, abs=1e-8)

@@ -178,3 +178,12 @@ def test_next_to_a_dead_point_it_grows_without_bound():
 def test_a_load_that_cannot_be_is_refused(loads, said):
     with pytest.raises(ValueError, match=said):
         mechanisms.create('four_bar').effort(0.4, loads)
+
+
+def test_loads_and_outputs_that_are_none_are_refused():
+    linkage = mechanisms.create('four_bar')
+    for loads in ([1.0, 2.0], 'B', 3.0, None):
+        with pytest.raises(ValueError, match='loads must be a mapping'):
+            linkage.effort(0.5, loads)
+    with pytest.raises(ValueError, match='O.x of four_bar does not move with the crank'):
+        linkage.output_effort('O.x', 0.5, 1.0)

@@ -124,6 +124,11 @@ class Arm:
             square(length), abs(vector.x), real(0.0))
         self._span, self._length = span, length
 
+    @property
+    def length(self) -> Optional[Real]:
+        """Its length, if that is constant."""
+        return self._length
+
     def offset(self, point: Complex, seen: Complex) -> Real:
         """Return the cross product of the arm and a point as seen from its foot."""
         return cross(self.vector, seen)
@@ -135,6 +140,18 @@ class Arm:
     def beyond(self, radius: Real, size: Real) -> Limit:
         """Return the margin square - radius^2; the radius is made from lengths up to size."""
         return self._limit(radius, size, -1.0, self.square - square(radius))
+
+    def stroke(self, first: Real, second: Real, size: Real) -> Tuple[Limit, Limit]:
+        """Return what `within` their sum and `beyond` their difference do; first varies."""
+        length = self._length
+        if length is None:
+            return self.within(first + second, size), self.beyond(first - second, size)
+        # However short it is, it is added last.
+        margins = ((first + (second - length)) * (first + (second + length)),
+                   ((length + second) - first) * (first + (length - second)))
+        longer, shorter = (gated(margin, self.square, real(0.0)) for margin in margins)
+        return (self._limit(first + second, size, 1.0, longer),
+                self._limit(first - second, size, -1.0, shorter))
 
     def across(self, point: Complex, offset: Real) -> Complex:
         """Return the vector from a point of this offset to its mirror image in the arm's line."""
@@ -286,7 +303,8 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True,
     """
     radius = first + second
     size = radius if longest is None else longest + second
-    limits = arm.within(radius, size), arm.beyond(first - second, size)
+    limits = (arm.within(radius, size), arm.beyond(first - second, size)) \
+        if longest is None else arm.stroke(first, second, size)
     roots = [x.smooth if smooth and x.smooth else x.root() for x in limits]
     twice = 2.0 * arm.square
     skew = (first - second) * (first + second) / twice
@@ -304,8 +322,19 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True,
             (v, skew, *turning.of), lambda dv, dskew, *rates: turning.formula(*rates) + (
                 (along * dv - v * dskew) * arm.square / square(length))))
 
-    return Dyad(with_turning(bars[0], u, first), with_turning(bars[1], skew - 0.5, second),
-                limits)
+    def with_growing(barrel: Complex) -> Complex:
+        """Add a barrel's turning, as its length and the arm's square grow: nothing cancels."""
+        length = arm.length
+        power = arm.square - square(second) if length is None else \
+            (length - second) * (length + second)
+        return with_spin(barrel, Rate(
+            (first, arm.square, *turning.of), lambda dc, dw, *rates: turning.formula(*rates) - (
+                dc * (square(first) - power) / (2.0 * first) + dw * (
+                    arm.square - square(first) + square(second)) / (4.0 * arm.square)) / (
+                        v * arm.square)))
+
+    return Dyad(with_turning(bars[0], u, first) if longest is None else with_growing(bars[0]),
+                with_turning(bars[1], skew - 0.5, second), limits)
 
 
 def _known_with(other: Real, vector: Complex, part: Real) -> Real:

@@ -10,6 +10,7 @@ to nothing in every motion that the linkage allows.
 
 from __future__ import annotations
 
+from collections import abc
 from typing import Any, Iterator, Mapping, TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 
 def effort(linkage: Mechanism, theta: Inputs, loads: Mapping[str, ArrayLike]) -> np.ndarray:
     """Return what `Mechanism.effort` does."""
+    if not isinstance(loads, abc.Mapping):
+        raise ValueError('loads must be a mapping from joints to forces and from links to '
+                         f'moments, got {quoted(loads)}')
     shape = np.broadcast_shapes(*map(np.shape, linkage.each_input(theta)))
     efforts = [np.zeros(shape) for _ in linkage.inputs]
     for by in range(len(linkage.inputs)):
@@ -73,5 +77,6 @@ def output_effort(linkage: Mechanism, output: str, theta: Inputs, effort: ArrayL
     if len(linkage.inputs) > 1:
         raise ValueError(f'{linkage.type} has several inputs; the effort of an output is there '
                          'for one')
+    linkage.check_output(output)
     with np.errstate(divide='ignore', invalid='ignore'):
         return (numbers('effort', effort) / linkage.joint_rates(theta, (output,))[output])[()]

@@ -85,6 +85,9 @@ class InverseRequest:
     def __init__(self, machine: Machine, outputs: Sequence[str]):
         self._machine, self._drives = machine, list(machine.inputs.values())
         self.outputs = [output or LEVER for output in outputs]
+        if len(self._drives) > 1 and len(outputs) == 1:
+            raise ValueError(f'{machine.name} has several inputs; one output does not tell them: '
+                             'ask inputs_for')
         self._inverse = machine.linkage.inverse(tuple(self.outputs))
         self.what = 'lever angles' if self.outputs == [LEVER] else \
             f'values of {listed(self.outputs)}'
