@@ -377,7 +377,8 @@ def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
 def substituted(outputs: Sequence[Real], arguments: Sequence[Real]) -> List[Real]:
     """Return expressions whose arguments are other expressions; rates of their own are lost."""
     known: dict = {}
-    for x in in_order(outputs, lambda x: x.operands if x.varies else ()):
+    for x in (x for output in outputs for x in unknown(
+            output, lambda x: x.operands if x.varies else (), known)):
         if x.op == 'argument':
             known[x] = arguments[x.args[0]]
         elif not x.varies:

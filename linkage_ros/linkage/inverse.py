@@ -249,7 +249,7 @@ class Inverse:
         flat, size = self._solve.at(*values), self._row
         return [flat[start:start + size] for start in range(0, len(flat), size)]
 
-    def _program(self, closed: InverseLinkage) -> Program:
+    def _program(self, closed: Union[InverseLinkage, InverseRods]) -> Program:
         """Return the code for all modes, held to the forward formula and polished by it."""
         n, check, parts = self._n, self.linkage.structure.checked(self.outputs), []
         for mode in closed.modes:
