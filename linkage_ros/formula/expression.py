@@ -377,15 +377,15 @@ def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
 def substituted(outputs: Sequence[Real], arguments: Sequence[Real]) -> List[Real]:
     """Return expressions whose arguments are other expressions; rates of their own are lost."""
     known: dict = {}
-    for output in outputs:
-        for x in unknown(output, lambda x: x.operands if x.varies else (), known):
-            if x.op == 'argument':
-                known[x] = arguments[x.args[0]]
-            elif not x.varies:
-                known[x] = x
-            else:
-                known[x] = known[x.args[0]] if x.op == 'rated' else Real(
-                    x.op, tuple(known[arg] for arg in x.args), positive=x.positive)
+    for x in (x for output in outputs for x in unknown(
+            output, lambda x: x.operands if x.varies else (), known)):
+        if x.op == 'argument':
+            known[x] = arguments[x.args[0]]
+        elif not x.varies:
+            known[x] = x
+        else:
+            known[x] = known[x.args[0]] if x.op == 'rated' else Real(
+                x.op, tuple(known[arg] for arg in x.args), positive=x.positive)
     return [known[x] for x in outputs]
 
 

@@ -38,6 +38,7 @@ class InverseRods:
             raise ValueError(f'more than {2 ** MOST_SIDES} assembly modes')
         self.branches, self.given = dict.fromkeys(rods, 1), dict[Real, Real]()
         self.turns = ((0.0,),) * len(outputs)
+        self.given: Dict[Real, Real] = {}
         names = [input_.name for input_ in linkage.inputs]
         self.modes = tuple(self._mode({**linkage.branches, **dict(zip(rods, sides))}, names)
                            for sides in product((1, -1), repeat=len(rods)))

@@ -229,5 +229,6 @@ def _arranged(layout: Layout, rest: float, joints: np.ndarray, rates: np.ndarray
     layout.effort(values)[:] = rates[:layout.efforts]
     if layout.speeds:
         driven[n:] = rates[:n]
+    if layout.velocities:
         rows[:, layout.posed:] = rates[n:].reshape(layout.legs, -1)
     return values

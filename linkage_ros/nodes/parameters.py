@@ -85,8 +85,10 @@ class SceneParameters:
         self.scene = scenes.read({name: scenes.plain(value) for name, value in given.items()})
         own = [one for one in self.scene.parameters if role in one.field.readers]
         self.fields = {one.name: one.field for one in own}
-        self.is_given = not given.keys().isdisjoint(one.name for one in self.scene.parameters)
-        for name in given.keys() & self.fields.keys():
+        of_scene = given.keys() & {one.name for one in self.scene.parameters}
+        self.is_given = bool(of_scene)
+        # Those that other nodes act on are not this one's.
+        for name in of_scene:
             node.undeclare_parameter(name)
         self._declare(own)
         self._candidate = self.scene
