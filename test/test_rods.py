@@ -478,7 +478,7 @@ def test_from_pitch_and_roll_to_motors_and_back_in_c(compiled, g1):
     for values in np.random.default_rng(12).uniform([-0.8, -0.2], [0.5, 0.2], (200, 2)):
         motors, back = np.zeros((2, 2))
         assert turn(values.ctypes.data, motors.ctypes.data, back.ctypes.data) == 0
-        found, _ = inverse.nearest(values.tolist(), None)
+        found, _ = inverse.nearest(values.tolist(), [0.0, 0.0])
         np.testing.assert_allclose(motors, found, atol=1e-12)
         np.testing.assert_allclose(back, values, atol=1e-12)
 

@@ -36,7 +36,7 @@ class InverseRods:
         rods = turning_rods(self.design.lines, outputs)
         if len(rods) > MOST_SIDES:
             raise ValueError(f'more than {2 ** MOST_SIDES} assembly modes')
-        self.branches, self.given = dict.fromkeys(rods, 1), dict[Real, Real]()
+        self.branches = dict.fromkeys(rods, 1)
         self.turns = ((0.0,),) * len(outputs)
         self.given: Dict[Real, Real] = {}
         names = [input_.name for input_ in linkage.inputs]
