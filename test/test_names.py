@@ -183,3 +183,19 @@ def test_parameters_have_such_names_too(kind):
     assert [each.name for each in changed.changed_from(read)] == ['leg.dimensions.m']
     with pytest.raises(scene.SceneError, match=r'^leg\.colour is not a parameter of the scene'):
         scene.changed(read, {made('leg.colour'): 1.0})
+
+
+@pytest.mark.parametrize('wrong', [bytearray(b'3'), b'3', memoryview(b'3'), '3'])
+def test_bytes_are_no_numbers(wrong):
+    for ask in (lambda: mechanisms.create('jansen', a=wrong),
+                lambda: mechanisms.create('jansen').solve(wrong)):
+        with pytest.raises(ValueError, match='must be'):
+            ask()
+
+
+def test_an_error_names_the_argument_that_is_wrong():
+    five_bar = mechanisms.create('five_bar')
+    with pytest.raises(ValueError, match='rate must be a sequence of as many values'):
+        five_bar.acceleration((0.3, 0.4), 1.0, 0.0)
+    with pytest.raises(ValueError, match=r'no output .distance\(O, G\).; allowed: distance\(A,B\)'):
+        mechanisms.create('jansen').extremes('distance(O, G)')

@@ -51,9 +51,15 @@ def _checked(design: Design, name: str, value: Any) -> Any:
     return length if length.ndim else float(length)
 
 
+# What numpy takes for numbers, a byte each.
+BYTES = (bytes, bytearray, memoryview)
+
+
 def numbers(name: str, value: Any) -> np.ndarray:
     """Return a number or an array of them as float64; raise ValueError, by its name, if not."""
     try:
+        if isinstance(value, (str, *BYTES)):
+            raise TypeError
         return np.asarray(value, float)
     except (TypeError, ValueError, OverflowError, RecursionError):
         raise ValueError(f'{name} must be a number or an array of numbers, '
@@ -63,7 +69,7 @@ def numbers(name: str, value: Any) -> np.ndarray:
 def _numbers(value: Any) -> np.ndarray:
     """Return numbers as an array; raise for what only could be converted to some."""
     given = np.asarray(value)
-    if given.dtype.kind not in 'iufO' or not given.size:
+    if isinstance(value, BYTES) or given.dtype.kind not in 'iufO' or not given.size:
         raise TypeError
     if given.dtype.kind == 'O' and any(isinstance(each, (str, bytes, bool, type(None)))
                                        for each in given.flat):

@@ -517,7 +517,8 @@ class Mechanism:
         return dict(zip(names, pose.over(*self._motion(theta, rate, rate_rate))))
 
     def _motion(self, *each: Inputs) -> Sequence[np.ndarray]:
-        return [values for inputs in each for values in self.each_input(inputs)]
+        return [values for name, inputs in zip(('theta', 'rate', 'rate_rate'), each)
+                for values in self.each_input(inputs, name)]
 
     def effort(self, theta: Inputs, loads: Mapping[str, ArrayLike]) -> np.ndarray:
         """
@@ -881,10 +882,10 @@ class Mechanism:
     def check_there(self, output: str) -> None:
         """Raise ValueError if there is no such output."""
         if not self.has_output(output):
-            allowed = (*self.joints, *(f'{name}.{axis}' for name in self.points for axis in 'xy'),
-                       'distance(A,B)', 'angle(A,B)')
-            raise ValueError(f'{self.type} has no output {quoted(output)}; '
-                             f'allowed: {listed(allowed)}{meant(output, allowed)}')
+            named = (*self.joints, *(f'{name}.{axis}' for name in self.points for axis in 'xy'))
+            raise ValueError(
+                f'{self.type} has no output {quoted(output)}; allowed: distance(A,B) and '
+                f'angle(A,B) of two joints, {listed(named)}{meant(output, named)}')
 
     # What inverses and studies of the motion are made from.
 
@@ -937,13 +938,13 @@ class Mechanism:
         names, pose = self._ready(kind, joints, *by)
         return dict(zip(names, pose.over(*self.each_input(theta))))
 
-    def each_input(self, theta: Any) -> Sequence[np.ndarray]:
+    def each_input(self, theta: Any, name: str = 'theta') -> Sequence[np.ndarray]:
         if len(self.inputs) == 1:
-            return (numbers('theta', theta),)
+            return (numbers(name, theta),)
         if not hasattr(theta, '__len__') or len(theta) != len(self.inputs):
             raise ValueError(f'{self.type} has {len(self.inputs)} inputs: '
-                             'theta must be a sequence of as many values')
-        return [numbers('theta', each) for each in theta]
+                             f'{name} must be a sequence of as many values')
+        return [numbers(name, each) for each in theta]
 
     def _checked_by(self, by: Any) -> int:
         """Return the number of an input; raise ValueError for what is none."""
