@@ -22,7 +22,7 @@ from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .spatial import EDGE, STEPS
+from .spatial import EDGE, LAST_STEP, STEPS
 
 # Cells at first, on each side of the rectangle, and how often one is divided at most.
 CELLS, DIVIDED = 6, 7
@@ -32,8 +32,9 @@ MOST, FEW = 400_000, 150_000
 # What three numbers that are 1 in the middle have to be above.
 LEAST = 1e-6
 # Poses on each side of the rectangle to which the steps have to come back, one step before the
-# last, and how near [rad].
-POSES, BACK = 33, 1e-6
+# last, and how near [rad]: what is left is the last step, which is to be below its limit between
+# these poses, too.
+POSES, BACK = 33, 0.01 * LAST_STEP
 # Halvings on the way to the largest rectangle.
 HALVINGS = 6
 
