@@ -13,8 +13,9 @@ from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from . import loops, readers
+from . import check, closing, loops, readers
 from .dyads import Drawing, Drive, short
+from .robot import FARTHEST, Joint, Robot
 from .. import command, mechanisms, scene
 from ..linkage.mechanism import Mechanism
 from ..scene.joint_names import quoted_name
@@ -39,10 +40,17 @@ def show(args: Optional[List[str]]) -> None:
     parser.add_argument('--loops', metavar='FILE', help='YAML with the loop joints of a URDF')
     parser.add_argument('--driven', metavar='JOINT', nargs='+', help='joints that motors move '
                         '(default: those of which the file says so, or else of any)')
+    for option, meaning in (('pose', 'where a joint is while sides are read'),
+                            ('hold', 'where a joint stays')):
+        parser.add_argument(f'--{option}', metavar='JOINT=VALUE', nargs='+', default=[],
+                            help=f'{meaning} [rad or m]; several may follow')
     asked = parser.parse_args(args)
     with np.errstate(all='ignore'):
         robot = readers.read(asked.file, asked.loops)
         robot.driven = asked.driven or robot.driven
+        closing.check_names(robot, asked.driven or ())
+        robot = closing.posed(robot, _values(asked.pose))
+        robot = closing.held(robot, {**robot.held, **_values(asked.hold)})
         given, said = described(robot)
     # Names in the file are the file's: what is no letter in them could end a comment.
     said = [elided(line, 10 ** 6) for line in said]
@@ -51,30 +59,65 @@ def show(args: Optional[List[str]]) -> None:
     print(*(f'{NAME}: {line}' for line in said), sep='\n', file=sys.stderr)
 
 
-def described(robot: readers.Robot) -> Tuple[Dict[str, Any], List[str]]:
+class _NotPlaced(ValueError):
+    """Why bodies are not placed."""
+
+    def __init__(self, drawing: Drawing):
+        super().__init__(_why(drawing))
+        self.bodies = drawing.left
+
+
+def described(robot: Robot) -> Tuple[Dict[str, Any], List[str]]:
     """Return the parameters of a robot's scene, and what is left out and what was checked."""
     given: Dict[str, Any] = {'mechanisms': []}
-    said: List[str] = []
-    for ground, frame_id, joints in loops.groups(robot):
-        try:
-            drawing = _drawn(robot, ground, frame_id, joints)
-            name, parameters, checked = _checked(robot, drawing, given['mechanisms'])
-        except (ArithmeticError, ValueError) as error:
-            bodies = dict.fromkeys(body for joint in joints for body in joint.bodies)
-            said.append(f'Left out: {", ".join(bodies)}: {error}.')
-            continue
-        given['mechanisms'].append(name)
-        given.update(parameters)
-        said += checked
+    robot, said, open_ones, stiff = closing.closed(robot)
+    for group in loops.groups(robot, stiff):
+        left = group.joints
+        for part in group.parts if group.why else [group]:
+            try:
+                if why := next((open_ones[joint.name] for joint in part.joints
+                                if joint.name in open_ones), ''):
+                    raise ValueError(why)
+                name, parameters, checked = _checked(
+                    robot, _drawn(robot, part), given['mechanisms'])
+            except (ArithmeticError, ValueError) as error:
+                if not group.why:
+                    bodies = error.bodies if isinstance(error, _NotPlaced) else _bodies(left)
+                    said.append(f'Left out: {", ".join(bodies)}: {error}.')
+                continue
+            given['mechanisms'].append(name)
+            given.update(parameters)
+            said += checked
+            done = {joint.name for joint in part.joints}
+            left = [joint for joint in left if joint.name not in done]
+        if group.why and left:
+            said.append(f'Left out: {", ".join(_bodies(left))}: {group.why}.')
     if not given['mechanisms']:
         raise command.RequestError(' '.join(said) or 'no joint of this robot closes a loop')
     return given, said
 
 
-def _drawn(robot: readers.Robot, ground: str, frame_id: str, joints: Sequence[readers.Joint]
-           ) -> Drawing:
+def _values(said: Sequence[str]) -> Dict[str, float]:
+    """Return what texts such as JOINT=VALUE say; raise RequestError for one that is none."""
+    found = {}
+    for each in said:
+        name, _, value = each.rpartition('=')
+        try:
+            found[name] = float(value)
+        except ValueError:
+            found[name] = math.nan
+        if not name or not abs(found[name]) < FARTHEST:
+            raise command.RequestError(f'{each!r} must be JOINT=VALUE, its value in rad or m')
+    return found
+
+
+def _bodies(joints: Sequence[Joint]) -> List[str]:
+    return [*dict.fromkeys(body for joint in joints for body in joint.bodies)]
+
+
+def _drawn(robot: Robot, group: loops.Group) -> Drawing:
     """Return the lines of a group of loops, with the drives that place the most of it."""
-    names = [joint.name for joint in joints if joint.position is not None]
+    names = [joint.name for joint in group.joints if joint.position is not None]
     motors = [name for name in names if name in robot.driven]
     tries: List[Sequence[str]] = [motors, [name for name in names
                                            if name in motors or name in robot.follows]]
@@ -82,13 +125,13 @@ def _drawn(robot: readers.Robot, ground: str, frame_id: str, joints: Sequence[re
         tries += (pair for count in (1, 2) for pair in combinations(names, count))
     drawings: List[Drawing] = []
     for drives in tries:
-        loop = loops.flat(robot, ground, frame_id, joints, drives)
+        loop = loops.flat(robot, group, drives)
         drawings.append(Drawing(robot, loop, drives))
         if not drawings[-1].left:
             break
     best = min(drawings, key=lambda drawing: len(drawing.left))
     if not best.drives:
-        raise ValueError(_why(best))
+        raise _NotPlaced(best) if best.left else ValueError('no motor moves it')
     for i, line in enumerate(best.lines):
         # At a change point the side seen in this pose is not always the one to be written.
         name, *_, side = line.split()
@@ -102,12 +145,16 @@ def _why(drawing: Drawing) -> str:
     held = [joint for joint in drawing.loop.joints if {*joint.bodies} & {*drawing.left}]
     free = 3 * len(drawing.left) - 2 * len(held) - sum(joint in drawing.driven for joint in held)
     names = ', '.join(joint.name for joint in held if joint.position is not None)
+    between = [joint.name for joint in held if joint in drawing.driven
+               and {*joint.bodies} <= {*drawing.left}]
+    if between and free <= 0:
+        return f'not of dyads, as {", ".join(between)} drives between two of them'
     return f'not driven: {free} more of {names} must be, named by --driven' if free > 0 else (
         'not of dyads: all of them hold each other, as on a platform on three bars'
         if free == 0 else f'held more than once by {names}')
 
 
-def _checked(robot: readers.Robot, drawing: Drawing, taken: Sequence[str]
+def _checked(robot: Robot, drawing: Drawing, taken: Sequence[str]
              ) -> Tuple[str, Dict[str, Any], List[str]]:
     """Return a mechanism's name and parameters, and what is to be said, once it has its pose."""
     name = re.sub('[^A-Za-z0-9]+', '_', drawing.drives[0].source).strip('_')[:60]
@@ -116,21 +163,28 @@ def _checked(robot: readers.Robot, drawing: Drawing, taken: Sequence[str]
     loop, given = drawing.loop, {
         f'{name}.{key}': value for key, value in _parameters(drawing)}
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
+    if not any(called.published for called in machine.joints.values()):
+        raise _NotPlaced(drawing)
     for drive in drawing.drives:
         start = f'{name}.{drive.name}.start'
         if sweep := _sweep(drive, machine.inputs[drive.name]):
             given[f'{name}.{drive.name}.sweep'] = [*sweep]
             given[start] = min(max(given[start], sweep[0]), sweep[1])
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
-    off, bent = _apart(machine.linkage, drawing), _bent(machine.linkage, drawing)
-    if not off <= drawing.allowed or not bent <= loop.near / loop.size:
-        raise ValueError(f'{off:.2g} of its size away from the pose of the file, where it is '
-                         'nearly stretched or folded')
+    if _apart(machine.linkage, drawing) > drawing.allowed:
+        raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
+    found = check.compared(robot, machine, [joint.name for joint in drawing.driven],
+                           _ends(drawing), loop.lean + loop.gap / loop.size)
+    if found.wrong:
+        raise ValueError(found.wrong)
     said = [f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.'] if drawing.left else []
-    why = f', not to {loops.ROUNDING:g}, as the file itself leaves its loops open by ' \
-        f'{loop.gap:.0e} m, {loop.gap / loop.size:.0e} of its size; closed, each body has its ' \
-        f'own lengths to {bent:.0e}' if off > loops.ROUNDING else ''
-    said.append(f'Checked: {name} has the pose of the file to {off:.0e} of its size{why}.')
+    moved = ', '.join(f'{source} from {low:.4g} to {high:.4g}'
+                      for source, low, high in found.ranges)
+    said.append(f'Checked: {name}: in {found.poses} poses of the robot, its loops closed in '
+                f'space, {moved}, the worst difference is {found.worst:.0e}, of {found.joint}'
+                + (f'; not beyond {found.beyond}' if found.beyond else '') + '.')
+    said += [f'{joint} has its ends {gap:.2g} m apart along its axis, on which no angle depends.'
+             for joint, gap in loop.across.items()]
     told = {called.name for called in machine.joints.values() if called.published}
     told |= {joint.name for joint in drawing.driven}
     own = [part for joint in loop.joints for part in joint.name.split('+')
@@ -158,24 +212,30 @@ def _linkage(drawing: Drawing) -> Mechanism:
     return mechanisms.create('custom', joints=drawing.lines)
 
 
-def _values(drawing: Drawing) -> Any:
+def _inputs(drawing: Drawing) -> Any:
     values = [drive.value for drive in drawing.drives]
     return values if len(values) > 1 else values[0]
 
 
 def _apart(linkage: Mechanism, drawing: Drawing, *names: str) -> float:
     """Return how far joints are from the pose of the file, as a part of the linkage's size."""
-    places = linkage.solve(_values(drawing))
+    places = linkage.solve(_inputs(drawing))
     return float(np.max([abs(complex(*places[name]) - place) for name, place in drawing.places
                          if name in (names or places)])) / drawing.loop.size
 
 
-def _bent(linkage: Mechanism, drawing: Drawing) -> float:
-    """Return how far distances on one body are from those in the file, as a part of the size."""
-    places = linkage.solve(_values(drawing))
-    return max(abs(abs(complex(*(places[first] - places[second]))) - abs(start - end))
-               for on in drawing.on.values() for (first, start), (second, end) in combinations(
-                   on.items(), 2)) / drawing.loop.size
+def _ends(drawing: Drawing) -> Dict[str, Tuple[float, float]]:
+    """Return between which positions each source moves in a check."""
+    found: Dict[str, Tuple[float, float]] = {}
+    for drive in drawing.drives:
+        around = math.pi if drive.name[:5] == 'crank' else 0.5 * drawing.loop.size
+        low, high = drive.value - around, drive.value + around
+        if drive.ends:
+            low, high = max(drive.ends[0], low - around), min(drive.ends[1], high + around)
+            low, high = (low, high) if low < high else drive.ends
+        low, high = sorted((end - drive.offset) / drive.ratio for end in (low, high))
+        found[drive.source] = low, high
+    return found
 
 
 def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:

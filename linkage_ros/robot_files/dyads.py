@@ -10,7 +10,7 @@ import math
 from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 from .loops import Loop, ROUNDING
-from .readers import Joint, Robot, SLIDE
+from .robot import Joint, Robot, SLIDE
 from ..linkage.dyads import bar_name, Dyads, Hinge, Motor, Pin, short, Slide
 
 
@@ -65,7 +65,7 @@ class Drawing(Dyads):
     @property
     def allowed(self) -> float:
         """How far a pose may be from the file's, of the size: rounding, or some of its gap."""
-        return max(ROUNDING, 30.0 * self.loop.gap / self.loop.size)
+        return max(ROUNDING, 30.0 * self.loop.gap / self.loop.size + self.loop.lean)
 
     @property
     def places(self) -> Iterator[Pin]:

@@ -6,17 +6,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Dict, Iterator, List, NamedTuple, Sequence, Set, Tuple
+from typing import Collection, Dict, List, Mapping, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .readers import BALL, FIXED, HINGE, Joint, Robot, SLIDE
-from ..command import RequestError
+from .robot import BALL, FIXED, HINGE, Joint, Robot, SLIDE, UNIVERSAL
+from .spatial import blocks, trees
 
+# What joints of a planar loop may be.
+FLAT = (HINGE, SLIDE, BALL, UNIVERSAL)
 # Axes that differ by more [rad] are not parallel: files have angles such as 1.5708.
 ASKEW = 1e-4
 # Hinges nearer to each other [m] cross in a point; the ends of a loop [m] are in one plane.
 TOGETHER = 1e-6
+# Loops that stay open by more, of their size, are not closed.
+OPEN = 1e-5
 # Of the size of a linkage, what is rounding.
 ROUNDING = 1e-12
 
@@ -26,7 +30,8 @@ class Loop(NamedTuple):
     Joints of a linkage on a ground; its plane is `frame`, seen from the link `frame_id`.
 
     In the plane places are complex, and so are the axes of slides; that of a hinge is 1 or -1.
-    The file leaves a gap [m] in the loops; what is nearer than `near` [m] is at one place.
+    What cannot be closed is a gap [m]; what is nearer than `near` [m] is at one place. Axes lean
+    against the plane's [rad]. Some joints have ends that are apart [m] across the plane.
     """
 
     ground: str
@@ -35,82 +40,161 @@ class Loop(NamedTuple):
     joints: List[Joint]
     size: float
     gap: float
+    lean: float
+    across: Dict[str, float]
 
     @property
     def near(self) -> float:
         return self.size * min(max(ROUNDING, 10.0 * self.gap / self.size), 1e-6)
 
 
-def groups(robot: Robot) -> Iterator[Tuple[str, str, List[Joint]]]:
-    """Yield the loops that share bars: their ground, its name in the file, their joints."""
-    home = {body: body for body in robot.frames}
-    for joint in robot.joints:
-        if joint.kind == FIXED:
-            if joint.gap > TOGETHER:
-                raise RequestError(f'{joint.name} makes {joint.bodies[0]} and {joint.bodies[1]} '
-                                   f'one, which the pose of the file has {joint.gap:.3g} apart [m '
-                                   'or rad]: give it a pose in which they fit')
-            new, old = sorted((home[body] for body in joint.bodies), key=robot.root.__ne__)
-            home = {body: new if at == old else at for body, at in home.items()}
+class Group(NamedTuple):
+    """Joints of loops that share bars, their ground, its name in the file; why not planar."""
+
+    ground: str
+    frame_id: str
+    joints: List[Joint]
+    why: str
+    parts: List['Group']
+
+
+def groups(robot: Robot, stiff: Collection[str] = ()) -> List[Group]:
+    """
+    Return the loops of a robot; where they are not planar, those parts of them that are.
+
+    Joints that are `stiff` never move: where they are all that is not planar, they are rigid.
+    """
+    home = _merged(robot, {body: body for body in robot.frames}, [
+        joint for joint in robot.joints if joint.kind == FIXED])
+    found = _blocks(robot, home, _with_balls(robot, _on(home, robot.joints)))
+    return [group if not group.why else group._replace(parts=_parts(robot, home, group, stiff))
+            for group in found]
+
+
+def _parts(robot: Robot, home: Dict[str, str], group: Group, stiff: Collection[str]
+           ) -> List[Group]:
+    """Return what is planar of loops that as a whole are not."""
+    names = {joint.name for joint in group.joints if joint.position is not None}
+    if names & {*robot.driven} <= {*stiff}:
+        stiff = ()
+    parts: List[Group] = []
+    for joint in sorted(group.joints, key=lambda joint: joint.name not in robot.driven):
+        if joint.kind != HINGE or any(joint.name == one.name for part in parts
+                                      for one in part.joints):
+            continue
+        left = [one for one in group.joints if not any(one in part.joints for part in parts)]
+        rigid = [one for one in left if one.name in stiff and _lean(one, joint.axis) > ASKEW]
+        here = _merged(robot, home, rigid)
+        parts += [part for part in _blocks(robot, here, _on(here, [
+            one for one in left if one.kind in FLAT and _lean(one, joint.axis) < ASKEW]))
+            if not part.why]
+    return parts
+
+
+def _blocks(robot: Robot, home: Mapping[str, str], joints: Sequence[Joint]) -> List[Group]:
+    """Return loops that share bars between bodies that have become one."""
+    found, cuts = trees(replace(robot, root=home[robot.root], joints=[*joints], frames={
+        body: robot.frames[body] for body in home.values()}))
+    ranks = {body: i for i, body in enumerate((home[robot.root], *found))}
+    groups = []
+    for block, own in blocks(found, cuts):
+        every = {found[body][1] for body in block} | {*own}
+        chosen = [joint for joint in joints if joint in every]
+        ground = min((body for joint in chosen for body in joint.bodies), key=ranks.__getitem__)
+        names = {name for joint in chosen for name in joint.name.split('+')}
+        frame_id = next((body for joint in robot.joints for body in joint.bodies
+                         if joint.name in names and home[body] == ground), ground)
+        try:
+            check_planar(ground, chosen)
+            why = ''
+        except ValueError as error:
+            why = str(error)
+        groups.append(Group(ground, frame_id, chosen, why, []))
+    return groups
+
+
+def _merged(robot: Robot, home: Mapping[str, str], rigid: Sequence[Joint]) -> Dict[str, str]:
+    """Return the body that each has become one with; the root keeps its name."""
+    home = dict(home)
+
+    def top(body: str) -> str:
+        while home[body] != body:
+            home[body] = body = home[home[body]]
+        return body
+
+    for joint in rigid:
+        first, second = sorted((top(body) for body in joint.bodies), key=top(
+            robot.root).__ne__)
+        home[second] = first
+    return {body: top(body) for body in home}
+
+
+def _on(home: Mapping[str, str], joints: Sequence[Joint]) -> List[Joint]:
+    """Return joints between bodies that have become one with others."""
     moved = [replace(joint, bodies=(home[joint.bodies[0]], home[joint.bodies[1]]))
-             for joint in robot.joints]
-    joints = _with_balls(robot, [joint for joint in moved if len({*joint.bodies}) == 2])
-    way: Dict[str, Set[Joint]] = {}
-    for root in (home[robot.root], *home.values()):
-        way.setdefault(root, set())
-        while step := next(((a, b, joint) for joint in joints for a, b in (
-                joint.bodies, joint.bodies[::-1]) if a in way and b not in way), None):
-            way[step[1]] = way[step[0]] | {step[2]}
-    found: List[Set[Joint]] = []
-    for joint in joints:
-        first, second = joint.bodies
-        if cycle := {joint} ^ way[first] ^ way[second]:
-            shared = [group for group in found if group & cycle]
-            found = [group for group in found if group not in shared] + [cycle.union(*shared)]
-    for group in found:
-        chosen = [joint for joint in joints if joint in group]
-        ground = min((body for joint in chosen for body in joint.bodies),
-                     key=lambda body: len(way[body]))
-        names = {joint.name for joint in chosen}
-        yield ground, next((body for joint in robot.joints for body in joint.bodies
-                            if joint.name in names and home[body] == ground), ground), chosen
+             for joint in joints]
+    return [joint for joint in moved if len({*joint.bodies}) == 2]
 
 
 def _with_balls(robot: Robot, joints: List[Joint]) -> List[Joint]:
     """Return joints with one ball for each two or three hinges that cross in a point."""
-    for body in dict.fromkeys(body for joint in joints for body in joint.bodies):
-        own = [joint for joint in joints if body in joint.bodies and joint.name not in robot.driven
-               and joint.kind in (HINGE, BALL)]
-        if body == robot.root or own != [joint for joint in joints if body in joint.bodies] \
-                or len(own) != 2:
+    on: Dict[str, List[Joint]] = {}
+    for joint in joints:
+        for body in joint.bodies:
+            on.setdefault(body, []).append(joint)
+    row = [*on]
+    for body in row:
+        own = on[body]
+        if body == robot.root or len(own) != 2 or any(
+                joint.name in robot.driven or joint.kind not in (HINGE, BALL) for joint in own):
             continue
         (one, two), axes = ((joint, joint.bodies[0] == body) for joint in own), np.array(
             [joint.axis for joint in own])
         bodies = one[0].bodies[one[1]], two[0].bodies[two[1]]
         places = one[0].places[one[1]], two[0].places[two[1]]
         if bodies[0] != bodies[1] and np.linalg.norm(places[0] - places[1]) < TOGETHER \
-                and np.linalg.norm(np.cross(*axes)) > ASKEW:
+                and (BALL in (own[0].kind, own[1].kind)
+                     or np.linalg.norm(np.cross(*axes)) > ASKEW):
             ball = Joint(f'{own[0].name}+{own[1].name}', BALL, bodies, places, axes[0])
-            return _with_balls(robot, [*(joint for joint in joints if joint not in own), ball])
+            joints, on[body] = [*(joint for joint in joints if joint not in own), ball], []
+            for end in bodies:
+                on[end] = [ball if joint in own else joint for joint in on[end]]
+            row += bodies
     return joints
 
 
-def flat(robot: Robot, ground: str, frame_id: str, joints: Sequence[Joint],
-         drives: Sequence[str]) -> Loop:
-    """Return loops in their plane; raise ValueError with what is not planar."""
+def check_planar(ground: str, joints: Sequence[Joint], drives: Sequence[str] = ()
+                 ) -> Tuple[List[Joint], float]:
+    """Return the hinges, and by how much axes lean [rad]; raise ValueError if not planar."""
     hinges = sorted((joint for joint in joints if joint.kind == HINGE),
                     key=lambda joint: (joint.name not in drives, ground not in joint.bodies))
     if not hinges:
         raise ValueError('not planar: no hinge says in which plane')
+    lean = 0.0
     for joint in joints:
-        if joint.kind not in (HINGE, SLIDE, BALL):
+        if joint.kind not in FLAT:
             raise ValueError(f'not planar: {joint.name} is a joint of type {joint.kind}')
-        across = np.linalg.norm(np.cross(joint.axis, hinges[0].axis))
-        lean = {HINGE: across, SLIDE: abs(joint.axis @ hinges[0].axis), BALL: 0.0}[joint.kind]
-        if lean > ASKEW:
+        askew = _lean(joint, hinges[0].axis)
+        lean = max(lean, askew)
+        if askew > ASKEW:
             raise ValueError(f'not planar: the axes of {hinges[0].name} and {joint.name} are '
-                             f'{np.degrees(np.arcsin(min(lean, 1.0))):.3g} degrees from it')
+                             f'{np.degrees(np.arcsin(min(askew, 1.0))):.3g} degrees from it')
     _check_rods(ground, joints)
+    return hinges, lean
+
+
+def _lean(joint: Joint, normal: np.ndarray) -> float:
+    """Return by how much a joint's axes are not as they are in a plane [rad]."""
+    if joint.kind == SLIDE:
+        return float(abs(joint.axis @ normal))
+    return float(max(np.linalg.norm(np.cross(axis, normal)) for axis in joint.axes)) \
+        if joint.kind == HINGE else 0.0
+
+
+def flat(robot: Robot, group: Group, drives: Sequence[str]) -> Loop:
+    """Return loops in their plane; raise ValueError with what is not planar."""
+    ground, frame_id, joints, *_ = group
+    hinges, lean = check_planar(ground, joints, drives)
     base = robot.frames[frame_id]
     normal = base[:3, :3].T @ hinges[0].axis
     right = np.eye(3)[int(abs(normal[0]) > 0.9)]
@@ -120,12 +204,11 @@ def flat(robot: Robot, ground: str, frame_id: str, joints: Sequence[Joint],
     origin = next((joint for joint in hinges if ground in joint.bodies), hinges[0])
     frame[:3, 3] = base[:3, :3].T @ (origin.places[0] - base[:3, 3])
     seen = np.linalg.inv(base @ frame)
-    found = []
+    found, across = [], {}
     for joint in joints:
         first, second = (seen @ [*place, 1.0] for place in joint.places)
-        if abs(first[2] - second[2]) > TOGETHER:
-            raise ValueError(f'not planar: {joint.name} is open across the plane by '
-                             f'{abs(first[2] - second[2]):.3g} m')
+        if abs(first[2] - second[2]) > TOGETHER * 1e-3:
+            across[joint.name] = abs(first[2] - second[2])
         axis = seen[:3, :3] @ joint.axis
         found.append(replace(
             joint, places=(complex(*first[:2]), complex(*second[:2])),
@@ -133,26 +216,26 @@ def flat(robot: Robot, ground: str, frame_id: str, joints: Sequence[Joint],
             else float(np.sign(axis[2]))))
     places = [place for joint in found for place in joint.places]
     size = max(abs(place - other) for place in places for other in places)
-    if not size:
+    if size < TOGETHER:
         raise ValueError('all its joints are at one place')
-    return Loop(ground, frame_id, frame, found, size, max(
-        _gap(robot, joint, size, joint.name in drives) for joint in found))
+    gap = max(_gap(joint) for joint in found)
+    if gap > OPEN * size:
+        raise ValueError(f'its loops cannot be closed: they stay open by {gap:.3g} m')
+    return Loop(ground, frame_id, frame, found, size, gap, lean if lean > 1e-12 else 0.0,
+                across)
 
 
-def _gap(robot: Robot, joint: Joint, size: float, drives: bool) -> float:
-    """Return by how much [m] a joint is open, or not where the joint that it follows has it."""
-    slides, apart = joint.kind == SLIDE, joint.places[1] - joint.places[0]
-    if not drives:
-        return abs((apart / joint.axis).imag if slides else apart)
-    source, ratio, offset = robot.source(joint.name)
-    late = ratio * robot.positions[source] + offset - robot.positions[joint.name]
-    return max(abs(late) * (1.0 if slides else size), _gap(robot, joint, size, False))
+def _gap(joint: Joint) -> float:
+    """Return by how much [m] a joint is open."""
+    apart = joint.places[1] - joint.places[0]
+    return abs((apart / joint.axis).imag if joint.kind == SLIDE else apart)
 
 
 def _check_rods(ground: str, joints: Sequence[Joint]) -> None:
     """Raise ValueError if a body can leave the plane: only rods may be on balls alone."""
     held = {ground}
-    while more := {end for joint in joints for end in joint.bodies if joint.kind != BALL
+    while more := {end for joint in joints for end in joint.bodies
+                   if joint.kind not in (BALL, UNIVERSAL)
                    and held & {*joint.bodies}} - held:
         held |= more
     for body in dict.fromkeys(end for joint in joints for end in joint.bodies):

@@ -1,0 +1,223 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A mechanism of a scene held against its robot, whose loops are closed in space."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+from typing import Dict, List, Mapping, NamedTuple, Sequence, Tuple
+
+import numpy as np
+
+from .robot import Robot, SLIDE
+from .spatial import Component, components, Poses
+from .. import scene
+
+# Motors are moved on so many paths, in all to so many poses; fewer than some are no check.
+PATHS, POSES, FEWEST = 12, 240, 200
+# By what numbers may differ [rad, or of the size], where the file's axes are exact.
+EXACT = 1e-9
+# Loops open by less, of their size, are closed.
+CLOSED = 1e-10
+# Of the usual stiffness of its loops, what a pose next to a change point has.
+CHANGE = 0.25
+# Loops that are no stiffer than this, of their size, cannot be closed to all digits.
+FLAT = 1e-6
+# A first step, as a part of one.
+LITTLE = 1e-3
+# A step that turns joints by more [rad] is made in smaller ones, so many times halved.
+LEAP, HALVINGS = 0.35, 6
+
+
+class Found(NamedTuple):
+    """
+    What a check has found: in how many poses, between which positions, the worst difference.
+
+    Attributes
+    ----------
+    ranges : list of (str, float, float)
+        Each motor, and between which positions it was moved.
+    worst, joint : float, str
+        The worst difference [rad, or of the size], and of which joint.
+    wrong : str
+        Why the scene is not the robot's, if it is not.
+    beyond : str
+        What was not reached.
+
+    """
+
+    poses: int
+    ranges: List[Tuple[str, float, float]]
+    worst: float
+    joint: str
+    wrong: str
+    beyond: str
+
+
+class Track(NamedTuple):
+    """Poses along paths: where motors and joints are, which are closed, how stiff they are."""
+
+    motors: np.ndarray
+    joints: Dict[str, np.ndarray]
+    alive: np.ndarray
+    margin: np.ndarray
+    volume: np.ndarray
+
+
+def compared(robot: Robot, machine: scene.Machine, driven: Sequence[str],
+             ends: Mapping[str, Tuple[float, float]], slack: float) -> Found:
+    """
+    Compare what a mechanism publishes with the joints of its robot.
+
+    Parameters
+    ----------
+    robot : Robot
+        In a pose in which its loops are closed.
+    machine : Machine
+        The mechanism.
+    driven : sequence of str
+        The joints that move it, its sources or what follows them.
+    ends : dict
+        Between which positions each source moves [rad or m].
+    slack : float
+        What the file leaves open for good, of the size.
+
+    """
+    component = next(each for each in components(replace(robot, driven=[*driven]))
+                     if {*driven} & {joint.name for joint in each.joints})
+    start = np.array([robot.positions[source] for source in ends])
+    targets = np.array([*ends.values()]).T
+    if len(ends) > 1:
+        low, high = targets
+        targets = np.random.default_rng(1).uniform(low, high, (PATHS, len(ends)))
+    tracker = _Tracker(robot, component, driven, [*ends], slack)
+    count, worst, joint, beyond = 0, 0.0, '', ''
+    for _ in range(3):
+        targets = targets[np.max(np.abs(targets - start), axis=1) > 1e-9]
+        if not len(targets):
+            break
+        track = tracker.track(start, targets)
+        apart, names = _differences(machine, component, [*ends], track)
+        allowed = (EXACT + 30.0 * slack) / np.maximum(track.margin, 1e-4)
+        good = np.logical_and.accumulate(track.alive & (apart <= allowed), axis=1)
+        first = np.minimum(good.sum(axis=1), good.shape[1] - 1)
+        paths = np.arange(len(good))
+        # Past a change point a robot may go on in two ways.
+        near = np.minimum.accumulate(track.volume, axis=1)[paths, first] < CHANGE * np.max(
+            track.volume[track.alive], initial=0.0)
+        for i in paths[track.alive[paths, first] & ~good[paths, first] & ~near]:
+            if np.max(track.margin[track.alive]) < FLAT:
+                return Found(0, [], 0.0, '', 'it could not be checked: its loops are at a dead '
+                             'point wherever its motors are', '')
+            where = ', '.join(f'{source} at {value:.4g}' for source, value in zip(
+                ends, track.motors[i, first[i]]))
+            off = apart[i, first[i]]
+            return Found(count, [], float(off), '', f'with {where} ' + (
+                'it has no pose, where the loops of the robot are closed' if math.isnan(off)
+                else f'{names[i][first[i]]} is off by {off:.2g}'), '')
+        count = int(good.sum())
+        if count:
+            worst, i, j = max((float(apart[i, j]), i, j) for i, j in np.argwhere(good))
+            joint, reached = names[i][j], track.motors[good]
+        if not good[paths, first].all():
+            beyond = 'a change point' if (track.alive & ~good).any() else 'where its loops end'
+        if count >= FEWEST:
+            ranges = [(source, float(low), float(high)) for source, low, high in zip(
+                ends, reached.min(axis=0), reached.max(axis=0))]
+            return Found(count, ranges, worst, joint, '', beyond)
+        share = good.sum(axis=1) / good.shape[1]
+        targets = start + (targets - start) * share[:, None]
+    return Found(count, [], worst, joint, f'it could not be checked in more than {count} poses',
+                 beyond)
+
+
+def _differences(machine: scene.Machine, component: Component, sources: List[str], track: Track
+                 ) -> Tuple[np.ndarray, List[List[str]]]:
+    """Return the worst difference in each pose, and of which joint."""
+    values = [drive.ratio * track.motors[..., sources.index(drive.source)] + drive.offset
+              for drive in machine.inputs.values()]
+    angles = machine.linkage.joint_angles(values if len(values) > 1 else values[0])
+    slides = {joint.name for joint in component.joints if joint.kind == SLIDE}
+    apart = {}
+    for link, called in machine.joints.items():
+        if called.published and called.name in track.joints:
+            off = called.of(angles[link]) - track.joints[called.name]
+            apart[called.name] = np.abs(off) / component.size if called.name in slides else np.abs(
+                off - math.tau * np.round(off / math.tau))
+    if not apart:
+        return np.full(track.alive.shape, math.nan), [[''] * track.alive.shape[1]] * len(
+            track.alive)
+    every, order = np.array([*apart.values()]), [*apart]
+    worst = np.argmax(np.where(np.isnan(every), math.inf, every), axis=0)
+    return (np.take_along_axis(every, worst[None], axis=0)[0],
+            [[order[i] for i in row] for row in worst])
+
+
+class _Tracker:
+    """Closes the loops of a component with its motors elsewhere, step by step."""
+
+    def __init__(self, robot: Robot, component: Component, driven: Sequence[str],
+                 sources: List[str], slack: float):
+        self._component, self._slack = component, slack
+        self._still = component.held(driven)
+        self._movers = []
+        for name in driven:
+            source, ratio, offset = robot.source(name)
+            self._movers.append((sources.index(source), ratio, offset, *component.column(name)))
+
+    def track(self, start: np.ndarray, targets: np.ndarray) -> Track:
+        """Return poses on straight paths of the motors, each closed from the one before."""
+        component, still, count = self._component, self._still, len(targets)
+        steps = -(-POSES // count)
+        poses = component.closed(component.at_start(count), still)
+        self._base = component.errors(poses)[0][0]
+        nullity = component.nullity(still)
+        motors = start + (targets - start)[:, None] * (np.arange(steps + 1) / steps)[:, None]
+        alive = np.zeros((count, steps), bool)
+        margin, volume = np.ones((2, count, steps))
+        joints: Dict[str, np.ndarray] = {}
+        drift, going = np.zeros((count, len(still))), np.arange(count)
+        # A little way tells which way joints go, so that the first step keeps to its branch.
+        little = motors[:, 0] + LITTLE * (motors[:, 1] - motors[:, 0])
+        ahead, fine = self._advanced(poses, motors[:, 0], little, drift, 0)
+        drift[fine] = component.step_between(poses, ahead)[fine] / LITTLE
+        for k in range(steps):
+            before = poses
+            poses, fine = self._advanced(
+                poses, motors[going, k], motors[going, k + 1], drift, HALVINGS)
+            drift = component.step_between(before, poses).take(np.flatnonzero(fine), axis=0)
+            poses, going = poses.some(np.flatnonzero(fine)), going[fine]
+            if not len(going):
+                break
+            alive[going, k] = True
+            margin[going, k], volume[going, k] = component.stiffness(poses, still, nullity)
+            for name, values in component.read(poses).items():
+                joints.setdefault(name, np.full(alive.shape, math.nan))[going, k] = values
+        return Track(motors[:, 1:], joints, alive, margin, volume)
+
+    def _advanced(self, poses: Poses, before: np.ndarray, after: np.ndarray, drift: np.ndarray,
+                  halvings: int) -> Tuple[Poses, np.ndarray]:
+        """Return poses with the motors moved on, and which of them are closed."""
+        component, step = self._component, drift.copy()
+        for i, ratio, offset, element, column, sign, zero in self._movers:
+            step[:, column] = sign * (ratio * after[:, i] + offset - zero) \
+                - poses.positions[:, element]
+        new = component.closed(component.stepped(poses, step), self._still, 8)
+        fine = (np.max(np.abs(component.errors(new)[0] - self._base), axis=1)
+                < (CLOSED + 10.0 * self._slack) * component.size) & (
+            np.max(np.abs(component.step_between(poses, new)) / component.unit, axis=1) < LEAP)
+        if fine.all() or not halvings:
+            return new, fine
+        some, middle = np.flatnonzero(~fine), 0.5 * (before + after)
+        half, reached = self._advanced(poses.some(some), before[some], middle[some],
+                                       0.5 * drift[some], halvings - 1)
+        left = some[reached]
+        if len(left):
+            rest, fine[left] = self._advanced(
+                half.some(np.flatnonzero(reached)), middle[left], after[left], 0.5 * drift[left],
+                halvings - 1)
+            for old, one in zip(new, rest):
+                old[left] = one
+        return new, fine

@@ -1,0 +1,152 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A robot in the closed pose that is nearest to the one it is given in."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+from typing import Dict, Iterable, List, Mapping, Tuple
+
+import numpy as np
+
+from .robot import FIXED, HINGE, Robot
+from .spatial import Component, components, displaced, Poses, trees, turned
+from ..command import RequestError
+from ..words import listed
+
+# What is open by less, of the size of its loops, is closed by the steps from where it is.
+NEAR = 1e-6
+# Other poses are looked for from so many starts; what is open by less is closed [of the size].
+STARTS, CLOSED = 24, 1e-10
+# A pose that is farther by less than this factor, and this [rad], is as near.
+ALIKE, ALIKE_LENGTH, DISTINCT = 1.2, 1e-3, 1e-3
+
+
+def check_names(robot: Robot, names: Iterable[str]) -> None:
+    """Raise RequestError for a name that no joint has which moves in one way."""
+    for name in names:
+        if name not in robot.positions:
+            raise RequestError(f'there is no joint {name!r}; allowed: '
+                               f'{listed(robot.positions, 200)}')
+
+
+def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
+    """Return a robot with some of its joints elsewhere; raise RequestError for what is none."""
+    positions, moves = robot.positions, {}
+    check_names(robot, values)
+    for body, (_, joint) in trees(robot)[0].items():
+        if joint.name in values and joint.position is not None:
+            change = (values[joint.name] - joint.position) * (
+                1.0 if joint.bodies[1] == body else -1.0) * joint.axis
+            moves[body] = turned(change[None], joint.places[0])[0] if joint.kind == HINGE \
+                else np.eye(4)
+            if joint.kind != HINGE:
+                moves[body][:3, 3] = change
+            del positions[joint.name]
+    for name in values:
+        if name in positions:
+            raise RequestError(f'{name} closes a loop, so that other joints say where it is')
+    return robot.displaced(displaced(robot, moves), values)
+
+
+def held(robot: Robot, values: Mapping[str, float]) -> Robot:
+    """Return a robot, some of whose joints stay where they are put."""
+    made = posed(robot, values)
+    return replace(made, joints=[
+        replace(joint, kind=FIXED, position=None) if joint.name in values else joint
+        for joint in made.joints])
+
+
+def _with_followers(robot: Robot) -> Robot:
+    """Return a robot with the joints that follow others where these have them."""
+    late, positions = {}, robot.positions
+    for _, joint in trees(robot)[0].values():
+        if joint.name in robot.follows and joint.position is not None:
+            source, ratio, offset = robot.source(joint.name)
+            late[joint.name] = ratio * positions[source] + offset
+    return posed(robot, late) if any(
+        abs(value - positions[name]) > 0.0 for name, value in late.items()) else robot
+
+
+def closed(robot: Robot) -> Tuple[Robot, List[str], Dict[str, str], List[str]]:
+    """
+    Return a robot with its loops closed, and what else there is to be known of it.
+
+    That is what is to be said, why joints stay open, and which cannot move.
+
+    Motors stay where they are, if their loops can be closed so.
+    """
+    robot = _with_followers(robot)
+    moves: Dict[str, np.ndarray] = {}
+    positions: Dict[str, float] = {}
+    said: List[str] = []
+    why: Dict[str, str] = {}
+    stiff: List[str] = []
+    for component in components(robot):
+        names = [name for name in component.positions if name in robot.driven]
+        try:
+            poses, moved = nearest(component, names, [
+                name for name in component.positions if name in robot.follows])
+        except ValueError as error:
+            why.update((joint.name, str(error)) for joint in component.joints)
+            continue
+        if component.gap(poses)[0] < CLOSED:
+            stiff += component.immobile(poses)
+        moves.update(component.moves(poses))
+        positions.update((name, float(value[0])) for name, value in component.read(poses).items())
+        if moved:
+            said.append(moved)
+    return robot.displaced(displaced(robot, moves), positions), said, why, stiff
+
+
+def nearest(component: Component, names: List[str], followers: List[str]) -> Tuple[Poses, str]:
+    """
+    Return the closed pose that is nearest to the file's, and what is to be said of it.
+
+    Motors that are named stay where they are, if the loops can be closed so, and so do joints
+    that follow others. Raises ValueError if two poses are as near.
+    """
+    start, still = component.at_start(), component.held(names)
+    gap = float(component.gap(start)[0])
+    poses = component.closed(start, still)
+    if gap < NEAR and component.gap(poses)[0] < max(CLOSED, 1e-3 * gap) \
+            and np.linalg.norm(component.away(poses.positions)) < 1e3 * max(gap, CLOSED):
+        return poses, ''
+    # Where they must, joints that follow others move as well, and then motors.
+    found, held_now = start, names
+    open_by = math.inf
+    for kept in [names + followers] * bool(followers) + [names] + [[]] * bool(names):
+        other, less = _closed_ones(component, component.held(kept))
+        if less < 0.9 * open_by:
+            found, open_by, held_now = other, less, kept
+        if open_by < CLOSED:
+            break
+    said = '' if held_now or not names else \
+        f'{", ".join(names)} moved: their loops cannot be closed where the file has them.'
+    determined = component.determined(found, component.held(held_now)) if held_now else 1.0
+    away = np.linalg.norm(component.away(found.positions) * determined, axis=1)
+    nearest_one = int(np.argmin(away))
+    for i in np.flatnonzero(away < ALIKE * away[nearest_one] + ALIKE_LENGTH):
+        name, first, second = component.farthest_apart(
+            found.some(np.array([nearest_one, i])), determined)
+        if abs(first - second) > DISTINCT:
+            raise ValueError(f'the file has them open, and they close as well with {name} at '
+                             f'{first:.3g} as at {second:.3g}: choose by --pose {name}=...')
+    return found.some(np.array([nearest_one])), said
+
+
+def _closed_ones(component: Component, still: np.ndarray) -> Tuple[Poses, float]:
+    """Return poses that are closed as far as can be, and how far they are open, of the size."""
+    columns = len(still)
+    count = max(2, min(STARTS, 400_000 // max(columns, 1) ** 2))
+    rng = np.random.default_rng(0)
+    spread = np.linspace(0.0, 2.0, count)[:, None] * ~still
+    home = np.zeros(columns)
+    poses = component.stepped(component.at_start(count), component.unit * spread * rng.uniform(
+        -1.0, 1.0, (count, columns)))
+    poses = component.closed(poses, still, 40, home, 1e-2)
+    poses = component.closed(poses, still, 12)
+    gaps = component.gap(poses)
+    return poses.some(np.flatnonzero(gaps <= 1.001 * gaps.min() + CLOSED)), float(gaps.min())

@@ -1,0 +1,101 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What robot descriptions in XML share: elements, numbers and poses in them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Dict, Iterable, Optional, Tuple
+import xml.etree.ElementTree as ElementTree
+from xml.parsers import expat
+
+import numpy as np
+
+from .robot import FARTHEST
+from ..command import RequestError
+
+Element = ElementTree.Element
+
+
+def parse(path: str) -> Element:
+    """Return the root element of a file, all names without their namespace's prefix."""
+    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
+    has_xacro = False
+
+    def start(tag: str, attributes: Dict[str, str]) -> None:
+        nonlocal has_xacro
+        has_xacro |= tag.startswith('xacro:') or any('${' in text for text in attributes.values())
+        builder.start(tag.split(':')[-1], attributes)
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = lambda tag: builder.end(tag.split(':')[-1])
+    parser.CharacterDataHandler = builder.data
+    try:
+        with open(path, 'rb') as file:
+            parser.ParseFile(file)
+    except expat.ExpatError as error:
+        raise RequestError(f'{path} is no XML: {error}') from None
+    if has_xacro:
+        raise RequestError(f'{path} is xacro: run xacro first, as in xacro {path} > robot.urdf')
+    return builder.close()
+
+
+def once(parts: Iterable[Tuple[str, Element]]) -> Dict[str, Element]:
+    """Return parts by name; raise RequestError if two have one name, or one child."""
+    found: Dict[str, Element] = {}
+    for name, part in parts:
+        if found.setdefault(name, part) is not part:
+            raise RequestError(f'there are two of <{part.tag}> for {name!r}, which may have one')
+    return found
+
+
+def attribute(part: Element, tag: str, key: str, otherwise: str = '') -> str:
+    """Return an attribute of an element in a part."""
+    found = part.find(tag)
+    return otherwise if found is None else found.get(key, otherwise)
+
+
+def text(part: Element, tag: str, otherwise: str = '') -> str:
+    """Return the text of an element in a part."""
+    return (part.findtext(tag) or otherwise).strip()
+
+
+def numbers(said: str, count: int = 3) -> np.ndarray:
+    """Return so many numbers; raise ValueError if they are others."""
+    found = np.array(said.split(), float)
+    if len(found) != count or not np.all(np.abs(found) < FARTHEST):
+        raise ValueError(f'{said!r} must be {count} numbers within {FARTHEST:g}')
+    return found
+
+
+def origin(part: Optional[Element]) -> np.ndarray:
+    """Return the pose in the attributes xyz and rpy of an element, if there is one."""
+    if part is None:
+        return np.eye(4)
+    return pose(*numbers(f'{part.get("xyz", "0 0 0")} {part.get("rpy", "0 0 0")}', 6))
+
+
+def pose(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> np.ndarray:
+    """Return a pose by its place [m] and its angles about fixed axes [rad]."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos((roll, pitch, yaw)), np.sin((roll, pitch, yaw))
+    about_z, about_y, about_x = np.array([
+        [[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]], [[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]],
+        [[1, 0, 0], [0, cr, -sr], [0, sr, cr]]])
+    return at((x, y, z), about_z @ about_y @ about_x)
+
+
+def at(place: Any, turned: Any = ((1, 0, 0), (0, 1, 0), (0, 0, 1))) -> np.ndarray:
+    """Return a pose by its place and its rotation matrix."""
+    made = np.eye(4)
+    made[:3, :3], made[:3, 3] = turned, place
+    return made
+
+
+def turned_by(quaternion: Any) -> np.ndarray:
+    """Return the rotation matrix of a quaternion w, x, y, z."""
+    w, x, y, z = np.asarray(quaternion) / math.sqrt(sum(part * part for part in quaternion))
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])

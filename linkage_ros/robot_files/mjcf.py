@@ -1,0 +1,94 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Robots in MJCF, as MuJoCo reads them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .elements import at, turned_by
+from .robot import BALL, FIXED, HINGE, Robot, SLIDE
+
+
+def read(path: str) -> Robot:
+    """Return the robot in a file, in the pose of its first keyframe, or at its zero."""
+    import mujoco as mj
+
+    model = _compiled(path)
+    data = mj.MjData(model)
+    data.qpos[:] = model.key_qpos[0] if model.nkey else model.qpos0
+    mj.mj_kinematics(model, data)
+    bodies = [model.body(i).name or f'body{i}' for i in range(model.nbody)]
+    names = [model.joint(i).name or f'joint{i}' for i in range(model.njnt)]
+    robot = Robot(bodies[0], {body: at(data.xpos[i], data.xmat[i].reshape(3, 3))
+                              for i, body in enumerate(bodies)})
+    for i, body in list(enumerate(bodies))[1:]:
+        above, joints = bodies[model.body_parentid[i]], model.body_jntadr[i] + np.arange(
+            model.body_jntnum[i])
+        if not joints.size:
+            robot.join(body, FIXED, (above, body), robot.frames[body])
+        for j in joints:
+            # Between several joints of one body there are bodies without a name.
+            below = body if j == joints[-1] else f'{body}/{names[j]}'
+            robot.frames.setdefault(below, robot.frames[body])
+            kind = mj.mjtJoint(model.jnt_type[j]).name[6:].lower()
+            one = kind in (HINGE, SLIDE)
+            robot.join(names[j], kind, (above, below), at(data.xanchor[j]),
+                       data.xaxis[j] if one else (0.0, 0.0, 1.0), None,
+                       float(data.qpos[model.jnt_qposadr[j]]) if one else None,
+                       model.jnt_range[j].tolist() if model.jnt_limited[j] else ('', ''))
+            above = below
+    for i in np.flatnonzero(model.eq_active0).tolist():
+        _tie(robot, model, i, bodies, names)
+    for way, target in zip(model.actuator_trntype, model.actuator_trnid[:, 0]):
+        kind = mj.mjtTrn(way).name[6:].lower()
+        wraps = model.tendon_adr[target] + np.arange(model.tendon_num[target]) \
+            if kind == 'tendon' else ()
+        robot.driven += [names[target]] * (kind in ('joint', 'jointinparent')) + [
+            names[model.wrap_objid[i]] for i in wraps
+            if mj.mjtWrap(model.wrap_type[i]) == mj.mjtWrap.mjWRAP_JOINT]
+    return robot
+
+
+def _compiled(path: str) -> Any:
+    """Return a model without its meshes: its files may be elsewhere."""
+    import mujoco as mj
+
+    # What it warns of, and writes to a file, is dynamics.
+    mj.set_mju_user_warning(lambda text: None)
+    spec = mj.MjSpec.from_file(path)
+    for geom in spec.geoms:
+        if geom.type in (mj.mjtGeom.mjGEOM_MESH, mj.mjtGeom.mjGEOM_HFIELD, mj.mjtGeom.mjGEOM_SDF):
+            geom.type, geom.meshname, geom.hfieldname = mj.mjtGeom.mjGEOM_SPHERE, '', ''
+            geom.size = [0.01, 0.0, 0.0]
+        geom.material = ''
+    for part in (*spec.meshes, *spec.hfields, *spec.skins, *spec.materials, *spec.textures):
+        spec.delete(part)
+    spec.compiler.boundmass = spec.compiler.boundinertia = 1e-9
+    return spec.compile()
+
+
+def _tie(robot: Robot, model: Any, i: int, bodies: Any, names: Any) -> None:
+    """Add what an equality makes of two bodies or joints."""
+    import mujoco as mj
+
+    kind, given = mj.mjtEq(model.eq_type[i]).name[5:].lower(), model.eq_data[i]
+    ends = [model.eq_obj1id[i], model.eq_obj2id[i]]
+    if kind == 'joint' and ends[1] < 0:
+        robot.held[names[ends[0]]] = float(given[0] + model.qpos0[model.jnt_qposadr[ends[0]]])
+    elif kind == 'joint' and not given[2:5].any():
+        one, other = model.qpos0[model.jnt_qposadr[ends]]
+        robot.follow(names[ends[0]], names[ends[1]], given[1], given[0] + one - given[1] * other)
+    if kind in ('connect', 'weld'):
+        welds = kind == 'weld'
+        own, other = (given[3:6], given[:3]) if welds else (given[:3], given[3:6])
+        frames = [at(own, turned_by(given[6:10] if welds else (1.0, 0.0, 0.0, 0.0))), at(other)]
+        if mj.mjtObj(model.eq_objtype[i]) == mj.mjtObj.mjOBJ_SITE:
+            frames = [at(model.site_pos[end], turned_by(model.site_quat[end])) for end in ends]
+            ends = model.site_bodyid[ends]
+        first, second = (robot.frames[bodies[end]] @ frame for end, frame in zip(ends, frames))
+        robot.join(model.equality(i).name or f'equality{i}', FIXED if welds else BALL,
+                   (bodies[ends[0]], bodies[ends[1]]), first, other=second)

@@ -1,0 +1,450 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Loops of a robot closed in space, by Newton's method: many poses at a time.
+
+Nothing here knows of planes or dyads. A pose is a displacement of each body from where the file
+has it: a product of screws along a tree of joints; joints that are not in the tree are equations
+(R. Murray, Z. Li, S. Sastry: A Mathematical Introduction to Robotic Manipulation, 1994, ch. 3).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
+
+import numpy as np
+
+from .robot import BALL, FIXED, FREE, HINGE, Joint, Robot, SLIDE, UNIVERSAL
+
+# A pose moves by no more than this in a step [rad, or parts of the size].
+STRIDE = 0.5
+# Hinges nearer to each other [m] cross in a point.
+TOGETHER = 1e-6
+# In which order joints are taken into the tree, so that hinges and balls are left to close it.
+_TREE = {FIXED: 0, SLIDE: 1, FREE: 2, UNIVERSAL: 3, BALL: 4, HINGE: 5}
+
+
+class Element(NamedTuple):
+    """What moves in one way: about or along an axis; a ball in three."""
+
+    joint: Joint
+    kind: str
+    sign: float
+    place: np.ndarray
+    axis: np.ndarray
+    parent: int
+    body: str
+
+    @property
+    def columns(self) -> int:
+        """How many numbers move it."""
+        return 3 if self.kind == BALL else 1
+
+
+class Poses(NamedTuple):
+    """Positions of the elements [rad or m], a row a pose, and how each displaces what is on it."""
+
+    positions: np.ndarray
+    moved: np.ndarray
+
+    def some(self, which: np.ndarray) -> 'Poses':
+        """Return some of the poses."""
+        return Poses(self.positions[which], self.moved[which])
+
+
+def trees(robot: Robot) -> Tuple[Dict[str, Tuple[str, Joint]], List[Joint]]:
+    """Return on which body, by which joint, each body hangs, and the joints that close loops."""
+    home = {body: body for body in robot.frames}
+
+    def top(body: str) -> str:
+        while home[body] != body:
+            home[body] = body = home[home[body]]
+        return body
+
+    near: Dict[str, List[Tuple[str, Joint]]] = {body: [] for body in robot.frames}
+    cuts = []
+    for joint in sorted(robot.joints, key=lambda joint: (
+            joint.is_cut, joint.name not in robot.driven, _TREE.get(joint.kind, 1))):
+        ends = [top(body) for body in joint.bodies]
+        if joint.is_cut or ends[0] == ends[1]:
+            cuts.append(joint)
+            continue
+        home[ends[1]] = ends[0]
+        for body, other in (joint.bodies, joint.bodies[::-1]):
+            near[body].append((other, joint))
+    found: Dict[str, Tuple[str, Joint]] = {}
+    for start in (robot.root, *robot.frames):
+        if start != robot.root and start not in found:
+            # A body that is only held by what closes loops.
+            place = robot.frames[start][:3, 3]
+            found[start] = robot.root, Joint('', FREE, (robot.root, start), (place, place), place)
+        row = [start]
+        for body in row:
+            for other, joint in near[body]:
+                if other != robot.root and other not in found:
+                    found[other] = body, joint
+                    row.append(other)
+    return found, cuts
+
+
+def displaced(robot: Robot, moves: Mapping[str, np.ndarray]) -> Dict[str, np.ndarray]:
+    """Return how each body is displaced where the joints that bodies hang on displace some."""
+    made = {robot.root: np.eye(4)}
+    for body, (base, _) in trees(robot)[0].items():
+        made[body] = made[base] @ moves[body] if body in moves else made[base]
+    return made
+
+
+def blocks(found: Mapping[str, Tuple[str, Joint]], cuts: Sequence[Joint]
+           ) -> List[Tuple[Set[str], List[Joint]]]:
+    """Return the loops of a tree and cuts, those that share joints together: bodies and cuts."""
+    lots: List[Tuple[Set[str], List[Joint]]] = []
+    for cut in cuts:
+        ways: List[Set[str]] = []
+        for body in cut.bodies:
+            ways.append(set())
+            while body in found:
+                ways[-1].add(body)
+                body = found[body][0]
+        cycle = ways[0] ^ ways[1]
+        shared = [lot for lot in lots if lot[0] & cycle]
+        lots = [lot for lot in lots if lot not in shared]
+        lots.append((cycle.union(*(lot[0] for lot in shared)),
+                     [each for lot in shared for each in lot[1]] + [cut]))
+    return lots
+
+
+def components(robot: Robot) -> Iterator['Component']:
+    """Yield the loops that share joints, each lot on its own."""
+    found, cuts = trees(robot)
+    for bodies, own in blocks(found, cuts):
+        yield Component(robot, found, bodies, own)
+
+
+class Component:
+    """
+    Loops that share joints, and poses of them.
+
+    Attributes
+    ----------
+    joints : list of Joint
+        All joints of the loops.
+    size : float
+        The greatest distance of two joints in the file's pose [m].
+
+    """
+
+    def __init__(self, robot: Robot, found: Dict[str, Tuple[str, Joint]], bodies: set,
+                 cuts: Sequence[Joint]):
+        self._elements: List[Element] = []
+        self._cuts = cuts
+        self._on: Dict[str, int] = {}
+        for body in found:
+            if body in bodies:
+                self._add(found, body, bodies)
+        own = {found[body][1] for body in bodies} | {*cuts}
+        self.joints = [joint for joint in robot.joints if joint in own]
+        places = np.array([place for joint in self.joints for place in joint.places])
+        self.size = float(np.max(np.linalg.norm(places - places[0], axis=1))) or 1.0
+        self._above = np.zeros((len(self._elements) + 1, len(self._elements)), bool)
+        for i, each in enumerate(self._elements):
+            self._above[i] = self._above[each.parent]
+            self._above[i, i] = True
+        counts = [each.columns for each in self._elements]
+        self._column = np.repeat(np.arange(len(counts)), counts)
+        self._first = np.cumsum([0, *counts])[:-1]
+        self._is_ball, self._slides = (np.array(
+            [each.kind == kind for each in self._elements], bool) for kind in (BALL, SLIDE))
+        self._place, self._axis = (np.array([getattr(each, key) for each in self._elements]
+                                            ).reshape(-1, 3) for key in ('place', 'axis'))
+        self._parents = np.array([each.parent for each in self._elements], int)
+        self._ways = np.where(self._is_ball[self._column, None], np.eye(3)[
+            (np.arange(len(self._column)) - self._first[self._column]) % 3],
+            self._axis[self._column])
+        x, y, z = self._axis.T
+        zero = np.zeros_like(x)
+        self._skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
+        self.unit = np.where(self._slides[self._column], self.size, 1.0)
+        self._ends = np.array([[self._end(found, body) for body in cut.bodies]
+                               for cut in self._cuts], int).reshape(-1, 2)
+        self._equations()
+
+    def _end(self, found: Dict[str, Tuple[str, Joint]], body: str) -> int:
+        """Return the last element that moves a body."""
+        while body in found and body not in self._on:
+            body = found[body][0]
+        return self._on.get(body, -1)
+
+    def _add(self, found: Dict[str, Tuple[str, Joint]], body: str, bodies: set) -> None:
+        base, joint = found[body]
+        while base in found and base not in self._on:
+            if base in bodies:
+                self._add(found, base, bodies)
+                break
+            base = found[base][0]
+        parent = self._on.get(base, -1)
+        if body in self._on:
+            return
+        forward = joint.bodies[1] == body
+        sign = 1.0 if forward else -1.0
+        place, axis = joint.places[not forward], joint.axes[not forward]
+        parts = {HINGE: [(HINGE, axis)], SLIDE: [(SLIDE, axis)], BALL: [(BALL, axis)],
+                 FREE: [*((SLIDE, each) for each in np.eye(3)), (BALL, axis)],
+                 UNIVERSAL: [(HINGE, axis), (HINGE, joint.second)][::1 if forward else -1]}
+        for kind, way in parts.get(joint.kind, []):
+            self._elements.append(Element(joint, kind, sign, place, np.asarray(way), parent,
+                                          body))
+            parent = len(self._elements) - 1
+        self._on[body] = parent
+
+    def _equations(self) -> None:
+        """Note places and directions on both ends of each cut that have to be the same."""
+        self._places = np.array([cut.places for cut in self._cuts]).reshape(-1, 2, 3)
+        pairs: List[Tuple[int, np.ndarray, np.ndarray]] = []
+        self._dots = []
+        for i, cut in enumerate(self._cuts):
+            if cut.kind == HINGE:
+                one, other = cut.axes
+                pairs.append((i, one, other if one @ other > 0.0 else -other))
+            if cut.kind == FIXED:
+                pairs += [(i, cut.turns[0][:, k], cut.turns[1][:, k]) for k in range(3)]
+            if cut.kind == UNIVERSAL:
+                self._dots.append((i, cut.axes[0], cut.second))
+        self._pair_ends = self._ends[[i for i, _, _ in pairs]].reshape(-1, 2)
+        self._pairs = np.array([(one, other) for _, one, other in pairs]).reshape(-1, 2, 3)
+
+    @property
+    def positions(self) -> Dict[str, float]:
+        """Where the file has each joint that has a name and moves in one way."""
+        return {joint.name: joint.position for joint in self.joints
+                if joint.position is not None}
+
+    def at_start(self, count: int = 1) -> Poses:
+        """Return so many times the pose of the file."""
+        return Poses(np.zeros((count, len(self._elements))),
+                     np.tile(np.eye(4), (count, len(self._elements), 1, 1)))
+
+    def held(self, names: Sequence[str]) -> np.ndarray:
+        """Return which columns are of the joints that are named."""
+        return np.array([self._elements[i].joint.name in names for i in self._column], bool)
+
+    def column(self, name: str) -> Tuple[int, int, float, float]:
+        """Return the element and the column of a joint, its sign in these, and its position."""
+        i = next(i for i, each in enumerate(self._elements) if each.joint.name == name)
+        each = self._elements[i]
+        return i, int(np.searchsorted(self._column, i)), each.sign, each.joint.position or 0.0
+
+    def step_between(self, one: Poses, other: Poses) -> np.ndarray:
+        """Return by how much each column is farther in other poses; what turns in three is not."""
+        return (other.positions - one.positions)[:, self._column]
+
+    def stiffness(self, poses: Poses, still: np.ndarray, nullity: int
+                  ) -> Tuple[np.ndarray, np.ndarray]:
+        """Return the least and the product of singular values of each pose: 0 at a dead point."""
+        slope = self.errors(poses, True)[1][:, :, ~still] / self.size
+        values = np.linalg.eigvalsh(slope.swapaxes(1, 2) @ slope)[:, nullity:]
+        values = np.sqrt(np.maximum(values, 0.0))
+        return np.min(values, axis=1, initial=1.0), np.prod(values, axis=1)
+
+    def nullity(self, still: np.ndarray) -> int:
+        """Return how many joints move freely, in an open pose."""
+        step = np.random.default_rng(2).uniform(-0.3, 0.3, (1, len(still)))
+        slope = self.errors(self.stepped(self.at_start(), step * self.unit), True)[1][:, :, ~still]
+        return int(np.sum(np.linalg.eigvalsh(slope[0].T @ slope[0]) < (3e-4 * self.size) ** 2))
+
+    def _frames(self, poses: Poses) -> np.ndarray:
+        """Return the displacement after each element; the last is that of the root."""
+        frames = np.empty((len(poses.positions), len(self._elements) + 1, 4, 4))
+        frames[:, -1] = np.eye(4)
+        for i, each in enumerate(self._elements):
+            np.matmul(frames[:, each.parent], poses.moved[:, i], out=frames[:, i])
+        return frames
+
+    def stepped(self, poses: Poses, step: np.ndarray) -> Poses:
+        """Return poses with a step of the columns [rad or m] more."""
+        positions, moved = poses.positions.copy(), poses.moved.copy()
+        one = self._first[~self._is_ball]
+        positions[:, ~self._is_ball] += step[:, one]
+        angle = np.where(self._slides, 0.0, positions)
+        turn = np.eye(3) + np.sin(angle)[..., None, None] * self._skew \
+            + (1.0 - np.cos(angle))[..., None, None] * (self._skew @ self._skew)
+        made = np.zeros_like(moved)
+        made[..., 3, 3] = 1.0
+        made[..., :3, :3] = turn
+        made[..., :3, 3] = self._place - np.einsum('peij,ej->pei', turn, self._place) \
+            + (positions - angle)[..., None] * self._axis
+        moved[:, ~self._is_ball] = made[:, ~self._is_ball]
+        for i in np.flatnonzero(self._is_ball):
+            own = step[:, self._first[i]:self._first[i] + 3]
+            moved[:, i] = turned(own, self._place[i]) @ moved[:, i]
+        return Poses(positions, moved)
+
+    def _twists(self, frames: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Return how each column turns, and moves the origin: (poses, columns, 3) each."""
+        base = frames[:, self._parents[self._column]]
+        axes = np.einsum('pcij,cj->pci', base[..., :3, :3], self._ways)
+        place = np.einsum('pcij,cj->pci', base[..., :3, :3], self._place[self._column]) \
+            + base[..., :3, 3]
+        slides = self._slides[self._column][:, None]
+        return np.where(slides, 0.0, axes), np.where(slides, axes, _cross(place, axes))
+
+    def errors(self, poses: Poses, slopes: bool = False) -> Tuple[np.ndarray, np.ndarray]:
+        """Return what is open in each pose [m], and its derivatives by the columns."""
+        frames = self._frames(poses)
+        count = len(frames)
+        turns, moves = self._twists(frames) if slopes else (frames[:, :0], frames[:, :0])
+        rows, slope = [], []
+        for ends, vectors, size, are_places in (
+                (self._ends, self._places, 1.0, True), (self._pair_ends, self._pairs, self.size,
+                                                        False)):
+            both = []
+            for side in (0, 1):
+                own = frames[:, ends[:, side]]
+                seen = np.einsum('pcij,cj->pci', own[..., :3, :3], vectors[:, side])
+                seen = seen + own[..., :3, 3] if are_places else seen
+                both.append(seen)
+                if slopes:
+                    above = self._above[ends[:, side]][:, self._column]
+                    rate = _cross(turns[:, None], seen[:, :, None])
+                    rate = rate + moves[:, None] if are_places else rate
+                    rate = rate * (above * size * (1.0, -1.0)[side])[None, :, :, None]
+                    slope.append(rate.swapaxes(2, 3).reshape(count, -1, len(self._column)))
+            rows.append((size * (both[0] - both[1])).reshape(count, -1))
+            if slopes:
+                slope[-2:] = [slope[-2] + slope[-1]]
+        for i, one, other in self._dots:
+            ends = self._ends[i]
+            first, second = (np.einsum('pij,j->pi', frames[:, end, :3, :3], way)
+                             for end, way in zip(ends, (one, other)))
+            rows.append(self.size * (np.einsum('pi,pi->p', first, second) - one @ other)[:, None])
+            if slopes:
+                above = self._above[ends][:, self._column].astype(float)
+                across = _cross(first, second)
+                slope.append(self.size * np.einsum('pci,pi->pc', turns, across)[:, None]
+                             * (above[0] - above[1]))
+        return np.concatenate(rows, axis=1), (np.concatenate(slope, axis=1) * self.unit
+                                              if slopes else np.zeros(0))
+
+    def closed(self, poses: Poses, still: np.ndarray, count: int = 12,
+               home: Optional[np.ndarray] = None, firm: float = 0.0) -> Poses:
+        """
+        Return poses that Newton's method has closed, as far as it can in so many steps.
+
+        The columns that are `still` do not move. `home` [columns] pulls poses back, at first
+        as firmly as loops pull, then less and less.
+        """
+        free = ~still
+        for i in range(count):
+            error, slope = self.errors(poses, True)
+            slope = slope[:, :, free]
+            down = slope.swapaxes(1, 2)
+            square, pull = down @ slope, (down @ error[:, :, None])[..., 0]
+            most = np.einsum('pii->p', square)[:, None]
+            weight = 1e-14 * most
+            if home is not None:
+                weight = weight + most * max(firm * 0.5 ** i, 1e-13)
+                pull = pull + weight * ((poses.positions[:, self._column] - home) / self.unit)[
+                    :, free]
+            square = square + weight[:, :, None] * np.eye(free.sum()) + 1e-300 * np.eye(free.sum())
+            step = np.zeros((len(error), len(still)))
+            step[:, free] = -np.linalg.solve(square, pull[..., None])[..., 0]
+            far = np.max(np.abs(step), axis=1, initial=0.0)[:, None]
+            step *= np.minimum(1.0, STRIDE / np.maximum(far, STRIDE)) * self.unit
+            poses = self.stepped(poses, step)
+            if np.all(far < 1e-15):
+                break
+        return poses
+
+    def gap(self, poses: Poses) -> np.ndarray:
+        """Return by how much the loops are open at most, of the size, in each pose."""
+        return np.max(np.abs(self.errors(poses)[0]), axis=1, initial=0.0) / self.size
+
+    def moves(self, poses: Poses) -> Dict[str, np.ndarray]:
+        """Return how the joint that each body hangs on displaces it in the first pose."""
+        moved: Dict[str, np.ndarray] = {}
+        for i, each in enumerate(self._elements):
+            moved[each.body] = moved.get(each.body, np.eye(4)) @ poses.moved[0, i]
+        return moved
+
+    def away(self, positions: np.ndarray) -> np.ndarray:
+        """
+        Return how far joints are from where the file has them, each a column [rad, or of size].
+
+        Hinges that cross in a point, as a ball does, do not count: a rod's pose in a file is any.
+        """
+        balls = np.array([each.kind == BALL or any(
+            np.linalg.norm(each.place - other.place) < TOGETHER
+            and np.linalg.norm(np.cross(each.axis, other.axis)) > 0.1
+            for other in self._elements if HINGE == each.kind == other.kind)
+            for each in self._elements], bool)
+        turned = positions - math.tau * np.round(positions / math.tau)
+        return np.where(self._slides, positions / self.size, turned) * ~balls
+
+    def determined(self, poses: Poses, still: np.ndarray) -> np.ndarray:
+        """Return 1.0 for each joint that cannot move while others are still, or else 0.0."""
+        slope = self.errors(poses.some(np.arange(1)), True)[1][0][:, ~still]
+        _, values, ways = np.linalg.svd(slope)
+        free = np.zeros(len(self._elements))
+        np.maximum.at(free, self._column[~still], np.linalg.norm(
+            ways[np.sum(values > 3e-4 * self.size):], axis=0))
+        return (free < 1e-6).astype(float)
+
+    def farthest_apart(self, two: Poses, determined: Any) -> Tuple[str, float, float]:
+        """Return the joint that two poses have the farthest apart, and where each has it."""
+        apart = np.abs(self.away(two.positions[:1] - two.positions[1:]))[0] * determined
+        apart *= [each.joint.position is not None for each in self._elements]
+        if not apart.any():
+            return '', 0.0, 0.0
+        name = self._elements[int(np.argmax(apart))].joint.name
+        first, second = self.read(two)[name]
+        return name, float(first), float(second)
+
+    def immobile(self, poses: Poses) -> List[str]:
+        """Return the joints with a name that cannot move near the first pose, closed."""
+        still = self.held([])
+        rng = np.random.default_rng(3)
+        free = np.zeros(len(still))
+        for _ in range(3):
+            slope = self.errors(poses, True)[1][0]
+            _, values, ways = np.linalg.svd(slope)
+            ways = ways[np.sum(values > 3e-4 * self.size):]
+            free = np.maximum(free, np.linalg.norm(ways, axis=0))
+            step = ways.T @ rng.normal(size=len(ways))
+            step *= 0.1 / max(np.max(np.abs(step), initial=0.0), 0.1)
+            poses = self.closed(self.stepped(poses, step[None] * self.unit), still)
+        return [each.joint.name for i, each in enumerate(self._elements)
+                if each.joint.position is not None and free[self._column == i].max() < 1e-6]
+
+    def read(self, poses: Poses) -> Dict[str, np.ndarray]:
+        """Return where joints with a name are [rad or m]; those of cuts are wrapped."""
+        found = {each.joint.name: each.sign * poses.positions[:, i] + each.joint.position
+                 for i, each in enumerate(self._elements) if each.joint.position is not None}
+        frames = self._frames(poses)
+        for cut, (first, second) in zip(self._cuts, self._ends):
+            if cut.position is not None and cut.kind == HINGE:
+                turned = frames[:, first, :3, :3].swapaxes(1, 2) @ frames[:, second, :3, :3]
+                skew = np.stack([turned[:, 2, 1] - turned[:, 1, 2], turned[:, 0, 2] - turned[
+                    :, 2, 0], turned[:, 1, 0] - turned[:, 0, 1]], axis=1)
+                found[cut.name] = cut.position + np.arctan2(
+                    0.5 * skew @ cut.axes[0], 0.5 * (np.einsum('pii->p', turned) - 1.0))
+        return found
+
+
+def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    x, y, z = one[..., 0], one[..., 1], one[..., 2]
+    a, b, c = other[..., 0], other[..., 1], other[..., 2]
+    return np.stack([y * c - z * b, z * a - x * c, x * b - y * a], axis=-1)
+
+
+def turned(turn: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Return displacements that turn by vectors (poses, 3) about a place."""
+    angle = np.linalg.norm(turn, axis=1)
+    x, y, z = (turn / np.where(angle, angle, 1.0)[:, None]).T
+    zero, sin, cos = np.zeros_like(x), np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
+    skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
+    made = np.tile(np.eye(4), (len(turn), 1, 1))
+    made[:, :3, :3] += sin * skew + (1.0 - cos) * skew @ skew
+    made[:, :3, 3] = place - made[:, :3, :3] @ place
+    return made
