@@ -5,6 +5,7 @@
 
 import ctypes
 import math
+import random
 import re
 import shutil
 import subprocess
@@ -12,9 +13,11 @@ import subprocess
 import gmpy2
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
+from linkage_ros.linkage.rod_lines import FORMS
 import numpy as np
 import pytest
 from truth import rods
+from truth.hostile_texts import NUMBERS
 
 RULE, RATE_RULE = 4.0, 8.0
 DEGREE = math.pi / 180.0
@@ -348,6 +351,24 @@ def test_in_a_plane_a_rod_is_a_dyad():
 def test_what_cannot_be_solved_is_refused_in_words(lines, problem):
     with pytest.raises(ValueError, match=problem):
         made(lines)
+
+
+def test_lines_of_any_text_are_read_or_refused_in_a_line():
+    rng = random.Random(1)
+    words = [*FORMS, 'at', 'axis', 'within', 'length', 'ground', 'pitch', 'roll', 'R', '0', '1e70',
+             '1e-70', '30deg', '@', *NUMBERS[:60]]
+    for _ in range(120):
+        lines = [line.split() for line in G1]
+        for _ in range(rng.choice((1, 1, 2))):
+            line = rng.choice(lines)
+            place = rng.randrange(len(line))
+            line[place:place + rng.randrange(2)] = [rng.choice(words)] * rng.randrange(2)
+            if rng.random() < 0.1:
+                rng.shuffle(lines)
+        try:
+            made(list(map(' '.join, lines)))
+        except ValueError as error:
+            assert len(str(error)) <= 240
 
 
 def test_platforms_on_more_rods_are_refused_by_name():

@@ -26,8 +26,9 @@ from .spatial import EDGE, STEPS
 
 # Cells at first, on each side of the rectangle, and how often one is divided at most.
 CELLS, DIVIDED = 6, 7
-# More pairs of cells than these are a proof that takes longer than a third of a second.
-MOST = 400_000
+# Pairs of cells at most: of limits that are given, which takes a third of a second, and of those
+# that are looked for.
+MOST, FEW = 400_000, 60_000
 # What three numbers that are 1 in the middle have to be above.
 LEAST = 1e-6
 # Poses on each side of the rectangle to which the steps have to come back, one step before the
@@ -107,23 +108,23 @@ class Window:
         """Return the largest rectangle of this shape, up to its size, that is right."""
         size, step = 0.0, 0.5
         for _ in range(HALVINGS):
-            if self.scaled(size + step).is_right():
+            if self.scaled(size + step).is_right(FEW):
                 size += step
             step *= 0.5
         return self.scaled(size)
 
-    def is_right(self) -> bool:
+    def is_right(self, most: int = MOST) -> bool:
         """Return whether it holds one pose at most for any motor angles, and all are found."""
-        return self._comes_back() and self.is_single()
+        return self._comes_back() and self.is_single(most)
 
-    def is_single(self) -> bool:
+    def is_single(self, most: int = MOST) -> bool:
         """Return whether it is proved that it holds one pose at most for any motor angles."""
         cells = self._cells(CELLS)
         if not any(self._turning):  # whatever the lengths are, the derivatives are the same
             cells = np.array([[*0.5 * (self.low + self.high), 0.0, 0.0]])
         chosen = np.array(list(product(*self._sides)))
         needed = np.repeat(cells, len(chosen), axis=0), np.tile(chosen, (len(cells), 1))
-        self._left = MOST
+        self._left = most
         for _ in range(DIVIDED):
             failing = self._failing(*needed)
             if not len(failing) or self._left < 0:
@@ -251,7 +252,7 @@ class Window:
         return with_poses > LEAST, alone > LEAST
 
     def _comes_back(self) -> bool:
-        """Return whether the steps find all poses of a grid, from all motor angles they have."""
+        """Return whether the steps find all poses of a grid, and none of them is singular."""
         axes = [np.linspace(low, high, POSES) for low, high in zip(self.low, self.high)]
         poses = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
         cells = np.concatenate([poses, np.zeros(poses.shape)], axis=1)
@@ -262,7 +263,9 @@ class Window:
             wanted = poses[there].T
             pivots = [self._pivots(rod, middle[there])
                       for rod, (middle, _) in zip(self.rods, arcs)]
-            if not (np.abs(self._found(wanted, pivots) - wanted) < BACK).all():
+            signs = np.sign(_determinant(self._rows(pivots, wanted)[0]))
+            if (signs != signs[:1]).any() or not (
+                    np.abs(self._found(wanted, pivots) - wanted) < BACK).all():
                 return False
         return True
 
