@@ -9,7 +9,7 @@ ifeq ($(wildcard wheels/$(DISTRO).txt),)
 $(error DISTRO is '$(DISTRO)', but must be kilted or jazzy)
 endif
 
-suffix := $(if $(filter kilted,$(DISTRO)),,-$(DISTRO))
+suffix := $(if $(filter kilted,$(DISTRO)),,-$(DISTRO))$(if $(PLAIN),-plain)
 venv := .venv$(suffix)
 build := build$(suffix)
 install := install$(suffix)
@@ -18,7 +18,7 @@ bin := $(CURDIR)/$(venv)/bin
 docs_python := $(CURDIR)/.venv-docs/bin/python
 lint_bin := .venv-lint/bin
 
-requirements := wheels/$(DISTRO).txt wheels/build.txt wheels/demo.txt
+requirements := wheels/$(DISTRO).txt wheels/build.txt wheels/demo.txt $(if $(PLAIN),,wheels/fast.txt)
 tools := wheels/dev.txt $(wildcard wheels/dev-$(DISTRO).txt)
 sources := package.xml setup.py setup.cfg resource/linkage_ros wheels/prefix.cmake \
   $(shell find linkage_ros config examples launch linkage_interfaces -type f ! -name '*.pyc' 2>/dev/null)
@@ -44,7 +44,7 @@ in_ros := source $(install)/setup.bash &&
 
 .PHONY: help
 help: ## Show what can be made
-	@echo 'make TARGET [DISTRO=kilted|jazzy] [PYTHON=python3.x]'
+	@echo 'make TARGET [DISTRO=kilted|jazzy] [PYTHON=python3.x] [PLAIN=1: without llvmlite]'
 	@sed -n 's/^\([a-z]*\):.*## /  \1\t/p' $(firstword $(MAKEFILE_LIST))
 
 .PHONY: demo
@@ -86,6 +86,13 @@ test: build $(venv)/.tools ## Run the tests, but for the long ones, and say what
 	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m slipcover --source linkage_ros \
 	  --json --out $(build)/coverage.json -m pytest -n 2 -m 'not long'
 	@python .ci/coverage.py $(build)/coverage.json
+
+# What starts nodes runs alike without machine code.
+.PHONY: nodes
+nodes: build $(venv)/.tools ## Run the tests of the nodes alone; with PLAIN=1 where llvmlite is not installed
+	@$(if $(PLAIN),! python -c 'import llvmlite' 2>/dev/null)
+	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 -m 'not long' \
+	  $(shell grep -lE 'ros_harness|\(graph' test/test_*.py)
 
 .PHONY: long
 long: build $(venv)/.tools ## Run the long tests

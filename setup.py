@@ -17,10 +17,11 @@ interfaces = Path(__file__).resolve().with_name('linkage_interfaces')
 # PATH, where names like `render` have no business.
 for_ros = sys.argv[1:2] != ['--help'] and {'install', 'develop'} & set(sys.argv)
 commands = {
-    'c_code': 'c_code.command', 'crank_driver': 'nodes.crank_driver',
-    'from_robot': 'robot_files.command', 'kinematics': 'nodes.kinematics',
-    'render': 'render', 'scene': 'nodes.scene_process', 'servo_inverse': 'nodes.servo_inverse',
-    'urdf': 'nodes.urdf_command', 'viewer': 'web.viewer'}
+    'c_code': 'c_code.command:main', 'crank_driver': 'executables:crank_driver',
+    'from_robot': 'robot_files.command:main', 'kinematics': 'executables:kinematics',
+    'render': 'render:main', 'scene': 'executables:scene',
+    'servo_inverse': 'executables:servo_inverse', 'urdf': 'nodes.urdf_command:main',
+    'viewer': 'executables:viewer'}
 
 
 def build_interfaces():
@@ -82,7 +83,7 @@ setup(
     description='Closed planar linkages moved exactly, in closed form.',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [f'{name} = {package_name}.{module}:main'
-                            for name, module in commands.items()] if for_ros else [],
+        'console_scripts': [f'{name} = {package_name}.{function}'
+                            for name, function in commands.items()] if for_ros else [],
     },
 )

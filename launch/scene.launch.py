@@ -10,6 +10,7 @@ Bring up a scene: its nodes, and what it is looked at with.
 from importlib.util import find_spec
 from pathlib import Path
 import re
+import socket
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
@@ -31,7 +32,7 @@ RVIZ_CONFIG = 'linkage.rviz'
 # Without a robot model nothing else publishes a transform, and RViz would know of no frame.
 FRAME = 'linkages'
 YES, NO = ('true', '1', 'yes', 'on'), ('false', '0', 'no', 'off')
-LARGEST_PORT = 65535
+USUAL_PORT, LARGEST_PORT = 8020, 65535
 
 # Name, default, and what it does.
 ARGUMENTS = (
@@ -39,7 +40,8 @@ ARGUMENTS = (
     ('namespace', '', 'Namespace of all nodes and topics.'),
     ('apart', 'false', 'Whether each node is a process of its own.'),
     ('viewer', 'true', 'Whether to serve the page with the picture and the sliders.'),
-    ('port', '8020', "Port of the viewer's page; 0: any that is free."),
+    ('port', '', "Port of the viewer's page; 0: any that is free; empty: 8020, or any where that "
+     'is taken, as by the viewer of another namespace.'),
     ('rviz', 'false', 'Whether to start RViz.'),
     ('robot_model', 'false',
      'Whether to start a robot_state_publisher for each mechanism, for frames and robot models.'),
@@ -62,7 +64,7 @@ def _started(context):
     apart, viewer, rviz_wanted, robot_model, use_sim_time = (
         switched(name, chosen[name])
         for name in ('apart', 'viewer', 'rviz', 'robot_model', 'use_sim_time'))
-    port = numbered('port', chosen['port'])
+    port = numbered('port', chosen['port'] or str(free_or_any(USUAL_PORT)))
     share = Path(get_package_share_directory(PACKAGE))
     path = _scene_path(share, chosen['scene'])
     shown = scene.load(str(path))
@@ -111,6 +113,17 @@ def numbered(name, text):
     if not re.fullmatch(r'\s*[0-9]{1,5}\s*', text) or int(text) > LARGEST_PORT:
         raise RuntimeError(f'{name} must be a whole number from 0 to {LARGEST_PORT}, not {text!r}')
     return int(text)
+
+
+def free_or_any(port):
+    """Return a port if nobody listens there on this machine, else 0."""
+    with socket.socket() as here:
+        here.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            here.bind(('127.0.0.1', port))
+        except OSError:
+            return 0
+    return port
 
 
 def _transform(frame, child, time, common):

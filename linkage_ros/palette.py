@@ -15,11 +15,11 @@ DARK, FAINT, GREY, FRAME, TRACK, GRID, SHADE = (
 # Behind what is drawn in the dark: a page's paper, and its grid; RViz's background is DUSK too.
 NIGHT, DUSK = '#161616', '#303030'
 
-# What pictures show: links, cranks, the tracer, guides and the floor.
-LINK, CRANK, TRACE, GUIDE, FLOOR = BLUE, ORANGE, VERMILION, GREEN, '#b5a27c'
-# What markers show, each seen on white, NIGHT and DUSK.
+# What pictures, markers, robot models and the page show, each seen on white, NIGHT and DUSK.
 BAR, DRIVEN, JOINT, LOCUS, SLOT, EARTH = '#0081c9', '#c87800', GREY, GREEN, GREY, '#998763'
 PLATE = '#5b8fae'
+# The floor of pictures.
+FLOOR = '#b5a27c'
 # Vermilion that can be read as text.
 REFUSED = '#a84300'
 

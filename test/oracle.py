@@ -395,7 +395,7 @@ class Bench:
     def __init__(self, graph, parameters, patience=DEADLINE, **kwargs):
         self._graph, self.model, self._patience = graph, Model(parameters), patience
         self.node = graph.start(Kinematics, parameters, **kwargs)
-        self._executor, self._handled = graph._executor, 0
+        self._executor, self._handled = graph.executor, 0
         self._crank = graph.node.create_publisher(JointState, 'crank_states', 100)
         self.listeners = {}
         self._latched = {topic: self._subscribe(topic, kind, LATCHED) for topic, kind in [

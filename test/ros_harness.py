@@ -41,14 +41,14 @@ class Graph:
         self._own = None if self._domain else Domain()
         self.context = rclpy.Context()
         rclpy.init(context=self.context, domain_id=self._domain or self._own.id)
-        self._executor = SingleThreadedExecutor(context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
         self._nodes = []
         self._stamps = itertools.count(1)
         self.node = self._add(rclpy.create_node('tester', context=self.context))
         return self
 
     def __exit__(self, *_):
-        self._executor.shutdown()
+        self.executor.shutdown()
         for node in self._nodes:
             node.destroy_node()
         rclpy.try_shutdown(context=self.context)
@@ -57,7 +57,7 @@ class Graph:
 
     def _add(self, node):
         self._nodes.append(node)
-        self._executor.add_node(node)
+        self.executor.add_node(node)
         return node
 
     def start(self, node_class, parameters=None, **kwargs):
@@ -68,7 +68,7 @@ class Graph:
 
     def end(self, node):
         """End a node."""
-        self._executor.remove_node(node)
+        self.executor.remove_node(node)
         self._nodes.remove(node)
         node.destroy_node()
 
@@ -84,7 +84,7 @@ class Graph:
         while not (held := predicate()):
             assert time.monotonic() < deadline, 'did not happen in time'
             try:
-                self._executor.spin_once(timeout_sec=0.02)
+                self.executor.spin_once(timeout_sec=0.02)
             except InvalidHandle:
                 # Another thread ended a node while this one waited for it.
                 continue
@@ -97,7 +97,10 @@ class Graph:
         parameters = [value if isinstance(value, Parameter) else
                       Parameter(name.replace('__', '.'), value=value)
                       for name, value in values.items()]
-        return self.answer(lambda: client.set_parameters_atomically(parameters)).result
+        result = self.answer(lambda: client.set_parameters_atomically(parameters)).result
+        # What is accepted acts when it has been prepared.
+        self.until(lambda: getattr(node, 'is_settled', True))
+        return result
 
     def call(self, client, request):
         """Return what a service answers."""
@@ -167,8 +170,10 @@ class Process:
     def __init__(self, name, parameter_file, *arguments, domain=None, env=None):
         self._domain = None if domain else Domain()
         self.domain = domain or self._domain.id
+        start = ('-m', module(name)) if name == 'urdf' else (
+            '-c', f'from linkage_ros import executables; executables.{name}()')
         self._process = subprocess.Popen(
-            [sys.executable, '-m', module(name), *arguments, '--ros-args',
+            [sys.executable, *start, *arguments, '--ros-args',
              '--params-file', str(parameter_file)],
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
             env={**os.environ, **(env or {}), 'ROS_DOMAIN_ID': str(self.domain)})

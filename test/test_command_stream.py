@@ -317,8 +317,26 @@ def test_a_trajectory_of_a_foot_and_a_bucket(graph, several_plan):
     (['flap'], [([math.nan], [])], 'point 0: flap cannot be nan: a value must be finite')])
 def test_a_trajectory_that_cannot_be_is_refused_as_a_whole(graph, plan, capfd, names, points,
                                                            reason):
-    refused = plan(names, *points)
+    refused, logged = plan(names, *points), []
+
+    def is_refused():
+        logged.append(capfd.readouterr().err)
+        return 'wanted_trajectory is refused: ' in ''.join(logged)
+
+    graph.until(is_refused)
+    assert reason in ''.join(logged)
     graph.until(plan(['flap'], ([flap(0.3)], [])))
     assert not refused()
-    said = capfd.readouterr().err
-    assert f'wanted_trajectory is refused: {reason}' in said or reason in said
+
+
+def test_a_trajectory_is_solved_beside_the_messages_and_a_newer_one_replaces_it(graph, plan):
+    older = plan(['flap'], *(([flap(0.3)], []) for _ in range(10_000)))
+    newer = plan(['flap'], ([flap(0.2)], []))
+    assert graph.until(newer) and not older()
+
+
+def test_a_trajectory_of_too_many_points_is_refused(graph, plan, capfd):
+    plan(['flap'], *(([flap(0.3)], []) for _ in range(10_001)))
+    logged = []
+    graph.until(lambda: logged.append(capfd.readouterr().err) or (
+        'it has 10001 points; send up to 10000' in ''.join(logged)))

@@ -217,7 +217,7 @@ def test_names_that_are_no_inputs_are_said_once(graph):
 
 
 def test_a_stream_of_new_names_is_said_within_bounds(graph, monkeypatch):
-    monkeypatch.setattr(kinematics, 'STRANGERS', 20)
+    monkeypatch.setattr(kinematics, 'UNKNOWN_NAMES', 20)
     hand = Hand(graph)
     for i in range(60):
         hand.send([f'{i}' * 1000, '\n', f'w{i}'], [0.0] * 3)
@@ -236,24 +236,24 @@ def test_inputs_that_nobody_sends_are_said_once(graph, monkeypatch):
     monkeypatch.setattr(kinematics, 'PATIENCE', 0.3)
     hand = Hand(graph, 'five_bar', FIVE_BAR)
     hand.send(['five_bar_crank'], [0.1])
-    said = graph.until(lambda: hand.warnings('nothing was heard'))
-    assert said == ['crank_states: nothing was heard of five_bar_crank2, without which five_bar '
-                    'cannot move']
+    said = graph.until(lambda: hand.warnings('nothing was received'))
+    assert said == ['crank_states: nothing was received of five_bar_crank2, without which '
+                    'five_bar cannot move']
     hand.send(['five_bar_crank'], [0.2])
     hand.moved(['five_bar_crank2'], [0.3])
     with pytest.raises(AssertionError, match='in time'):
-        graph.until(lambda: len(hand.warnings('nothing was heard')) > 1, 5 * RETRY)
+        graph.until(lambda: len(hand.warnings('nothing was received')) > 1, 5 * RETRY)
 
 
 def test_nothing_is_missed_where_nothing_or_everything_was_heard(graph, monkeypatch):
     monkeypatch.setattr(kinematics, 'PATIENCE', 0.2)
     hand = Hand(graph, 'five_bar', FIVE_BAR)
     with pytest.raises(AssertionError, match='in time'):
-        graph.until(lambda: hand.warnings('nothing was heard'), 0.5)
+        graph.until(lambda: hand.warnings('nothing was received'), 0.5)
     hand.send(['five_bar_crank'], [0.1])
     hand.moved(['five_bar_crank2'], [0.2])
     with pytest.raises(AssertionError, match='in time'):
-        graph.until(lambda: hand.warnings('nothing was heard'), 0.5)
+        graph.until(lambda: hand.warnings('nothing was received'), 0.5)
 
 
 def test_without_llvmlite_the_node_says_so(graph, monkeypatch):

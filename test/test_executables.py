@@ -4,6 +4,7 @@
 """The executables as users start them: how they end, and what they say of a bad scene."""
 
 from importlib import import_module
+import os
 from pathlib import Path
 import re
 import signal
@@ -15,6 +16,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 NODES = ('crank_driver', 'kinematics', 'servo_inverse')
+EXECUTABLES = (*NODES, 'scene', 'viewer')
 
 
 @pytest.fixture(scope='module')
@@ -38,6 +40,50 @@ def test_a_signal_ends_a_node_quietly(harness, name, stop):
     assert re.search(rf'\[{name}\]: ready: .*water_drop', first)
     process.interrupt(stop)
     assert process.end() == (0, '')
+
+
+IMPORTS_FOR_EVER = """
+import sys
+import time
+
+
+class Slow:
+    def find_spec(self, name, path=None, target=None):
+        if name == 'rclpy':
+            print('importing', flush=True)
+            while True:
+                time.sleep(0.01)
+
+
+sys.meta_path.insert(0, Slow())
+"""
+
+
+@pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('name', EXECUTABLES)
+def test_a_signal_ends_what_is_still_being_imported(harness, tmp_path, name, stop):
+    (tmp_path / 'sitecustomize.py').write_text(IMPORTS_FOR_EVER)
+    path = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', '')])
+    process = harness.Process(name, ROOT / 'config' / 'all.yaml', env={'PYTHONPATH': path})
+    assert process.line() == 'importing\n'
+    process.interrupt(stop)
+    assert process.end() == (0, '')
+
+
+@pytest.mark.parametrize('name', EXECUTABLES)
+def test_a_thread_that_computes_does_not_hold_up_the_end(harness, name):
+    done = subprocess.run([sys.executable, '-c', textwrap.dedent(f"""
+        from threading import Thread
+        from time import sleep
+
+        from linkage_ros import executables
+
+        Thread(target=sleep, args=(600.0,)).start()
+        print('started')
+        executables.{name}()
+        """), '--foo'], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (1, 'started\n')
+    assert one_sentence(done.stderr, ARGUMENTS[0][1])
 
 
 ARGUMENTS = [
@@ -87,8 +133,7 @@ def test_a_signal_while_a_message_is_published_is_no_failure(harness):
 
         def _end(self):
             signal.raise_signal(signal.SIGTERM)
-            while rclpy.ok():
-                pass
+            rclpy.shutdown()
             self._publisher.publish(JointState())
 
     assert run(Ended, 'ended', args=[]) == 0

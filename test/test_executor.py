@@ -128,7 +128,7 @@ def test_a_signal_amid_a_callback_ends_a_node_quietly(stop, plain):
                 self.create_subscription(JointState, 'crank_states', print, 1)
 
             def _time(self):
-                if self._publisher.is_heard:
+                if self._publisher.has_subscribers:
                     signal.raise_signal({int(stop)})
                     while rclpy.ok():
                         pass

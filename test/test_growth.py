@@ -4,7 +4,6 @@
 """What many mechanisms share, and what a change to one of them leaves alone, counted."""
 
 import gc
-from types import SimpleNamespace
 import weakref
 
 from linkage_ros import scene
@@ -63,11 +62,11 @@ def test_a_changed_scene_is_what_all_values_read_anew_make(values):
 
 def test_of_a_change_to_one_only_that_is_read_prepared_and_announced(graph, monkeypatch):
     pytest.importorskip('rclpy')
-    from linkage_ros.nodes import kinematics, mechanism_publisher, ownership
+    from linkage_ros.nodes import driven_mechanism, kinematics, ownership
     from rcl_interfaces.msg import ParameterEvent
 
     read, made = [], []
-    read_machine, model = scene.read_machine, mechanism_publisher.Model
+    read_machine, model = scene.read_machine, driven_mechanism.MechanismModel
 
     def reading(name, given, old, strict):
         machine = read_machine(name, given, old, strict)
@@ -75,7 +74,7 @@ def test_of_a_change_to_one_only_that_is_read_prepared_and_announced(graph, monk
         return machine
 
     monkeypatch.setattr(scene, 'read_machine', reading)
-    monkeypatch.setattr(mechanism_publisher, 'Model', lambda machine, *args: (
+    monkeypatch.setattr(driven_mechanism, 'MechanismModel', lambda machine, *args: (
         made.append(machine.name) or model(machine, *args)))
     node = graph.start(kinematics.Kinematics, MANY)
     assert read == made == MANY['mechanisms']
@@ -106,31 +105,3 @@ def test_whoever_comes_late_gets_all_however_many_changes_were_before(graph, mon
         graph.until(lambda late=late: [one.scale for one in late.scene.machines.values()] == [
             one.scale for one in owner.scene.machines.values()])
         graph.end(late)
-
-
-def test_parameters_declared_at_once_are_those_that_are_declared_one_by_one(graph, monkeypatch):
-    pytest.importorskip('rclpy')
-    from linkage_ros.nodes import kinematics, parameter_server, scene_node
-
-    def declared():
-        node = graph.start(kinematics.Kinematics, {
-            'mechanisms': ['m'], 'm.type': 'four_bar', 'm.joint_names': ['AB=knee']})
-        names = sorted(node.fields)
-        assert set(names) <= set(node.list_parameters([], 0).names)
-        found = [(node.get_parameter(name).get_parameter_value(), node.describe_parameter(name))
-                 for name in names]
-        assert node.set_parameters([scene_node.Parameter('m.points', value=['A'])])[0].successful
-        assert not node.set_parameters([scene_node.Parameter('m.type', value='x')])[0].successful
-        graph.end(node)
-        return names, found
-
-    at_once, refused = declared(), []
-    monkeypatch.setattr(scene_node, 'declare', lambda *args: refused.append(args))
-    assert declared() == at_once
-    bare, wanted = graph.start(scene_node.Node, node_name='bare'), refused[0][1:]
-    assert parameter_server.declare(bare, *wanted)
-    assert wanted[0].keys() < set(bare.list_parameters([], 0).names)
-    # A client library that keeps parameters elsewhere is left alone.
-    for kept in ({}, {'_parameters': {}, '_descriptors': {}}):
-        assert not parameter_server.declare(SimpleNamespace(**kept), *wanted)
-        assert not any(kept.values())

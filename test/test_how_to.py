@@ -248,6 +248,14 @@ def test_a_urdf_with_pairs_of_frames(graph, follow, library):
             assert places[f'{loop}_eye'] == pytest.approx(places[f'{loop}_pin'], abs=1e-12)
 
 
+def test_the_scene_of_a_whole_robot(follow):
+    follow('how-to/whole-robot')
+    shown = scene.load('robot.yaml')
+    assert len(shown.machines) == 2
+    line = Path('robot.yaml').read_text().splitlines()[1]
+    assert line.startswith('# ros2 launch linkage_ros robot.launch.py robot:=examples/leg.urdf')
+
+
 def test_a_model_for_mujoco(graph, follow):
     pytest.importorskip('mujoco')
     follow('how-to/mujoco')

@@ -6,13 +6,17 @@
 import ast
 from importlib.util import find_spec
 import json
+import math
 from pathlib import Path
 import re
 import runpy
+import socket
 import sys
 
 from linkage_ros import scene
+from linkage_ros.render.cycle import Cycle
 from linkage_ros.robot_model import rviz
+import numpy as np
 import pytest
 
 yaml = pytest.importorskip('yaml')
@@ -97,7 +101,8 @@ def test_rviz_looks_from_where_the_linkages_are_seen(shown):
 def test_rviz_shows_any_other_scene_too(shown):
     given = scene.load(str(CONFIG / 'all.yaml'))
     assert rviz.adapted(shown, given.machines, given.frame_id) == shown
-    other = rviz.adapted(shown, ['walker', 'jansen'], 'earth', 'left/side', True, 'left/')
+    machines = scene.read({'mechanisms': ['walker', 'jansen'], 'walker.type': 'klann'}).machines
+    other = rviz.adapted(shown, machines, 'earth', 'left/side', True, 'left/')
     assert {name for name, *_ in topics(other)} == {
         f'/left/side/{name}/{topic}' for name in ('walker', 'jansen')
         for topic in ('markers', 'locus', 'robot_description')}
@@ -105,6 +110,34 @@ def test_rviz_shows_any_other_scene_too(shown):
     assert all(d['Enabled'] and d['Value'] for d in displays(other))
     assert [d['TF Prefix'] for d in displays(other) if 'TF Prefix' in d] == ['left', 'left']
     assert rviz.adapted(other, given.machines, given.frame_id)['Panels'] == shown['Panels']
+
+
+def seen_by(view, machine):
+    """Return how far off the middle of a camera joints are seen, as a part of what it sees."""
+    focus = np.array([view['Focal Point'][axis] for axis in 'XYZ'], float)
+    pitch, yaw = view['Pitch'], view['Yaw']
+    away = np.array([math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch),
+                     math.sin(pitch)])
+    eye = focus + view['Distance'] * away
+    flat = Cycle(machine).course.reshape(-1, 2)
+    turn = np.eye(3)[[0, 2] if math.cos(machine.pose[3]) < 0.5 else [0, 1]]
+    places = flat @ turn + machine.pose[:3]
+    depth = (eye - places) @ away
+    off = np.linalg.norm((places - eye) + depth[:, None] * away, axis=1)
+    return off / depth / math.tan(math.radians(22.5)), away
+
+
+@pytest.mark.parametrize('path', sorted(CONFIG.glob('*.yaml')), ids=lambda path: path.stem)
+def test_rviz_opens_on_all_of_a_scene_and_sees_its_plane(shown, path):
+    machines = scene.load(str(path)).machines
+    view = rviz.adapted(shown, machines, 'world')['Visualization Manager']['Views']['Current']
+    for machine in machines.values():
+        off, away = seen_by(view, machine)
+        assert off.max() < 1.0
+        upright = math.cos(machine.pose[3]) < 0.5
+        assert (away[1] < -0.9) if upright else (away[2] > 0.9)
+    # Not from so far that it is small either.
+    assert max(seen_by(view, machine)[0].max() for machine in machines.values()) > 0.3
 
 
 @pytest.fixture
@@ -143,7 +176,7 @@ def test_every_argument_of_the_launch_file_is_described(constants):
     documented = (ROOT / 'docs' / 'viewer.md').read_text()
     assert all(f'`{name}`' in documented for name in arguments)
     viewer = (ROOT / 'linkage_ros' / 'web' / 'viewer.py').read_text()
-    assert re.search(rf'^PORT = {arguments["port"][0]}$', viewer, re.MULTILINE)
+    assert re.search(rf'^PORT = {constants["USUAL_PORT"]}$', viewer, re.MULTILINE)
 
 
 @pytest.mark.parametrize('text, wanted', [
@@ -228,3 +261,13 @@ def test_what_cannot_be_is_refused_with_what_is_allowed():
             ('viewer', 'maybe', "viewer must be true or false, not 'maybe'")):
         with pytest.raises(RuntimeError, match=complaint):
             started(**{name: text})
+
+
+def test_a_second_viewer_takes_another_port(constants):
+    with socket.socket() as taken:
+        taken.bind(('127.0.0.1', 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        constants['socket'] = socket
+        assert constants['free_or_any'](port) == 0
+    assert constants['free_or_any'](port) == port

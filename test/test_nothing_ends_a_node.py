@@ -242,12 +242,12 @@ def many(tmp_path):
 @pytest.mark.parametrize('name', [
     'kinematics', pytest.param('crank_driver', marks=pytest.mark.long),
     pytest.param('servo_inverse', marks=pytest.mark.long),
-    pytest.param('scene_process', marks=pytest.mark.long)])
+    pytest.param('scene', marks=pytest.mark.long)])
 def test_a_signal_ends_the_start_of_a_thousand_mechanisms(processes, many, name, publishers,
                                                           number):
     process = Process(name, many)
     processes.append(process)
-    node = 'kinematics' if name == 'scene_process' else name
+    node = 'kinematics' if name == 'scene' else name
 
     def begun():
         return process.has_ended or node in graph.node.get_node_names() and publishers <= len(
@@ -255,7 +255,7 @@ def test_a_signal_ends_the_start_of_a_thousand_mechanisms(processes, many, name,
 
     with Graph(process.domain) as graph:
         # How many there are depends on the node.
-        if name in ('kinematics', 'scene_process') or publishers == 0:
+        if name in ('kinematics', 'scene') or publishers == 0:
             graph.until(begun)
             assert not process.has_ended
             ends_quietly(process, number)
@@ -263,7 +263,7 @@ def test_a_signal_ends_the_start_of_a_thousand_mechanisms(processes, many, name,
 
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('name', [
-    'servo_inverse', pytest.param('scene_process', marks=pytest.mark.long)])
+    'servo_inverse', pytest.param('scene', marks=pytest.mark.long)])
 def test_a_signal_ends_a_long_trajectory(processes, tmp_path, name, number):
     path = tmp_path / 'scene.yaml'
     path.write_text('/**:\n  ros__parameters:\n    mechanisms: [m]\n    m.type: five_bar\n')
@@ -302,7 +302,7 @@ def without_llvmlite(tmp_path, monkeypatch):
         [str(tmp_path), os.environ.get('PYTHONPATH', '')]))
 
 
-@pytest.mark.parametrize('name', ['kinematics', 'scene_process'])
+@pytest.mark.parametrize('name', ['kinematics', 'scene'])
 def test_without_llvmlite_a_message_that_nobody_listens_to_ends_nothing(
         processes, without_llvmlite, name):
     process = Process(name, CONFIG / 'jansen.yaml')

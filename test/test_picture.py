@@ -16,7 +16,7 @@ from linkage_ros import palette, scene  # noqa: E402
 from linkage_ros.linkage.walker import Assembly  # noqa: E402
 from linkage_ros.nodes import messages  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.nodes.whole_scene import LATCHED  # noqa: E402
+from linkage_ros.nodes.publishers import LATCHED  # noqa: E402
 from linkage_ros.robot_model import urdf  # noqa: E402
 from ros_harness import Graph, Process  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
@@ -71,7 +71,7 @@ def test_a_leg_that_cannot_be_assembled_goes_once_and_comes_back(graph):
     graph.until(lambda: picture().keys() == CELL_IDS)
     with pytest.raises(AssertionError, match='in time'):
         turn([2.0], states, seconds=0.5)
-    assert picture().keys() == {2}
+    graph.until(lambda: picture().keys() == {2})
     assert sum(array.markers[0].action == Marker.DELETE for array in arrays) == 1
     turn([0.4], states)
     graph.until(lambda: picture().keys() == CELL_IDS)
@@ -84,7 +84,7 @@ def test_a_locus_that_is_no_curve_any_more_goes_for_whoever_comes_late_too(graph
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Assembly, 'locus', lambda *_: np.zeros((1, 2)))
         assert graph.set(node, cell__scale=0.9).successful
-    graph.until(lambda: not picture())
+        graph.until(lambda: not picture())
     late = graph.listen(Marker, 'cell/locus', LATCHED)
     assert graph.until(lambda: late)[0].action == Marker.DELETE
     assert graph.set(node, cell__scale=1.0).successful
@@ -97,11 +97,11 @@ def test_whoever_comes_late_sees_the_newest_locus_and_model(graph):
         assert graph.set(node, cell__scale=scale).successful
     locus = graph.listen(Marker, 'cell/locus', LATCHED)
     model = graph.listen(String, 'cell/robot_description', LATCHED)
-    graph.until(lambda: locus and model)
     wanted = scene.read({**CELL, 'cell.scale': 4.0}).machines['cell']
-    assert model[0].data == urdf.describe([wanted], 'world')
-    drawn = np.array([(p.x, p.y) for p in locus[0].points])
-    assert drawn == pytest.approx(wanted.assembly().locus(wanted.tracer))
+    curve = wanted.assembly().locus(wanted.tracer)
+    graph.until(lambda: model and model[-1].data == urdf.describe([wanted], 'world'))
+    graph.until(lambda: locus and np.allclose(
+        [(p.x, p.y) for p in locus[-1].points], curve, rtol=1e-9))
 
 
 def test_nothing_is_left_of_a_node_that_is_destroyed(graph):

@@ -67,7 +67,7 @@ class Scene:
             self.received[topic][-1].header.stamp.sec == self._stamp))
 
 
-@pytest.mark.parametrize('name', ['kinematics', 'scene_process'])
+@pytest.mark.parametrize('name', ['kinematics', 'scene'])
 def test_without_llvmlite_and_without_subscribers_a_node_goes_on(tmp_path, name):
     (tmp_path / 'sitecustomize.py').write_text(NOT_INSTALLED)
     scene = Path(__file__).parents[1] / 'config' / 'jansen.yaml'

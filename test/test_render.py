@@ -181,7 +181,7 @@ def test_a_gif_keeps_the_colours_that_colour_blind_people_tell_apart(tmp_path):
     file = rendered(tmp_path, '--frames', '3', ending='gif')
     with Image.open(file) as image:
         seen = {colour for _, colour in image.convert('RGB').getcolors(1 << 16)}
-    wanted = [palette.BLUE, palette.ORANGE, palette.GREEN, palette.VERMILION, 'white']
+    wanted = [palette.BAR, palette.DRIVEN, palette.LOCUS, palette.GREY, 'white']
     assert {tuple(round(255 * c) for c in to_rgb(colour)) for colour in wanted} <= seen
 
 
@@ -353,8 +353,9 @@ def test_several_cranks_turn_as_fast_as_they_were_told_to():
     (['jansen.yaml', '--out', 'a.png', '--bogus'], 'unrecognized arguments: --bogus'),
     (['jansen.yaml', 'all.yaml', '--out', 'a.png'], 'unrecognized arguments: all.yaml'),
     (['foreign.yaml', '--out', 'a.png'], "foreign.yaml must be YAML with '/**:'"),
-    (['date.yaml', '--out', 'a.png'], "date.yaml must be YAML with '/**:'"),
-    (['itself.yaml', '--out', 'a.png'], "itself.yaml must be YAML with '/**:'"),
+    (['empty.yaml', '--out', 'a.png'], "empty.yaml must be YAML with '/**:'"),
+    (['date.yaml', '--out', 'a.png'], 'Cannot have a value before ros__parameters at line 1'),
+    (['itself.yaml', '--out', 'a.png'], 'Will not support aliasing at line 1'),
     (['.', '--out', 'a.png'], '.: Is a directory'),
     (['jansen.yaml', '--out', 'a.bmp'], '--out must end in .png, .svg, .gif, .mp4, not a.bmp'),
     (['jansen.yaml'], '--out'),
@@ -374,6 +375,9 @@ def test_several_cranks_turn_as_fast_as_they_were_told_to():
     (['jansen.yaml', '--out', 'a.png', '--trace', 'x'], 'growing'),
     (['jansen.yaml', '--out', 'a.png', '--mechanisms', 'x'], 'allowed: jansen'),
     (['peaucellier.yaml', '--out', 'a.png', '--angle', '180'], 'stays inside'),
+    (['jansen.yaml', '--out', 'a.png', '--angle', 'r/2'], 'such as 30, pi/6 or 30deg, not r/2'),
+    (['jansen.yaml', '--out', 'a.png', '--angle', 'inf'], 'such as 30, pi/6 or 30deg, not inf'),
+    (['jansen.yaml', '--out', 'a.png', '--show', 'lables'], 'did you mean labels?'),
     (['bad.yaml', '--out', 'a.png'], 'leg.type must be'),
     (['picture.png', '--out', 'a.png'], 'picture.png'),
     (['still.yaml', '--out', 'a.gif'], 'nothing moves'),
@@ -385,7 +389,8 @@ def test_what_cannot_be_is_said_in_one_line_and_no_file_is_left(
     start = '/**: {ros__parameters: {mechanisms: [leg], leg.type: '
     (tmp_path / 'bad.yaml').write_text(start + 'unknown}}')
     (tmp_path / 'still.yaml').write_text(start + 'jansen, leg.crank.speed: 0.0}}')
-    (tmp_path / 'foreign.yaml').write_text('/kinematics: {ros__parameters: {rate: 5.0}}')
+    (tmp_path / 'foreign.yaml').write_text('/other: {ros__parameters: {rate: 5.0}}')
+    (tmp_path / 'empty.yaml').write_text('')
     (tmp_path / 'date.yaml').write_text('a: 2020-13-45')
     (tmp_path / 'itself.yaml').write_text('/**: {ros__parameters: &a {b: *a}}')
     (tmp_path / 'picture.png').write_bytes(b'\x89PNG\r\n\xff')
@@ -401,6 +406,16 @@ def test_a_crank_that_stands_still_has_a_picture(tmp_path):
     file.write_text('/**: {ros__parameters: {mechanisms: [water_drop, jansen], '
                     'water_drop.crank.speed: 0.0}}')
     assert main([str(file), '--out', str(tmp_path / 'a.png'), '--angle', '90']) == 0
+
+
+def test_an_angle_may_be_written_as_joint_lines_have_it(tmp_path):
+    pictures = []
+    for angle in ('60', '60deg', 'pi/3', '2*30'):
+        out = tmp_path / 'a.png'
+        assert main([str(CONFIG / 'jansen.yaml'), '--out', str(out), '--angle', angle,
+                     '--size', '128x128', '--hide', 'axes,title']) == 0
+        pictures.append(out.read_bytes())
+    assert len(set(pictures)) == 1
 
 
 def test_no_ros_is_needed(tmp_path):
@@ -421,3 +436,17 @@ def test_without_matplotlib_its_package_is_named(tmp_path):
     assert ended.returncode == 1
     assert ended.stderr.startswith('render: matplotlib is not installed: ')
     assert ended.stderr.count('\n') == 1
+
+
+def test_readings_are_written_beside_or_below_each_other():
+    machines = [*scene.load(str(CONFIG / 'excavator.yaml')).machines.values(),
+                *scene.load(str(CONFIG / 'scissor_lift.yaml')).machines.values(),
+                machine('five_bar')]
+    picture = picture_of(*machines, size=(900, 400))
+    picture.at(0.0)
+    for panel in picture.panels:
+        headline = next(layer for layer in panel.moving if isinstance(layer, layers.Headline))
+        boxes = [text.get_window_extent() for text in headline.artists]
+        for one, other in itertools.combinations(boxes, 2):
+            assert (min(one.x1, other.x1) <= max(one.x0, other.x0)
+                    or min(one.y1, other.y1) <= max(one.y0, other.y0))

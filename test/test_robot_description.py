@@ -163,7 +163,7 @@ def test_the_command_says_in_one_line_what_is_wrong(
 
 
 NOWHERE, NO_SCENE, FOREIGN = 'nowhere.yaml', 'rate.yaml', 'foreign.yaml'
-FILES = {NO_SCENE: 'rate: 5.0\n', FOREIGN: '/kinematics:\n  ros__parameters:\n    rate: 5.0\n',
+FILES = {NO_SCENE: 'rate: 5.0\n', FOREIGN: '/another_node:\n  ros__parameters:\n    rate: 5.0\n',
          'date.yaml': 'a: 2020-13-45\n', 'itself.yaml': '/**: {ros__parameters: &a {b: *a}}\n',
          'deep.yaml': '[' * 5000, 'empty.yaml': '', 'bytes.yaml': '\x00'}
 

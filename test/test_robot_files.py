@@ -11,7 +11,7 @@ import random
 import re
 
 from linkage_ros import mechanisms, scene
-from linkage_ros.robot_files import command, readers
+from linkage_ros.robot_files import closing, command, model, readers
 import numpy as np
 import pytest
 from robots import LIBRARIES
@@ -450,6 +450,212 @@ def test_axes_and_poses_of_an_sdf_are_seen_as_its_version_says(
     joint, = readers.read(str(file)).joints
     assert joint.axis == pytest.approx(np.array(axis), abs=1e-15)
     assert joint.places[0] == pytest.approx(np.array([0.0, 0.0, 1.0]))
+
+
+CUT = re.compile('<constraint.*</constraint>', re.DOTALL)
+LINKS = ('<link name="closing_w_1"/><link name="closing_w_2"/>'
+         '<joint name="c1" type="fixed"><parent link="coupler"/><child link="closing_w_1"/>'
+         '<origin xyz="0.3 0 0" rpy="1 2 3"/></joint><joint name="c2" type="fixed">'
+         '<parent link="rocker"/><child link="closing_w_2"/><origin xyz="0 0 0.2"/></joint>')
+DIALECTS = {
+    'loop_joint of RigidBodyDynamics and Isaac Sim': (
+        '<loop_joint name="w" type="revolute"><link1 link="coupler" xyz="0.3 0 0" rpy="0 0 0"/>'
+        '<link2 link="rocker" xyz="0 0 0.2" rpy="0 0 0"/><axis xyz="0 1 0"/></loop_joint>', ''),
+    'loop of URDF+': (
+        '<loop name="w" type="continuous"><predecessor link="coupler"><origin xyz="0.3 0 0"/>'
+        '</predecessor><successor link="rocker"><origin xyz="0 0 0.2"/></successor>'
+        '<axis xyz="0 1 0"/></loop>', ''),
+    'joint of Gazebo': (
+        '<gazebo><joint name="w" type="revolute"><parent>coupler</parent><child>rocker</child>'
+        '<pose>0 0 0.2 0 0 0</pose><axis><xyz>0 1 0</xyz></axis></joint></gazebo>', ''),
+    'universal joint of Gazebo': (
+        '<gazebo><joint name="w" type="universal"><parent>coupler</parent><child>rocker</child>'
+        '<pose>0 0 0.2 0 0 0</pose><axis><xyz>0 1 0</xyz></axis><axis2><xyz>1 0 0</xyz></axis2>'
+        '</joint></gazebo>', ''),
+    'ball_constraint of Drake': (
+        '<drake:ball_constraint><drake:ball_constraint_body_A name="coupler"/>'
+        '<drake:ball_constraint_body_B name="rocker"/><drake:ball_constraint_p_AP '
+        'value="0.3 0 0"/><drake:ball_constraint_p_BQ value="0 0 0.2"/></drake:ball_constraint>',
+        ''),
+    'linear_bushing_rpy of Drake': (
+        '<frame name="f" link="coupler" xyz="0.3 0 0" rpy="0 0 0"/>'
+        '<frame name="g" link="rocker" xyz="0 0 0.2" rpy="0 0 0"/><drake:linear_bushing_rpy>'
+        '<drake:bushing_frameA name="f"/><drake:bushing_frameC name="g"/>'
+        '<drake:bushing_torque_stiffness value="1e4 0 1e4"/></drake:linear_bushing_rpy>', ''),
+    'frames of onshape-to-robot': (LINKS, ''),
+    'links of example-parallel-robots': (
+        '', '{closed_loop: [[wrist_a, wrist_b]], type: [3d], name_mot: [motor]}'),
+    'joints of example-parallel-robots': (
+        '', '{closed_loop: [[wrist_a_fixed, wrist_b_fixed]], type: [3D], name_mot: [motor]}'),
+    'pins of Robonex': (
+        '', '{pin_loops: [{name: w, parent: coupler, child: rocker, parent_xyz: [0.3, 0, 0], '
+        'child_xyz: [0, 0, 0.2], axis: [0, 1, 0]}]}'),
+    'balls of Robonex': (
+        '', '{ball_loops: [{parent: coupler, child: rocker, parent_xyz: [0.3, 0, 0], '
+        'child_xyz: [0, 0, 0.2]}]}'),
+    'closures of solidworks_urdf_exporter2': (
+        '', '{closures: [{link_a: coupler, link_b: rocker, point: [0.3, 0, 0.2], '
+        'axis: [0, 1, 0]}], independent: [motor]}'),
+    'a rod that detaches': (
+        '<gazebo><plugin filename="gz-sim-detachable-joint-system" '
+        'name="gz::sim::systems::DetachableJoint"><parent_link>coupler</parent_link>'
+        '<child_link>pin</child_link></plugin></gazebo><link name="pin"/><joint name="pin_joint" '
+        'type="continuous"><parent link="rocker"/><child link="pin"/><origin xyz="0 0 0.2"/>'
+        '<axis xyz="0 1 0"/></joint>', '')}
+
+
+@pytest.mark.parametrize('dialect', DIALECTS)
+def test_a_loop_is_closed_in_every_way_in_which_tools_write_it(imported, tmp_path, dialect):
+    inside, loops = DIALECTS[dialect]
+    file, more = tmp_path / 'four_bar.urdf', []
+    file.write_text(CUT.sub(inside, (ROBOTS / 'four_bar.urdf').read_text()))
+    if loops:
+        (tmp_path / 'loops.yaml').write_text(loops)
+        more = ['--loops', tmp_path / 'loops.yaml']
+    machine, = imported(file, *more).values()
+    for angle in (-1.1, 0.0, 0.7):
+        joints = published(machine, motor=angle)
+        assert joints['shoulder'] == pytest.approx(-angle, abs=1e-14)
+        assert joints['elbow'] == pytest.approx(-angle, abs=1e-14)
+
+
+def test_xacro_has_to_be_run_first(capsys, tmp_path):
+    file = tmp_path / 'robot.xacro'
+    file.write_text('<robot name="r"><xacro:property name="a" value="1"/></robot>')
+    assert f'is xacro: run xacro first, as in xacro {file} > robot.urdf' in refused(capsys, file)
+
+
+def test_where_both_sides_fit_a_pose_has_to_choose(imported, capsys, tmp_path):
+    # Coupler and rocker lie on the line between their pivots, each beyond the other's end.
+    file = written(tmp_path, 'four_bar.urdf', (
+        'xyz="0 0 0.2"/><axis', f'xyz="0 0 0.2" rpy="0 {math.atan2(2.0, 3.0)!r} 0"/><axis'), (
+        'xyz="0.3 0 0"/><axis', f'xyz="0.3 0 0" rpy="0 {-math.atan2(3.0, 2.0)!r} 0"/><axis'))
+    assert 'they close as well with' in refused(capsys, file, '--driven', 'motor')
+    found = [published(*imported(
+        file, '--driven', 'motor', '--pose', f'elbow={side}').values(), motor=0.0)['elbow']
+             for side in (-0.5, 0.5)]
+    assert found[0] == pytest.approx(-found[1]) and found[1] > 0.1
+
+
+def test_a_joint_that_is_held_moves_nothing(imported, tmp_path):
+    pytest.importorskip('mujoco')
+    spring = written(tmp_path, 'gripper.xml', (
+        '<body name="right_coupler" pos="0 0.0315 -0.0041">',
+        '<body name="right_coupler" pos="0 0.0315 -0.0041"><joint name="spring" axis="1 0 0"/>'))
+    held = imported(spring, '--hold', 'spring=0')['right_driver_joint']
+    free = imported('gripper.xml')['right_driver_joint']
+    for angle in (0.1, 0.5):
+        assert published(held, right_driver_joint=angle) == pytest.approx(
+            published(free, right_driver_joint=angle), abs=1e-14)
+
+
+@pytest.mark.parametrize('file', ['boom.urdf', 'gripper.xml', 'rack.sdf', 'palletiser.urdf'])
+def test_all_joints_of_a_whole_robot_are_published(imported, file):
+    more = ['--loops', ROBOTS / 'palletiser_loops.yaml'] * ('pallet' in file)
+    machines, robot = imported(file, *more), readers.read(str(ROBOTS / file), *map(str, more[1:]))
+    rest = model.others(robot, machines, {})
+    names = ['others'] * bool(rest)
+    if names:
+        machines = {**machines, **scene.read({'mechanisms': names, **rest}).machines}
+    published = {drive.source for machine in machines.values()
+                 for drive in machine.inputs.values()}
+    published |= {called.name for machine in machines.values()
+                  for called in machine.joints.values() if called.published}
+    text = model.description(str(ROBOTS / file), *map(str, more[1:]))
+    assert {*LIBRARIES[1](text).joints} <= published
+
+
+def random_mjcf(rng):
+    """Return a random tree of bodies, with what MJCF allows of frames, units and names."""
+    names = iter(rng.permutation(['a b', 'joint-1', '3', 'Hüfte', 'x&quot;y', "o'k", 'l&#10;e',
+                                  *(f'j{i}' for i in range(9))]))
+
+    def vector(scale=1.0):
+        return ' '.join(map(repr, map(float, rng.normal(size=3) * scale)))
+
+    def body(depth):
+        joints = ''.join(
+            f'<joint name="{next(names, rng.integers(1 << 40))}" pos="{vector(0.1)}" '
+            f'axis="{vector()}" type="{rng.choice(["hinge", "slide"])}" ref="{rng.normal():.3f}" '
+            f'armature="0.1" limited="true" range="-3 3"/>' for _ in range(rng.integers(3)))
+        return (f'<body name="b{rng.integers(1 << 40)}" pos="{vector()}" euler="{vector(50)}">'
+                f'{joints}<geom size="0.1"/>'
+                f'{"".join(body(depth + 1) for _ in range(rng.integers(3 - depth)))}</body>')
+
+    return (f'<mujoco><compiler angle="{rng.choice(["degree", "radian"])}" eulerseq="zyx"/>'
+            f'<worldbody>{body(0)}{body(0)}</worldbody></mujoco>')
+
+
+@pytest.mark.parametrize('seed', range(12))
+def test_a_tree_of_mujoco_is_the_same_tree_as_urdf(tmp_path, seed):
+    mujoco = pytest.importorskip('mujoco')
+    rng, file = np.random.default_rng(seed), tmp_path / 'tree.xml'
+    file.write_text(random_mjcf(rng), encoding='utf-8')
+    robot = readers.read(str(file))
+    whole = mujoco.MjModel.from_xml_path(str(file))
+    data = mujoco.MjData(whole)
+    positions = {name: float(rng.normal()) for name in robot.positions}
+    for name, value in positions.items():
+        data.qpos[whole.joint(name).qposadr] = value
+    mujoco.mj_kinematics(whole, data)
+    bodies = [whole.body(i).name for i in range(1, whole.nbody)]
+    found = LIBRARIES[1](model.urdf(robot)).places(positions, bodies)
+    for i, body in enumerate(bodies):
+        assert found[body] == pytest.approx(data.xpos[i + 1], abs=1e-13)
+
+
+def random_urdf(rng):
+    """Return a random tree of links."""
+    text, names = '<link name="base"/>', ['base']
+    for i in range(rng.integers(2, 8)):
+        rows = rng.normal(size=(3, 3))
+        # Not all readers make axes as long as one.
+        rows[2] /= np.linalg.norm(rows[2])
+        numbers = [' '.join(map(repr, map(float, row))) for row in rows]
+        kind = rng.choice(['revolute', 'continuous', 'prismatic', 'fixed'])
+        text += (f'<link name="l {i}"/><joint name="j-{i}" type="{kind}"><parent link="'
+                 f'{rng.choice(names)}"/><child link="l {i}"/><origin xyz="{numbers[0]}" '
+                 f'rpy="{numbers[1]}"/><axis xyz="{numbers[2]}"/><limit lower="-9" upper="9" '
+                 'effort="1" velocity="1"/></joint>')
+        names.append(f'l {i}')
+    return f'<robot name="r">{text}</robot>', names
+
+
+@pytest.mark.parametrize('library', LIBRARIES)
+@pytest.mark.parametrize('seed', range(8))
+def test_links_are_where_other_readers_of_a_urdf_have_them(tmp_path, seed, library):
+    rng, file = np.random.default_rng(seed), tmp_path / 'tree.urdf'
+    text, names = random_urdf(rng)
+    file.write_text(text)
+    robot = readers.read(str(file))
+    positions = {name: float(rng.uniform(-3.0, 3.0)) for name in robot.positions}
+    there = library(text).places({name: 0.0 for name in positions} | positions, names)
+    here = closing.posed(robot, positions).frames
+    for name in names:
+        assert here[name][:3, 3] == pytest.approx(there[name], abs=1e-12)
+
+
+def test_frames_of_an_sdf_stand_on_frames(tmp_path):
+    file = tmp_path / 'model.sdf'
+    file.write_text("""<sdf version="1.9"><world name="w"><model name="m"><pose>1 0 0 0 0 0</pose>
+      <link name="a"><pose relative_to="f">0 1 0 0 0 0</pose></link>
+      <frame name="f"><pose degrees="true">0 0 2 0 0 90</pose></frame>
+      <frame name="g" attached_to="n::c"><pose>0 0 0.5 0 0 0</pose></frame>
+      <model name="n"><pose relative_to="a">0 0 3 0 0 0</pose><link name="b"/>
+        <link name="c"><pose rotation_format="quat_xyzw">1 0 0  1 0 0 0</pose></link>
+        <joint name="i" type="revolute"><parent>b</parent><child>c</child>
+          <axis><xyz expressed_in="__model__">0 0 1</xyz></axis></joint></model>
+      <joint name="j" type="revolute"><parent>world</parent><child>g</child>
+        <axis><xyz expressed_in="f">1 0 0</xyz></axis></joint></model></world></sdf>""")
+    robot = readers.read(str(file))
+    assert robot.frames['a'][:3, 3] == pytest.approx([0.0, 0.0, 2.0])
+    assert robot.frames['n::b'][:3, 3] == pytest.approx([0.0, 0.0, 5.0])
+    assert robot.frames['n::c'][:3, 3] == pytest.approx([0.0, 1.0, 5.0])
+    i, j = (next(joint for joint in robot.joints if joint.name == name) for name in (
+        'n::i', 'j'))
+    assert i.axis == pytest.approx([0.0, 0.0, 1.0]) and j.bodies == ('world', 'n::c')
+    assert j.places[0] == pytest.approx([0.0, 1.0, 4.5]) and j.axis == pytest.approx(
+        [0.0, 1.0, 0.0])
 
 
 def robot_of(linkage, values):

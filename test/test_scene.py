@@ -59,6 +59,15 @@ def test_a_scene_is_written_as_the_few_values_that_tell_it(file, tmp_path):
     assert len(kept) < len(before.parameters) / 2
 
 
+def test_names_that_ros_takes_for_values_are_written_as_texts(tmp_path):
+    before = scene.read({'mechanisms': ['y', 'nan', 'Inf', 'on'], 'frame_id': '1e5', **{
+        f'{name}.type': 'klann' for name in ('y', 'nan', 'Inf', 'on')},
+        'y.frame_id': '08', 'nan.frame_id': '0x1F', 'nan.crank.source': '1_0'})
+    again = tmp_path / 'again.yaml'
+    again.write_text(writing.in_yaml(writing.without_defaults(before)))
+    assert scene.load(str(again)).parameters == before.parameters
+
+
 def test_scale_multiplies_every_length():
     lever = mechanisms.create('slotted_lever')
     small, large = (Assembly(lever, scale=scale) for scale in (0.001, 1.0))
@@ -258,7 +267,12 @@ def test_a_crank_that_has_left_its_start_follows_a_sweep_that_does_not_hold_it()
 
 
 def test_parameters_of_the_client_library_are_none_of_the_scenes_business():
-    scene.read({'use_sim_time': True, 'qos_overrides./crank_states.publisher.depth': 5})
+    scene.read({'use_sim_time': True})
+
+
+def test_overrides_of_quality_of_service_would_not_act_and_are_refused():
+    with pytest.raises(scene.SceneError, match='qos_overrides.* is not a parameter'):
+        scene.read({'qos_overrides./crank_states.publisher.depth': 5})
 
 
 def test_a_crank_that_cannot_turn_swings_within_its_reach():
@@ -414,7 +428,7 @@ def test_a_crank_that_is_geared_by_a_fraction_turns_on_until_all_comes_round(rat
         'O ground 0 0', 'Q ground 3 0', 'A crank O 1',
         f'B crank Q 1 geared crank {ratio} 0']}).machines['gears']
     drive = machine.first
-    assert drive.period == period
+    assert drive.input.period == period
     motion, exact = Motion.of(drive), eval(ratio, {'sqrt': math.sqrt})
     for turns in (0.5, 1.5, period - 0.25, period + 0.25):
         angle, _ = motion.at(round(turns * math.tau * 1e9))

@@ -475,7 +475,8 @@ def test_what_is_saved_starts_the_tuned_scene_again(show, tmp_path):
     assert (lever.first.start, lever.first.speed) == (0.75, 2.0)
     assert drop.pose == (0.0, 0.0, 0.5, 1.5, 0.0, 0.0)
     assert scene.load(str(file)).rate == RATE['rate']
-    assert 'dimensions.b' not in file.read_text()
+    # What defines a mechanism is there, what is as usual besides is not.
+    assert 'lever.dimensions.b: 150.0' in file.read_text() and 'leg_pairs' not in file.read_text()
 
 
 def test_the_page_learns_how_far_dimensions_go_and_which_bars_follow(lever):
@@ -506,7 +507,11 @@ def test_the_page_is_sent_what_an_output_does_over_a_turn(lever):
     slope = (after - 2.0 * phi + before) / step ** 2
     truth = phi, speed, slope, 0.5 * math.pi + 0.0 * x, 1.0 / speed
     for said, values in zip(about_lever, truth):
-        np.testing.assert_allclose(said['y'], values, rtol=2e-5, atol=2e-7)
+        y = np.array(said['y'], float)
+        known = np.isfinite(y)
+        assert known.sum() >= 357 and set(np.array(said['x'])[known]) <= set(x)
+        np.testing.assert_allclose(y[known], values[np.isin(x, np.array(said['x'])[known])],
+                                   rtol=2e-5, atol=2e-7)
     assert [said['units'][1] for said in about_lever] == ['rad', 'rad/s', 'rad/s²', 'rad', '']
     assert about_lever[0]['reach'] == [[-math.pi, math.pi]] and about_lever[0]['dead'] == []
     # A kite lies flat at 0 and at pi: there it may be assembled in two ways.
@@ -1998,7 +2003,8 @@ def test_a_reload_keeps_view_units_and_arrows_and_a_lost_connection_is_said(show
 def test_mechanisms_of_one_name_in_two_namespaces_are_told_apart(graph, show, looked_at):
     for space in ('left', 'right'):
         for kind in (CrankDriver, Kinematics):
-            graph.start(kind, {'mechanisms': ['arm'], 'arm.type': 'four_bar'}, namespace=space)
+            graph.start(kind, {'mechanisms': ['arm'], 'arm.type': 'four_bar',
+                               'frame_prefix': f'{space}/'}, namespace=space)
     running = show({}, kinds=())
 
     async def doing(seen):
@@ -2006,6 +2012,13 @@ def test_mechanisms_of_one_name_in_two_namespaces_are_told_apart(graph, show, lo
             '[...document.querySelectorAll("#views button, section h2")].map('
             'one => one.textContent).join()'
             ' === "all,left/arm,right/arm,left/arm,right/arm"'))
+
+        async def beside():
+            """Return whether two loci are seen beside each other: the frames are two."""
+            columns = np.unique(coloured(await seen.canvas(), *GREEN)[:, 1])
+            return len(columns) and (np.diff(columns) > 30).sum() == 1
+
+        await browser.until(beside)
 
     looked_at(running, doing)
 

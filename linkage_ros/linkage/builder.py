@@ -24,6 +24,7 @@ from ..formula.expression import (
     cross,
     dimension,
     dot,
+    gated,
     Number,
     Real,
     real,
@@ -114,6 +115,8 @@ class Builder:
         self.directions: Dict[str, Complex] = {}
         self.transmissions: Dict[str, Real] = {}
         self.folds: List[planar.Limit] = []
+        # Limits that are no dead points: the ends of ways.
+        self.ways: List[planar.Limit] = []
         self.inputs: List[Input] = []
         self.arguments: List[Real] = []
         self.cylinders: List[Tuple[str, str]] = []
@@ -184,6 +187,13 @@ class Builder:
         """Drive a joint along the line from a joint towards another of one link, low to high."""
         word = called or self._numbered('carriage')
         place = self.drive(Input(word, LENGTH, low, high), geared)
+        # As a cylinder has no place beyond its stroke, so a carriage has none beyond its way.
+        way = abs(low) + abs(high)
+        for margin in (place - low, high - place):
+            limit = planar.Limit(margin, planar.GRAZE * way)
+            self.limits.append(limit)
+            self.ways.append(limit)
+            place = gated(place, limit.margin, limit.tolerance)
         self._ride(word, name, origin, towards, place, abs(low) + abs(high))
 
     def yoke(self, name: str, pin: str, origin: str, towards: str) -> None:

@@ -220,7 +220,7 @@ class Inverse:
         """
         rows = np.broadcast_arrays(*(numbers('values', each) for each in values))
         inputs, rates = self._found(np.stack([row.ravel() for row in rows]))
-        order = np.argsort(np.where(np.isnan(inputs[:, 0]), np.inf, inputs[:, 0]), axis=0)
+        order = np.lexsort(np.nan_to_num(inputs, nan=np.inf).swapaxes(0, 1)[::-1], axis=0)
         most = max(int(np.isfinite(inputs[:, 0]).sum(axis=0).max(initial=0)), 1)
         parts = (np.moveaxis(np.take_along_axis(part, order[:, None], 0)[:most], 0, -1)
                  for part in (inputs, rates))
@@ -326,8 +326,9 @@ class Inverse:
 
     def _within(self, inputs: Sequence[float]) -> Tuple[float, ...]:
         """Return inputs as they are counted: angles in the turns from -pi."""
-        return tuple(0.0 if abs(x) < LEAST else x - turns if (turns := input_.turns_of(x)) else x
-                     for input_, x in zip(self._inputs, inputs))
+        return tuple(0.0 if abs(x) < LEAST * size else x - turns if (
+            turns := input_.turns_of(x)) else x
+            for input_, size, x in zip(self._inputs, self._sizes, inputs))
 
     def _distinct(self, found: Sequence[Found]) -> List[Found]:
         """Return answers in order, without those that rounding does not tell from another."""
@@ -398,8 +399,8 @@ class Inverse:
     def _single(self, inputs: np.ndarray, rates: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return answers as they are counted, NaN what rounding does not tell from another."""
         for i, input_ in enumerate(self._inputs):
-            inputs[:, i] = input_.wrapped(np.where(np.abs(inputs[:, i]) < LEAST, 0.0,
-                                                   inputs[:, i]))
+            inputs[:, i] = input_.wrapped(np.where(
+                np.abs(inputs[:, i]) < LEAST * self._sizes[i], 0.0, inputs[:, i]))
         for one, two in combinations(range(len(inputs)), 2):
             with np.errstate(invalid='ignore'):
                 apart = np.max([input_.apart(x, y) / size for input_, size, x, y in zip(

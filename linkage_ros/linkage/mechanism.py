@@ -311,7 +311,7 @@ class Mechanism:
 
         Takes, returns and raises what `solve` does; infinite or NaN at a dead point.
         """
-        return self._vectors('velocities', theta, points, by)
+        return self._vectors('velocities', theta, points, self._checked_by(by))
 
     def joint_angles(self, theta: Inputs, joints: Optional[Sequence[str]] = None) -> dict:
         """
@@ -354,7 +354,7 @@ class Mechanism:
     def joint_rates(self, theta: Inputs, joints: Optional[Sequence[str]] = None,
                     by: int = 0) -> dict:
         """Differentiate the joint angles by one of the inputs; see `joint_angles`."""
-        return self._scalars('rates', theta, joints, by)
+        return self._scalars('rates', theta, joints, self._checked_by(by))
 
     def period(self, by: int = 0) -> int:
         """
@@ -762,7 +762,8 @@ class Mechanism:
         -------
         list of ((float, float), (float, float))
             For each arc the least value and the input there, then the greatest; an angle is
-            followed past -pi and pi.
+            followed past -pi and pi. By default an arc in which the output jumps, as an angle does
+            where its ends meet, counts as several.
 
         """
         return Analysis(self).extremes(output, arcs)
@@ -939,6 +940,14 @@ class Mechanism:
             raise ValueError(f'{self.type} has {len(self.inputs)} inputs: '
                              'theta must be a sequence of as many values')
         return [numbers('theta', each) for each in theta]
+
+    def _checked_by(self, by: Any) -> int:
+        """Return the number of an input; raise ValueError for what is none."""
+        if isinstance(by, (bool, np.bool_)) or not hasattr(by, '__index__') \
+                or not 0 <= by.__index__() < len(self.inputs):
+            raise ValueError(f'by must be the number of an input, from 0 to '
+                             f'{len(self.inputs) - 1}, got {quoted(by)}')
+        return int(by)
 
     def _ready(self, kind: str, wanted: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
         """Return the names that are wanted and the function that computes them."""

@@ -25,6 +25,9 @@ CLOSE = 1e-13
 BROKEN = 1e-6
 # Newton's method halves its error more than once a step; bisection needs one step a bit.
 STEPS = 200
+# An output jumps that changes by more than this part of half a turn, or of its range, between
+# neighbouring values of the input.
+JUMP = 0.05
 # An output that changes by no more than so many times its rounding stands still.
 STILL = 64.0
 # What a value may miss, as a part of the output's range, before it counts as stepped over.
@@ -89,7 +92,10 @@ class MonotoneBranches:
         self._curve = curve
         self._angular = angular
         self._rounding = rounding
-        runs = [run for arc in _cut(arcs, marks) for run in self._runs(*arc)]
+        arcs = list(arcs)
+        self.jumps = [at for arc in cut(arcs, marks) for at in self._jumps(*arc)]
+        runs = [run for arc in cut(arcs, sorted({*marks, *self.jumps}))
+                for run in self._runs(*arc)]
         self._range = max((np.ptp(value) for _, value, *_ in runs), default=0.0)
         self._branches = [branch for run in runs for branch in self._branched(*run)] \
             if self._moves(runs) else []
@@ -176,6 +182,27 @@ class MonotoneBranches:
                 break
             theta = guess if lo < guess < hi else 0.5 * (lo + hi)
         return best
+
+    def _jumps(self, lo: float, hi: float) -> List[float]:
+        """Return where the output jumps, as an angle does by pi where its ends meet."""
+        theta = sampled(lo, hi)
+        value, rate = self._curve(theta)
+        with np.errstate(invalid='ignore'):
+            size = math.pi if self._angular else float(
+                np.nanmax(value, initial=-np.inf) - np.nanmin(value, initial=np.inf))
+            # What the rates at both samples do not explain of the values there.
+            places = np.flatnonzero(np.abs(self._difference(np.diff(value)) - np.diff(theta)
+                                           * 0.5 * (rate[1:] + rate[:-1])) > JUMP * size)
+        before, after = theta[places], theta[places + 1]
+        for _ in range(STEPS if len(places) else 0):
+            middle = 0.5 * (before + after)
+            if ((middle <= before) | (middle >= after)).all():
+                break
+            low, mid, high = self._curve(np.concatenate([before, middle, after]))[0].reshape(3, -1)
+            first = np.abs(self._difference(mid - low)) > np.abs(self._difference(high - mid))
+            before, after = np.where(first, before, middle), np.where(first, middle, after)
+        low, high = self._curve(np.concatenate([before, after]))[0].reshape(2, -1)
+        return before[np.abs(self._difference(high - low)) > JUMP * size].tolist()
 
     def _runs(self, lo: float, hi: float) -> Iterator[_Run]:
         """Yield samples as angles, values, rates and rounding, cut where there is no value."""
@@ -282,7 +309,7 @@ class MonotoneBranches:
         return np.where(least <= far, best, np.nan)
 
 
-def _cut(arcs: Iterable[Arc], marks: Sequence[float]) -> Iterator[Arc]:
+def cut(arcs: Iterable[Arc], marks: Sequence[float]) -> Iterator[Arc]:
     """Yield arcs, cut at marks, which may be dead points."""
     for start, end in arcs:
         inside = [mark for mark in marks if start < mark < end]

@@ -232,7 +232,7 @@ class Structure:
     def closures(self) -> List[Limit]:
         """What vanishes where a dyad, a slot, a slider or a kite stretches or folds."""
         return [limit for limit in (*self.built.limits, *self.built.folds)
-                if limit.margin.varies]
+                if limit.margin.varies and limit not in self.built.ways]
 
     def _closures(self, _: Names) -> List[Real]:
         """Return each closure and its rate by the first input."""

@@ -271,7 +271,8 @@ class CommandStream:
             return
         near = [self._near(target) for target in targets]
         jumps = [target.machine.name not in self._last for target in targets]
-        self._worker.replace('trajectory', lambda: self._solve(message, targets, near, jumps))
+        self._worker.replace('wanted_trajectory', lambda: self._solve(
+            message, targets, near, jumps))
 
     def _refuse(self, error: ValueError) -> None:
         self._logger.error(f'wanted_trajectory is refused: {error}')
@@ -283,7 +284,7 @@ class CommandStream:
             name for target in targets for name in target.actuators])
         try:
             for i, point in enumerate(message.points):
-                if not self._worker.is_newest('trajectory'):
+                if not self._worker.is_newest('wanted_trajectory'):
                     return None
                 solved.points.append(_solved_point(
                     i, point, len(message.joint_names), targets, near, jumps))

@@ -9,9 +9,11 @@ from functools import wraps
 import traceback
 from typing import Any, Callable, Optional, Set, Tuple
 
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
 RCLError = rclpy_implementation.RCLError
+InvalidHandle = rclpy_implementation.InvalidHandle
 # How many different errors are logged.
 MOST = 100
 
@@ -58,3 +60,14 @@ class Incidents:
                 return None
 
         return guarded
+
+
+def refused(response: Any, reason: str) -> Any:
+    """Return the response of a service whose request could not be handled."""
+    if hasattr(response, 'results'):
+        response.results.append(SetParametersResult(successful=False, reason=reason))
+    elif hasattr(response, 'message'):
+        response.success, response.message = False, reason
+    elif isinstance(getattr(response, 'result', None), SetParametersResult):
+        response.result = SetParametersResult(successful=False, reason=reason)
+    return response

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from array import array
 from collections import OrderedDict
+from contextlib import suppress
 from struct import Struct
 from typing import Any, Callable, Dict, NamedTuple, Optional, Tuple
 
@@ -73,10 +74,11 @@ class Reader:
                 self._used.move_to_end(source)
                 return source
         message = deserialized(text, JointState)
-        source = Source(text, message, self._interpret(message))
         self._missed += 1
         crowded = len(self._used) == SOURCES or len(alike) == ARRANGEMENTS
-        if source.size and len(text) <= LONGEST and not (crowded and self._missed % SAMPLED):
+        source = Source(text, message, self._interpret(message),
+                        not (crowded and self._missed % SAMPLED))
+        if source.size and len(text) <= LONGEST:
             self._cache(source)
         return source
 
@@ -110,6 +112,8 @@ class Source:
         The same.
     meaning
         What else is known of all its messages.
+    is_lasting : bool
+        Whether more messages than this are expected.
 
     Attributes
     ----------
@@ -121,15 +125,17 @@ class Source:
 
     """
 
-    def __init__(self, text: bytes, message: JointState, meaning: Any):
+    def __init__(self, text: bytes, message: JointState, meaning: Any, is_lasting: bool):
         self.meaning, self.size = meaning, 0
         numbers = Numbers(pack(message.header.stamp), tuple(message.position),
                           tuple(message.velocity))
         self._only: Tuple[bytes, Optional[Numbers]] = text, numbers
-        try:
-            layout = MessageLayout(text, message)
-        except NoLayout:
-            return
+        if is_lasting:
+            with suppress(NoLayout):
+                self._lay_out(text, MessageLayout(text, message), numbers)
+
+    def _lay_out(self, text: bytes, layout: MessageLayout, numbers: Numbers) -> None:
+        """Find out how numbers are read, by a message and what it says."""
         (self.positions, self._first), (self.velocities, count) = layout.numbers[:2]
         end = self.positions + 8 * self._first
         self._unpack = Struct(f'<{HEADER}x8s{self.positions - HEADER - 8}x{self._first}d'

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 import sys
 import time
@@ -15,6 +17,7 @@ from sensor_msgs.msg import JointState
 
 from . import joint_state_reader, scene_node
 from .driven_mechanism import DrivenMechanism
+from .incidents import InvalidHandle, RCLError
 from .mechanism_model import MechanismModel
 from .message_layout import pack, Unreadable
 from .plan import Planner, Route
@@ -70,9 +73,12 @@ class Kinematics(scene_node.SceneNode):
     def check(self, new: scene.Scene) -> None:
         """Refuse what has no robot model; SceneError says why."""
         for name, machine in new.machines.items():
-            if not machine.in_space and (name not in self.scene.machines
-                                         or machine is not self.scene.machines[name]):
-                bodies.robot([machine], machine.frame_id or new.frame_id)
+            before = self.scene.machines[name]
+            if not machine.in_space and (
+                    machine is not before or new.frame_id != self.scene.frame_id):
+                bodies.size(machine)
+                # Nothing else that is refused depends on dimensions, whose travels take long.
+                bodies.robot([replace(machine, linkage=before.linkage)], new.frame_id)
 
     def prepare(self, new: scene.Scene) -> Any:
         """Return the model of each mechanism, another for each that has changed, and its robot."""
@@ -112,6 +118,12 @@ class Kinematics(scene_node.SceneNode):
         except scene.SceneError as error:
             self.get_logger().info(f'no robot_description of the whole scene: {error}', once=True)
         return lambda: self._scene_joint_states.describe(text) if models is self._models else None
+
+    def destroy_node(self) -> None:
+        """Delete what is displayed, then end."""
+        with suppress(RCLError, InvalidHandle):
+            self.say_goodbye()
+        super().destroy_node()
 
     def say_goodbye(self) -> None:
         """Delete what is displayed."""

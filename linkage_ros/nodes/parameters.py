@@ -5,23 +5,43 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from copy import copy
 from shlex import quote
-from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
+from typing import (
+    AbstractSet,
+    Any,
+    Callable,
+    Dict,
+    Iterator,
+    List,
+    Mapping,
+    Optional,
+    Sequence,
+    Tuple,
+)
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
+    Parameter as ParameterMessage,
     ParameterDescriptor,
     SetParametersResult,
 )
+from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from .. import scene as scenes
 from ..scene import slider
 from ..words import elided, quoted
+
+
+class Undeclared(ParameterNotDeclaredException):
+    """A name that no parameter has; the text says so."""
+
+    def __init__(self, text: str):
+        Exception.__init__(self, text)
 
 
 class SceneParameters:
@@ -76,6 +96,25 @@ class SceneParameters:
         node.add_on_set_parameters_callback(self._validate)
         node.add_post_set_parameters_callback(self._adopt)
 
+    def set_together(self, messages: Sequence[ParameterMessage]) -> AbstractSet[int]:
+        """
+        Set the parameters of a request that can be read, if all of them can be set; return whose.
+
+        One by one the values of another scene cannot be: a leg of mixed sizes cannot be assembled.
+        What is returned are the places of the parameters that have been set.
+        """
+        readable = {}
+        for i, one in enumerate(messages):
+            with suppress(scenes.SceneError, KeyError, ValueError):
+                parameter = Parameter.from_parameter_msg(one)
+                if not self.fields[one.name].read_only:
+                    self._value(parameter)
+                    readable[i] = parameter
+        if len({one.name for one in messages}) < len(messages) or not readable:
+            return frozenset()
+        result = self._node.set_parameters_atomically([*readable.values()])
+        return readable.keys() if result.successful else frozenset()
+
     def follow(self, values: Mapping[str, Any]) -> str:
         """Set values that another node owns; return why not, or nothing."""
         parameters = [Parameter(name, value=value) for name, value in values.items()]
@@ -87,8 +126,11 @@ class SceneParameters:
 
     def ranged(self, name: str, descriptor: ParameterDescriptor) -> ParameterDescriptor:
         """Return a parameter's descriptor with the range of its slider about its value."""
-        descriptor = copy(descriptor)
-        ends = self._slider_ends(name) if name in self.fields else None
+        if name not in self.fields:
+            return descriptor
+        descriptor, ends = copy(descriptor), self._slider_ends(name)
+        # The client library notes the type of a refused value.
+        descriptor.type = _kind(self.fields[name]).value
         if ends and self.fields[name].kind == 'integer':
             descriptor.integer_range = [IntegerRange(from_value=ends[0], to_value=ends[1], step=1)]
         elif ends:
@@ -112,18 +154,25 @@ class SceneParameters:
         return ends
 
     def _declare(self, own: Sequence[scenes.Parameter]) -> None:
-        descriptors = {field: _descriptor(field) for field in set(self.fields.values())}
+        descriptors = {field: _descriptor(field, field.read_only)
+                       for field in set(self.fields.values())}
         self._node.declare_parameters('', [
             (one.name, one.value, copy(descriptors[one.field])) if one.value != () else
-            (one.name, _kind(one.field), _descriptor(one.field, dynamic=False))
+            (one.name, None, _descriptor(one.field, read_only=False))
             for one in own], ignore_override=True)
         # The type of an empty list does not follow from its value.
-        empty = [_parameter(one) for one in own if one.value == () and not one.field.read_only]
-        if empty:
-            self._node.set_parameters(empty)
+        empty = [one for one in own if one.value == ()]
+        self._node.set_parameters_atomically([_parameter(one) for one in empty])
+        for one in empty:
+            if one.field.read_only:
+                self._node.set_descriptor(one.name, _descriptor(one.field, read_only=True))
 
     def _typed_alike(self, parameters: List[Parameter]) -> List[Parameter]:
         """Return parameters in their own types: 3 for 3.0, and lists that are empty."""
+        for one in parameters:
+            if not self._node.has_parameter(one.name):
+                raise Undeclared(f'{elided(one.name)} is not a parameter of '
+                                 f'{self._node.get_fully_qualified_name()}')
         return [self._typed(one) for one in parameters]
 
     def _typed(self, parameter: Parameter) -> Parameter:
@@ -169,8 +218,10 @@ class SceneParameters:
     def _adopt(self, parameters: List[Parameter]) -> None:
         if self._is_derived or self._candidate is self.scene:
             return
-        before, self.scene = self.scene, self._candidate
-        changed = self.scene.changed_from(before)
+        changed = self._candidate.changed_from(self.scene)
+        if not changed:
+            return
+        self.scene = self._candidate
         given = {one.name for one in parameters}
         # Values that nobody set may follow from others.
         derived = [_parameter(one) for one in changed if one.name in self.fields
@@ -198,9 +249,9 @@ def _parameter(parameter: scenes.Parameter) -> Parameter:
     return Parameter(parameter.name, _kind(parameter.field), parameter.value)
 
 
-def _descriptor(field: Any, dynamic: bool = True) -> ParameterDescriptor:
+def _descriptor(field: Any, read_only: bool) -> ParameterDescriptor:
     """Return how a kind of parameter is described, whatever its name."""
     # A wrong type is refused by the sentence of its field, not by the client library's.
     return ParameterDescriptor(
-        description=field.meaning, read_only=field.read_only, type=_kind(field).value,
-        additional_constraints=field.allowed, dynamic_typing=dynamic)
+        description=field.meaning, read_only=read_only, type=_kind(field).value,
+        additional_constraints=field.allowed, dynamic_typing=True)

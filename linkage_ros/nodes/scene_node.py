@@ -9,9 +9,10 @@ from contextlib import contextmanager, suppress
 from functools import partial
 import gc
 import sys
-from typing import Any, Callable, Iterable, Iterator, List, Optional
+from typing import Any, Callable, Iterable, Iterator, List, Mapping, Optional
 
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rcl_interfaces.srv import SetParameters
 import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -21,7 +22,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
-from .incidents import Incidents
+from .incidents import Incidents, refused
 from .ownership import Announcer, Follower
 from .parameters import SceneParameters
 from .shutdown import ShutdownHandler
@@ -85,6 +86,11 @@ class SceneNode(Node):
         return self._parameters_of_scene.is_given
 
     @property
+    def fields(self) -> Mapping[str, scenes.Field]:
+        """The parameters that it acts on."""
+        return self._parameters_of_scene.fields
+
+    @property
     def is_settled(self) -> bool:
         """Whether the newest scene has been adopted."""
         return self._adopted is self.scene
@@ -130,18 +136,39 @@ class SceneNode(Node):
         """Describe a parameter, with the range of its slider around the present value."""
         return self._parameters_of_scene.ranged(name, super().describe_parameter(name))
 
+    def create_service(self, srv_type: Any, srv_name: str, callback: Callable, **kwargs: Any
+                       ) -> Any:
+        """Create a service that answers with the reason if its callback raises."""
+        return super().create_service(
+            srv_type, srv_name, partial(self._respond, callback), **kwargs)
+
     def destroy_node(self) -> None:
         """End the worker too."""
         self._worker.end()
         super().destroy_node()
+
+    def _respond(self, callback: Callable, request: Any, response: Any) -> Any:
+        if isinstance(request, SetParameters.Request) and len(request.parameters) > 1:
+            is_set = self._parameters_of_scene.set_together(request.parameters)
+            for i, one in enumerate(request.parameters):
+                if i in is_set:
+                    response.results.append(SetParametersResult(successful=True))
+                else:
+                    self._respond(callback, SetParameters.Request(parameters=[one]), response)
+            return response
+        try:
+            return callback(request, response)
+        except Exception as error:
+            self.report('a request', error)
+            return refused(response, elided(f'internal error: {error!r}', 299))
 
     def _changed(self, changed: List[scenes.Parameter]) -> None:
         """Prepare the newest scene, and tell the nodes that follow."""
         if type(self).prepare is SceneNode.prepare:
             self._adopt(self.scene, self.scene)
         else:
-            self._worker.replace('scene', partial(self._prepared, self.scene))
-        self._worker.replace('ranges', self._parameters_of_scene.renew_ranges)
+            self._worker.replace('a changed scene', partial(self._prepared, self.scene))
+        self._worker.replace('the ranges of sliders', self._parameters_of_scene.renew_ranges)
         if self._announcer:
             self._announcer.announce(changed)
 
@@ -242,7 +269,6 @@ def _spin(executor: Any, nodes: List[Node], shutdown: ShutdownHandler,
             except Exception as error:
                 # A callback of the client library's own, such as a parameter service.
                 incidents.report('a request', error)
-        _say_goodbye(nodes)
     finally:
         executor.shutdown()
 

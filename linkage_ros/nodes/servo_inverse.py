@@ -23,7 +23,10 @@ from ..scene.inverse_request import InverseRequest, LEVER, present
 from ..words import elided, listed, MESSAGE, quoted
 
 try:
-    from linkage_interfaces.srv import InputsFor, ServoInverse as ServoInverseType
+    from linkage_interfaces.srv import (  # type: ignore[attr-defined]
+        InputsFor,
+        ServoInverse as ServoInverseType,
+    )
 except ImportError as error:
     raise ImportError(
         'servo_inverse needs the service types of linkage_interfaces: run colcon '
@@ -94,10 +97,6 @@ class ServoInverse(scene_node.SceneNode):
             fill()
         except ValueError as problem:
             response.message = elided(str(problem), MESSAGE)
-        except Exception as problem:
-            # A client waits for ever for a service that raised.
-            response.message = elided(f'internal error: {problem!r}', MESSAGE)
-            self.report('a request', problem)
         return response
 
     def _interpret(self, message: JointState) -> List[Tuple[str, int]]:
@@ -157,8 +156,11 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
 
 def solve_together(machine: scene.Machine, request: Any, response: Any) -> None:
     """Answer a request for several outputs; raise ValueError if it cannot be answered."""
-    inverse, values, near = InverseRequest(machine, request.outputs), request.values, request.near
-    n = len(machine.inputs)
+    values, near, n = request.values, request.near, len(machine.inputs)
+    if len(request.outputs) != n:
+        raise ValueError(f'{machine.name} has {n} inputs: as many outputs are needed, not '
+                         f'{len(request.outputs)}')
+    inverse = InverseRequest(machine, request.outputs)
     if len(values) != n or len(near) not in (0, n):
         raise ValueError(f'values must have {n} numbers and near as many or none, not '
                          f'{len(values)} and {len(near)}')

@@ -8,11 +8,13 @@ from __future__ import annotations
 from collections import deque
 from functools import partial
 import threading
-from typing import Any, Callable, Deque, Dict, Iterable, Optional
+from typing import Any, Callable, Deque, Dict, Iterable, Optional, Tuple
 
 # How long the end of a node waits for its worker [s].
 PATIENCE = 0.1
 
+# What other jobs make.
+OTHER = 'what is published once'
 # A job makes something in the worker's thread; what it returns acts on the executor's thread.
 Job = Callable[[], Optional[Callable[[], None]]]
 
@@ -70,37 +72,39 @@ class Worker:
             self._thread.start()
 
     def _run(self) -> None:
-        while job := self._take():
+        while taken := self._take():
+            kind, job = taken
             try:
                 act = job()
             except Exception as error:
-                self._failed('what is prepared beside the messages', error)
+                self._failed(kind, error)
             else:
                 if act:
-                    self._hand_over(act)
+                    self._hand_over(kind, act)
 
-    def _take(self) -> Optional[Job]:
+    def _take(self) -> Optional[Tuple[str, Job]]:
         with self._lock:
             if self._ended.is_set() or not (self._newest or self._others):
                 self._thread = None
                 return None
             if self._newest:
-                return self._newest.pop(next(iter(self._newest)))
-            return self._others.popleft()
+                kind = next(iter(self._newest))
+                return kind, self._newest.pop(kind)
+            return OTHER, self._others.popleft()
 
-    def _hand_over(self, act: Callable[[], None]) -> None:
+    def _hand_over(self, kind: str, act: Callable[[], None]) -> None:
         """Let the executor act, and wait until it has: one act at a time holds up messages."""
         executor, done = self._node.executor, threading.Event()
         if executor is not None:
-            executor.create_task(partial(self._act, act, done))
+            executor.create_task(partial(self._act, kind, act, done))
             while not done.wait(PATIENCE) and not self._ended.is_set():
                 pass
 
-    def _act(self, act: Callable[[], None], done: threading.Event) -> None:
+    def _act(self, kind: str, act: Callable[[], None], done: threading.Event) -> None:
         try:
             if not self._ended.is_set():
                 act()
         except Exception as error:
-            self._failed('what was prepared beside the messages', error)
+            self._failed(kind, error)
         finally:
             done.set()

@@ -11,6 +11,7 @@ import shutil
 from . import parts
 from .. import scene
 from ..command import chosen, Parser, RequestError, run
+from ..linkage.arithmetic import Formula
 from ..scene.machine import IN_SPACE
 from ..words import meant
 
@@ -161,8 +162,9 @@ def parser() -> Parser:
     made.add_argument('--size', metavar='WxH', type=size, default=(720, 720),
                       help='pixels (default: 720x720)')
     still = made.add_argument_group('for .png and .svg')
-    still.add_argument('--angle', metavar='DEG', type=within(float, -math.inf, math.inf),
-                       help="the first mechanism's crank angle (default: where it starts)")
+    still.add_argument('--angle', metavar='DEG', type=degrees,
+                       help="the first mechanism's crank angle, in degrees or as in pi/2 or 90deg "
+                       '(default: where it starts)')
     moving = made.add_argument_group('for .gif and .mp4')
     moving.add_argument('--turns', metavar='N', type=within(float, 0.001, 1000.0),
                         help="turns of the first mechanism's crank, or swings to and fro "
@@ -187,6 +189,17 @@ def within(kind, low, high):
         return value
     read.__name__ = 'whole number' if kind is int else 'number'
     return read
+
+
+def degrees(text):
+    """Return an angle [degrees] from a number or from arithmetic such as pi/2."""
+    try:
+        formula = Formula(text.removeprefix('+'))
+        value = float(formula.value({}))
+    except (ValueError, KeyError):
+        raise argparse.ArgumentTypeError(f'must be a finite angle, such as 30, pi/6 or 30deg, '
+                                         f'not {text}') from None
+    return math.degrees(value) if {'pi', 'deg'} & formula.words.keys() else value
 
 
 def words(text):

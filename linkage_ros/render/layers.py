@@ -19,7 +19,7 @@ from matplotlib.patheffects import withStroke
 import numpy as np
 
 from .cycle import SAMPLES
-from ..palette import CRANK, DARK, FLOOR, GREY, GUIDE, LINK, TRACE, TRACK
+from ..palette import BAR, DARK, DRIVEN, EARTH, FLOOR, GREY, LOCUS, TRACK
 from ..robot_model import shapes
 
 FADED = 0.3  # turns after which a fading trace is gone
@@ -46,7 +46,7 @@ class Trace:
         self._tracer = machine.linkage.points.index(machine.tracer)
         self.artists = []
         if kind in ('growing', 'fading'):
-            lines = LineCollection([], lw=3 * unit, color=TRACE, zorder=2, animated=True)
+            lines = LineCollection([], lw=3 * unit, color=LOCUS, zorder=2, animated=True)
             axes.add_collection(lines, autolim=False)
             self.artists = [lines]
         elif kind != 'none':
@@ -55,9 +55,9 @@ class Trace:
                 self._add_still(axes, curve * (side, 1.0), unit)
 
     def _add_still(self, axes, curve, unit):
-        bold = {'color': TRACE, 'lw': 3 * unit, 'zorder': 2}
+        bold = {'color': LOCUS, 'lw': 3 * unit, 'zorder': 2}
         if self._kind == 'stance':
-            axes.plot(*curve.T, color=whiter(TRACE, 0.65), lw=1.2 * unit, zorder=2)
+            axes.plot(*curve.T, color=whiter(LOCUS, 0.65), lw=1.2 * unit, zorder=2)
             curve = standing(curve)
         axes.plot(*curve.T, **bold)
 
@@ -72,7 +72,7 @@ class Trace:
             pieces = np.stack([curves[:-1], curves[1:]], axis=2)
             ages = np.linspace(1.0, 0.0, len(pieces))
             self.artists[0].set_segments(pieces.reshape(-1, 2, 2))
-            self.artists[0].set_color(np.repeat([whiter(TRACE, age) for age in ages],
+            self.artists[0].set_color(np.repeat([whiter(LOCUS, age) for age in ages],
                                                 pieces.shape[1], axis=0))
 
 
@@ -90,7 +90,7 @@ def guides(axes, machine, cycle, unit):
     """Draw the crank circle, a straight line that is traced, and slides on the ground."""
     linkage = machine.linkage
     first_leg = cycle.course[:, 0]
-    dashed = {'color': GUIDE, 'lw': 1.6 * unit, 'ls': (0, (6, 4)), 'zorder': 1}
+    dashed = {'color': GREY, 'lw': 1.6 * unit, 'ls': (0, (6, 4)), 'zorder': 1}
     around = np.exp(1j * np.linspace(0.0, math.tau, 361))
     for bar in shapes.cranks(linkage, 'ground'):
         centre, pin = (first_leg[0, linkage.points.index(name)] for name in bar)
@@ -185,19 +185,19 @@ class Legs:
 
         dark = whiter(DARK, white)
         if 'links' in parts:
-            made['plates'] = PolyCollection([], facecolors=whiter(LINK, 0.78 + 0.22 * white),
+            made['plates'] = PolyCollection([], facecolors=whiter(BAR, 0.78 + 0.22 * white),
                                             zorder=zorder, animated=True)
             axes.add_collection(made['plates'], autolim=False)
-            lines('bars', whiter(LINK, white), 5.5, 0.1)
+            lines('bars', whiter(BAR, white), 5.5, 0.1)
             rimmed('slots', 'white', 13.5, 0.2)
             lines('rods', dark, 4, 0.3)
-            lines('cranks', whiter(CRANK, white), 5.5, 0.32)
+            lines('cranks', whiter(DRIVEN, white), 5.5, 0.32)
             rimmed('bodies', whiter(TRACK, white), 9, 0.34, 'projecting')
-            rimmed('driven', whiter(CRANK, white), 9, 0.36, 'projecting')
+            rimmed('driven', whiter(DRIVEN, white), 9, 0.36, 'projecting')
         if 'joints' in parts:
-            dots('pivots', PIVOT, 2 * PIVOT_SIZE, 0.05, mfc=whiter(GREY, 0.4), mec=GREY)
+            dots('pivots', PIVOT, 2 * PIVOT_SIZE, 0.05, mfc=EARTH, mec=EARTH)
             dots('joints', 'o', 9, 0.4, mfc='white', mec=dark, mew=2.2 * unit)
-            dots('tracer', 'o', 11, 0.5, mfc=whiter(TRACE, white), mec=dark, mew=1.6 * unit)
+            dots('tracer', 'o', 11, 0.5, mfc=whiter(LOCUS, white), mec=dark, mew=1.6 * unit)
         return made
 
     def show(self, pose):
@@ -275,11 +275,14 @@ class Headline:
             fixed_lines += textwrap.wrap(words, 60 if single else 28)
         self.artists = []
         if 'title' in parts:
-            fixed_lines.append(' ')
             count = len(readings(self._linkage, [1.0] * len(machine.inputs), self._short))
+            across = min(count, 4 - 2 * self._short)
+            rows = math.ceil(count / across)
+            fixed_lines += [' '] * rows
             self.artists = [axes.annotate(
-                '', (k / count, 1.0), (0, 6), 'axes fraction', 'offset points', fontsize=size,
-                va='baseline', animated=True, in_layout=False) for k in range(count)]
+                '', (k % across / across, 1.0), (0, 6 + 1.2 * size * (rows - 1 - k // across)),
+                'axes fraction', 'offset points', fontsize=size, va='baseline', animated=True,
+                in_layout=False) for k in range(count)]
         axes.set_title('\n'.join(fixed_lines), loc='left', fontsize=size)
 
     def show(self, pose):

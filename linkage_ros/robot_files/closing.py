@@ -148,5 +148,6 @@ def _closed_ones(component: Component, still: np.ndarray) -> Tuple[Poses, float]
         -1.0, 1.0, (count, columns)))
     poses = component.closed(poses, still, 40, home, 1e-2)
     poses = component.closed(poses, still, 12)
+    poses = component.wrapped(poses)
     gaps = component.gap(poses)
     return poses.some(np.flatnonzero(gaps <= 1.001 * gaps.min() + CLOSED)), float(gaps.min())

@@ -8,12 +8,13 @@ from __future__ import annotations
 from itertools import combinations
 import math
 import re
+import shlex
 import sys
 from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from . import check, closing, loops, readers, rods
+from . import check, closing, loops, model, readers, rods
 from .dyads import Drawing, Drive, short
 from .robot import FARTHEST, Joint, Robot
 from .. import command, mechanisms, scene
@@ -24,6 +25,8 @@ from ..words import elided
 
 NAME = 'from_robot'
 NEEDS = 'pip install pyyaml, and mujoco for MJCF'
+# What is said of a mechanism that is not its robot's, or could not be held against it.
+WRONG = 'held against the robot'
 _OTHER = {'left': 'right', 'right': 'left', 'out': 'in', 'in': 'out'}
 
 
@@ -53,10 +56,22 @@ def show(args: Optional[List[str]]) -> None:
         robot = closing.held(robot, {**robot.held, **_values(asked.hold)})
         given, said = described(robot)
     # Names in the file are the file's: what is no letter in them could end a comment.
-    said = [elided(line, 10 ** 6) for line in said]
-    print(elided(f'# From {asked.file}.', 10 ** 4), *(f'# {line}' for line in said),
-          in_yaml(given), sep='\n', end='')
-    print(*(f'{NAME}: {line}' for line in said), sep='\n', file=sys.stderr)
+    head = [elided(line, 10 ** 6) for line in (
+        f'From {asked.file}. All its joints on /joint_states, and its model:', _launch(asked),
+        *said)]
+    print(*(f'# {line}' for line in head), in_yaml(given), sep='\n', end='')
+    print(*(f'{NAME}: {line}' for line in head[2:]), sep='\n', file=sys.stderr)
+    if wrong := [line for line in said if WRONG in line]:
+        raise command.RequestError(f'{len(wrong)} mechanisms are left out, as they could not be '
+                                   'held against the robot')
+
+
+def _launch(asked: Any) -> str:
+    """Return the line that brings up the robot with its scene."""
+    said = {'robot': asked.file, 'scene': 'SCENE.yaml', 'loops': asked.loops or '',
+            'hold': ' '.join(asked.hold)}
+    return 'ros2 launch linkage_ros robot.launch.py ' + ' '.join(
+        f'{name}:={shlex.quote(text)}' for name, text in said.items() if text)
 
 
 class _NotPlaced(ValueError):
@@ -192,7 +207,7 @@ def _checked(robot: Robot, drawing: Drawing, taken: Sequence[str]
     found = check.compared(robot, machine, [joint.name for joint in drawing.driven],
                            _ends(drawing), loop.lean + loop.gap / loop.size)
     if found.wrong:
-        raise ValueError(found.wrong)
+        raise ValueError(f'{WRONG}: {found.wrong}')
     said = [f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.'] if drawing.left else []
     moved = ', '.join(f'{source} from {low:.4g} to {high:.4g}'
                       for source, low, high in found.ranges)
@@ -261,7 +276,7 @@ def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
     yield 'type', 'custom'
     yield 'joints', drawing.lines
     yield 'frame_id', drawing.loop.frame_id
-    yield 'pose', [float(short(value)) for value in (*frame[:3, 3], *_rpy(frame[:3, :3]))]
+    yield 'pose', [float(short(value)) for value in (*frame[:3, 3], *model.rpy(frame[:3, :3]))]
     for drive in drawing.drives:
         yield f'{drive.name}.source', drive.source
         yield f'{drive.name}.ratio', drive.ratio
@@ -276,13 +291,3 @@ def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
                      + (f'{zero:+}' if zero else ''))
     yield 'joint_names', names
     yield 'only_named', True
-
-
-def _rpy(turned: np.ndarray) -> Tuple[float, float, float]:
-    a, b = turned[:2, 0]
-    yaw = math.atan2(b, a) if math.hypot(a, b) > 1e-9 else 0.0
-    sin, cos = math.sin(yaw), math.cos(yaw)
-    ahead, aside = turned[:2, 2], turned[:2, 1]
-    return (math.atan2(sin * ahead[0] - cos * ahead[1], cos * aside[1] - sin * aside[0]),
-            math.atan2(-turned[2, 0], cos * a + sin * b), yaw)
-

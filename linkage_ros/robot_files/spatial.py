@@ -262,6 +262,11 @@ class Component:
             np.matmul(frames[:, each.parent], poses.moved[:, i], out=frames[:, i])
         return frames
 
+    def wrapped(self, poses: Poses) -> Poses:
+        """Return poses without whole turns of hinges."""
+        turns = math.tau * np.round(poses.positions / math.tau)
+        return poses._replace(positions=poses.positions - np.where(self._slides, 0.0, turns))
+
     def stepped(self, poses: Poses, step: np.ndarray) -> Poses:
         """Return poses with a step of the columns [rad or m] more."""
         positions, moved = poses.positions.copy(), poses.moved.copy()

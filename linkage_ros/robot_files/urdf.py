@@ -167,9 +167,9 @@ class Reader:
             if text(cut, 'axis/use_parent_model_frame') in ('1', 'true'):
                 axis = frame[:3, :3].T @ axis
             kind = cut.get('type', '')
-            self.robot.join(cut.get('name', ''), UNIVERSAL if kind == 'universal' else kind,
-                            (one, other), frame, axis,
-                            second=frame[:3, :3] @ numbers(text(cut, 'axis2/xyz', '0 0 1')))
+            second = frame[:3, :3] @ numbers(text(cut, 'axis2/xyz', '0 0 1'))
+            self.robot.join(cut.get('name', ''), kind, (one, other), frame, axis,
+                            second=second if kind == UNIVERSAL else None)
         for plugin in self._root.findall('gazebo/plugin'):
             if 'detachable' in f'{plugin.get("name")} {plugin.get("filename")}'.lower():
                 one, other = (text(plugin, tag) for tag in ('parent_link', 'child_link'))

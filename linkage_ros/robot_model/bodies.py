@@ -35,10 +35,9 @@ from ..scene import Machine, SceneError
 from ..scene.machine import IN_SPACE
 from ..words import listed
 
-COLOURS = {'orange': palette.ORANGE, 'blue': palette.BLUE, 'green': palette.GREEN,
-           'vermilion': palette.VERMILION, 'sky': palette.SKY, 'purple': palette.PURPLE,
-           'grey': palette.DARK}
-*BARS, JOINTS = COLOURS
+# As in the markers: bars, what inputs move, guides and joints.
+COLOURS = {'bar': palette.BAR, 'driven': palette.DRIVEN, 'slot': palette.SLOT,
+           'joint': palette.JOINT}
 
 # As parts of the longest bar: radii of bars, joints and barrels, thickness of guides and blocks.
 BAR, JOINT, BARREL, GUIDE, BLOCK = 1 / 80, 1 / 40, 1 / 32, 1 / 80, 1 / 20
@@ -91,7 +90,7 @@ class Point(NamedTuple):
 
     def ball(self, place: Place = (0.0, 0.0)) -> Piece:
         """Return what is seen of it, at a place of its own frame or of another."""
-        return Piece(BALL, JOINTS, self.radius, place, place)
+        return Piece(BALL, 'joint', self.radius, place, place)
 
 
 class Joint(NamedTuple):
@@ -287,17 +286,17 @@ class _Tree:
         """Yield ground, crank and legs."""
         ground = Body(self._name('', GROUND), root, self._machine.pose)
         for side in dict.fromkeys(leg.side for leg in self._assembly.legs.values()):
-            self._add_shapes(side, GROUND, ground, JOINTS)
+            self._add_shapes(side, GROUND, ground)
         yield ground
         if self._shared:
             yield self._with_hub(self._hung('', 1.0, self._shared))
         for prefix, leg in self._assembly.legs.items():
             ends: Counter[str] = Counter()
             self._add_points(prefix, leg.side, GROUND, ground, self._frames[GROUND], ends)
-            for i, link in enumerate(self._links):
+            for link in self._links:
                 body = (self._lagging(prefix, leg, link) if link is self._shared
                         else self._hung(prefix, leg.side, link))
-                self._add_pieces(leg.side, link, body, BARS[i % len(BARS)])
+                self._add_pieces(leg.side, link, body)
                 carried = [point for point in self._frames[link.name] if point != link.joint]
                 self._add_points(prefix, leg.side, link.name, body, carried, ends)
                 yield self._with_hub(body)
@@ -330,17 +329,20 @@ class _Tree:
         return Body(self._name(prefix, link.name), self._name(prefix, link.parent),
                     (x, y, 0.0, 0.0, 0.0, zero), joint)
 
-    def _add_pieces(self, side, link, body, colour):
+    def _add_pieces(self, side, link, body):
         """Add bars as rods, and what slides on a link or is the slide."""
         frame = self._frames[link.name]
         for first, second in self._bars:
             if first in frame and second in frame:
-                body.pieces.append(Piece(ROD, colour, BAR * self._thickness,
+                body.pieces.append(Piece(ROD, self._colour(link), BAR * self._thickness,
                                          self._place(side, link.name, first),
                                          self._place(side, link.name, second)))
-        self._add_shapes(side, link.name, body, colour)
+        self._add_shapes(side, link.name, body)
 
-    def _add_shapes(self, side, link, body, colour):
+    def _colour(self, link):
+        return 'driven' if link.name in self._machine.inputs else 'bar'
+
+    def _add_shapes(self, side, link, body):
         """Add guides, blocks, barrels and the rods in them."""
         for shape in self._shapes:
             if shape.start.link == link:
@@ -348,6 +350,8 @@ class _Tree:
                 drawn, thickness = {shapes.GUIDE: (BOX, GUIDE), shapes.BLOCK: (BOX, BLOCK),
                                     shapes.BARREL: (ROD, BARREL), shapes.ROD: (ROD, BAR)
                                     }[shape.kind]
+                colour = ('slot' if shape.kind == shapes.GUIDE else 'bar'
+                          if shape.kind == shapes.ROD else self._colour(shape.slide))
                 if start != end:
                     body.pieces.append(Piece(drawn, colour, thickness * self._thickness, start,
                                              end))
@@ -366,7 +370,7 @@ class _Tree:
         """Return a body; one that carries no joint is seen, and weighs, where it hangs."""
         if not body.points:
             origin = (0.0, 0.0)
-            body.pieces.append(Piece(BALL, JOINTS, JOINT * self._thickness, origin, origin))
+            body.pieces.append(Piece(BALL, 'joint', JOINT * self._thickness, origin, origin))
         return body
 
     def _name(self, prefix, name):

@@ -5,13 +5,24 @@
 
 import copy
 import json
-from typing import Iterable
+import math
+from typing import Any, Dict, Iterable, Mapping, Tuple
+
+import numpy as np
+
+from ..scene import Machine
 
 GROUP = 'rviz_common/Group'
 NEEDS_TRANSFORMS = ('rviz_default_plugins/RobotModel', 'rviz_default_plugins/TF')
 
 
-def adapted(config: dict, names: Iterable[str], frame_id: str, namespace: str = '',
+# How far away a camera is that sees a ball of radius 1 and room about it: its view is 45 degrees.
+AWAY = 1.1 / math.sin(math.radians(22.5))
+# A camera looks down on an upright plane by so much [rad], and on a flat one almost straight.
+DOWN, STEEPEST = 0.15, 1.56
+
+
+def adapted(config: dict, machines: Mapping[str, Machine], frame_id: str, namespace: str = '',
             robot_model: bool = False, frame_prefix: str = '') -> dict:
     """
     Return a configuration that shows other mechanisms.
@@ -20,8 +31,8 @@ def adapted(config: dict, names: Iterable[str], frame_id: str, namespace: str = 
     ----------
     config : dict
         A configuration with one group of displays a mechanism, which bears its name.
-    names : iterable of str
-        The mechanisms to be shown.
+    machines : mapping
+        The mechanisms to be shown, by name; the camera sees them all.
     frame_id : str
         The frame that their poses are in.
     namespace : str
@@ -41,14 +52,49 @@ def adapted(config: dict, names: Iterable[str], frame_id: str, namespace: str = 
     displays = manager['Displays']
     places = [i for i, display in enumerate(displays) if display['Class'] == GROUP]
     pattern = displays[places[0]]
-    displays[places[0]:places[-1] + 1] = [_renamed(pattern, name, namespace) for name in names]
+    displays[places[0]:places[-1] + 1] = [_renamed(pattern, name, namespace)
+                                           for name in machines]
     manager['Global Options']['Fixed Frame'] = frame_id
+    made['Visualization Manager']['Views']['Current'].update(_camera(machines.values()))
     for display in _all(displays):
         if display['Class'] in NEEDS_TRANSFORMS:
             display['Enabled'] = display['Value'] = robot_model
         if 'TF Prefix' in display:
             display['TF Prefix'] = frame_prefix.rstrip('/')
     return made
+
+
+def _camera(machines: Iterable[Machine]) -> Dict[str, Any]:
+    """Return from where all that mechanisms reach is seen, square to the plane of the first."""
+    seen, normals = zip(*map(_seen, machines))
+    places, normal = np.concatenate(seen), normals[0]
+    low, high = places.min(axis=0), places.max(axis=0)
+    x, y, z = (round(float(one), 2) + 0.0 for one in (low + high) / 2)
+    pitch = min(max(math.asin(max(-1.0, min(1.0, normal[2]))), DOWN), STEEPEST)
+    # Seen from above, x is to the right.
+    yaw = math.atan2(*normal[1::-1]) if math.hypot(*normal[:2]) > 0.1 else -math.pi / 2
+    return {'Distance': round(AWAY * float(np.linalg.norm(high - low)) / 2, 2) or 1.0,
+            'Focal Point': {'X': x, 'Y': y, 'Z': z}, 'Pitch': round(pitch, 6),
+            'Yaw': round(yaw % math.tau, 6)}
+
+
+def _seen(machine: Machine) -> Tuple[np.ndarray, np.ndarray]:
+    """Return points that a mechanism's joints come to [m], (n, 3), and its plane's normal."""
+    values = [np.concatenate([np.linspace(low, high, 25) for low, high in (
+        [drive.ends] if drive.ends else drive.reach)]) / machine.scale_of(name)
+        for name, drive in machine.inputs.items()]
+    grid = np.meshgrid(*(own[::len(values)] for own in values))
+    found = machine.linkage.solve(grid if len(grid) > 1 else grid[0], machine.points)
+    places = machine.scale * np.concatenate([place.reshape(-1, 2) for place in found.values()])
+    places = places[np.isfinite(places).all(axis=1)]
+    if machine.mirrored:
+        places = np.concatenate([places, places * (-1.0, 1.0)])
+    x, y, z, roll, pitch, yaw = machine.pose
+    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(one), math.sin(one)) for one in (roll, pitch, yaw))
+    turn = np.array([[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+                     [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+                     [-sp, cp * sr, cp * cr]])
+    return places @ turn[:, :2].T + (x, y, z), turn[:, 2]
 
 
 def _renamed(group, name, namespace):

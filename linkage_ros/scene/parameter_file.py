@@ -179,13 +179,16 @@ def _list_of(kind: type) -> str:
 
 
 def _read(event: Any, line: int) -> Any:
-    """Return what a scalar is: a truth value, a whole number, a number or a text."""
+    """Return what a scalar is; raise ValueError if it is nothing."""
     text = event.value
     is_quoted = event.style in ('"', "'")
     if not text and not is_quoted:
         raise ValueError(f'No value at line {line}')
-    if is_quoted or event.tag == TEXT:
-        return text
+    return text if is_quoted or event.tag == TEXT else plain(text)
+
+
+def plain(text: str) -> Any:
+    """Return what a text without quotes is: a truth value, a number or the text."""
     if text in TRUE or text in FALSE:
         return text in TRUE
     if _WHOLE.fullmatch(text):

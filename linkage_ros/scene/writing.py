@@ -10,17 +10,24 @@ from textwrap import indent
 from typing import Any, Dict, Mapping
 
 from . import read, Scene, SceneError
+from .parameter_file import plain, TEXT
 
 
 def in_yaml(given: Mapping[str, Any]) -> str:
     """Return a parameter file with these values, by full parameter name."""
     import yaml
 
+    class Dumper(yaml.SafeDumper):
+        """Quotes texts that ROS would read as something else, such as y, nan and 1e5."""
+
+    Dumper.add_representer(str, lambda dumper, text: dumper.represent_scalar(
+        TEXT, text, None if isinstance(plain(text), str) else "'"))
     texts = ['/**:', '  ros__parameters:']
     for name, value in given.items():
-        plain = list(value) if isinstance(value, tuple) else value
-        numbers = isinstance(plain, list) and not any(isinstance(one, str) for one in plain)
-        text = yaml.safe_dump({name: plain}, width=1000, default_flow_style=numbers and None)
+        shown = list(value) if isinstance(value, tuple) else value
+        numbers = isinstance(shown, list) and not any(isinstance(one, str) for one in shown)
+        text = yaml.dump({name: shown}, Dumper=Dumper, width=1000,
+                         default_flow_style=numbers and None)
         texts.append(indent(text.rstrip(), '    '))
     return '\n'.join(texts) + '\n'
 

@@ -62,7 +62,7 @@ class Feed:
         Returns
         -------
         looks : dict
-            By number: mechanism, kind, pose (x, y, z, qx, qy, qz, qw), width [m] and colour.
+            By number: mechanism, kind, frame, pose (x, y, z, qx, qy, qz, qw), width [m], colour.
         records : bytes
             For each marker its number and its points' count, uint32, and the points, float32
             x, y, z; all little-endian.
@@ -131,4 +131,5 @@ def _look(mechanism: str, marker: Marker) -> dict[str, Any]:
     colours = [colour.r, colour.g, colour.b, colour.a]
     _shown([*pose, *colours, marker.scale.x])
     return {'mechanism': mechanism, 'kind': KINDS[marker.type], 'pose': pose,
+            'frame': marker.header.frame_id,
             'width': marker.scale.x, 'colour': colours}

@@ -105,6 +105,8 @@ export class Picture {
     this.view = null;
     this.mechanisms = [];
     this.boxes = new Map();
+    /** How far each frame is drawn aside: what is in two frames need not be in one place. */
+    this.asides = new Map();
     /** The mechanism and the dimension whose bars are lit, and the line of a joint that is pulled. */
     this.lit = { mechanism: null, dimension: '' };
     this.pull = () => null;
@@ -113,6 +115,7 @@ export class Picture {
   show(mechanisms) {
     this.mechanisms = mechanisms;
     this.boxes.clear();
+    this.asides.clear();
   }
 
   /** Find the size of a mechanism anew. */
@@ -159,6 +162,7 @@ export class Picture {
         const depth = dot(this.seen.out, look.pose.slice(0, 3));
         const map = [this.seen.right, this.seen.up].map(way => [
           dot(way, x), dot(way, y), dot(way, z), dot(way, look.pose.slice(0, 3))]);
+        map[0][3] += this.asides.get(look.frame) ?? 0;
         const places = new Float64Array(points.length / 3 * 2);
         for (let from = 0, to = 0; from < points.length; from += 3) {
           for (const [a, b, c, d] of map) {
@@ -181,18 +185,37 @@ export class Picture {
       this.maps.set(key, map);
     }
     const all = new Box();
+    const frames = new Map(shapes.map(({ mechanism: { key }, look }) => [key, look.frame]));
+    const inFrames = new Map();
     for (const [key, box] of now) {
       let known = this.boxes.get(key) ?? new Box();
       // It was never so large: something far off was drawn that is gone.
       if (box.size > 0 && known.size > SHRUNK * box.size) known = new Box();
       if (!known.holds(box)) this.boxes.set(key, known.grown(box));
-      for (const corner of this.corners(key, this.boxes.get(key) ?? box)) all.add(...corner);
+      const frame = frames.get(key);
+      if (!inFrames.has(frame)) inFrames.set(frame, new Box());
+      for (const corner of this.corners(key, this.boxes.get(key) ?? box)) {
+        all.add(...corner);
+        inFrames.get(frame).add(...corner);
+      }
     }
+    this.setAside(inFrames);
     const span = [0, 1].map(i => Math.max(all.high[i] - all.low[i], 1e-9));
     this.scale = Math.min((width - 2 * MARGIN) / span[0], (height - 2 * MARGIN) / span[1]);
     this.middle = [0, 1].map(i => (all.high[i] + all.low[i]) / 2);
     this.scale *= this.view.zoom;
     this.centre = [width / 2 + this.view.shift[0], height / 2 + this.view.shift[1]];
+  }
+
+  /** Draw each frame to the right of those before it, from the next picture on. */
+  setAside(boxes) {
+    let edge = null;
+    for (const [frame, box] of boxes) {
+      const before = this.asides.get(frame) ?? 0;
+      const aside = edge === null ? 0 : edge + SLACK * box.size - (box.low[0] - before);
+      this.asides.set(frame, Number.isFinite(aside) ? aside : 0);
+      edge = box.high[0] - before + this.asides.get(frame);
+    }
   }
 
   /** Return the corners of a box in a mechanism's plane, one after the other, as they are seen. */

@@ -1,9 +1,8 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Parameters that are set while nodes run: judged aside and together, answered one by one."""
+"""Parameters that are set while nodes run: answered one by one, prepared aside, then adopted."""
 
-from itertools import pairwise
 import math
 import threading
 import time
@@ -19,6 +18,7 @@ from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
 from rcl_interfaces.msg import (
+    Log,  # noqa: E402
     Parameter as ParameterMessage,  # noqa: E402
     ParameterValue,  # noqa: E402
 )
@@ -53,7 +53,7 @@ class Client:
     """The parameter services of a node, called from outside."""
 
     def __init__(self, graph, node):
-        self._graph, self._node = graph, node
+        self._graph, self.node = graph, node
         self._clients = {}
 
     def ask(self, type_, **request):
@@ -63,7 +63,7 @@ class Client:
                 GetParameterTypes: 'get_parameter_types'}[type_]
         if type_ not in self._clients:
             self._clients[type_] = self._graph.node.create_client(
-                type_, f'{self._node.get_fully_qualified_name()}/{name}')
+                type_, f'{self.node.get_fully_qualified_name()}/{name}')
             self._graph.until(self._clients[type_].service_is_ready)
         return self._clients[type_].call_async(type_.Request(**request))
 
@@ -197,13 +197,16 @@ class Slow(nodes.SceneNode):
         self.free.set()
         self.begin()
 
+    def check(self, new):
+        """Refuse a scale of 1300."""
+        if new.machines['leg'].scale == 1300.0:
+            raise scene.SceneError('leg.scale must not be 1300')
+
     def prepare(self, new):
-        """Wait until it may go on; refuse a scale of 13."""
+        """Wait until it may go on."""
         self.begun.append(new)
         self.free.wait(20.0)
         self.prepared.append((threading.current_thread(), new.machines['leg'].scale))
-        if new.machines['leg'].scale == 13.0:
-            raise scene.SceneError('leg.scale must not be 13')
         return new
 
     def adopt(self, new):
@@ -211,64 +214,56 @@ class Slow(nodes.SceneNode):
         self.adopted.append((threading.current_thread(), new.machines['leg'].scale))
 
 
+def settled(graph, node):
+    """Wait until what was accepted is adopted."""
+    graph.until(lambda: node.is_settled)
+
+
+def held_up(graph, client):
+    """Let the worker of a node be busy with a scene."""
+    client.about(['leg.scale'])
+    node = client.node
+    node.free.clear()
+    begun = len(node.begun)
+    assert client.set(('leg.scale', 1.5))[0].successful
+    graph.until(lambda: len(node.begun) > begun)
+
+
 def test_a_scene_is_prepared_in_a_worker_and_adopted_by_the_executor(graph):
     node = graph.start(Slow, LEG)
     assert Client(graph, node).set(('leg.scale', 2.0))[0].successful
+    settled(graph, node)
     assert node.prepared[-1][0] is not threading.main_thread()
     assert node.adopted[-1] == (threading.main_thread(), 2.0)
 
 
-def test_messages_are_handled_while_a_scene_is_prepared(graph):
+def test_a_change_is_answered_and_messages_are_handled_while_it_is_prepared(graph):
     node = graph.start(Slow, LEG)
     client, ticks = Client(graph, node), []
     node.create_timer(0.01, lambda: ticks.append(0))
-    client.about(['leg.scale'])
-    node.free.clear()
-    future = client.ask(SetParameters, parameters=[_message('leg.scale', 2.0)])
+    held_up(graph, client)
     seen = len(ticks)
     graph.until(lambda: len(ticks) > seen + 20)
-    assert not future.done() and node.scene.machines['leg'].scale == 1.0
+    assert node.get_parameter('leg.scale').value == 1.5
+    assert not node.is_settled and node.adopted[-1][1] == 1.0
     node.free.set()
-    graph.until(future.done)
-    assert future.result().results[0].successful and node.scene.machines['leg'].scale == 2.0
+    settled(graph, node)
+    assert node.adopted[-1][1] == 1.5
 
 
-def test_a_hundred_sets_at_once_cost_as_much_as_the_last(graph):
+def test_of_a_hundred_changes_each_is_answered_and_the_newest_prepared(graph):
     node = graph.start(Slow, LEG)
     client = Client(graph, node)
-    client.set(('leg.scale', 1.5))
-    node.free.clear()
-    answered = []
-    for number in range(100):
-        client.ask(SetParameters, parameters=[
-            _message('leg.scale', 2.0 + number)]).add_done_callback(
-                lambda future, number=number: answered.append(number))
-        # Of many at once some would get lost on the way: what is answered at once comes between.
-        client.call(GetParameterTypes, names=['leg.scale'])
+    held_up(graph, client)
+    begun = len(node.begun)
+    for number in range(50):
+        assert client.set(('leg.scale', 2.0 + number))[0].successful
+        assert node.get_parameter('leg.scale').value == 2.0 + number
+    results = client.set(*[('leg.scale', 52.0 + number) for number in range(50)])
+    assert [result.successful for result in results] == [True] * 50
     node.free.set()
-    made = len(node.prepared)
-    graph.until(lambda: len(answered) == 100)
-    assert answered == list(range(100))
-    assert node.scene.machines['leg'].scale == 101.0
-    assert len(node.prepared) - made <= 10
-
-
-def test_of_a_change_the_messages_wait_for_a_part_of_what_it_takes_to_prepare(graph):
-    given = {**LEG, 'leg.leg_pairs': 6}
-    node = graph.start(Kinematics, given)
-    client, waited, prepared = Client(graph, node), [], []
-    for value in (14.9, 14.8, 14.7, 14.6, 14.5):
-        # The processor's time is counted: other processes may run.
-        began = time.thread_time()
-        node.prepare(scene.read({**given, 'leg.dimensions.m': value + 0.01}))
-        prepared.append(time.thread_time() - began)
-        future = client.ask(SetParameters, parameters=[_message('leg.dimensions.m', value)])
-        turns = []
-        graph.until(lambda turns=turns, future=future: (
-            turns.append(time.thread_time()) or future.done()))
-        assert future.result().results[0].successful
-        waited.append(max(after - before for before, after in pairwise(turns)))
-    assert sorted(waited)[2] < 0.5 * sorted(prepared)[2]
+    settled(graph, node)
+    assert node.adopted[-1][1] == 101.0 and len(node.begun) == begun + 1
 
 
 def test_a_set_among_a_thousand_mechanisms_costs_what_it_changes():
@@ -285,7 +280,7 @@ def test_each_of_many_sets_gets_its_own_answer(graph):
     node = graph.start(Slow, LEG)
     wanted = [('leg.scale', 2.0), ('leg.scale', -1.0), ('leg.points', ['Z']),
               ('leg.points', ['G']), ('leg.scale', 'wide'), ('leg.branches.C', 7),
-              ('frame_id', 'map'), ('leg.scale', 13.0)]
+              ('frame_id', 'map'), ('leg.scale', 1300.0)]
     results = Client(graph, node).set(*wanted)
     assert [r.successful for r in results] == [True, False, False, True, False, False, True, False]
     for (name, _), result in zip(wanted, results):
@@ -296,27 +291,30 @@ def test_each_of_many_sets_gets_its_own_answer(graph):
 
 def test_a_set_within_the_process_is_at_once_and_is_kept(graph):
     node = graph.start(Slow, LEG)
-    client = Client(graph, node)
-    client.set(('leg.scale', 1.5))
-    node.free.clear()
-    working = len(node.begun)
-    future = client.ask(SetParameters, parameters=[_message('leg.pose', [1.0] * 6)])
-    graph.until(lambda: len(node.begun) > working)
-    node.free.set()
-    assert node.set_parameters([Parameter('leg.scale', value=3.0)])[0].successful
-    assert node.scene.machines['leg'].scale == 3.0
-    graph.until(future.done)
+    held_up(graph, Client(graph, node))
+    for name, value in (('leg.pose', [1.0] * 6), ('leg.scale', 3.0)):
+        assert node.set_parameters([Parameter(name, value=value)])[0].successful
     machine = node.scene.machines['leg']
     assert (machine.scale, machine.pose) == (3.0, (1.0,) * 6)
+    node.free.set()
+    settled(graph, node)
+    assert node.adopted[-1][1] == 3.0 and node.scene.machines['leg'] is machine
 
 
-def test_a_mistake_while_a_scene_is_prepared_is_an_answer_not_the_end(graph, monkeypatch):
+def test_a_mistake_while_a_scene_is_prepared_leaves_the_one_before(graph, monkeypatch):
     node = graph.start(Slow, LEG)
+    said = graph.listen(Log, '/rosout', 100)
+    client = Client(graph, node)
+    graph.until(lambda: node.count_subscribers('/rosout'))
     monkeypatch.setattr(node, 'prepare', lambda new: 1 // 0)
-    refused, = Client(graph, node).set(('leg.scale', 2.0))
-    assert not refused.successful and 'internal error: ZeroDivisionError' in refused.reason
+    for scale in (2.0, 3.0):
+        assert client.set(('leg.scale', scale))[0].successful
+        graph.until(lambda: any('ZeroDivisionError' in one.msg for one in said))
+    assert node.adopted[-1][1] == 1.0
     monkeypatch.undo()
-    assert Client(graph, node).set(('leg.scale', 3.0))[0].successful
+    assert client.set(('leg.scale', 4.0))[0].successful
+    settled(graph, node)
+    assert node.adopted[-1][1] == 4.0
 
 
 def test_what_others_have_to_say_about_a_parameter_counts(graph):
@@ -338,12 +336,7 @@ def test_the_time_to_be_used_can_be_set_as_ever(graph):
 
 def test_a_node_ends_while_its_worker_is_busy(graph):
     node = graph.start(Slow, LEG)
-    client = Client(graph, node)
-    client.about(['leg.scale'])
-    node.free.clear()
-    working = len(node.begun)
-    client.ask(SetParameters, parameters=[_message('leg.scale', 2.0)])
-    graph.until(lambda: len(node.begun) > working)
+    held_up(graph, Client(graph, node))
     began = time.monotonic()
     node.destroy_node()
     node.free.set()

@@ -1,0 +1,59 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Bring up a robot with the scene that from_robot has made of it, all its joints on /joint_states.
+
+    ros2 launch linkage_ros robot.launch.py robot:=robot.xml scene:=robot.yaml
+"""
+
+from pathlib import Path
+import tempfile
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from linkage_ros import scene
+from linkage_ros.robot_files import model, readers
+from linkage_ros.scene.writing import in_yaml
+
+# Name, default, and what it does.
+ARGUMENTS = (
+    ('robot', None, 'MJCF, SDF or URDF of the robot.'),
+    ('scene', None, 'What from_robot has printed of it.'),
+    ('loops', '', 'Its file of loops, if it has one.'),
+    ('hold', '', 'Joints that stay, as in "spring=0.1 other=0".'),
+    ('simulated', 'true', 'Whether crank_driver simulates the motors; false: the robot has them.'),
+)
+# Motors and passive joints are on one topic, as robot_state_publisher wants them.
+ON_JOINT_STATES = [('crank_states', 'joint_states')]
+
+
+def generate_launch_description():
+    """Return the arguments and what depends on them."""
+    return LaunchDescription([
+        *(DeclareLaunchArgument(name, default_value=default, description=description)
+          for name, default, description in ARGUMENTS),
+        OpaqueFunction(function=_started)])
+
+
+def _started(context):
+    chosen = {name: LaunchConfiguration(name).perform(context) for name, *_ in ARGUMENTS}
+    loops = chosen['loops'] or None
+    shown, robot = scene.load(chosen['scene']), readers.read(chosen['robot'], loops)
+    held = {name: float(value) for name, _, value in (
+        each.rpartition('=') for each in chosen['hold'].split())}
+    files = [chosen['scene']]
+    if rest := model.others(robot, shown.machines, held):
+        # The last file says which mechanisms there are.
+        file = Path(tempfile.mkdtemp()) / 'others.yaml'
+        file.write_text(in_yaml({'mechanisms': [*shown.machines, model.OTHERS], **rest}))
+        files.append(str(file))
+    text = ParameterValue(model.description(chosen['robot'], loops), value_type=str)
+    nodes = ['kinematics'] + ['crank_driver'] * (chosen['simulated'].lower() in ('true', '1'))
+    return [Node(package='robot_state_publisher', executable='robot_state_publisher',
+                 parameters=[{'robot_description': text, 'publish_frequency': 100.0}]),
+            *(Node(package='linkage_ros', executable=name, parameters=files,
+                   remappings=ON_JOINT_STATES) for name in nodes)]

@@ -1,0 +1,34 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The executables that run until a signal: it ends them quietly from this module's import on."""
+
+from importlib import import_module
+import os
+import signal
+import sys
+import threading
+from typing import Callable
+
+
+def _executable(module: str) -> Callable[[], None]:
+    def start() -> None:
+        # Importing ROS takes longer than a signal may; `ShutdownHandler` takes over from here.
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: os._exit(0))
+        code = import_module(f'{__package__}.{module}').main()
+        if threading.active_count() == 1:
+            sys.exit(code)
+        # A thread that compiles would hold up the end.
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+
+    return start
+
+
+crank_driver = _executable('nodes.crank_driver')
+kinematics = _executable('nodes.kinematics')
+scene = _executable('nodes.scene_process')
+servo_inverse = _executable('nodes.servo_inverse')
+viewer = _executable('web.viewer')

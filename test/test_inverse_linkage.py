@@ -1,0 +1,186 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The inverse linkage: what comes apart, its joint lines, and that its answers are all."""
+
+import math
+
+from linkage_ros import mechanisms
+import numpy as np
+import pytest
+from truth import random_linkages
+
+FIVE_BAR = """\
+# five_bar driven by P.x, P.y
+O ground 0.0 0.0
+Q ground 0.118 0.0
+X carriage O along Q -1.912 1.912    # at P.x
+Y block X 0.0 0.118
+P carriage X along Y -1.912 1.912    # at P.y
+A dyad O P 0.09 0.09 right
+C dyad Q P 0.09 0.09 right"""
+
+
+def custom(*joints, **numbers):
+    """Return a linkage of joint lines."""
+    return mechanisms.create('custom', joints=joints, **numbers)
+
+
+def outputs_of(linkage):
+    """Return all joint angles, slides and coordinates that move."""
+    names = (*linkage.joints, *(f'{point}.{axis}' for point in linkage.points for axis in 'xy'))
+    return [name for name in names if linkage.moves(name)]
+
+
+def test_the_joint_lines_of_an_inverse_are_printed():
+    assert str(mechanisms.create('five_bar').inverse(('P.x', 'P.y'))) == FIVE_BAR
+    assert str(mechanisms.create('jansen').inverse('G.x')) == (
+        'the inverse of jansen for G.x is searched')
+
+
+@pytest.mark.parametrize('kind, outputs', [
+    ('four_bar', {'crank', 'AB', 'QB'}), ('jansen', {'crank', 'BC', 'AC', 'BE', 'AE', 'EF', 'DF'}),
+    ('klann', {'crank', 'AD', 'BD'}), ('watt', {'crank', 'AB', 'QB'}),
+    ('slider_crank', {'crank', 'AB', 'block'}), ('slotted_lever', {'crank', 'lever', 'slide'}),
+    ('whitworth', {'crank', 'lever', 'slide', 'LR', 'block'})])
+def test_joint_angles_and_slides_come_apart(kind, outputs):
+    linkage = mechanisms.create(kind)
+    closed = {name for name in linkage.joints if linkage.inverse(name).closed}
+    assert closed >= outputs
+
+
+@pytest.mark.parametrize('kind', [kind for kind in mechanisms.TYPES if kind != 'five_bar'])
+def test_an_assembly_mode_is_a_linkage_that_has_the_pose(kind):
+    linkage, rng = mechanisms.create(kind), np.random.default_rng(2)
+    arc = max(linkage.reach(), key=lambda arc: arc[1] - arc[0])
+    theta = rng.uniform(*arc, 3)
+    for output in outputs_of(linkage):
+        closed = linkage.inverse(output).closed
+        if not closed:
+            continue
+        given = np.array([ratio * linkage.joint_angles(theta, (name,))[name] + offset
+                          for name, ratio, offset in closed.driving])
+        modes = [mode.linkage.built for mode in closed.modes]
+        drawn = [custom(*closed.lines) if not closed.branches else mechanisms.create(
+            'custom', joints=closed.lines, branches=dict(mode.linkage.branches))
+            for mode in closed.modes]
+        places = [each.solve(given[0]) for each in drawn]
+        assert len(modes) == len(drawn)
+        true = linkage.solve(theta)
+        for one, two in ((a, b) for a in true for b in true if a < b and {a, b} <= {*places[0]}):
+            apart = np.hypot(*(true[one] - true[two]).T)
+            found = [np.hypot(*(place[one] - place[two]).T) for place in places]
+            assert np.nanmin(np.abs(np.array(found) - apart), axis=0).max() < \
+                1e-9 * linkage.longest, (output, one, two)
+
+
+def checked(linkage, inverse, poses, sure=1e-4):
+    """Check that each pose is among the answers, and that every answer has its outputs."""
+    count = 0
+    for pose in poses:
+        row = linkage.checked(inverse.outputs).at(*pose)
+        values, rates = row[:len(pose)], np.reshape(row[len(pose):], (len(pose), -1))
+        scale = np.array([1.0 if linkage.is_angle(name) else linkage.longest
+                          for name in inverse.outputs])
+        sizes = [input_.size for input_ in linkage.inputs]
+        if not np.isfinite(row).all() or np.linalg.svd(
+                (rates.T * sizes) / scale[:, None], compute_uv=False)[-1] < sure:
+            continue
+        answers = inverse.all(values)
+        count += 1
+        assert min((max(input_.apart(x, y) / input_.size for input_, x, y in zip(
+            linkage.inputs, answer.inputs, pose)) for answer in answers), default=9.0) < 1e-9, (
+            linkage, inverse.outputs, pose, answers)
+        for answer in answers:
+            reached = linkage.checked(inverse.outputs).at(*answer.inputs)[:len(pose)]
+            for now, value, name, size in zip(reached, values, inverse.outputs, scale):
+                gap = math.remainder(now - value, math.tau) if linkage.is_angle(name) \
+                    else now - value
+                assert abs(gap) < 1e-7 * size, (linkage, inverse.outputs, answer)
+        many, rates = inverse.over(*np.transpose([values]))
+        np.testing.assert_allclose(many[:, 0].T, [answer.inputs for answer in answers],
+                                   rtol=1e-9, atol=1e-9)
+    return count
+
+
+@pytest.mark.parametrize('seeds', [
+    range(12), pytest.param(range(12, 400), marks=pytest.mark.long)])
+def test_of_random_linkages_no_answer_is_missed_and_none_invented(seeds):
+    closed = count = 0
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        drawn = random_linkages.design(rng)
+        try:
+            linkage = mechanisms.create('custom', joints=drawn.joints, branches=drawn.branches,
+                                        **drawn.dimensions)
+        except ValueError:
+            continue
+        names = outputs_of(linkage)
+        outputs = [str(name) for name in rng.choice(names, min(3, len(names)), replace=False)]
+        for output in outputs:
+            asked = (output, *(input_.name for input_ in linkage.inputs[1:]))
+            try:
+                inverse = linkage.inverse(asked)
+            except ValueError as error:
+                # The first input does not move it, whatever its formula says.
+                assert 'do not tell all inputs' in str(error)
+                continue
+            if not inverse.closed:
+                continue
+            closed += 1
+            count += checked(linkage, inverse, [tuple(
+                rng.uniform(input_.low, input_.high) for input_ in linkage.inputs)
+                for _ in range(12)])
+    assert closed > len(seeds) / 3 and count > len(seeds)
+
+
+def test_two_outputs_tell_two_inputs_in_closed_form():
+    linkage, rng = mechanisms.create('five_bar'), np.random.default_rng(1)
+    for outputs in (('P.x', 'P.y'), ('P.x', 'crank'), ('crank2', 'P.y')):
+        inverse = linkage.inverse(outputs)
+        assert inverse.closed
+        assert checked(linkage, inverse, rng.uniform(-math.pi, math.pi, (40, 2)).tolist()) > 10
+
+
+def test_an_input_that_comes_round_after_two_turns_is_answered_in_both():
+    linkage = custom('O ground 0 0', 'Q ground 4 0', 'A crank O 1',
+                     'D crank Q 2 geared crank 1/2 0', 'B dyad A D 2.2 2 left')
+    (low, high), = linkage.reach()
+    assert linkage.period() == 2 and 4.2 < low < 4.31 < 8.26 < high < 8.27
+    for theta in np.linspace(low + 1e-3, high - 1e-3, 40):
+        for output in ('B.x', 'crank2', 'AB'):
+            value = float(linkage.joint_angles(theta, (output,))[output])
+            answers = linkage.input_for(output, value)
+            assert np.nanmin(linkage.inputs[0].apart(answers, theta)) < 1e-7
+            assert linkage.input_for(output, value, near=theta) == pytest.approx(theta, abs=1e-7)
+
+
+def test_an_angle_that_jumps_where_its_ends_meet_is_answered_on_both_sides():
+    linkage = custom('O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'L slot Q A 0 out 2.2')
+    for theta in np.linspace(-3.1, 3.1, 63):
+        value = float(linkage.joint_angles(theta, ('angle(A,L)',))['angle(A,L)'])
+        assert np.nanmin(np.abs(linkage.input_for('angle(A,L)', value) - theta)) < 1e-6
+    for (least, _), (greatest, _) in linkage.extremes('angle(A,L)'):
+        assert greatest - least < math.pi + 1e-9
+
+
+@pytest.mark.parametrize('by', [-1, 2, 'crank2', 1.0, None, True])
+def test_an_input_that_there_is_not_is_refused(by):
+    linkage = mechanisms.create('five_bar')
+    for ask in (linkage.velocity, linkage.joint_rates):
+        with pytest.raises(ValueError, match='by must be the number of an input, from 0 to 1'):
+            ask((1.0, 2.0), None, by)
+
+
+def test_a_carriage_has_no_place_beyond_its_way():
+    linkage = custom('G ground 0 0', 'H ground 1 0', 'S carriage G along H 0 1',
+                     'P ground 0.5 2', 'B dyad S P 1.5 1.5 left')
+    assert np.isnan(linkage.solve(1.5)['B']).all() and np.isnan(linkage.solve(-0.1)['S']).any()
+    assert np.isfinite(linkage.solve([0.0, 1.0])['B']).all()
+    assert linkage.reach() == [(0.0, 1.0)]
+
+
+def test_one_input_may_be_asked_for_as_several_are():
+    leg = mechanisms.create('jansen')
+    assert [answer.inputs for answer in leg.inputs_for(('G.x',), (-31.0,))] == [
+        (theta,) for theta in leg.input_for('G.x', -31.0)]
