@@ -28,7 +28,7 @@ from .spatial import EDGE, STEPS
 CELLS, DIVIDED = 6, 7
 # Pairs of cells at most: of limits that are given, which takes a third of a second, and of those
 # that are looked for.
-MOST, FEW = 400_000, 60_000
+MOST, FEW = 400_000, 150_000
 # What three numbers that are 1 in the middle have to be above.
 LEAST = 1e-6
 # Poses on each side of the rectangle to which the steps have to come back, one step before the
