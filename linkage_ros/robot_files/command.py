@@ -10,11 +10,11 @@ import math
 import re
 import shlex
 import sys
-from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from . import check, closing, loops, model, readers
+from . import check, closing, loops, model, readers, rods
 from .dyads import Drawing, Drive, short
 from .robot import FARTHEST, Joint, Robot
 from .. import command, mechanisms, scene
@@ -108,10 +108,26 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str]]:
             done = {joint.name for joint in part.joints}
             left = [joint for joint in left if joint.name not in done]
         if group.why and left:
-            said.append(f'Left out: {", ".join(_bodies(left))}: {group.why}.')
+            said += _in_space(robot, group._replace(joints=left), open_ones, given)
     if not given['mechanisms']:
         raise command.RequestError(' '.join(said) or 'no joint of this robot closes a loop')
     return given, said
+
+
+def _in_space(robot: Robot, group: loops.Group, open_ones: Mapping[str, str],
+              given: Dict[str, Any]) -> List[str]:
+    """Add the mechanism of loops that are not planar; return what is said of it."""
+    try:
+        if why := next((open_ones[joint.name] for joint in group.joints
+                        if joint.name in open_ones), ''):
+            raise ValueError(why)
+        name, parameters, said = rods.described(robot, group, given['mechanisms'])
+    except (ArithmeticError, ValueError) as error:
+        return [f'Left out: {", ".join(_bodies(group.joints))}: {group.why}; '
+                f'as rods in space: {error}.']
+    given['mechanisms'].append(name)
+    given.update(parameters)
+    return said
 
 
 def _values(said: Sequence[str]) -> Dict[str, float]:

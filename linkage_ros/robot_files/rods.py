@@ -1,0 +1,271 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Loops of a robot that are not planar, as linkages of rods: ankles, waists, Achilles rods.
+
+A body that hangs on two balls is a rod; two bodies with a ball each and a driven slide between
+them are a cylinder; the others are links on a tree of hinges and slides. All angles count from the
+pose that the robot has.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+import math
+import re
+from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
+
+import numpy as np
+
+from . import check
+from .dyads import short
+from .loops import Group
+from .robot import BALL, HINGE, Joint, Robot, SLIDE, UNIVERSAL
+from .. import mechanisms, scene
+from ..linkage.rod_lines import FORMS, WindowError
+from ..scene.joint_names import quoted_name
+from ..words import listed
+
+_BALLS = BALL, UNIVERSAL
+# Limits of a hinge that say nothing [rad].
+_ANY = 0.999 * math.pi
+# Poses on each side of the motors' ranges that a check moves them in.
+_SIDE = 7
+
+
+class Link(NamedTuple):
+    """A link on a joint, its parent, and its axis, which may be the other way round."""
+
+    name: str
+    parent: str
+    joint: Joint
+    axis: np.ndarray
+    place: np.ndarray
+
+
+class Rods:
+    """
+    The lines of a group of joints.
+
+    Raises
+    ------
+    ValueError
+        If they are no tree of hinges and slides with rods between its links.
+
+    """
+
+    def __init__(self, robot: Robot, group: Group):
+        ground, self.frame_id, joints = group.ground, group.frame_id, group.joints
+        self._seen = np.linalg.inv(robot.frames[self.frame_id])
+        self._driven = {*robot.driven}
+        self.links: Dict[str, Link] = {}
+        self.rods: List[str] = []
+        # The joint that drives an input, by the input's name.
+        self.inputs: Dict[str, Joint] = {}
+        self._names: Set[str] = {*FORMS, 'ground', 'at', 'axis', 'within', 'length'}
+        own = {body: [joint for joint in joints if body in joint.bodies]
+               for joint in joints for body in joint.bodies}
+        rods = {body: tuple(held) for body, held in own.items() if body != ground
+                and len(held) == 2 and all(joint.kind in _BALLS for joint in held)
+                and BALL in {joint.kind for joint in held}}
+        halves = [joint for joint in joints if joint.kind == SLIDE and joint.name in self._driven
+                  and all(len(own[body]) == 2 and body != ground for body in joint.bodies)]
+        self._bodies = {ground: 'ground'}
+        left = [joint for joint in joints if joint not in halves and not {
+            *joint.bodies} & rods.keys() and not any({*joint.bodies} & {*half.bodies}
+                                                     for half in halves)]
+        while reached := [joint for joint in left
+                          if len({*joint.bodies} & self._bodies.keys()) == 1]:
+            self._add(reached[0])
+            left.remove(reached[0])
+        if left:
+            raise ValueError(f'{listed(joint.name for joint in left)} close loops that have more '
+                             'than rods in them')
+        for body, held in rods.items():
+            self._rod(body, held)
+        for half in halves:
+            self._cylinder(half, [next(joint for joint in own[body] if joint is not half)
+                                  for body in half.bodies])
+
+    def _named(self, joint: Joint) -> str:
+        name = re.sub('[^A-Za-z0-9]+', '_', joint.name).strip('_')[:50]
+        name = name if name[:1].isalpha() else f'joint_{name}'.rstrip('_')
+        while name in self._names:
+            name += '_'
+        self._names.add(name)
+        return name
+
+    def _text(self, vector: np.ndarray, is_place: bool = True) -> str:
+        seen = self._seen[:3, :3] @ vector + self._seen[:3, 3] * is_place
+        return ' '.join(short(float(x)) for x in seen)
+
+    def _add(self, joint: Joint) -> None:
+        """Add a link on a joint with one that is there."""
+        backwards = joint.bodies[0] not in self._bodies
+        base, body = joint.bodies[::-1] if backwards else joint.bodies
+        if joint.kind not in (HINGE, SLIDE, UNIVERSAL):
+            raise ValueError(f'{joint.name} is a joint of type {joint.kind} and no end of a rod')
+        axes = [joint.axis] if joint.kind != UNIVERSAL else [joint.axis, joint.second]
+        parent = self._bodies[base]
+        for axis in axes[::-1] if backwards else axes:
+            name = self._named(joint)
+            self.links[name] = Link(name, parent, joint, -axis if backwards else axis,
+                                    joint.places[backwards])
+            parent = name
+        self._bodies[body] = parent
+        if joint.name in self._driven:
+            if joint.kind != HINGE:
+                raise ValueError(f'{joint.name} drives, and is no hinge and no cylinder')
+            self.inputs[parent] = joint
+
+    def _end(self, joint: Joint, body: str) -> str:
+        """Return the other end of a ball of a rod: its link and place."""
+        other = joint.bodies[joint.bodies[0] == body]
+        if other not in self._bodies:
+            raise ValueError(f'{joint.name} holds {body} to {other}, which is a rod, too')
+        return f'{self._bodies[other]} {self._text(joint.places[joint.bodies[1] == other])}'
+
+    def _rod(self, body: str, held: Tuple[Joint, ...]) -> None:
+        ends = [joint.places[joint.bodies[1] == body] for joint in held]
+        length = short(float(np.linalg.norm(ends[0] - ends[1])))
+        name = self._named(held[0])
+        self.rods.append(f'{name} rod {self._end(held[0], body)} {self._end(held[1], body)} '
+                         f'length {length}')
+
+    def _cylinder(self, half: Joint, balls: Sequence[Joint]) -> None:
+        ends = [ball.places[ball.bodies[1] == body] for ball, body in zip(balls, half.bodies)]
+        way = ends[1] - ends[0]
+        if np.linalg.norm(np.cross(half.axis, way)) > 1e-6 * np.linalg.norm(way):
+            raise ValueError(f'{half.name} does not slide along the line of its balls')
+        name = self._named(half)
+        self.rods.append(f'{name} cylinder ' + ' '.join(
+            self._end(ball, body) for ball, body in zip(balls, half.bodies)))
+        self.inputs[name] = half
+
+    def lines(self, limits: Mapping[str, Tuple[float, float]] = {}) -> List[str]:
+        """Return the lines, with limits for some other than the file's."""
+        found = []
+        for name, link in self.links.items():
+            word = 'motor' if name in self.inputs else link.joint.kind
+            word = HINGE if word == UNIVERSAL else word
+            ends = None if word == 'motor' else limits.get(name, self._limits(link))
+            found.append(f'{name} {word} {link.parent} at {self._text(link.place)} axis '
+                         f'{self._text(link.axis, False)}' + (
+                             f' within {short(ends[0])} {short(ends[1])}' if ends else ''))
+        return found + self.rods
+
+    @staticmethod
+    def _limits(link: Link) -> Optional[Tuple[float, float]]:
+        """Return a joint's limits, counted from where it is; None where they say nothing."""
+        joint = link.joint
+        if joint.limits is None or joint.position is None:
+            return None
+        low, high = (end - joint.position for end in joint.limits)
+        return (low, high) if joint.kind == SLIDE or -_ANY < low < high < _ANY else None
+
+    def parameters(self, lines: Sequence[str]) -> Iterator[Tuple[str, Any]]:
+        """Yield the parameters of its mechanism."""
+        yield 'type', 'rods'
+        yield 'joints', [*lines]
+        yield 'frame_id', self.frame_id
+        for name, joint in self.inputs.items():
+            yield f'{name}.source', joint.name
+            yield f'{name}.offset', self._zero(name) - (joint.position or 0.0)
+            yield f'{name}.start', self._zero(name)
+        yield 'joint_names', [
+            f'{link.name}={quoted_name(link.joint.name)}' + (
+                f'{position:+}' if (position := float(short(link.joint.position or 0.0))) else '')
+            for link in self.links.values() if link.name not in self.inputs
+            and link.joint.position is not None]
+        yield 'only_named', True
+
+    def _zero(self, name: str) -> float:
+        """Return what an input is in the pose of the robot: an angle of 0, a length as it is."""
+        line = next((line for line in self.rods if line.startswith(f'{name} cylinder ')), None)
+        if line is None:
+            return 0.0
+        words = line.split()
+        return math.dist(map(float, words[3:6]), map(float, words[7:10]))
+
+
+def described(robot: Robot, group: Group, taken: Sequence[str]
+              ) -> Tuple[str, Dict[str, Any], List[str]]:
+    """
+    Return a mechanism's name, its parameters, and what is to be said of it.
+
+    Raises ValueError for loops that rods cannot be, or whose poses are others than the robot's.
+    """
+    found = Rods(robot, group)
+    if not found.inputs:
+        raise ValueError('not driven: its motors must be named by --driven')
+    lines, said = _lines(found)
+    name = f'{next(iter(found.inputs))}_rods'
+    name = f'{name}_{len(taken)}' if name in taken else name
+    given = {f'{name}.{key}': value for key, value in found.parameters(lines)}
+    machine = scene.read({'mechanisms': [name], **given}).machines[name]
+    ends = _ranges(machine, found)
+    compared = check.compared(robot, machine, [joint.name for joint in found.inputs.values()],
+                              ends, 0.0)
+    if compared.wrong:
+        raise ValueError(compared.wrong)
+    moved = ', '.join(f'{source} from {low:.4g} to {high:.4g}'
+                      for source, low, high in compared.ranges)
+    said.append(f'Checked: {name}: in {compared.poses} poses of the robot, its loops closed in '
+                f'space, {moved}, the worst difference is {compared.worst:.0e}, of '
+                f'{compared.joint}.')
+    return name, given, said + [*_corners(machine, found)]
+
+
+def _lines(found: Rods) -> Tuple[List[str], List[str]]:
+    """Return lines whose limits can be, and what is said where they are not the file's."""
+    lines = found.lines()
+    try:
+        mechanisms.create('rods', joints=lines)
+        return lines, []
+    except WindowError as error:
+        if not error.limits:
+            raise
+        said = ', '.join(f'{name} from {low + zero:.4g} to {high + zero:.4g}'
+                         for name, (low, high) in error.limits.items()
+                         for zero in [found.links[name].joint.position or 0.0])
+        return found.lines(limits=error.limits), [
+            f'Limits: inside those of the file, or without any, there may be a second pose; these '
+            f'are the largest shown to have one at most: {said}.']
+
+
+def _ranges(machine: scene.Machine, found: Rods) -> Dict[str, Tuple[float, float]]:
+    """Return ranges of the motors, as the robot counts them, in which all is a pose."""
+    names = [*machine.inputs]
+    start = np.array([machine.inputs[name].start for name in names])
+    sizes = np.array([2.5 if machine.linkage.is_angle(name) else 0.5 * x
+                      for name, x in zip(names, start)])
+    share = 1.0
+    for _ in range(40):
+        axes = [np.linspace(x - share * size, x + share * size, _SIDE)
+                for x, size in zip(start, sizes)]
+        values = np.array([each.ravel() for each in np.meshgrid(*axes)])
+        angles = machine.linkage.joint_angles(values if len(values) > 1 else values[0])
+        if np.isfinite(list(angles.values())).all():
+            break
+        share *= 0.85
+    return {joint.name: (x - share * size - zero, x + share * size - zero)
+            for (name, joint), x, size in zip(found.inputs.items(), start, sizes)
+            for zero in [machine.inputs[name].offset]}
+
+
+def _corners(machine: scene.Machine, found: Rods) -> Iterator[str]:
+    """Yield where the motors are at the corners of the hinges' limits."""
+    for held in machine.linkage.windows():
+        names = [line.names[0] for line in held.lines]
+        inverse = machine.linkage.driven_by(*names)
+        zeros = [found.links[name].joint.position or 0.0 for name in names]
+        for corner in product(*held.limits):
+            motors = inverse.joint_angles(corner, [*found.inputs])
+            where = ', '.join(f'{found.links[name].joint.name} at {value + zero:.4g}'
+                              for name, value, zero in zip(names, corner, zeros))
+            there = ', '.join(
+                f'{joint.name} at {motors[name] - machine.inputs[name].offset:.4g}'
+                if math.isfinite(motors[name]) else f'{joint.name} does not reach'
+                for name, joint in found.inputs.items())
+            yield f'Motors: with {where}: {there}.'

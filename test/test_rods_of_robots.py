@@ -1,0 +1,90 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Ankles on rods in robots' files: random ones, written as MJCF, and what is read of them."""
+
+import math
+
+from linkage_ros import scene
+from linkage_ros.robot_files.command import main as from_robot
+import numpy as np
+import pytest
+from truth import rods
+
+pytest.importorskip('mujoco')
+LIGHT = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>'
+
+
+def text(vector):
+    return ' '.join(map(repr, map(float, vector)))
+
+
+def less(one, other):
+    return text(np.subtract(one, other))
+
+
+def mjcf(ankle, limits, motors=('l', 'r')):
+    """Return an ankle as MJCF; its rods hang on balls, and their eyes are tied to the foot."""
+    legs = ''.join(
+        f'<body name="crank {i}" pos="{text(ankle.motors[i])}"><joint name="{name}" '
+        f'axis="{text(ankle.motor_axes[i])}"/>{LIGHT}<body name="rod {i}" '
+        f'pos="{less(ankle.pivots[i], ankle.motors[i])}"><joint type="ball" name="ball {i}"/>'
+        f'{LIGHT}<site name="eye {i}" pos="{less(ankle.ends[i], ankle.pivots[i])}"/></body></body>'
+        for i, name in enumerate(motors))
+    pins = ''.join(f'<site name="pin {i}" pos="{less(ankle.ends[i], ankle.second)}"/>'
+                   for i in (0, 1))
+    ranges = [f'range="{low!r} {high!r}"' if limits is not None else ''
+              for low, high in (np.transpose(limits).tolist() if limits is not None
+                                else ((0, 0), (0, 0)))]
+    ties = ''.join(f'<connect site1="eye {i}" site2="pin {i}"/>' for i in (0, 1))
+    drives = ''.join(f'<motor joint="{name}"/>' for name in motors)
+    return (
+        '<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="shin">'
+        f'{LIGHT}<joint name="knee" axis="0 1 0"/><body name="cross" pos="{text(ankle.first)}">'
+        f'<joint name="pitch" axis="{text(ankle.first_axis)}" {ranges[0]}/>{LIGHT}'
+        f'<body name="foot" pos="{less(ankle.second, ankle.first)}"><joint name="roll" '
+        f'axis="{text(ankle.second_axis)}" {ranges[1]}/>{LIGHT}{pins}</body></body>{legs}</body>'
+        f'</worldbody><equality>{ties}</equality><actuator>{drives}</actuator></mujoco>')
+
+
+def imported(folder, ankle, limits, capsys):
+    """Return what from_robot makes of an ankle, and what it says."""
+    (folder / 'robot.xml').write_text(mjcf(ankle, limits))
+    assert from_robot([str(folder / 'robot.xml')]) == 0
+    said = capsys.readouterr()
+    (folder / 'robot.yaml').write_text(said.out)
+    (machine,) = scene.load(folder / 'robot.yaml').machines.values()
+    return machine, said.err
+
+
+def turning(seed):
+    """Return a random ankle of motors, not of cylinders."""
+    rng = np.random.default_rng(seed)
+    while True:
+        ankle = rods.random_ankle(rng)
+        if ankle.motor_axes[0] is not None:
+            return ankle
+
+
+@pytest.mark.parametrize('seed', [1, 2])
+def test_an_ankle_is_imported_with_the_limits_of_its_file(tmp_path, capsys, seed):
+    ankle, half = turning(seed), np.array([0.15, 0.12])
+    machine, said = imported(tmp_path, ankle, (-half, half), capsys)
+    assert 'in 240 poses of the robot' in said and said.count('Motors: with ') == 4
+    assert 'Limits' not in said
+    names = {called.name for called in machine.joints.values() if called.published}
+    assert names == {'pitch', 'roll'} and machine.frame_id == 'shin'
+    assert {drive.source for drive in machine.inputs.values()} == {'l', 'r'}
+    motors = np.random.default_rng(3).uniform(-0.1, 0.1, (2, 40))
+    found = np.stack(list(machine.linkage.joint_angles(motors, ['pitch', 'roll']).values()))
+    there = np.isfinite(found[0])
+    assert there.sum() > 10
+    gaps = rods.gaps(ankle, motors, *found)
+    assert np.abs(np.array(gaps)[:, there]).max() < 1e-15
+
+
+def test_without_limits_the_largest_are_taken_and_said(tmp_path, capsys):
+    machine, said = imported(tmp_path, turning(4), None, capsys)
+    assert 'these are the largest shown to have one at most: pitch from -' in said
+    assert all(math.isfinite(end) for held in machine.linkage.windows()
+               for ends in held.limits for end in ends)
