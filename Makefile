@@ -94,9 +94,10 @@ nodes: build $(venv)/.tools ## Run the tests of the nodes alone; with PLAIN=1 wh
 	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 -m 'not long' \
 	  $(shell grep -lE 'ros_harness|\(graph' test/test_*.py)
 
+# Hours; what is left without those that are marked exhaustive takes minutes.
 .PHONY: long
-long: build $(venv)/.tools ## Run the long tests
-	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 -m long
+long: build $(venv)/.tools ## Run the long tests; WHICH='long and not exhaustive': in minutes
+	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 -m '$(or $(WHICH),long)'
 
 .PHONY: lint
 lint: .venv-lint/.installed ## Check style and types

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from truth import random_linkages
 
+# Many more than `.ci/run` has time for.
+EXHAUSTIVE = [pytest.mark.long, pytest.mark.exhaustive]
 FIVE_BAR = """\
 # five_bar driven by P.x, P.y
 O ground 0.0 0.0
@@ -104,7 +106,7 @@ def checked(linkage, inverse, poses, sure=1e-4):
 
 
 @pytest.mark.parametrize('seeds', [
-    range(12), pytest.param(range(12, 400), marks=pytest.mark.long)])
+    range(12), pytest.param(range(12, 400), marks=EXHAUSTIVE)])
 def test_of_random_linkages_no_answer_is_missed_and_none_invented(seeds):
     closed = count = 0
     for seed in seeds:

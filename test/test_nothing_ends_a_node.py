@@ -30,6 +30,8 @@ from sensor_msgs.msg import JointState  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 
+# Many more than `.ci/run` has time for.
+EXHAUSTIVE = [pytest.mark.long, pytest.mark.exhaustive]
 CONFIG = Path(__file__).parents[1] / 'config'
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 LEVER = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}
@@ -238,11 +240,11 @@ def many(tmp_path):
 
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('publishers', [
-    0, pytest.param(100, marks=pytest.mark.long), pytest.param(1500, marks=pytest.mark.long)])
+    0, pytest.param(100, marks=EXHAUSTIVE), pytest.param(1500, marks=EXHAUSTIVE)])
 @pytest.mark.parametrize('name', [
-    'kinematics', pytest.param('crank_driver', marks=pytest.mark.long),
-    pytest.param('servo_inverse', marks=pytest.mark.long),
-    pytest.param('scene', marks=pytest.mark.long)])
+    'kinematics', pytest.param('crank_driver', marks=EXHAUSTIVE),
+    pytest.param('servo_inverse', marks=EXHAUSTIVE),
+    pytest.param('scene', marks=EXHAUSTIVE)])
 def test_a_signal_ends_the_start_of_a_thousand_mechanisms(processes, many, name, publishers,
                                                           number):
     process = Process(name, many)
@@ -263,7 +265,7 @@ def test_a_signal_ends_the_start_of_a_thousand_mechanisms(processes, many, name,
 
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('name', [
-    'servo_inverse', pytest.param('scene', marks=pytest.mark.long)])
+    'servo_inverse', pytest.param('scene', marks=EXHAUSTIVE)])
 def test_a_signal_ends_a_long_trajectory(processes, tmp_path, name, number):
     path = tmp_path / 'scene.yaml'
     path.write_text('/**:\n  ros__parameters:\n    mechanisms: [m]\n    m.type: five_bar\n')

@@ -20,9 +20,12 @@ from ros_harness import Graph  # noqa: E402
 # Of each scene, with machine code and without: 156 histories in all, and 10 000.
 FEW, MANY = range(6), range(6, 391)
 
+# Many more than `.ci/run` has time for.
+EXHAUSTIVE = [pytest.mark.long, pytest.mark.exhaustive]
+
 
 @pytest.mark.parametrize('name', SCENES)
-@pytest.mark.parametrize('seeds', [FEW, pytest.param(MANY, marks=pytest.mark.long)],
+@pytest.mark.parametrize('seeds', [FEW, pytest.param(MANY, marks=EXHAUSTIVE)],
                          ids=['few', 'many'])
 def test_whatever_happens_the_node_publishes_what_the_library_says(name, seeds):
     with Graph() as graph:
@@ -112,7 +115,7 @@ WITHOUT = 'LINKAGE_ROS_WITHOUT_LLVMLITE'
 
 
 @pytest.mark.skipif(WITHOUT in os.environ, reason='this is without')
-@pytest.mark.parametrize('which', ['not long', pytest.param('long', marks=pytest.mark.long)])
+@pytest.mark.parametrize('which', ['not long', pytest.param('long', marks=EXHAUSTIVE)])
 def test_all_this_holds_without_llvmlite(tmp_path, which):
     (tmp_path / 'sitecustomize.py').write_text(
         "import sys\nsys.modules['llvmlite'] = None\n")

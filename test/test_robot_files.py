@@ -790,5 +790,6 @@ def test_random_linkages_come_back_from_robots():
 
 
 @pytest.mark.long
+@pytest.mark.exhaustive
 def test_many_random_linkages_come_back_from_robots():
     check_random_robots(range(20, 120))

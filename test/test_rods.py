@@ -76,6 +76,7 @@ def test_a_rod_on_a_hinge_is_right_to_the_last_digits():
 
 
 @pytest.mark.long
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('seed', range(10))
 def test_a_hundred_thousand_rods_on_hinges_are(seed):
     assert check_random_rods(100 + seed, 20000) > 9000
@@ -140,6 +141,7 @@ def test_two_rods_find_every_pose_inside_the_limits():
 
 
 @pytest.mark.long
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('seed', range(20))
 def test_two_rods_of_two_hundred_ankles_do(seed):
     for ankle, window, rng in ankles(1000 + seed, 10):
@@ -171,6 +173,7 @@ def test_no_pose_is_of_another_assembly():
 
 
 @pytest.mark.long
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('seed', range(20))
 def test_no_pose_of_a_million_motor_pairs_is_of_another_assembly(seed):
     assert sum(check_assemblies(*each, 10000) for each in ankles(2000 + seed, 5)) > 1000
@@ -198,6 +201,7 @@ def test_limits_with_a_second_or_a_singular_pose_are_refused():
 
 
 @pytest.mark.long
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('seed', range(20))
 def test_a_thousand_such_windows_are(seed):
     assert check_windows(3000 + seed, 75) > 45

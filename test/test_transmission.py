@@ -25,6 +25,8 @@ import numpy as np
 import pytest
 from truth import random_linkages
 
+# Many more than `.ci/run` has time for.
+EXHAUSTIVE = [pytest.mark.long, pytest.mark.exhaustive]
 ROOT = Path(__file__).parents[1]
 STAND_IN = ROOT / 'test' / 'ros2_control'
 STRICT = ('-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wshadow', '-Werror', '-O2')
@@ -238,7 +240,7 @@ def test_the_joints_are_chosen_by_their_names(machines, tmp_path):
 
 
 @pytest.mark.parametrize('seeds', [
-    range(10), pytest.param(range(10, 100), marks=pytest.mark.long)])
+    range(10), pytest.param(range(10, 100), marks=EXHAUSTIVE)])
 def test_random_linkages_go_both_ways(tmp_path, seeds):
     machines = []
     for seed in seeds:
@@ -335,6 +337,7 @@ def test_a_transmission_is_proved(tmp_path, compiler):
 
 
 @pytest.mark.long
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('compiler', COMPILERS)
 @pytest.mark.parametrize('path', SCENES, ids=lambda path: path.stem)
 def test_every_scene_is_proved_at_a_hundred_thousand_states(tmp_path, path, compiler):
