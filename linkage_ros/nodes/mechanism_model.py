@@ -225,7 +225,8 @@ def _arranged(layout: Layout, rest: float, joints: np.ndarray, rates: np.ndarray
     values, n = np.full(layout.size, rest), layout.inputs
     rows, driven = layout.rows(values), layout.driven(values)
     driven[:n] = joints[:n]
-    rows[:, layout.coordinates:layout.posed] = joints[n:].reshape(layout.legs, -1)
+    if layout.joints:
+        rows[:, layout.coordinates:layout.posed] = joints[n:].reshape(layout.legs, -1)
     layout.effort(values)[:] = rates[:layout.efforts]
     if layout.speeds:
         driven[n:] = rates[:n]
