@@ -698,9 +698,11 @@ def test_what_the_inputs_hold_against_loads_is_their_effort(graph):
             assert set(efforts.values()) == {0.0}
     assert graph.set(node, left__loads=[]).successful
     assert not turn([0.5, 0.3], one).effort
-    for wrong in (['B=3'], ['QB=1 2'], ['Z=1 2'], ['B=1 2', 'B=1 2'], ['B=nan 0'], ['B=1 2 3']):
+    for wrong in (['B=3'], ['QB=1 2'], ['Z=1 2'], ['B=1 2', 'B=1 2'], ['B=nan 0']):
         result = graph.set(node, left__loads=wrong)
         assert not result.successful and 'left.loads must be texts such as' in result.reason
+    result = graph.set(node, left__loads=['B=1 2 3'])
+    assert not result.successful and 'a force has as many parts as a place: x, y' in result.reason
 
 
 def test_a_sign_and_a_zero_hold_where_some_legs_are_left_out(graph):

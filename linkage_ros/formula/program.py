@@ -74,8 +74,10 @@ def _quiet(function: Any) -> Any:
 
 # To the same bits as FLOATS, on numpy's floats: they divide by zero.
 QUIET = Dialect(
-    {name: f'float64({code})' for name, code in FLOATS.templates.items()},
-    {'float64': np.float64, **{name: _quiet(value) for name, value in FLOATS.names.items()}},
+    {**{name: f'float64({code})' for name, code in FLOATS.templates.items()},
+     'rint': 'round_even({})'},
+    {'float64': np.float64, 'round_even': np.rint,
+     **{name: _quiet(value) for name, value in FLOATS.names.items()}},
     'float64({!r})'.format)
 ARRAYS = Dialect({name: row.array for name, row in OPERATIONS.items()}, {
     **{name: row.numpy for name, row in OPERATIONS.items()}, 'nan': np.nan, 'inf': np.inf})

@@ -132,7 +132,9 @@ class Line(NamedTuple):
     @property
     def drives(self) -> bool:
         """Whether it adds an input."""
-        return self.word in INPUTS and not any(arg.option == 'geared' for arg in self.arguments)
+        # A motor is a word of rod lines.
+        return self.word in (*INPUTS, 'motor') and not any(
+            arg.option == 'geared' for arg in self.arguments)
 
     @property
     def called(self) -> str:

@@ -34,7 +34,7 @@ def design(type_: str, joints: Tuple[str, ...], tracer: Optional[str],
     """
     words = WORDS[type_]
     lines = words.parse(joints)
-    if not any(line.word in words.INPUTS for line in lines):
+    if not any(line.drives for line in lines):
         raise ValueError('a linkage needs a line that drives it: '
                          f'{" or ".join(words.INPUTS)}')
     for line in lines:

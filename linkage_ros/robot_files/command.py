@@ -164,7 +164,8 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
         if not drawings[-1].left:
             break
     best = min(drawings, key=lambda drawing: len(drawing.left))
-    if len(motors) == 1 and best.left:
+    if best.left and len(motors) == 1 and all(
+            group.ground not in joint.bodies for joint in group.joints if joint.name == motors[0]):
         # A motor between two moving links is measured by what moves instead, a link on the ground.
         for joint in group.joints:
             if group.ground in joint.bodies and joint.position is not None:

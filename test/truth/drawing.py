@@ -452,7 +452,7 @@ class Linkage:
     def _stand(self):
         """Note the joints and the closures that each joint stands on, itself among them."""
         self.stands, self.closures = {}, {}
-        closed = ('dyad', 'cylinder', 'block', 'inversor', 'slot', 'slider', 'mirror',
+        closed = ('dyad', 'carriage', 'cylinder', 'block', 'inversor', 'slot', 'slider', 'mirror',
                   'antiparallelogram')
         for line in self.lines:
             joints = line.joints
@@ -710,6 +710,8 @@ def draw(do, linkage, rows, values, way=None, turns=None, moved=None):
         elif word == 'carriage':
             slides[name], lines[name] = driven[i], _unit(do, at[1] - at[0])
             points[name] = at[0] + lines[name] * driven[i]
+            # It has no place beyond its way.
+            gaps[name] = do.least(driven[i] - row[0], row[1] - driven[i])
         elif word == 'block':
             on = linkage.line_of_block(line.joints[0])
             points[name] = at[0] + lines[on] * do.point(*row)

@@ -44,7 +44,7 @@ class Output(NamedTuple):
 
     `what` is 'point', 'angle' or 'slide'; `parts` are bars by their two joints, that of an angle
     and that from which it is counted, from `quarters` of a turn; of one joint is what slides on
-    its line. `needs` are the joints without which it is NaN: none for what is driven. `by` is the
+    its line. `needs` are the joints without which it is NaN: none for a driven angle. `by` is the
     number of the input by which it is differentiated, None for a pose.
     """
 
@@ -86,7 +86,8 @@ def outputs(linkage, links):
         parts = (bars[link.name], *parent * (not slides_on))
         found.append(Output(
             'slide' if slides_on else 'angle', link.name, parts,
-            () if link.name in linkage.driven_names else sum(parts, ()),
+            () if link.name in linkage.driven_names and linkage.placing(
+                parts[0][0]).word != 'carriage' else sum(parts, ()),
             0 if zero or slides_on else round(link.zero / (math.pi / 2))))
     return found
 
@@ -180,7 +181,7 @@ class Measure:
             if grazed and out.what == 'slide':  # which has been moved on with the inputs
                 spread[i] += self.linkage.longest * mpfr(2) ** -NUDGE
         for name in closures:
-            if self._lines[name].word == 'cylinder':
+            if self._lines[name].word in ('carriage', 'cylinder'):
                 slack[name] = LOOSER * (slack[name] + half_ulp(self.linkage.longest))
         states = {name: _state(gap, slack[name]) for name, gap in closures.items()}
         states.update((name, 'undirected') for name, arm in arms.items()

@@ -458,6 +458,8 @@ def _asked_back(subject, output, drawing, unit, held):
     if good.any():
         wanted = [float(value[i]) for i in rng.choice(np.flatnonzero(good), 2)]
         spread = np.ptp(np.unwrap(value[good]) if turns else value[good]) / scale
+    # Answers are those of all turns until all comes round.
+    period = max(input_.period for input_ in mechanism.inputs)
     for limit, target in zip((FIRST, FURTHER), wanted):
         start = time.process_time()
         try:
@@ -467,12 +469,12 @@ def _asked_back(subject, output, drawing, unit, held):
                 yield 'inverse refused', f'{output} moves by {spread:.3g}'
             return
         took = time.process_time() - start
-        if took > limit:
+        if took > limit * period:
             # The collector's time counts too, but not twice.
             start = time.process_time()
             mechanism.input_for(output, np.nextafter(target, np.inf), others=subject.held)
             took = time.process_time() - start
-        if took > limit:
+        if took > limit * period:
             yield 'inverse slow', f'{output} = {target!r}: {took:.3f} s'
         answers = np.asarray(answers)
         answers = answers[np.isfinite(answers)]
@@ -483,7 +485,7 @@ def _asked_back(subject, output, drawing, unit, held):
             continue
         if spread < 1e-6:
             return
-        if len(answers) > 40:
+        if len(answers) > 40 * period:
             yield 'inverse too many', f'{output} = {target!r}: {len(answers)} answers'
         yield from _false(subject, output, target, answers, turns, scale)
         if not any(map(subject.without_direction, answers.tolist())):
