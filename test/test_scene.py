@@ -428,7 +428,7 @@ def test_a_crank_that_is_geared_by_a_fraction_turns_on_until_all_comes_round(rat
         'O ground 0 0', 'Q ground 3 0', 'A crank O 1',
         f'B crank Q 1 geared crank {ratio} 0']}).machines['gears']
     drive = machine.first
-    assert drive.input.period == period
+    assert drive.period == period
     motion, exact = Motion.of(drive), eval(ratio, {'sqrt': math.sqrt})
     for turns in (0.5, 1.5, period - 0.25, period + 0.25):
         angle, _ = motion.at(round(turns * math.tau * 1e9))

@@ -33,7 +33,9 @@ from ..words import listed, meant, plain_text, quoted
 # Lengths beyond these are counted in a power of two of their own, which changes no bit of a
 # result and keeps squares and products of lengths inside the range of float64.
 SMALL, LARGE = 1e-30, 1e30
-MOST_TURNS = 1000
+# A ratio whose denominator is larger never comes round; one that takes more turns than these is
+# answered for one turn only, as every turn takes as long as the first.
+MOST_TURNS, MOST_COUNTED = 1000, 60
 # Values of expressions of dimensions that are held: some twenty times those of Jansen's leg.
 MOST_VALUES = 10000
 
@@ -363,16 +365,17 @@ class Mechanism:
         That is more than one where the input drives others by gears of fractions; a ratio that is
         none with a denominator up to MOST_TURNS is taken for the nearest that is.
         """
-        return self.inputs[by].period
+        ratios = [np.ravel(self._value(derivative(value, {by: 1.0}, {})))
+                  for _, value in self._structure.built.driven.values()]
+        return math.lcm(*(Fraction(float(ratio)).limit_denominator(MOST_TURNS).denominator
+                          for each in ratios for ratio in each if math.isfinite(ratio)))
 
     def _counted_input(self, by: int, input_: Input) -> Input:
         """Return an input with the values [rad or m] between which all poses lie."""
         if not input_.turns:
             return input_._replace(low=self._metres(input_.low), high=self._metres(input_.high))
-        ratios = [np.ravel(self._value(derivative(value, {by: 1.0}, {})))
-                  for _, value in self._structure.built.driven.values()]
-        period = math.lcm(*(Fraction(float(ratio)).limit_denominator(MOST_TURNS).denominator
-                            for each in ratios for ratio in each if math.isfinite(ratio)))
+        period = self.period(by)
+        period = period if period <= MOST_COUNTED else 1
         return input_._replace(low=-math.pi * period, high=math.pi * period, period=period)
 
     def reach(self, *others: float) -> list:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 import math
 from typing import Iterable, Optional, Tuple
@@ -62,6 +62,8 @@ class Drive:
         It is ratio * position + offset; so is what is measured instead.
     measures : str
         The output that is measured instead; empty: the input itself.
+    period : int
+        After how many turns the pose is the same, as `Mechanism.period` has it.
 
     """
 
@@ -75,6 +77,7 @@ class Drive:
     ratio: float = 1.0
     offset: float = 0.0
     measures: str = ''
+    period: int = 1
 
     @cached_property
     def is_plain(self) -> bool:
@@ -109,7 +112,7 @@ def read_drive(name: str, linkage: Mechanism, input_: Input, reach: Tuple[Arc, .
     """Return how an input of a mechanism moves; `old` is how it did before, if it was there."""
     drive = _read(name, *_scaled(input_, linkage, reach, scale), values, old, strict)
     _check_measures(name, linkage, drive)
-    return drive
+    return replace(drive, period=linkage.period(linkage.inputs.index(input_)))
 
 
 def _read(name: str, input_: Input, reach: Tuple[Arc, ...], values: Values, old: Optional[Drive],

@@ -73,8 +73,7 @@ class Motion:
     @classmethod
     def of(cls, drive: Drive, since: int = 0) -> Motion:
         """Return how an input moves from its start."""
-        return cls(drive.speed, drive.sweep, drive.start, since, drive.input.turns,
-                   drive.input.period)
+        return cls(drive.speed, drive.sweep, drive.start, since, drive.input.turns, drive.period)
 
     def changed(self, speed: float, sweep: Optional[Arc], now: int) -> Motion:
         """Return the motion that takes over from this one at a time [ns], without a jump."""
