@@ -92,7 +92,7 @@ test: build $(venv)/.tools ## Run the tests, but for the long ones, and say what
 nodes: build $(venv)/.tools ## Run the tests of the nodes alone; with PLAIN=1 where llvmlite is not installed
 	@$(if $(PLAIN),! python -c 'import llvmlite' 2>/dev/null)
 	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 -m 'not long' \
-	  $(shell grep -lE 'ros_harness|\(graph' test/test_*.py)
+	  $$(grep -lE 'ros_harness|\(graph' test/test_*.py)
 
 # Hours; what is left without those that are marked exhaustive takes minutes.
 .PHONY: long
