@@ -61,7 +61,13 @@ class SceneNode(Node):
     """
 
     def __init__(self, name: str, **kwargs: Any):
-        super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
+        try:
+            super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
+        except ValueError as error:
+            # The client library has no type for an empty list, and does not say whose it is.
+            raise scenes.SceneError(
+                f'no list may be empty in a parameter file, leave it out: mechanisms must be at '
+                f'least one, points some joints ({error})') from None
         incidents = Incidents(self.get_logger(), lambda: not self.context.ok())
         self.guarded, self.report = incidents.guarded, incidents.report
         self._worker = Worker(self, incidents.report)
