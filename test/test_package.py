@@ -68,7 +68,8 @@ def test_the_workflow_runs_what_has_to_be_green():
     workflow = (ROOT / '.github/workflows/ci.yml').read_text()
     jobs = yaml.safe_load(workflow)['jobs']
     steps = [step['run'] for job in jobs.values() for step in job['steps'] if 'run' in step]
-    assert set().union(*map(made, steps)) == made((ROOT / '.ci/run').read_text())
+    # The long tests take longer than what is asked of a change before it lands.
+    assert set().union(*map(made, steps)) == made((ROOT / '.ci/run').read_text()) | {'long'}
     assert set(jobs['test']['strategy']['matrix']['distro']) == {
         file.stem for file in (ROOT / 'wheels').glob('*.txt') if 'ros-rclpy' in file.read_text()}
 
