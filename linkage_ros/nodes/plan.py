@@ -32,6 +32,8 @@ except ImportError:
 
 # Plans that are cached.
 PLANS = 64
+# After how many runs a plan looks for its machine code; then each time that many more are done.
+TRIED = 2, 4, 8, 16, 32, 64
 
 
 class Route(NamedTuple):
@@ -138,10 +140,10 @@ class Plan:
         self._executor.publish(self._output)
         if self._is_interpreted and plan_llvm:
             self._runs += 1
-            # Tried ever more rarely: while subscribers come one by one no plan lasts.
-            if self._runs > 1 and self._runs & (self._runs - 1) == 0 and (
-                    executor := plan_llvm.executor(self)):
-                self._executor, self._is_interpreted = executor, False
+            # Tried now and then: while subscribers come one by one no plan lasts.
+            if self._runs in TRIED or self._runs % TRIED[-1] == 0:
+                executor = plan_llvm.executor(self)
+                self._executor, self._is_interpreted = executor or self._executor, not executor
 
     def _find_output(self) -> Output:
         poses = tuple(one.pose for one in (*(one for one, _ in self.solved), *self._members))

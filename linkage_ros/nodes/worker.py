@@ -72,8 +72,8 @@ class Worker:
             self._thread.start()
 
     def _run(self) -> None:
-        while taken := self._take():
-            kind, job = taken
+        while chosen := self._next_job():
+            kind, job = chosen
             try:
                 act = job()
             except Exception as error:
@@ -82,7 +82,7 @@ class Worker:
                 if act:
                     self._hand_over(kind, act)
 
-    def _take(self) -> Optional[Tuple[str, Job]]:
+    def _next_job(self) -> Optional[Tuple[str, Job]]:
         with self._lock:
             if self._ended.is_set() or not (self._newest or self._others):
                 self._thread = None
