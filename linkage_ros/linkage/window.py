@@ -19,11 +19,12 @@ second derivatives times half the square of that: all of the cell is proved, not
 from __future__ import annotations
 
 from itertools import product
-from typing import List, NamedTuple, Optional, Sequence, Tuple
+import math
+from typing import Any, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .spatial import EDGE, LAST_STEP, STEPS
+from .spatial import Circle, EDGE, gap, LAST_STEP, newton_step, row, STEPS, Vector
 
 # Cells on each side of the rectangle, of all motor angles, and again of each of these that is
 # needed: at first, and for limits that are given where that is too coarse.
@@ -37,29 +38,7 @@ POSES, BACK = 33, 0.01 * LAST_STEP
 # Halvings on the way to the largest rectangle; how much smaller it becomes if steps do not do.
 HALVINGS, SMALLER = 6, 0.9
 # The hull is taken to be a polygon of 16 sides: directions in units of cells.
-SIDES = [(np.cos(angle), np.sin(angle)) for angle in np.arange(8) * np.pi / 8.0]
-
-
-class Way(NamedTuple):
-    """The way of a point that turns: centre + cos u + sin v, arrays (3,)."""
-
-    centre: np.ndarray
-    u: np.ndarray
-    v: np.ndarray
-
-    def at(self, angle: np.ndarray) -> np.ndarray:
-        """Return places (3, n)."""
-        return self.centre[:, None] + np.outer(self.u, np.cos(angle)) \
-            + np.outer(self.v, np.sin(angle))
-
-    def ahead(self, angle: np.ndarray) -> np.ndarray:
-        """Return the derivatives (3, n) of places by the angle."""
-        return np.outer(self.v, np.cos(angle)) - np.outer(self.u, np.sin(angle))
-
-    @property
-    def radius(self) -> float:
-        """How far the point is from the axis."""
-        return float(np.linalg.norm(self.u))
+SIDES = [(math.cos(angle), math.sin(angle)) for angle in np.arange(8) * math.pi / 8.0]
 
 
 class Cells(NamedTuple):
@@ -78,39 +57,35 @@ class Directions(NamedTuple):
 
 
 class HeldBy(NamedTuple):
-    """A rod in the frame of the first hinge; its length is None where it is an input."""
+    """A rod in the frame of the first hinge; its length [m] is None where it is an input."""
 
-    pivot: Way
-    end: Way
-    length: Optional[float]
+    pivot: Circle
+    end: Circle
+    length: Any
 
     @property
     def sides(self) -> Tuple[float, ...]:
         """The sides of a crank on which a pose may have it; one where no crank turns."""
-        return (1.0, -1.0) if self.length is not None and self.pivot.radius > 0.0 else (0.0,)
+        return (1.0, -1.0) if self.length is not None and any(self.pivot.u) else (0.0,)
 
-    def motor_angles(self, poses: np.ndarray, side: float) -> np.ndarray:
-        """Return motor angles (n,) for poses (2, n); NaN where the rod does not reach."""
+    def pivots(self, poses: np.ndarray, side: float) -> Vector:
+        """Return where the pivot is for poses (2, n); NaN where the rod does not reach."""
+        centre, u, v = self.pivot
         if self.length is None or not side:
-            return np.zeros(poses.shape[1])
-        off = _place(self.end, poses) - self.pivot.centre[:, None]
-        x, y = self.pivot.u @ off, self.pivot.v @ off
-        along = 0.5 * (self.pivot.radius ** 2 + _dot(off, off) - self.length ** 2)
-        with np.errstate(invalid='ignore'):
-            return np.arctan2(y, x) + side * np.arccos(along / np.hypot(x, y))
-
-    def row(self, pivot: np.ndarray, poses: np.ndarray) -> Tuple[np.ndarray, ...]:
-        """Return |A - B|^2 / 2 and its gradient, for places (3, n) of the pivot and poses."""
-        end, by_r = _place(self.end, poses), _turned(self.end.ahead(poses[1]), poses[0])
-        rod = pivot - end
-        return 0.5 * _dot(rod, rod), -_dot(pivot, _quarter(end)), -_dot(rod, by_r)
+            return Vector(*(x + np.zeros(poses.shape[1]) for x in centre))
+        off = _place(self.end, poses).minus(centre)
+        x, y = off.dot(u), off.dot(v)
+        along = 0.5 * (u.dot(u) + off.dot(off) - self.length ** 2)
+        size = x * x + y * y
+        across = side * np.sqrt(size - along * along)
+        return self.pivot.at((along * x - across * y) / size, (along * y + across * x) / size)
 
     def directions(self, poses: Cells, count: int, again: int) -> Directions:
         """Return the directions of its gradients in cells of a rectangle."""
         motors = self._motors(poses, count)
         if len(motors.middle) > 1:
-            coarse, half = self._over(motors, poses)[0].any(axis=1), motors.half / again
-            motors = Cells((motors.middle[coarse, None] + half * np.arange(
+            needed, half = self._over(motors, poses)[0].any(axis=1), motors.half / again
+            motors = Cells((motors.middle[needed, None] + half * np.arange(
                 1 - again, again, 2)).ravel(), half)
         allowed, gradient, spread = self._over(motors, poses)
         needed = allowed.any(axis=1)
@@ -124,11 +99,10 @@ class HeldBy(NamedTuple):
     def _motors(self, poses: Cells, count: int) -> Cells:
         """Return cells of all motor angles, or of all lengths, that poses may need."""
         if len(self.sides) > 1:
-            low, high = -np.pi, np.pi
+            low, high = -math.pi, math.pi
         elif self.length is None:
-            away = np.linalg.norm(_place(self.end, poses.middle) - self.pivot.centre[:, None],
-                                  axis=0)
-            slack = poses.half @ (_flat(self.end), self.end.radius)
+            off = _place(self.end, poses.middle).minus(self.pivot.centre)
+            away, slack = np.sqrt(off.dot(off)), poses.half @ (_flat(self.end), _norm(self.end.u))
             low, high = max(away.min() - slack, 0.0), away.max() + slack
         else:
             return Cells(np.zeros(1), np.zeros(()))
@@ -142,49 +116,40 @@ class HeldBy(NamedTuple):
         That is whether f may be zero, the gradient in the middle as x + iy, and by how much [rad]
         its direction may differ elsewhere.
         """
-        angles, turn, lengths, way = (
-            (motors.middle, motors.half, self.length, 0.0) if self.length is not None else
-            (np.zeros(len(motors.middle)), 0.0, motors.middle, motors.half))
-        pivot, moved = self.pivot.at(angles).T, self.pivot.ahead(angles).T
-        ends, own = self._ends(poses.middle)
-        # Not as products of matrices: for these numpy starts threads, which take longer.
-        parts, by_motor = (-np.einsum('kx,sxn->skn', x, y) for x, y in (
-            (pivot, ends), (moved, ends[:3])))
-        parts += own[:, None]
-        parts[0] += np.reshape(0.5 * ((pivot ** 2).sum(axis=1) - lengths ** 2), (-1, 1))
-        by_motor[0] += (pivot * moved).sum(axis=1)[:, None]
+        at = motors.middle[:, None]
+        angle, turn, length, way = (at, motors.half, self.length, 0.0) \
+            if self.length is not None else (0.0 * at, 0.0, at, motors.half)
+        pose = tuple(f(x) for x in poses.middle for f in (np.cos, np.sin))
+        pivot, moved = (of(np.cos(angle), np.sin(angle))
+                        for of in (self.pivot.at, self.pivot.ahead))
+        rod, by_p, by_r = row(pivot, self.end, pose)
+        centre, end, ahead = (each.turned(*pose[:2]) for each in (
+            self.end.centre, self.end.at(*pose[2:]), self.end.ahead(*pose[2:])))
+        across = pivot.x * ahead.y - pivot.y * ahead.x
+        # The derivatives of the gradient by the motor, and by both angles.
+        changes = (moved.x * end.y - moved.y * end.x - 1j * moved.dot(ahead),
+                   pivot.x * end.x + pivot.y * end.y + 1j * across,
+                   across + 1j * (ahead.dot(ahead) + rod.dot(end.minus(centre))))
         halves = turn, *poses.half
-        square = 0.5 * sum(halves) ** 2
         first, second, motor, size = self._bounds()
-        terms = [np.abs(x) * half for x, half in zip((by_motor[0], *parts[1:3]), halves)]
-        slack = np.reshape(way * (lengths + 0.5 * way), (-1, 1)) + ROUNDING * (
-            size + np.max(lengths)) ** 2
-        possible = ~(np.abs(parts[0]) > sum(terms) + square * max(first, second, motor) + slack)
-        gradient = parts[1] + 1j * parts[2]
-        length = np.abs(gradient)
-        along, across = length - square * np.hypot(first, second), square * np.hypot(first, second)
-        for x, y, half in zip((by_motor[1], *parts[3:5]), (by_motor[2], *parts[4:6]), halves):
-            change = (x + 1j * y) * gradient.conj() * (half / length)
-            along, across = along - np.abs(change.real), across + np.abs(change.imag)
-        return possible, gradient, np.where(along > 0.0, np.arctan2(across, along), np.pi)
-
-    def _ends(self, poses: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Return B and its derivatives (6, 3, n): p, r, pp, pr, rr; of |B|^2 / 2 as well."""
-        end, by_r = _place(self.end, poses), _turned(self.end.ahead(poses[1]), poses[0])
-        by_rr = _turned(np.broadcast_to(self.end.centre[:, None], end.shape), poses[0]) - end
-        none = np.zeros(end.shape[1])
-        return np.array([end, _quarter(end), by_r, _quarter(_quarter(end)), _quarter(by_r),
-                         by_rr]), np.array([
-                             0.5 * _dot(end, end), none, _dot(end, by_r), none, none,
-                             self.end.radius ** 2 + _dot(end, by_rr)])
+        square = 0.5 * sum(halves) ** 2
+        terms = sum(abs(x) * half for x, half in zip((rod.dot(moved), by_p, by_r), halves))
+        possible = ~(abs(gap(rod, length)) > terms + square * max(first, second, motor)
+                     + way * (length + 0.5 * way) + ROUNDING * (size + length) ** 2)
+        gradient = by_p + 1j * by_r
+        steep = abs(gradient)
+        seen = [change * gradient.conj() * (half / steep) for change, half in zip(changes, halves)]
+        rest = square * math.hypot(first, second)
+        along, aside = steep - rest - sum(abs(x.real) for x in seen), rest + sum(
+            abs(x.imag) for x in seen)
+        return possible, gradient, np.where(along > 0.0, np.arctan2(aside, along), np.pi)
 
     def _bounds(self) -> Tuple[float, float, float, float]:
         """Return bounds of derivatives of f by the first, second angle, motor; of A and B."""
-        pivot, end = (float(np.linalg.norm(way.centre)) for way in (self.pivot, self.end))
-        return (_flat(self.pivot) * _flat(self.end),
-                (pivot + self.pivot.radius + end) * self.end.radius,
-                (pivot + end + self.end.radius) * self.pivot.radius,
-                pivot + self.pivot.radius + end + self.end.radius)
+        (pivot, rho), (end, radius) = ((_norm(way.centre), _norm(way.u))
+                                       for way in (self.pivot, self.end))
+        return (_flat(self.pivot) * _flat(self.end), (pivot + rho + end) * radius,
+                (pivot + end + radius) * rho, pivot + rho + end + radius)
 
 
 class Window:
@@ -203,11 +168,12 @@ class Window:
     def __init__(self, rods: Sequence[HeldBy], low: Sequence[float], high: Sequence[float]):
         self.rods = rods
         self.low, self.high = np.asarray(low, float), np.asarray(high, float)
+        self.middle = 0.5 * (self.low + self.high)
 
     def scaled(self, factor: float) -> Window:
         """Return the rectangle made larger or smaller about its middle."""
-        middle, half = 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
-        return Window(self.rods, middle - factor * half, middle + factor * half)
+        half = factor * (self.high - self.middle)
+        return Window(self.rods, self.middle - half, self.middle + half)
 
     def largest(self) -> Window:
         """Return the largest rectangle of this shape, up to its size, that is right."""
@@ -225,49 +191,42 @@ class Window:
 
     def is_single(self, cells: Tuple[int, int, int]) -> bool:
         """Return whether it is proved that it holds one pose at most for any motor angles."""
-        poses = self._poses(cells[0])
+        count = cells[0]
+        # A little beyond the edges.
+        low, half = self.low - 2.0 * EDGE, (0.5 * (self.high - self.low) + 2.0 * EDGE) / count
+        poses = Cells(low[:, None] + half[:, None] * (2.0 * np.indices(
+            (count, count)).reshape(2, -1) + 1.0), half)
         with np.errstate(all='ignore'):
             one, other = (rod.directions(poses, *cells[1:]) for rod in self.rods)
-            shared = (np.packbits(one.allowed, axis=1)[:, None]
-                      & np.packbits(other.allowed, axis=1)).any(axis=2)
-            away = np.mod(one.middle[:, None] - other.middle, np.pi)
-            apart = np.minimum(away, np.pi - away) > one.half[:, None] + other.half + APART
-        return bool((apart | ~shared).all())
-
-    def _poses(self, count: int) -> Cells:
-        """Return cells of the rectangle, a little beyond its edges."""
-        low, high = self.low - 2.0 * EDGE, self.high + 2.0 * EDGE
-        half = 0.5 * (high - low) / count
-        return Cells(low[:, None] + half[:, None] * (2.0 * np.indices(
-            (count, count)).reshape(2, -1) + 1.0), half)
+            away = np.mod(one.middle[:, None] - other.middle, math.pi)
+            apart = np.minimum(away, math.pi - away) > one.half[:, None] + other.half + APART
+        shared = np.packbits(one.allowed, axis=1)[:, None] & np.packbits(other.allowed, axis=1)
+        return bool((apart | ~shared.any(axis=2)).all())
 
     def comes_back(self) -> bool:
         """Return whether the steps find all poses of a grid, whichever sides cranks are on."""
         axes = [np.linspace(low, high, POSES) for low, high in zip(self.low, self.high)]
-        grid = np.stack(np.meshgrid(*axes)).reshape(2, -1)
-        return all(self._steps_back(grid, sides) < BACK
-                   for sides in product(*(rod.sides for rod in self.rods)))
-
-    def _steps_back(self, poses: np.ndarray, sides: Sequence[float]) -> float:
-        """Return how far [rad] from poses the steps but the last end at most."""
-        angles = [rod.motor_angles(poses, side) for rod, side in zip(self.rods, sides)]
-        there = ~np.isnan(angles).any(axis=0)
-        poses, pivots = poses[:, there], [
-            rod.pivot.at(angle[there]) for rod, angle in zip(self.rods, angles)]
-
-        def rows(at: np.ndarray) -> List[Tuple[np.ndarray, ...]]:
-            return [rod.row(pivot, at) for rod, pivot in zip(self.rods, pivots)]
-
-        wanted = [row[0] for row in rows(poses)]
-        found = np.outer(0.5 * (self.low + self.high), np.ones(poses.shape[1]))
+        poses = np.stack(np.meshgrid(*axes)).reshape(2, -1)
         with np.errstate(all='ignore'):
-            for _ in range(STEPS - 1):
-                (f, a, b), (g, c, d) = rows(found)
-                f, g = wanted[0] - f, wanted[1] - g
-                step = np.array([f * d - b * g, a * g - f * c]) / (a * d - b * c)
-                found = found + 2.0 * np.arctan(0.5 * step)
-        # One that is nowhere is infinitely far.
-        return float(np.nan_to_num(np.abs(found - poses), nan=np.inf).max(initial=0.0))
+            return all(self._steps_back(poses, sides)
+                       for sides in product(*(rod.sides for rod in self.rods)))
+
+    def _steps_back(self, poses: np.ndarray, sides: Sequence[float]) -> bool:
+        pivots = [rod.pivots(poses, side) for rod, side in zip(self.rods, sides)]
+        there = ~np.isnan([pivot.x for pivot in pivots]).any(axis=0)
+        rods = []
+        for rod, pivot in zip(self.rods, pivots):
+            pivot = Vector(*(x[there] for x in pivot))
+            off = pivot.minus(_place(rod.end, poses[:, there]))
+            rods.append((pivot, rod.end, np.sqrt(off.dot(off))))
+        first, second = self.middle
+        pose = math.cos(first), math.sin(first), math.cos(second), math.sin(second)
+        for _ in range(STEPS - 1):
+            pose, _step = newton_step(rods, pose)
+        left = [np.angle((pose[2 * i] + 1j * pose[2 * i + 1]) * np.exp(-1j * poses[i, there]))
+                for i in (0, 1)]
+        # NaN is nowhere near.
+        return bool((np.abs(left) < BACK).all())
 
 
 def _hull(cells: np.ndarray) -> np.ndarray:
@@ -284,26 +243,15 @@ def _hull(cells: np.ndarray) -> np.ndarray:
     return hull
 
 
-def _flat(way: Way) -> float:
+def _norm(vector: Vector) -> float:
+    return float(np.linalg.norm(vector))
+
+
+def _flat(way: Circle) -> float:
     """Return how far a point may be from the first hinge."""
-    return float(np.linalg.norm(way.centre[:2])) + way.radius
+    return math.hypot(*way.centre[:2]) + _norm(way.u)
 
 
-def _dot(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    return sum(a * b for a, b in zip(x, y))
-
-
-def _turned(vector: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    cos, sin = np.cos(angle), np.sin(angle)
-    x, y, z = vector
-    return np.array([x * cos - y * sin, x * sin + y * cos, z])
-
-
-def _quarter(vector: np.ndarray) -> np.ndarray:
-    """Return the derivative of a vector by an angle about z."""
-    x, y, _ = vector
-    return np.array([-y, x, np.zeros(len(x))])
-
-
-def _place(end: Way, poses: np.ndarray) -> np.ndarray:
-    return _turned(end.at(poses[1]), poses[0])
+def _place(end: Circle, poses: np.ndarray) -> Vector:
+    first, second = poses
+    return end.at(np.cos(second), np.sin(second)).turned(np.cos(first), np.sin(first))
