@@ -9,7 +9,6 @@ from contextlib import contextmanager, suppress
 from copy import copy
 from shlex import quote
 from typing import (
-    AbstractSet,
     Any,
     Callable,
     Dict,
@@ -81,8 +80,10 @@ class SceneParameters:
         # Whose value counts instead of an own one, and whether that is being followed.
         self.owner_of: Callable[[str], Optional[str]] = lambda name: None
         self._is_followed = self._is_derived = False
-        given = {name: one.value for name, one in node.get_parameters_by_prefix('').items()}
-        self.scene = scenes.read({name: scenes.plain(value) for name, value in given.items()})
+        # A parameter file's empty list has no type and no value.
+        given = {name: () if one.value is None else scenes.plain(one.value)
+                 for name, one in node.get_parameters_by_prefix('').items()}
+        self.scene = scenes.read(given)
         own = [one for one in self.scene.parameters if role in one.field.readers]
         self.fields = {one.name: one.field for one in own}
         of_scene = given.keys() & {one.name for one in self.scene.parameters}
@@ -98,13 +99,8 @@ class SceneParameters:
         node.add_on_set_parameters_callback(self._validate)
         node.add_post_set_parameters_callback(self._adopt)
 
-    def set_together(self, messages: Sequence[ParameterMessage]) -> AbstractSet[int]:
-        """
-        Set the parameters of a request that can be read, if all of them can be set; return whose.
-
-        One by one the values of another scene cannot be: a leg of mixed sizes cannot be assembled.
-        What is returned are the places of the parameters that have been set.
-        """
+    def set_readable(self, messages: Sequence[ParameterMessage]) -> Dict[int, SetParametersResult]:
+        """Set the parameters of a request that can be read; return their results by their place."""
         readable = {}
         for i, one in enumerate(messages):
             with suppress(scenes.SceneError, KeyError, ValueError):
@@ -112,19 +108,34 @@ class SceneParameters:
                 if not self.fields[one.name].read_only:
                     self._value(parameter)
                     readable[i] = parameter
-        if len({one.name for one in messages}) < len(messages) or not readable:
-            return frozenset()
-        result = self._node.set_parameters_atomically([*readable.values()])
-        return readable.keys() if result.successful else frozenset()
+        return dict(zip(readable, self._set_together([*readable.values()])))
 
-    def follow(self, values: Mapping[str, Any]) -> str:
-        """Set values that another node owns; return why not, or nothing."""
-        parameters = [Parameter(name, value=value) for name, value in values.items()]
+    def follow(self, values: Mapping[str, Any]) -> Dict[str, str]:
+        """Set values that another node owns; return why not, by name."""
         self._is_followed = True
         try:
-            return str(self._node.set_parameters_atomically(parameters).reason)
+            results = self._set_together([
+                Parameter(name, value=value) for name, value in values.items()])
         finally:
             self._is_followed = False
+        return {name: result.reason for name, result in zip(values, results)
+                if not result.successful}
+
+    def _set_together(self, parameters: List[Parameter]) -> List[SetParametersResult]:
+        """
+        Set parameters, all at once or else half by half; return a result for each.
+
+        One by one the values of another scene cannot be: a leg of mixed sizes cannot be assembled.
+        Of a name that comes several times only the last value is validated and set.
+        """
+        if not parameters:
+            return []
+        result = self._node.set_parameters_atomically(
+            [*{one.name: one for one in parameters}.values()])
+        if result.successful or len(parameters) == 1:
+            return [result] * len(parameters)
+        half = len(parameters) // 2
+        return self._set_together(parameters[:half]) + self._set_together(parameters[half:])
 
     def ranged(self, name: str, descriptor: ParameterDescriptor) -> ParameterDescriptor:
         """Return a parameter's descriptor with the range of its slider about its value."""

@@ -58,15 +58,16 @@ class ShutdownHandler:
         self._sent.close()
 
     def _wait(self) -> None:
+        # Open to the end: another signal would not find where to write, and print that.
         with self._received:
             if not self._received.recv(1):
                 return
-        self.is_over = True
-        if self.wake:
-            self.wake()
-        if not self._left.wait(PATIENCE):
-            if self.last_words:
-                self.last_words()
-            sys.stdout.flush()
-            sys.stderr.flush()
-            os._exit(0)
+            self.is_over = True
+            if self.wake:
+                self.wake()
+            if not self._left.wait(PATIENCE):
+                if self.last_words:
+                    self.last_words()
+                sys.stdout.flush()
+                sys.stderr.flush()
+                os._exit(0)
