@@ -100,7 +100,7 @@ class SceneParameters:
         node.add_post_set_parameters_callback(self._adopt)
 
     def set_readable(self, messages: Sequence[ParameterMessage]) -> Dict[int, SetParametersResult]:
-        """Set the parameters of a request that can be read; return their results by their place."""
+        """Set what can be read of a request; return the results by their place in it."""
         readable = {}
         for i, one in enumerate(messages):
             with suppress(scenes.SceneError, KeyError, ValueError):
