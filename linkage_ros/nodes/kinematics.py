@@ -74,11 +74,15 @@ class Kinematics(scene_node.SceneNode):
         """Refuse what has no robot model; SceneError says why."""
         for name, machine in new.machines.items():
             before = self.scene.machines[name]
-            if not machine.in_space and (
-                    machine is not before or new.frame_id != self.scene.frame_id):
+            if machine.in_space:
+                continue
+            if machine is not before:
                 bodies.size(machine)
-                # Nothing else that is refused depends on dimensions, whose travels take long.
-                bodies.robot([replace(machine, linkage=before.linkage)], new.frame_id)
+            # Of dimensions and sweeps nothing else is refused, and their travels take long.
+            alike = replace(machine, linkage=before.linkage, reach=before.reach,
+                            inputs=before.inputs)
+            if alike != before or new.frame_id != self.scene.frame_id:
+                bodies.robot([alike], new.frame_id)
 
     def prepare(self, new: scene.Scene) -> Any:
         """Return the model of each mechanism, another for each that has changed, and its robot."""
