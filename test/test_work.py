@@ -61,7 +61,9 @@ def test_for_markers_alone_no_joint_angle_is_computed_and_the_reverse(graph, wor
     assert {key for key in work if key[0] == 'jansen'} == {('jansen', 12, 0, 0)}
     assert {key for key in work if key[0] == 'peaucellier'} == {
         ('peaucellier', 0, 6, 6), ('peaucellier', 0, 6, 0)}
-    assert {key for key in work if key[0] == 'water_drop'} == {('water_drop', 0, 2, 0)}
+    # A message of the turn before, with velocities, may have come late.
+    assert {key[:3] for key in work if key[0] == 'water_drop'} == {('water_drop', 0, 2)}
+    assert ('water_drop', 0, 2, 0) in work
 
 
 def test_a_topic_nobody_listens_to_is_not_built(graph, monkeypatch):

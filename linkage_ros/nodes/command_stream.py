@@ -27,10 +27,10 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from . import joint_state_reader
-from .message_layout import NEVER, pack, PatchedPublisher, unpack, Unreadable
+from .log import Once, Throttle
+from .message_layout import NEVER, pack, unpack, Unreadable
 from .messages import JointStates
-from .publishers import TrackedPublisher
-from .throttle import Once, Throttle
+from .publishers import PatchedPublisher, TrackedPublisher
 from .worker import Worker
 from ..cache import Cache
 from ..scene.inverse_request import InverseRequest

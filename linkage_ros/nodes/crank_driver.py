@@ -14,9 +14,9 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from . import scene_node
-from .message_layout import pack, PatchedPublisher
+from .message_layout import pack
 from .messages import JointStates
-from .publishers import TrackedPublisher
+from .publishers import PatchedPublisher, TrackedPublisher
 from .. import scene
 from ..scene.motion import Motion
 from ..words import listed

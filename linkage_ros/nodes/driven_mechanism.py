@@ -16,10 +16,9 @@ from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from . import messages
+from .log import Throttle
 from .mechanism_model import MechanismModel, Pose
-from .message_layout import PatchedPublisher
-from .publishers import LATCHED, TrackedPublisher
-from .throttle import Throttle
+from .publishers import LATCHED, PatchedPublisher, TrackedPublisher
 from .. import scene
 from ..linkage.walker import Solution
 

@@ -17,12 +17,11 @@ from sensor_msgs.msg import JointState
 
 from . import joint_state_reader, scene_node
 from .driven_mechanism import DrivenMechanism
-from .incidents import InvalidHandle, RCLError
+from .log import InvalidHandle, Once, RCLError, Throttle
 from .mechanism_model import MechanismModel
 from .message_layout import pack, Unreadable
 from .plan import Planner, Route
 from .scene_joint_states import SceneJointStates
-from .throttle import Once, Throttle
 from .. import scene
 from ..robot_model import bodies, urdf
 from ..words import listed

@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState
 from visualization_msgs.msg import MarkerArray
 
 from . import messages
-from .message_layout import PatchedPublisher
+from .publishers import PatchedPublisher
 from .. import scene
 from ..cache import Cache
 from ..linkage.mechanism import Mechanism

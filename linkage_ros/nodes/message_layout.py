@@ -13,7 +13,7 @@ message says.
 from __future__ import annotations
 
 import struct
-from typing import Any, Callable, List, Optional, Sequence, Tuple
+from typing import Any, Callable, List, Tuple
 
 from builtin_interfaces.msg import Time
 import numpy as np
@@ -214,57 +214,13 @@ class Template:
         return bytes(self.message)
 
     def places(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return where in memory numbers lie, which value each is, and where the stamps lie."""
-        own, start = np.flatnonzero(self._sources <= len(self._values)), _address(self._numbers)
-        own = own[self._sources[own] > 0]
-        stamps = [start - len(LEAD) - HEADER + place.start for place in self._stamps]
-        return start + 8 * own, self._sources[own] - 1, np.array(stamps, int)
+        """Return where in `message` values lie, which value each is, and where the stamps lie."""
+        own = np.flatnonzero((self._sources > 0) & (self._sources <= len(self._values)))
+        return HEADER + 8 * own, self._sources[own] - 1, np.array(
+            [place.start - len(LEAD) for place in self._stamps], int)
 
     def _check(self, build: Callable, layout: MessageLayout, count: int) -> None:
         stamp, values = Time(sec=12, nanosec=345), np.linspace(-1.5, 7.25, count)
         if not layout.is_same(self.patched(pack(stamp), values),
                               serialize_message(build(stamp, values))):
             raise NoLayout('a patched message does not read back as it was written')
-
-
-def _address(array: np.ndarray) -> int:
-    return array.__array_interface__['data'][0]
-
-
-class PatchedPublisher:
-    """
-    Publishes one message again and again with other values.
-
-    Parameters
-    ----------
-    publisher : rclpy.publisher.Publisher
-        Where it goes.
-    build, count
-        As for Template.
-    logger : rclpy logger
-        Logs once if messages have to be built one by one.
-
-    Attributes
-    ----------
-    template : Template or None
-        The bytes that are patched, where that can be done.
-
-    """
-
-    def __init__(self, publisher: Any, build: Callable, count: int, logger: Any):
-        self.publisher = publisher
-        self._build = build
-        self.template: Optional[Template] = None
-        try:
-            self.template = Template(build, count)
-        except NoLayout as reason:
-            logger.warning(f'{publisher.topic_name}: {reason}; publishing ordinary messages',
-                           once=True)
-
-    def publish(self, stamp: bytes, values: Sequence[Any]) -> None:
-        """Publish the message with this stamp, packed, and values, one array after the other."""
-        joined: Any = np.concatenate(values) if len(values) > 1 else values[0]
-        if self.template:
-            self.publisher.publish(self.template.patched(stamp, joined))
-        else:
-            self.publisher.publish(self._build(unpack(stamp), joined))

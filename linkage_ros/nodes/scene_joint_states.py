@@ -12,9 +12,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from .mechanism_model import MechanismModel, Pose
-from .message_layout import PatchedPublisher
 from .messages import JointStates
-from .publishers import LATCHED, TrackedPublisher
+from .publishers import LATCHED, PatchedPublisher, TrackedPublisher
 from ..cache import Cache
 
 # Arrangements of the message that are cached.

@@ -23,7 +23,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
-from .incidents import Incidents, refused
+from .log import Incidents, refused
 from .ownership import Announcer, Follower
 from .parameters import SceneParameters
 from .shutdown import ShutdownHandler
