@@ -89,11 +89,6 @@ class FreshModel(MechanismModel):
         publisher.template = None
         return publisher
 
-    def joint_message(self, *args):
-        """Return new joint states."""
-        self._joint_states = messages.JointStates()
-        return super().joint_message(*args)
-
     def marker_message(self, *args):
         """Return new markers."""
         self.marker_array = messages.Markers(*self._drawn)

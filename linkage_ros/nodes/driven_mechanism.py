@@ -25,16 +25,7 @@ from ..linkage.walker import Solution
 
 class DrivenMechanism:
     """
-    The state and the topics of one mechanism.
-
-    Parameters
-    ----------
-    node : rclpy.node.Node
-        Whose topics they are.
-    machine : Machine
-        The mechanism.
-    changed : callable
-        Called when subscribers come or go.
+    The state and the topics of one mechanism; `changed` is called when subscribers come or go.
 
     Attributes
     ----------

@@ -19,7 +19,7 @@ from . import joint_state_reader, scene_node
 from .driven_mechanism import DrivenMechanism
 from .log import InvalidHandle, Once, RCLError, Throttle
 from .mechanism_model import MechanismModel
-from .message_layout import pack, Unreadable
+from .message_layout import pack_time, Unreadable
 from .plan import Planner, Route
 from .scene_joint_states import SceneJointStates
 from .. import scene
@@ -141,7 +141,7 @@ class Kinematics(scene_node.SceneNode):
         self._planner.invalidate()
 
     def _now(self) -> bytes:
-        return pack(self.get_clock().now().to_msg())
+        return pack_time(self.get_clock().now().nanoseconds)
 
     def _receive(self, text: bytes) -> None:
         try:

@@ -41,6 +41,11 @@ def pack(stamp: Time) -> bytes:
     return _STAMP.pack(stamp.sec, stamp.nanosec)
 
 
+def pack_time(nanoseconds: int) -> bytes:
+    """Return a time [ns] as the stamp of a message has it."""
+    return _STAMP.pack(*divmod(nanoseconds, 10 ** 9))
+
+
 def unpack(stamp: bytes) -> Time:
     """Return the stamp that some bytes of a message are."""
     sec, nanosec = _STAMP.unpack(stamp)
@@ -70,12 +75,8 @@ class MessageLayout:
     """
     Where the numbers lie in a message, and which other bytes count.
 
-    Parameters
-    ----------
-    text : bytes
-        A message, serialised.
-    message : ROS message
-        The same; of types without arrays of fixed size and without wide strings.
+    The message is given serialised and as it is; it is of a type without arrays of fixed size and
+    without wide strings. Raises NoLayout if it is encoded otherwise.
 
     Attributes
     ----------
@@ -85,11 +86,6 @@ class MessageLayout:
         For each sequence of float64 or points where its numbers begin, and how many they are.
     fixed : uint8 array
         A mask of the bytes that are neither number nor padding.
-
-    Raises
-    ------
-    NoLayout
-        If it is encoded otherwise.
 
     """
 
@@ -163,26 +159,11 @@ class MessageLayout:
 
 class Template:
     """
-    The bytes of a message whose stamp and float64 values change.
+    The bytes of a message whose stamp and float64 values change; `message` as last patched.
 
-    Parameters
-    ----------
-    build : callable
-        From a stamp and `count` floats, an array, to a message that shows some of them, and else
-        no numbers in its sequences but zero.
-    count : int
-        How many values the message is made from.
-
-    Attributes
-    ----------
-    message : memoryview
-        The bytes as they were last patched.
-
-    Raises
-    ------
-    NoLayout
-        If a patched message reads differently from one that is built.
-
+    `build` makes, from a stamp and an array of `count` floats, a message that shows some of them,
+    and else no numbers in its sequences but zero. Raises NoLayout if a patched message reads
+    differently from one that is built.
     """
 
     def __init__(self, build: Callable, count: int):

@@ -63,17 +63,7 @@ class Announcer:
 
 
 class Follower:
-    """
-    Sets the parameters of a node to the owner's values.
-
-    Parameters
-    ----------
-    node : SceneNode
-        Who follows.
-    parameters : SceneParameters
-        Its parameters.
-
-    """
+    """Sets the parameters of a node to the owner's values."""
 
     def __init__(self, node: Any, parameters: SceneParameters):
         self._node, self._parameters = node, parameters

@@ -21,17 +21,7 @@ class ShutdownHandler:
     Catches SIGINT and SIGTERM in a thread, so that none interrupts a callback.
 
     The first one sets `is_over` and calls `wake`; whoever spins then stops. Where that takes
-    longer than PATIENCE, the process says its last words and ends with exit code 0.
-
-    Attributes
-    ----------
-    wake : callable, optional
-        Ends the executor's waiting.
-    last_words : callable, optional
-        Called before the process ends amid a callback.
-    is_over : bool
-        Whether there was a signal.
-
+    longer than PATIENCE, `last_words` are said, and the process ends with exit code 0.
     """
 
     def __init__(self) -> None:
