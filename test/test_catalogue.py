@@ -72,6 +72,7 @@ def test_a_file_that_is_no_mechanism_is_named(tmp_path, text, said):
     assert error.startswith('ImportError: linkage_ros.mechanisms.broken ') and said in error
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('seeds', [1, pytest.param(5, marks=pytest.mark.long)])
 @pytest.mark.parametrize('kind', list(mechanisms.TYPES))
 def test_every_mechanism_holds_what_any_linkage_must(kind, seeds):
@@ -264,6 +265,7 @@ def _curves():
         yield pytest.param(partial(_near_a_change_point, seed), id=f'near a change point {seed}')
 
 
+@pytest.mark.sample(14)
 @pytest.mark.parametrize('make', [*_curves()])
 def test_a_drawn_curve_is_within_a_five_hundredth_of_its_size(make):
     linkage = make()

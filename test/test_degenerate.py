@@ -72,6 +72,7 @@ def test_bars_that_are_alike_have_velocities_and_rates(kind):
                                        err_msg=name)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('kind', ALIKE)
 def test_bars_that_are_alike_can_be_asked_about_their_motion(kind):
     found = ALIKE[kind]
