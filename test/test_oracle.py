@@ -115,10 +115,11 @@ def test_numbers_are_the_same_at_the_ends_of_the_reach_and_in_many_legs(graph, n
 WITHOUT = 'LINKAGE_ROS_WITHOUT_LLVMLITE'
 
 
+# `make nodes PLAIN=1` runs them so, too.
+@pytest.mark.long
 @pytest.mark.skipif(WITHOUT in os.environ, reason='this is without')
 @pytest.mark.parametrize('which', [
-    'not long', pytest.param('long and not exhaustive', marks=pytest.mark.long),
-    pytest.param('exhaustive', marks=EXHAUSTIVE)])
+    'not exhaustive', pytest.param('exhaustive', marks=pytest.mark.exhaustive)])
 def test_all_this_holds_without_llvmlite(tmp_path, which):
     (tmp_path / 'sitecustomize.py').write_text(
         "import sys\nsys.modules['llvmlite'] = None\n")
