@@ -601,7 +601,7 @@ def test_what_a_sensor_cannot_be_at_is_nowhere_on_the_page(show):
                 return abs(await carriage(told) - value) < 1e-9
 
             await page.cast('/lift')
-            told, _ = lift.machines['lift'].told(lift.machines['lift'].first, 1.0, 0.0)
+            told, _ = lift.machines['lift'].to_source(lift.machines['lift'].first, 1.0, 0.0)
             await browser.until(lambda: is_at(told, 1.0))
             await browser.until(lambda: is_at(99.0, 1.2))
 

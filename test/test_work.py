@@ -136,8 +136,8 @@ def test_the_locus_is_sent_once_and_a_late_subscriber_gets_it(graph, monkeypatch
 def test_a_change_of_dimensions_rebuilds_only_that_mechanism(graph, monkeypatch):
     node = graph.start(Kinematics)
     built = []
-    assembly = scene.Machine.assembly
-    monkeypatch.setattr(scene.Machine, 'assembly', lambda machine: (
+    assembly = scene.SceneMechanism.assembly
+    monkeypatch.setattr(scene.SceneMechanism, 'assembly', lambda machine: (
         built.append(machine.name) or assembly(machine)))
     assert graph.set(node, jansen__dimensions__m=14.0).successful
     assert set(built) == {'jansen'}

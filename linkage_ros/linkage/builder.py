@@ -190,7 +190,7 @@ class Builder:
         # As a cylinder has no place beyond its stroke, so a carriage has none beyond its way.
         way = abs(low) + abs(high)
         for margin in (place - low, high - place):
-            limit = planar.Limit(margin, planar.GRAZE * way)
+            limit = planar.Limit(margin, planar.TOLERANCE * way)
             self.limits.append(limit)
             self.ways.append(limit)
             place = gated(place, limit.margin, limit.tolerance)
@@ -327,7 +327,7 @@ class Builder:
         """Join bars to two joints that are parallel to the bars from a corner to them."""
         to_first, to_second = (self._side(corner, end) for end in (first, second))
         self.folds.append(planar.Limit(cross(to_first.vector, to_second.vector),
-                                       planar.GRAZE * to_first.length * to_second.length))
+                                       planar.TOLERANCE * to_first.length * to_second.length))
         place = self.points[first].place + to_second.vector
         from_first, from_second = (planar.parallel(side.vector, place)
                                    for side in (to_second, to_first))
@@ -348,7 +348,7 @@ class Builder:
                  offset: Real, ends: Sequence[Complex], to_first: Real, to_second: Real,
                  *others: str) -> None:
         """Join two bars at a point's mirror image, given its bars from second and first."""
-        self.folds.append(planar.Limit(offset, planar.GRAZE * to_first * to_second))
+        self.folds.append(planar.Limit(offset, planar.TOLERANCE * to_first * to_second))
         place, from_second, from_first = planar.mirror(arm, point, offset, ends)
         self._pair(name, first, second, planar.Dyad(from_first, from_second, ()), to_first,
                    to_second, *others, place=place)

@@ -36,7 +36,7 @@ from .arguments import numbers
 from .curves import LEAST
 from .inverse_linkage import InverseLinkage, taken_apart
 from .inverse_rods import InverseRods, taken_apart as rods_taken_apart
-from .planar import GRAZE
+from .planar import TOLERANCE
 from .search import blocks, Search, SINGULAR
 from ..cache import cached
 from ..formula.expression import (
@@ -499,7 +499,7 @@ class Inverse:
             (*(x / size for x, size in zip(inputs, sizes)),
              *(rate * sizes[i // n] for i, rate in enumerate(rates)))
             for inputs, rates in answers),
-            *(GRAZE * (math.pi if angular else scale)
+            *(TOLERANCE * (math.pi if angular else scale)
               for angular, scale in zip(self._angular, self._scales)),
             *(x / size for x, size in zip(near or (), sizes)),
             *(end / size for pair, size in zip(limits, sizes) if pair for end in pair))

@@ -49,7 +49,7 @@ from ..formula.expression import (
 LEFT, RIGHT = 1.0, -1.0
 
 # A limit that is hit up to rounding counts as reached: eight half ulps of the scale.
-GRAZE = 8 * 2.0 ** -53
+TOLERANCE = 8 * 2.0 ** -53
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ class Arm:
         # At the limit the length is the radius: the square moves by that times what lengths do.
         # A tolerance is a constant: where a cylinder makes the radius, it is no longer than size.
         bound = (self._length or size) if radius.varies else abs(radius)
-        return Limit(margin, GRAZE * bound * (size + self._span))
+        return Limit(margin, TOLERANCE * bound * (size + self._span))
 
 
 class CrankArm(Arm):
@@ -234,7 +234,7 @@ class CrankArm(Arm):
         margin = where(abs(start) <= abs(end), start + sign * gm * square(s),
                        end - sign * gm * square(h))
         margin = self._with_rate(margin, radius, sign)
-        tolerance = GRAZE * abs(radius) * (size + self._g + self._m)
+        tolerance = TOLERANCE * abs(radius) * (size + self._g + self._m)
         gap, half = (start, s) if sign > 0.0 else (end, h)
         grown = square_root(gm) * self._first_sign(sign)
         smooth = where(abs(gap) <= tolerance, grown * half, root(margin, tolerance))
@@ -259,7 +259,7 @@ class CrankArm(Arm):
         """Return the sign that makes s (sign +1) or h positive at the first quarter turn."""
         ahead, behind = (-sign, 1.0) if self._crank.backwards else (1.0, sign)
         beyond = where(0.0 <= self._turn.y, behind, -behind)
-        return where(-GRAZE <= self._turn.x, ahead, beyond)
+        return where(-TOLERANCE <= self._turn.x, ahead, beyond)
 
     def inverse_of_isosceles(self) -> Optional[Complex]:
         """Return 1 / conjugate(arm) where foot and pin are as far from the centre, else None."""
@@ -354,8 +354,8 @@ def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
     gaps = (exact_sum(first, second, -base) * exact_sum(first, second, base),
             exact_sum(base, -first, second) * exact_sum(base, first, -second))
     twice = 2.0 * square(base)
-    grazed = GRAZE * square(first + second)
-    height = root(gaps[0], grazed) * root(gaps[1], grazed)
+    tolerance = TOLERANCE * square(first + second)
+    height = root(gaps[0], tolerance) * root(gaps[1], tolerance)
     return Complex(0.5 + (first - second) * (first + second) / twice, height / twice * side)
 
 
@@ -477,7 +477,7 @@ class Rail:
     def limits(self, rod: Real) -> Tuple[Limit, ...]:
         """Return the margins whose product is rod^2 - height^2."""
         margin = (rod - self.height) * (rod + self.height)
-        return (Limit(margin, GRAZE * rod * (rod + self._span)),)
+        return (Limit(margin, TOLERANCE * rod * (rod + self._span)),)
 
 
 class CrankRail(Rail):
@@ -509,7 +509,7 @@ class CrankRail(Rail):
     def _limit(self, rod: Real, start: Real, end: Real, gap: Real, half: Real,
                sign: Real) -> Limit:
         margin = gap + 2.0 * self._crank.length * square(half)
-        tolerance = GRAZE * (rod + self._span)
+        tolerance = TOLERANCE * (rod + self._span)
         grown = square_root(2.0 * self._crank.length) * sign
         smooth = where(abs(gap) <= tolerance, grown * half, root(margin, tolerance))
         return Limit(margin, tolerance, smooth, CrankEnds(

@@ -35,7 +35,7 @@ from .worker import Worker
 from ..cache import Cache
 from ..scene.inverse_request import InverseRequest
 from ..scene.joint_names import JointName
-from ..scene.machine import Machine
+from ..scene.scene_mechanism import SceneMechanism
 from ..words import elided, listed
 
 # Between two searches for a first command, which may be anywhere [s].
@@ -49,7 +49,7 @@ class Target(NamedTuple):
     """Outputs of a mechanism as a message names them, and what solves them for its actuators."""
 
     named: str
-    machine: Machine
+    machine: SceneMechanism
     request: InverseRequest
     places: Tuple[int, ...]
     names: Tuple[JointName, ...]
@@ -111,12 +111,12 @@ class CommandStream:
     mechanisms : iterable of str
         The mechanisms of its scene.
     present : callable
-        From a Machine to where its inputs are; infinite where that is not known.
+        From a mechanism to where its inputs are; infinite where that is not known.
 
     """
 
     def __init__(self, node: Any, mechanisms: Iterable[str],
-                 present: Callable[[Machine], List[float]]):
+                 present: Callable[[SceneMechanism], List[float]]):
         self._present, self._logger, self._clock = present, node.get_logger(), node.get_clock()
         self._commands = TrackedPublisher(node, JointState, 'servo_commands', 10)
         self._arrays = {name: TrackedPublisher(node, Float64MultiArray, f'{name}/commands', 10)
@@ -124,7 +124,7 @@ class CommandStream:
         self._trajectories = TrackedPublisher(node, JointTrajectory, 'servo_trajectory', 10)
         self._message, self._throttle = JointStates(), Throttle(self._logger)
         self._unknown = Once(UNKNOWN_NAMES)
-        self._machines: Mapping[str, Machine] = {}
+        self._machines: Mapping[str, SceneMechanism] = {}
         self._last: Dict[str, Command] = {}
         self._searches: Dict[str, float] = {}
         self._worker = Worker(node, node.report)
@@ -133,7 +133,7 @@ class CommandStream:
         node.create_subscription(JointTrajectory, 'wanted_trajectory', node.guarded(
             'wanted_trajectory', self._receive_trajectory), 10)
 
-    def adopt(self, machines: Mapping[str, Machine]) -> None:
+    def adopt(self, machines: Mapping[str, SceneMechanism]) -> None:
         """Act on these mechanisms from now on."""
         self._machines, self._publishers = machines, Cache(self._publisher, ARRANGEMENTS)
         # The last pose of several inputs may be none of another geometry.
@@ -145,7 +145,7 @@ class CommandStream:
         """End the trajectory that is being computed."""
         self._worker.end()
 
-    def _output(self, named: str) -> Optional[Tuple[Machine, str, JointName]]:
+    def _output(self, named: str) -> Optional[Tuple[SceneMechanism, str, JointName]]:
         """Return whose output others call so, its own name and how that differs."""
         for machine in self._machines.values():
             own = {name.name: (joint, name) for joint, name in machine.joints.items()}

@@ -59,9 +59,9 @@ class CrankDriver(scene_node.SceneNode):
     def __init__(self, in_process: Sequence[Any] = (), **kwargs: Any):
         super().__init__(scene.DRIVER, **kwargs)
         self._motions: Dict[Tuple[str, str], Motion] = {}
-        self._drives: Dict[Tuple[str, str], scene.Drive] = {}
-        self._machines: Mapping[str, scene.Machine] = {}
-        self._sent: List[Tuple[Tuple[str, str], scene.Drive]] = []
+        self._drives: Dict[Tuple[str, str], scene.InputSettings] = {}
+        self._machines: Mapping[str, scene.SceneMechanism] = {}
+        self._sent: List[Tuple[Tuple[str, str], scene.InputSettings]] = []
         self._now: Optional[int] = None
         self._steady = 0
         self._names: List[str] = []
@@ -135,12 +135,13 @@ class CrankDriver(scene_node.SceneNode):
             positions, speeds = zip(*[self._position(*sent, now) for sent in self._sent])
             self._message.publish(pack(Stamp(*divmod(now, SECOND))), [positions + speeds])
 
-    def _position(self, key: Tuple[str, str], drive: scene.Drive, now: int) -> Tuple[float, float]:
+    def _position(self, key: Tuple[str, str], drive: scene.InputSettings,
+                  now: int) -> Tuple[float, float]:
         """Return the position and the speed of an input's source [rad or m, per second]."""
         value, speed = self._motions[key].at(now)
         if drive.is_plain:
             return value, speed
-        return self._machines[key[0]].told(drive, value, speed)
+        return self._machines[key[0]].to_source(drive, value, speed)
 
     def serves(self) -> str:
         """Say which inputs it moves, how often."""

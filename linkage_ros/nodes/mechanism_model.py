@@ -19,7 +19,7 @@ from .message_layout import PatchedPublisher
 from .. import scene
 from ..cache import Cache
 from ..linkage.mechanism import Mechanism
-from ..linkage.quantities import Spot
+from ..linkage.quantities import LinkPoint
 from ..linkage.walker import Layout, Solution
 from ..robot_model import bodies, shapes, urdf
 
@@ -58,7 +58,7 @@ class MechanismModel:
 
     Parameters
     ----------
-    machine : Machine
+    machine : SceneMechanism
         The mechanism.
     frame_id, prefix : str
         The frame of its pose, and what is put before it in markers.
@@ -70,7 +70,7 @@ class MechanismModel:
 
     """
 
-    def __init__(self, machine: scene.Machine, frame_id: str, prefix: str):
+    def __init__(self, machine: scene.SceneMechanism, frame_id: str, prefix: str):
         self.machine, self.made_of = machine, (machine, frame_id, prefix)
         self.inputs = list(machine.inputs.values())
         self.robot = None if machine.in_space else bodies.robot([machine], frame_id)
@@ -186,7 +186,7 @@ class MechanismModel:
         return self.marker_array.message(stamp, places, sorted(grounded))
 
 
-def _shown(machine: scene.Machine) -> Tuple[Sequence, Dict[int, list]]:
+def _shown(machine: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
     """Return the points of the markers, joints and others, and which of them each marker shows."""
     linkage, wanted = machine.linkage, machine.points
     if machine.in_space:
@@ -205,7 +205,7 @@ def _shown(machine: scene.Machine) -> Tuple[Sequence, Dict[int, list]]:
                if shape.slide.name in machine.inputs else messages.BODIES_ID)
         pieces[id_].append((shape.start, shape.end))
     spots = [point for several in pieces.values() for piece in several for point in piece
-             if isinstance(point, Spot)]
+             if isinstance(point, LinkPoint)]
     place = {point: i for i, point in enumerate((*wanted, *spots))}
     return (*wanted, *spots), {
         id_: [[place[point] for point in piece] for piece in several if place.keys() >= set(piece)]

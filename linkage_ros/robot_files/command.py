@@ -238,7 +238,7 @@ def _checked(robot: Robot, drawing: Drawing, taken: Sequence[str]
     return name, given, said
 
 
-def _sweep(drive: Drive, read: scene.Drive) -> Optional[Tuple[float, float]]:
+def _sweep(drive: Drive, read: scene.InputSettings) -> Optional[Tuple[float, float]]:
     """Return between which ends the limits of its joint let an input move, in its reach."""
     if drive.ends is None:
         return None

@@ -11,8 +11,8 @@ from typing import Any, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .drive import Drive, in_words
-from .machine import Machine
+from .input_settings import in_words, InputSettings
+from .scene_mechanism import SceneMechanism
 from ..formula.program import compile_in_background
 from ..linkage.inputs import Arc
 from ..linkage.inverse import CLOSE
@@ -51,9 +51,9 @@ class SceneAnswer(NamedTuple):
     is_singular: bool
 
 
-def present(machine: Machine, positions: Mapping[str, float]) -> List[float]:
+def present(machine: SceneMechanism, positions: Mapping[str, float]) -> List[float]:
     """Return where the inputs are [rad or m], from the last position of each source, else inf."""
-    known = [machine.understood(drive, positions[drive.source], None, None)[0]
+    known = [machine.from_source(drive, positions[drive.source], None, None)[0]
              if drive.source in positions else math.inf for drive in machine.inputs.values()]
     return [value if math.isfinite(value) else math.inf for value in known]
 
@@ -82,7 +82,7 @@ class InverseRequest:
 
     """
 
-    def __init__(self, machine: Machine, outputs: Sequence[str]):
+    def __init__(self, machine: SceneMechanism, outputs: Sequence[str]):
         self._machine, self._drives = machine, list(machine.inputs.values())
         self.outputs = [output or LEVER for output in outputs]
         self._inverse = machine.linkage.inverse(tuple(self.outputs))
@@ -290,7 +290,7 @@ class InverseRequest:
         return [[(value * self._units[0], at * scale) for value, at in span] for span in found]
 
 
-def _inside(drive: Drive, value: float) -> float:
+def _inside(drive: InputSettings, value: float) -> float:
     """Return an input between its ends, where a crank's whole periods are one; else NaN."""
     low, high = drive.ends or (value, value)
     if drive.input.turns and not low <= value <= high:
