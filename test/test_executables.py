@@ -73,6 +73,7 @@ sys.meta_path.insert(0, Slow())
 """
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize('name', EXECUTABLES)
 def test_a_signal_ends_what_is_still_being_imported(harness, tmp_path, name, stop):
@@ -84,6 +85,7 @@ def test_a_signal_ends_what_is_still_being_imported(harness, tmp_path, name, sto
     assert process.end() == (0, '')
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', EXECUTABLES)
 def test_a_thread_that_computes_does_not_hold_up_the_end(harness, name):
     done = subprocess.run([sys.executable, '-c', textwrap.dedent(f"""

@@ -6,13 +6,13 @@
 import json
 import math
 import threading
-import time
 
 import pytest
 
 pytest.importorskip('rclpy')
 pytest.importorskip('linkage_interfaces')
 
+from effort import few_calls
 from linkage_ros import scene
 from linkage_ros.nodes import scene_node as nodes
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
@@ -243,7 +243,7 @@ class Slow(nodes.SceneNode):
     def prepare(self, new):
         """Wait until it may go on."""
         self.begun.append(new)
-        self.free.wait(20.0)
+        self.free.wait(60.0)
         self.prepared.append((threading.current_thread(), new.machines['leg'].scale))
         return new
 
@@ -308,9 +308,8 @@ def test_a_set_among_a_thousand_mechanisms_costs_what_it_changes():
     names = [f'leg{i}' for i in range(1000)]
     given = {'mechanisms': names, **{f'{name}.type': 'jansen' for name in names}}
     before = scene.read(given)
-    began = time.thread_time()
-    after = scene.read({**given, 'leg7.dimensions.m': 14.9}, before)
-    assert time.thread_time() - began < 0.25
+    with few_calls(100_000):
+        after = scene.read({**given, 'leg7.dimensions.m': 14.9}, before)
     assert [p.name for p in after.changed_from(before)] == ['leg7.dimensions.m']
 
 
@@ -393,7 +392,7 @@ def test_the_time_to_be_used_can_be_set_as_ever(graph):
 def test_a_node_ends_while_its_worker_is_busy(graph):
     node = graph.start(Slow, LEG)
     held_up(graph, Client(graph, node))
-    began = time.monotonic()
+    prepared = len(node.prepared)
     node.destroy_node()
+    assert len(node.prepared) == prepared
     node.free.set()
-    assert time.monotonic() - began < 3.0

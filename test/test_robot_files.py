@@ -314,13 +314,15 @@ def changed(text, rng):
     ) + text[high:]
 
 
+@pytest.mark.parametrize('count', [8, pytest.param(60, marks=pytest.mark.long)])
 @pytest.mark.parametrize('ending', ['sdf', 'urdf', 'xml'])
-def test_whatever_is_in_a_file_it_is_read_or_refused_in_one_sentence(capsys, tmp_path, ending):
+def test_whatever_is_in_a_file_it_is_read_or_refused_in_one_sentence(
+        capsys, tmp_path, ending, count):
     if ending == 'xml':
         pytest.importorskip('mujoco')
     rng, texts = random.Random(ending), [
         path.read_text() for path in sorted(ROBOTS.glob(f'*.{ending}'))]
-    for _ in range(60):
+    for _ in range(count):
         file = tmp_path / f'robot.{ending}'
         file.write_text(changed(rng.choice(texts), rng), encoding='utf-8')
         code = command.main([str(file)])
