@@ -33,7 +33,7 @@ import numpy as np
 from .builder import Bar, Builder, GROUND, Link, Point
 from .inputs import ANGLE, Input, LENGTH
 from .joint_lines import check_numbers, formula, Line, parsed
-from .planar import GRAZE, Limit
+from .planar import Limit, TOLERANCE
 from .spatial import (
     Circle,
     drawn_ahead,
@@ -389,7 +389,7 @@ class _Drawing:
         """Return the limits of a joint, and have them kept."""
         if not joint.limits:
             return []
-        slack = GRAZE * self._span if joint.line.word == 'slide' else real(EDGE)
+        slack = TOLERANCE * self._span if joint.line.word == 'slide' else real(EDGE)
         found = [Limit(value - joint.limits[0], slack), Limit(joint.limits[1] - value, slack)]
         self._builder.limits += found
         return found

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from typing import Any, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
-from .planar import GRAZE, Limit
+from .planar import Limit, TOLERANCE
 from ..formula.expression import (
     arctangent,
     cosine,
@@ -217,7 +217,7 @@ def rod_on_hinge(hinge: Hinge, pivot: Pivot, end: Vector, length: Real, side: Re
     d = pivot.along(hinge.axis, end)
     w = square_root(square(p) + square(q))
     room = (length - d) * (length + d)
-    tolerance = GRAZE * span * span
+    tolerance = TOLERANCE * span * span
     near, far = (Limit(margin, tolerance) for margin in (
         room - square(w - rho), square(w + rho) - room))
     r1, r2 = near.root(), far.root()
@@ -243,7 +243,7 @@ def rod_on_slide(axis: Vector, pivot: Vector, end: Vector, length: Real, side: R
     """Slide along an axis, a unit vector, so that a rod fits; see `rod_on_hinge`."""
     foot = pivot.minus(end)
     ahead, off = foot.dot(axis), axis.cross(foot).length()
-    limit = Limit((length - off) * (length + off), GRAZE * span * span)
+    limit = Limit((length - off) * (length + off), TOLERANCE * span * span)
     reach = limit.root()
 
     def rate(dx: Real, dy: Real, dz: Real, dlength: Real) -> Real:
