@@ -303,6 +303,14 @@ def test_all_motors_of_a_pose_are_found_and_the_nearest(g1):
     assert g1.inputs_for(('pitch', 'roll'), (1.0, 0.05)) == []
 
 
+def test_the_inverse_s_rates_are_those_of_the_outputs(g1):
+    inputs, rates = g1.inverse(('pitch', 'roll')).over([-0.1, 0.2], [0.05, -0.1])
+    assert inputs.shape == (2, 2, 4)
+    forward = [g1.joint_rates(inputs, [name], by)[name]
+               for by in (0, 1) for name in ('pitch', 'roll')]
+    np.testing.assert_allclose(rates, forward, rtol=1e-12)
+
+
 def test_accelerations_are_those_of_the_motion(g1):
     step, at, speed, change = 1e-4, (0.1, -0.05), (1.0, 2.0), (3.0, -1.0)
     moved = [pose(g1, [x + v * t + 0.5 * a * t * t for x, v, a in zip(at, speed, change)])

@@ -12,7 +12,7 @@ searched: one input between the extremes of the output, several by steps on the 
 
 from __future__ import annotations
 
-from functools import reduce
+from functools import cached_property, reduce
 from itertools import chain, combinations, islice, product
 import math
 from typing import (
@@ -34,7 +34,7 @@ from numpy.typing import ArrayLike
 from .analysis import Analysis
 from .arguments import numbers
 from .curves import LEAST
-from .inverse_linkage import InverseLinkage, taken_apart
+from .inverse_linkage import InverseLinkage, Mode, taken_apart
 from .inverse_rods import InverseRods, taken_apart as rods_taken_apart
 from .planar import TOLERANCE
 from .search import blocks, Search, SINGULAR
@@ -164,7 +164,6 @@ class Inverse:
         self._turned = [(0.5 * input_.turn, input_.turn, LEAST) if input_.turns else
                         (math.inf, math.inf, LEAST * input_.size) for input_ in linkage.inputs]
         self._check, self._choices = linkage.checked(outputs), Cache()
-        self._rated = linkage.posed((), outputs, outputs)
         self.closed: Union[InverseLinkage, InverseRods, None] = (
             taken_apart if linkage.axes == 'xy' else rods_taken_apart)(linkage, outputs)
         if self.closed:
@@ -176,6 +175,11 @@ class Inverse:
         else:
             self._search: Any = Analysis(linkage).branches(*outputs) if self._n == 1 else Search(
                 linkage, outputs)
+
+    @cached_property
+    def _rated(self) -> Pose:
+        """Return the code for the outputs with their rates."""
+        return self.linkage.posed((), self.outputs, self.outputs)
 
     def __str__(self) -> str:
         what = listed(self.outputs)
@@ -258,6 +262,8 @@ class Inverse:
     def _judged_modes(self, closed: Union[InverseLinkage, InverseRods]) -> List[Real]:
         """Return what all modes answer, held to the forward formula and polished by it."""
         n, structure, parts = self._n, self.linkage.structure, []
+        if n == 2 and isinstance(closed, InverseRods) and closed.is_own:
+            return [part for mode in closed.modes for part in self._own_mode(mode)]
         limits = [limit for limit in structure.built.limits if limit.margin.varies]
         forward = [*structure.checked(self.outputs), *(limit.margin for limit in limits)]
         for mode in closed.modes:
@@ -269,6 +275,14 @@ class Inverse:
                     margin + FAR * limit.tolerance
                     for margin, limit in zip(row[n + n * n:], limits)])
         return parts
+
+    def _own_mode(self, mode: Mode) -> List[Real]:
+        """Return the inputs of a mode that need not be held to the forward formula, and rates."""
+        (a, b), (c, d) = mode.rates
+        det = a * d - b * c
+        return [gated(real(1.0), abs(sum(mode.inputs, real(0.0))), real(0.0)),
+                *map(self._counted, range(self._n), mode.inputs),
+                d / det, -c / det, -b / det, a / det]
 
     def _judged(self, inputs: Sequence[Real], reached: Sequence[Real], rates: Sequence[Real],
                 margins: Sequence[Real]) -> List[Real]:

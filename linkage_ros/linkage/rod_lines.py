@@ -374,7 +374,7 @@ class _Drawing:
         span = self._span + (length if not length.varies else real(0.0))
         side, sided = (drawn_ahead if joint.line.word == 'slide' else drawn_side)(
             hinge, pivot.point, end.point)
-        side *= float(self._signs.get(name, 1))
+        side *= self._signs.get(name, 1)
         if joint.line.word == 'slide':
             joint.shift, *limits = rod_on_slide(hinge.axis, base.place, seen, length, side, span)
         else:
