@@ -126,7 +126,9 @@ clean: ## Remove everything that was made
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
 $(install)/.built: $(venv)/.installed $(sources)
-	@colcon --log-base $(log) build --build-base $(build) --install-base $(install) --cmake-args \
+	@echo 'Building linkage_interfaces and linkage_ros: a minute, once.'
+	@colcon --log-base $(log) build --build-base $(build) --install-base $(install) \
+	  --event-handlers console_start_end- summary- status- --cmake-args \
 	  -DBUILD_TESTING=OFF -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH=$(CURDIR)/$(venv) \
 	  -DCMAKE_PROJECT_INCLUDE=$(CURDIR)/wheels/prefix.cmake -DPython3_EXECUTABLE=$(bin)/python
 	@touch $@
