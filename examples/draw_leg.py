@@ -32,7 +32,7 @@ def joints(machines, part):
         angles = machine.linkage.joint_angles(value)
         found.update((called.name, called.of(angles[link]))
                      for link, called in machine.joints.items())
-        found[drive.source], _ = machine.told(drive, value, 0.0)
+        found[drive.source], _ = machine.to_source(drive, value, 0.0)
     return found
 
 

@@ -8,7 +8,7 @@ import os
 import sys
 from typing import Callable, List, Mapping, NoReturn, Optional, Sequence
 
-from .scene import Machine, SceneError
+from .scene import SceneError, SceneMechanism
 from .words import meant
 
 
@@ -60,7 +60,7 @@ def run(name: str, work: Callable, args: Optional[Sequence[str]], needs: str) ->
     return 1
 
 
-def chosen(machines: Mapping[str, Machine], names: Sequence[str]) -> List[Machine]:
+def chosen(machines: Mapping[str, SceneMechanism], names: Sequence[str]) -> List[SceneMechanism]:
     """Return the machines that are named, or all; raise RequestError for one that is not there."""
     for name in names:
         if name not in machines:

@@ -25,6 +25,7 @@ What the kinematics node has to publish after any history, worked out by the lib
 """
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import combinations
 import math
 import re
@@ -33,7 +34,7 @@ import time
 from typing import NamedTuple
 
 from linkage_ros import scene
-from linkage_ros.linkage.quantities import Spot
+from linkage_ros.linkage.quantities import LinkPoint
 from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.robot_model import bodies, shapes, urdf
 import numpy as np
@@ -114,7 +115,7 @@ class Solver:
         self._sizes = [machine.scale if name in slides else 1.0 for name in self._joints]
         self.shown = _shown(machine)
         spots = [spot for pieces in self.shown.values() for piece in pieces for spot in piece
-                 if isinstance(spot, Spot)]
+                 if isinstance(spot, LinkPoint)]
         self._spots = tuple(dict.fromkeys(spots))
 
     def pose(self, values, speeds):
@@ -155,7 +156,7 @@ class Solver:
         for id_, pieces in self.shown.items():
             legs = _on_each_side(pose.legs) if id_ == GROUND else pose.legs
             found[id_] = [
-                spots[leg.number][point] if isinstance(point, Spot)
+                spots[leg.number][point] if isinstance(point, LinkPoint)
                 else leg.places[self.machine.linkage.points.index(point)]
                 for leg in legs for piece in pieces for point in piece]
         return found
@@ -190,7 +191,7 @@ def _shown(machine):
         id_ = 3 if shape.kind == shapes.GUIDE else 6 if shape.slide.name in machine.inputs else 4
         pieces[id_].append((shape.start, shape.end))
     drawn = {id_: [piece for piece in several if all(
-        isinstance(point, Spot) or point in wanted for point in piece)]
+        isinstance(point, LinkPoint) or point in wanted for point in piece)]
         for id_, several in pieces.items()}
     return {id_: several for id_, several in drawn.items() if several}
 
@@ -252,7 +253,7 @@ class Model:
         return set(moved)
 
     def _source(self, state, machine, i, drive, position, speed):
-        value, speed = machine.understood(drive, position, speed, state.values[i])
+        value, speed = machine.from_source(drive, position, speed, state.values[i])
         if math.isfinite(value) or not drive.measures:
             state.values[i], state.speeds[i] = value, speed
 
@@ -626,7 +627,7 @@ class Bench:
         x, y, z, roll, pitch, yaw = machine.pose
         turned = rotation(roll, pitch, yaw)
         q = marker.pose.orientation
-        if not np.allclose(turned, matrix(q.x, q.y, q.z, q.w), atol=1e-12):
+        if not np.abs(turned - matrix(q.x, q.y, q.z, q.w)).max() < 1e-12:
             raise Mismatch(f'{topic}: marker {marker.id} is turned')
         at, step = marker.pose.position, bodies.size(machine) / 250.0
         heights = [(x, y, z) + step * layer * turned[:, 2] for layer in LAYERS]
@@ -659,6 +660,7 @@ class Bench:
                 and message.header.frame_id == self.model.frames[name])
 
 
+@lru_cache
 def rotation(roll, pitch, yaw):
     """Return the rotation about the fixed axes x, y, z in turn."""
     def about(i, j, angle):
@@ -798,7 +800,7 @@ class Generator:
             return float(self._pick(SPECIAL))
         value = self._input(drive)
         if drive.measures:
-            value = float(machine.told(drive, value, 0.0)[0])
+            value = float(machine.to_source(drive, value, 0.0)[0])
             return value if math.isfinite(value) else float(self._random.normal())
         return (value - drive.offset) / drive.ratio
 

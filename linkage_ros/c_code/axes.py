@@ -9,7 +9,7 @@ from typing import List, NamedTuple, Optional, Sequence
 import numpy as np
 
 from ..linkage.builder import GROUND, Link
-from ..scene import Machine
+from ..scene import SceneMechanism
 from ..scene.joint_names import JointName
 from ..scene.motion import Motion
 from ..words import listed
@@ -35,8 +35,8 @@ class Axis(NamedTuple):
     wraps: bool
 
 
-def axis(machine: Machine, output: str, name: str = '', factor: float = 1.0, offset: float = 0.0,
-         wraps: bool = False) -> Axis:
+def axis(machine: SceneMechanism, output: str, name: str = '', factor: float = 1.0,
+         offset: float = 0.0, wraps: bool = False) -> Axis:
     """Return the axis of an output, from its value in the scene by a factor and an offset."""
     linkage = machine.linkage
     factor *= machine.scale_of(output)
@@ -46,19 +46,19 @@ def axis(machine: Machine, output: str, name: str = '', factor: float = 1.0, off
                 math.tau * abs(factor) if angular and not counts_turns else 0.0, wraps)
 
 
-def actuators(machine: Machine) -> List[Axis]:
+def actuators(machine: SceneMechanism) -> List[Axis]:
     """Return what the sources of a mechanism's inputs tell."""
     return [axis(machine, drive.measures or name, drive.source, 1.0 / drive.ratio,
                  -drive.offset / drive.ratio) for name, drive in machine.inputs.items()]
 
 
-def joints(machine: Machine, names: Sequence[str] = ()) -> List[Axis]:
+def joints(machine: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
     """
     Return the joints that a controller commands, as many as there are inputs.
 
     Parameters
     ----------
-    machine : Machine
+    machine : SceneMechanism
         Of several legs it is the first.
     names : sequence of str
         Joints by their names in the scene, or outputs after the mechanism's name: 'leg_P.x'.
@@ -85,7 +85,7 @@ def joints(machine: Machine, names: Sequence[str] = ()) -> List[Axis]:
             for output, called in zip(outputs, named)]
 
 
-def output_of(machine: Machine, name: str) -> Optional[str]:
+def output_of(machine: SceneMechanism, name: str) -> Optional[str]:
     """Return the output that a name in the scene stands for, None if it is none."""
     for link in machine.linkage.joints:
         called = machine.joints.get(_key(machine, link))
@@ -95,18 +95,18 @@ def output_of(machine: Machine, name: str) -> Optional[str]:
     return output if output != name and machine.linkage.has_output(output) else None
 
 
-def start(machine: Machine) -> List[float]:
+def start(machine: SceneMechanism) -> List[float]:
     """Return where the inputs start, in the linkage's own units."""
     return [Motion.of(drive).at(0)[0] / machine.scale_of(name)
             for name, drive in machine.inputs.items()]
 
 
-def _key(machine: Machine, link: str) -> str:
+def _key(machine: SceneMechanism, link: str) -> str:
     """Return by what a link of the first leg is found among the joints' names."""
     return link if link in machine.inputs else next(iter(machine.assembly().legs)) + link
 
 
-def _chain(machine: Machine) -> List[str]:
+def _chain(machine: SceneMechanism) -> List[str]:
     """Return links, each on the one before it, that tell the inputs."""
     links = machine.linkage.links
     barrels = {link.parent for link in links if link.name in machine.inputs}
@@ -130,7 +130,7 @@ def _chain(machine: Machine) -> List[str]:
         return list(machine.inputs)
 
 
-def _tell(machine: Machine, outputs: Sequence[str]) -> bool:
+def _tell(machine: SceneMechanism, outputs: Sequence[str]) -> bool:
     """Return whether outputs change independently of each other at the start."""
     pose = machine.linkage.posed((), (), tuple(outputs))
     rates = np.reshape(pose.over(*start(machine)), (-1, len(outputs)))

@@ -9,7 +9,7 @@ from typing import List, Optional, Sequence, Tuple
 from . import header
 from .axes import output_of
 from .. import command, scene
-from ..scene import Machine
+from ..scene import SceneMechanism
 from ..words import listed
 
 NAME = 'c_code'
@@ -32,8 +32,8 @@ def show(args: Optional[List[str]]) -> None:
         raise command.RequestError(str(error)) from None
 
 
-def with_joints(machines: Sequence[Machine], names: Sequence[str]
-                ) -> List[Tuple[Machine, List[str]]]:
+def with_joints(machines: Sequence[SceneMechanism], names: Sequence[str]
+                ) -> List[Tuple[SceneMechanism, List[str]]]:
     """Return each machine with those of some joints that are its own."""
     own = [(machine, [name for name in names if output_of(machine, name)])
            for machine in machines]

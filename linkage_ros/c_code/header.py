@@ -19,21 +19,21 @@ from .names import field
 from .sides import Sides
 from ..formula.program import Pose
 from ..linkage.inputs import Input
-from ..scene import Machine
+from ..scene import SceneMechanism
 from ..words import listed, plain_text
 
 # How many values of the input the error of `float` is measured at.
 SAMPLED = 2001
 
 
-def written(machine: Machine, outputs: Sequence[str] = (), single: bool = False,
+def written(machine: SceneMechanism, outputs: Sequence[str] = (), single: bool = False,
             joints: Sequence[str] = ()) -> str:
     """
     Return the header of a mechanism.
 
     Parameters
     ----------
-    machine : Machine
+    machine : SceneMechanism
         Of a scene; its scale is applied, of several legs the first is written.
     outputs : sequence of str
         What `input_for` takes: an inverse is written for each.
@@ -51,7 +51,7 @@ def written(machine: Machine, outputs: Sequence[str] = (), single: bool = False,
     return _Header(machine, single, joints, [plain_text(output) for output in outputs]).text()
 
 
-def opened(machine: Machine, joints: Sequence[str] = ()) -> str:
+def opened(machine: SceneMechanism, joints: Sequence[str] = ()) -> str:
     """Return a header of actuators and joints alone, for dimensions that are given to it."""
     sides = Sides(machine, joints, is_open=True)
     text = sides.text()
@@ -77,7 +77,7 @@ def guarded(sides: Sides, about: Sequence[str], parts: Sequence[str]) -> str:
 
 
 class _Header:
-    def __init__(self, machine: Machine, single: bool, joints: Sequence[str],
+    def __init__(self, machine: SceneMechanism, single: bool, joints: Sequence[str],
                  outputs: Sequence[str]):
         self.machine, self.name = machine, machine.name
         self.linkage = machine.linkage

@@ -12,13 +12,13 @@ from . import header
 from .axes import actuators, Axis, joints
 from .names import comment, constants, filled, literal
 from .sides import template
-from ..scene import Machine
+from ..scene import SceneMechanism
 
 # What a package may be called.
 PACKAGE = re.compile(r'(?=.{2,64}$)[a-z](_?[a-z0-9])*', re.ASCII)
 
 
-def package(name: str, scene: str, machines: Sequence[Tuple[Machine, Sequence[str]]]
+def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequence[str]]]
             ) -> Dict[Path, str]:
     """
     Return the files of a package, by their path in it.
@@ -29,7 +29,7 @@ def package(name: str, scene: str, machines: Sequence[Tuple[Machine, Sequence[st
         The package's.
     scene : str
         The name of the scene's file.
-    machines : sequence of (Machine, sequence of str)
+    machines : sequence of (SceneMechanism, sequence of str)
         The mechanisms and the joints that are commanded of each; see `axes.joints`.
 
     Raises
@@ -66,7 +66,7 @@ def package(name: str, scene: str, machines: Sequence[Tuple[Machine, Sequence[st
     return files
 
 
-def _values(package_name: str, class_: str, machine: Machine,
+def _values(package_name: str, class_: str, machine: SceneMechanism,
             commanded: Sequence[Axis]) -> Mapping[str, str]:
     driven = actuators(machine)
     roles = list(machine.inputs), [axis.output for axis in commanded]

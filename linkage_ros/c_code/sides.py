@@ -21,7 +21,7 @@ from ..formula.program import Program
 from ..linkage.builder import in_metres
 from ..linkage.inverse_linkage import InverseLinkage
 from ..linkage.inverse_rods import InverseRods
-from ..scene import Machine
+from ..scene import SceneMechanism
 
 # In double and in single precision: below which part of its size a Jacobian is singular, and in a
 # search; what a search may miss, an input may be beside its sweep, and what is near enough.
@@ -45,7 +45,7 @@ class Sides:
     Of an open one the dimensions may be changed; see `axes.joints` for `names`.
     """
 
-    def __init__(self, machine: Machine, names: Sequence[str] = (), single: bool = False,
+    def __init__(self, machine: SceneMechanism, names: Sequence[str] = (), single: bool = False,
                  is_open: bool = False, outputs: Sequence[Tuple[str, ...]] = ()):
         self.machine, self.name = machine, machine.name
         self.linkage = open_linkage(machine.linkage) if is_open else machine.linkage

@@ -18,7 +18,7 @@ from .curves import extremes
 from .dead_points import NEAR, near_zeros, NearZero
 from .inputs import Arc
 from .monotone import cut, distinct, MonotoneBranches
-from .planar import GRAZE
+from .planar import TOLERANCE
 
 if TYPE_CHECKING:
     from .mechanism import Mechanism
@@ -69,7 +69,7 @@ class Analysis:
         marks = distinct((near.value for near in self._near_zeros()
                           if near.gap <= NEAR * near.size), self._first.counted())
         return MonotoneBranches(self._curve('output', output), self._reach(), marks, angular,
-                                GRAZE * (math.pi if angular else self._linkage.longest))
+                                TOLERANCE * (math.pi if angular else self._linkage.longest))
 
     def _reach(self) -> List[Arc]:
         """Return the reach in arcs, none of them on both sides of an end of a turn."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from .curves import refined, sampled
 from .inputs import Arc, Input
-from .planar import GRAZE
+from .planar import TOLERANCE
 
 # How near to zero a closure comes, as a part of its size, for outputs to change quickly there.
 NEAR = 1e-2
@@ -62,7 +62,7 @@ def near_zeros(curve: Callable, arc: Arc, input_: Input, rounding: np.ndarray,
     size = np.fmax.reduce(np.abs(values), axis=1, initial=0.0)
     # An arm vanishes where it is as short as rounding makes it. What is never more than rounding,
     # as the area of a kite that always lies flat, tells nothing.
-    rounding = np.where(size > FLAT * rounding, rounding + GRAZE ** 2 * size, -np.inf)
+    rounding = np.where(size > FLAT * rounding, rounding + TOLERANCE ** 2 * size, -np.inf)
     for end in (0, -1):
         if input_.is_cut(theta[end]):
             yield from map(NearZero, [float(theta[end])] * len(size),

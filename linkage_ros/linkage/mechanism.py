@@ -24,7 +24,7 @@ from .design import Design
 from .input_range import arcs
 from .inputs import Arc, Input
 from .inverse import Answer, Inverse
-from .quantities import Points, Spot, Structure, structure_of
+from .quantities import LinkPoint, Points, Structure, structure_of
 from ..cache import Cache
 from ..formula.expression import derivative, Real
 from ..formula.program import Batch, evaluate, Pose, Program
@@ -454,7 +454,7 @@ class Mechanism:
 
         Parameters
         ----------
-        points : tuple of str or Spot
+        points : tuple of str or LinkPoint
             The joints, and points that are none, whose places are wanted.
         joints, moving : tuple of str
             The links whose joint angles and velocities are wanted.
@@ -474,12 +474,12 @@ class Mechanism:
 
     def _legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...]) -> Pose:
         lengths, unit = dict(self._lengths), self._lengths[UNIT.args[0]]
-        named: List[Union[str, Spot]] = []
+        named: List[Union[str, LinkPoint]] = []
         for i, point in enumerate(points):
-            if isinstance(point, Spot):
+            if isinstance(point, LinkPoint):
                 names = f'[x{i}]', f'[y{i}]'
                 lengths.update(zip(names, (point.x / unit, point.y / unit)))
-                point = Spot(point.link, *names)
+                point = LinkPoint(point.link, *names)
             named.append(point)
         program = self._structure.legs(tuple(named), joints, moving)
         return program.bind(lengths, dict(self._evaluated), self._accelerate)

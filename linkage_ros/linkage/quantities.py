@@ -53,7 +53,7 @@ class Leg(NamedTuple):
     size: Any
 
 
-class Spot(NamedTuple):
+class LinkPoint(NamedTuple):
     """A point that is no joint: the link that carries it, and where it lies there [m]."""
 
     link: str
@@ -62,7 +62,7 @@ class Spot(NamedTuple):
 
 
 # Joints by name, and spots.
-Points = Tuple[Union[str, Spot], ...]
+Points = Tuple[Union[str, LinkPoint], ...]
 
 
 class Structure:
@@ -99,7 +99,7 @@ class Structure:
         return [in_metres(part) for place in map(self._place, names)
                 for part in (place if isinstance(place, Vector) else (place.x, place.y))]
 
-    def _place(self, point: Union[str, Spot]) -> Union[Complex, Vector]:
+    def _place(self, point: Union[str, LinkPoint]) -> Union[Complex, Vector]:
         """Return where a joint is, or a spot whose coordinates are dimensions."""
         if isinstance(point, str):
             return self.built.points[point].place

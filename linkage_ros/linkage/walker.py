@@ -17,7 +17,7 @@ import numpy as np
 
 from .curves import drawn
 from .mechanism import Mechanism
-from .quantities import Leg, Spot
+from .quantities import Leg, LinkPoint
 from ..formula.program import Batch
 
 
@@ -159,7 +159,7 @@ class Assembly:
         except ImportError:
             return self.linkage
 
-    def solution(self, points: Sequence[Union[str, Spot]] = (), joints: Sequence[str] = (),
+    def solution(self, points: Sequence[Union[str, LinkPoint]] = (), joints: Sequence[str] = (),
                  rates: Optional[Sequence[str]] = None, efforts: int = 0) -> Solution:
         """
         Return what solves all legs for points, joint angles and rates, and nothing else.

@@ -16,26 +16,16 @@ from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from . import messages
+from .log import Throttle
 from .mechanism_model import MechanismModel, Pose
-from .message_layout import PatchedPublisher
-from .publishers import LATCHED, TrackedPublisher
-from .throttle import Throttle
+from .publishers import LATCHED, PatchedPublisher, TrackedPublisher
 from .. import scene
 from ..linkage.walker import Solution
 
 
 class DrivenMechanism:
     """
-    The state and the topics of one mechanism.
-
-    Parameters
-    ----------
-    node : rclpy.node.Node
-        Whose topics they are.
-    machine : Machine
-        The mechanism.
-    changed : callable
-        Called when subscribers come or go.
+    The state and the topics of one mechanism; `changed` is called when subscribers come or go.
 
     Attributes
     ----------
@@ -50,7 +40,7 @@ class DrivenMechanism:
 
     """
 
-    def __init__(self, node: Any, machine: scene.Machine, changed: Callable[[], None]):
+    def __init__(self, node: Any, machine: scene.SceneMechanism, changed: Callable[[], None]):
         name = self.name = machine.name
         self._joint_states = TrackedPublisher(
             node, JointState, f'{name}/joint_states', 10, changed)
@@ -106,7 +96,7 @@ class DrivenMechanism:
         """Set an input by what a sensor reads [rad or m]; return False if that cannot be."""
         source = self.model.inputs[i]
         near = float(self.inputs[0, i]) if self.known[0, i] else None
-        value, speed = self.model.machine.understood(source, position, speed, near)
+        value, speed = self.model.machine.from_source(source, position, speed, near)
         if not math.isfinite(value):
             self._throttle.warn(source.source, lambda: (
                 f'{source.measures} cannot be where {source.source} is {position:.6g}: it is '
@@ -166,7 +156,7 @@ class DrivenMechanism:
             if topic.has_subscribers:
                 yield model.publisher(topic.publisher, build, pose, self._logger)
 
-    def prepared(self, machine: scene.Machine, frame_id: str, prefix: str,
+    def prepared(self, machine: scene.SceneMechanism, frame_id: str, prefix: str,
                  in_scene: bool) -> MechanismModel:
         """Return the model of a mechanism, with what its subscribers need; the same if it is."""
         before = self._model

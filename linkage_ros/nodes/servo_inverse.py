@@ -158,7 +158,7 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
             value for value, reached in zip(values, response.reachable) if not reached]), MESSAGE)
 
 
-def solve_together(machine: scene.Machine, request: Any, response: Any) -> None:
+def solve_together(machine: scene.SceneMechanism, request: Any, response: Any) -> None:
     """Answer a request for several outputs; raise ValueError if it cannot be answered."""
     values, near, n = request.values, request.near, len(machine.inputs)
     if len(request.outputs) != n:
@@ -180,11 +180,11 @@ def solve_together(machine: scene.Machine, request: Any, response: Any) -> None:
     response.message = '' if answers else elided(inverse.reason(*values), MESSAGE)
 
 
-def _machine(scene_: scene.Scene, name: str, output: str) -> scene.Machine:
+def _machine(scene_: scene.Scene, name: str, output: str) -> scene.SceneMechanism:
     """Return a mechanism by its name, or the only one, or for a lever the only slotted lever."""
     levers = {key: machine for key, machine in scene_.machines.items()
               if machine.linkage.type == 'slotted_lever'}
-    machines: Mapping[str, scene.Machine] = scene_.machines if output else levers
+    machines: Mapping[str, scene.SceneMechanism] = scene_.machines if output else levers
     if name in machines:
         return machines[name]
     if not name:
@@ -201,7 +201,7 @@ def _machine(scene_: scene.Scene, name: str, output: str) -> scene.Machine:
     raise ValueError(f'mechanism may be empty only where there is one{what}; allowed: {allowed}')
 
 
-def _machine_together(scene_: scene.Scene, name: str) -> scene.Machine:
+def _machine_together(scene_: scene.Scene, name: str) -> scene.SceneMechanism:
     """Return a mechanism by its name, or the only one with several inputs."""
     able = {key: machine for key, machine in scene_.machines.items() if len(machine.inputs) > 1}
     found = scene_.machines.get(name) or (

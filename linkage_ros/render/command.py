@@ -12,7 +12,7 @@ from . import parts
 from .. import scene
 from ..command import chosen, Parser, RequestError, run
 from ..linkage.arithmetic import Formula
-from ..scene.machine import IN_SPACE
+from ..scene.scene_mechanism import IN_SPACE
 from ..words import meant
 
 STILL, MOVING = ('.png', '.svg'), ('.gif', '.mp4')

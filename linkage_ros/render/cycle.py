@@ -13,7 +13,7 @@ from typing import NamedTuple, Tuple
 import numpy as np
 
 from ..robot_model.shapes import drawn
-from ..scene import Drive, in_words, Machine, SceneError
+from ..scene import in_words, InputSettings, SceneError, SceneMechanism
 from ..scene.motion import Motion
 
 SAMPLES = 720  # of a turn
@@ -39,7 +39,7 @@ class Wheel:
 
     """
 
-    def __init__(self, drive: Drive):
+    def __init__(self, drive: InputSettings):
         self.input = drive.input
         self._sweep = sweep = drive.sweep
         self._sign = math.copysign(1.0, drive.speed)
@@ -90,7 +90,7 @@ class Cycle:
 
     """
 
-    def __init__(self, machine: Machine):
+    def __init__(self, machine: SceneMechanism):
         assembly = machine.assembly()
         sliding = drawn(machine, machine.points)
         self._solution = assembly.solution((*machine.linkage.points, *(
@@ -121,7 +121,7 @@ class Cycle:
         before = self.course[samples % (len(self.course) - 1), :, joint]
         return np.concatenate([before, self.pose(end).places[None, :, joint]])
 
-    def locus(self, machine: Machine) -> np.ndarray:
+    def locus(self, machine: SceneMechanism) -> np.ndarray:
         """
         Return the whole curve of the first leg's tracer [m], shape (n, 2).
 

@@ -32,7 +32,7 @@ class Picture:
 
     Parameters
     ----------
-    machines : sequence of Machine
+    machines : sequence of SceneMechanism
         What to draw.
     size : (int, int)
         Width and height in pixels.

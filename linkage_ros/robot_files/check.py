@@ -66,7 +66,7 @@ class Track(NamedTuple):
     volume: np.ndarray
 
 
-def compared(robot: Robot, machine: scene.Machine, driven: Sequence[str],
+def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
              ends: Mapping[str, Tuple[float, float]], slack: float) -> Found:
     """
     Compare what a mechanism publishes with the joints of its robot.
@@ -75,7 +75,7 @@ def compared(robot: Robot, machine: scene.Machine, driven: Sequence[str],
     ----------
     robot : Robot
         In a pose in which its loops are closed.
-    machine : Machine
+    machine : SceneMechanism
         The mechanism.
     driven : sequence of str
         The joints that move it, its sources or what follows them.
@@ -133,8 +133,8 @@ def compared(robot: Robot, machine: scene.Machine, driven: Sequence[str],
                  beyond)
 
 
-def _differences(machine: scene.Machine, component: Component, sources: List[str], track: Track
-                 ) -> Tuple[np.ndarray, List[List[str]]]:
+def _differences(machine: scene.SceneMechanism, component: Component, sources: List[str],
+                 track: Track) -> Tuple[np.ndarray, List[List[str]]]:
     """Return the worst difference in each pose, and of which joint."""
     values = [drive.ratio * track.motors[..., sources.index(drive.source)] + drive.offset
               for drive in machine.inputs.values()]

@@ -87,7 +87,7 @@ def rpy(turned: np.ndarray) -> Tuple[float, float, float]:
             math.atan2(-turned[2, 0], cos * a + sin * b), yaw)
 
 
-def others(robot: Robot, machines: Dict[str, scene.Machine], held: Dict[str, float]
+def others(robot: Robot, machines: Dict[str, scene.SceneMechanism], held: Dict[str, float]
            ) -> Dict[str, Any]:
     """Return the parameters of a mechanism of all joints that a scene does not publish."""
     known = {drive.source for machine in machines.values() for drive in machine.inputs.values()}

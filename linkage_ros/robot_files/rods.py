@@ -234,7 +234,7 @@ def _lines(found: Rods) -> Tuple[List[str], List[str]]:
             f'are the largest shown to have one at most: {said}.']
 
 
-def _ranges(machine: scene.Machine, found: Rods) -> Dict[str, Tuple[float, float]]:
+def _ranges(machine: scene.SceneMechanism, found: Rods) -> Dict[str, Tuple[float, float]]:
     """Return ranges of the motors, as the robot counts them, in which all is a pose."""
     names = [*machine.inputs]
     start = np.array([machine.inputs[name].start for name in names])
@@ -254,7 +254,7 @@ def _ranges(machine: scene.Machine, found: Rods) -> Dict[str, Tuple[float, float
             for zero in [machine.inputs[name].offset]}
 
 
-def _corners(machine: scene.Machine, found: Rods) -> Iterator[str]:
+def _corners(machine: scene.SceneMechanism, found: Rods) -> Iterator[str]:
     """Yield where the motors are at the corners of the hinges' limits."""
     for held in machine.linkage.windows():
         names = [line.names[0] for line in held.lines]

@@ -16,7 +16,7 @@ from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 import numpy as np
 
 from .bodies import BALL, Body, BOX, Joint, Piece, Point, Robot, ROD, size
-from ..scene import Machine, SceneError
+from ..scene import SceneError, SceneMechanism
 from ..scene.motion import Motion
 
 # Of aluminium [kg/m^3].
@@ -106,7 +106,7 @@ def assembled(robot: Robot, density: float = DENSITY) -> Assembled:
     return made
 
 
-def _solved(machine: Machine, starts: Dict[str, float]
+def _solved(machine: SceneMechanism, starts: Dict[str, float]
             ) -> Tuple[Dict[str, float], Dict[str, Dict[str, float]]]:
     """Return joints' positions at the start; of those that are geared, the rate by each input."""
     assembly, called, inputs = machine.assembly(), machine.joints, list(machine.inputs)
@@ -129,7 +129,7 @@ def _solved(machine: Machine, starts: Dict[str, float]
     return {called[name].name: called[name].of(value) for name, value in values.items()}, rates
 
 
-def _slots(machine: Machine, bodies: Sequence[Body], positions: Dict[str, float]
+def _slots(machine: SceneMechanism, bodies: Sequence[Body], positions: Dict[str, float]
            ) -> Iterator[Body]:
     """Yield what runs in the slot of a yoke, which no joint of the tree stands for."""
     at: Dict[str, Tuple[complex, float]] = {}

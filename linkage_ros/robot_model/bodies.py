@@ -31,8 +31,8 @@ from . import shapes
 from .. import palette
 from ..linkage.builder import GROUND
 from ..linkage.output_range import common_reach, ground_frame, Travel, travels
-from ..scene import Machine, SceneError
-from ..scene.machine import IN_SPACE
+from ..scene import SceneError, SceneMechanism
+from ..scene.scene_mechanism import IN_SPACE
 from ..words import listed
 
 # As in the markers: bars, what inputs move, guides and joints.
@@ -133,7 +133,7 @@ class Body:
 class Part:
     """The bodies of one mechanism, parents first."""
 
-    machine: Machine
+    machine: SceneMechanism
     bodies: List[Body]
 
     @cached_property
@@ -176,13 +176,14 @@ class Robot:
                                  f'{tag}s {name}')
 
 
-def robot(machines: Iterable[Machine], frame_id: str, width: Optional[float] = None) -> Robot:
+def robot(machines: Iterable[SceneMechanism], frame_id: str,
+          width: Optional[float] = None) -> Robot:
     """
     Return mechanisms as one robot model.
 
     Parameters
     ----------
-    machines : iterable of Machine
+    machines : iterable of SceneMechanism
         What is in it; the model of a single one bears its name.
     frame_id : str
         The root link: the frame of the poses of those that have none of their own.
@@ -233,7 +234,7 @@ def _root(robots: Sequence[Robot], above: Mapping[str, str]) -> str:
     return frames[0]
 
 
-def _robot(machine: Machine, frame_id: str, width: Optional[float]) -> Robot:
+def _robot(machine: SceneMechanism, frame_id: str, width: Optional[float]) -> Robot:
     bodies = list(_Tree(machine, width).bodies(frame_id))
     made = Robot(machine.name, frame_id, [Part(machine, bodies)])
     made.check_names(f'{machine.name}.joints')
@@ -255,7 +256,7 @@ def _numbers(robot: Robot) -> Iterator[float]:
             yield from point.place
 
 
-def size(machine: Machine) -> float:
+def size(machine: SceneMechanism) -> float:
     """Return the longest bar [m]; raise SceneError where it cannot be drawn."""
     length = machine.scale * float(machine.linkage.longest)
     if not SMALLEST <= length <= LARGEST:
@@ -268,7 +269,7 @@ def size(machine: Machine) -> float:
 class _Tree:
     """The bodies of a mechanism."""
 
-    def __init__(self, machine: Machine, width: Optional[float]):
+    def __init__(self, machine: SceneMechanism, width: Optional[float]):
         if machine.in_space:
             raise SceneError(f'{machine.name} is {IN_SPACE}')
         length = size(machine)

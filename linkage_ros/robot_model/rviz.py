@@ -10,7 +10,7 @@ from typing import Any, Dict, Iterable, Mapping, Tuple
 
 import numpy as np
 
-from ..scene import Machine
+from ..scene import SceneMechanism
 
 GROUP = 'rviz_common/Group'
 NEEDS_TRANSFORMS = ('rviz_default_plugins/RobotModel', 'rviz_default_plugins/TF')
@@ -22,8 +22,8 @@ AWAY = 1.1 / math.sin(math.radians(22.5))
 DOWN, STEEPEST = 0.15, 1.56
 
 
-def adapted(config: dict, machines: Mapping[str, Machine], frame_id: str, namespace: str = '',
-            robot_model: bool = False, frame_prefix: str = '') -> dict:
+def adapted(config: dict, machines: Mapping[str, SceneMechanism], frame_id: str,
+            namespace: str = '', robot_model: bool = False, frame_prefix: str = '') -> dict:
     """
     Return a configuration that shows other mechanisms.
 
@@ -64,7 +64,7 @@ def adapted(config: dict, machines: Mapping[str, Machine], frame_id: str, namesp
     return made
 
 
-def _camera(machines: Iterable[Machine]) -> Dict[str, Any]:
+def _camera(machines: Iterable[SceneMechanism]) -> Dict[str, Any]:
     """Return from where all that mechanisms reach is seen, square to the plane of the first."""
     seen, normals = zip(*map(_seen, machines))
     places, normal = np.concatenate(seen), normals[0]
@@ -78,7 +78,7 @@ def _camera(machines: Iterable[Machine]) -> Dict[str, Any]:
             'Yaw': round(yaw % math.tau, 6)}
 
 
-def _seen(machine: Machine) -> Tuple[np.ndarray, np.ndarray]:
+def _seen(machine: SceneMechanism) -> Tuple[np.ndarray, np.ndarray]:
     """Return points that a mechanism's joints come to [m], (n, 3), and its plane's normal."""
     values = [np.concatenate([np.linspace(low, high, 25) for low, high in (
         [drive.ends] if drive.ends else drive.reach)]) / machine.scale_of(name)

@@ -19,8 +19,8 @@ import numpy as np
 from ..linkage.builder import GROUND, Link
 from ..linkage.mechanism import Mechanism
 from ..linkage.output_range import ground_frame
-from ..linkage.quantities import Spot
-from ..scene import Drive, Machine
+from ..linkage.quantities import LinkPoint
+from ..scene import InputSettings, SceneMechanism
 
 GUIDE, BLOCK, BARREL, ROD = 'guide', 'block', 'barrel', 'rod'
 # Of the longest bar: half the length of a block, and how far a guide goes beyond its block.
@@ -40,8 +40,8 @@ class Shape(NamedTuple):
 
     kind: str
     slide: Link
-    start: Spot
-    end: Spot
+    start: LinkPoint
+    end: LinkPoint
 
     @property
     def is_fixed(self) -> bool:
@@ -49,7 +49,7 @@ class Shape(NamedTuple):
         return self.start.link == GROUND
 
 
-def shapes(machine: Machine) -> List[Shape]:
+def shapes(machine: SceneMechanism) -> List[Shape]:
     """Return what slides in a mechanism, guides first; what no pose is found of is left out."""
     linkage = machine.linkage
     slides = [link for link in linkage.links if link.kind == 'prismatic']
@@ -64,7 +64,7 @@ def shapes(machine: Machine) -> List[Shape]:
     return sorted(found, key=lambda shape: shape.kind != GUIDE)
 
 
-def drawn(machine: Machine, wanted: Collection[str]) -> List[Shape]:
+def drawn(machine: SceneMechanism, wanted: Collection[str]) -> List[Shape]:
     """Return what is drawn where these joints are wanted; rods are drawn as other bars are."""
     return [shape for shape in shapes(machine)
             if shape.kind != ROD and {shape.slide.joint, shape.slide.tip} <= set(wanted)]
@@ -90,32 +90,34 @@ def _area(p: complex, q: complex, r: complex) -> float:
     return abs(((q - p).conjugate() * (r - p)).imag) / 2.0
 
 
-def marks(linkage: Mechanism, wanted: Collection[str]) -> List[Tuple[str, Spot, Spot]]:
+def marks(linkage: Mechanism, wanted: Collection[str]) -> List[Tuple[str, LinkPoint, LinkPoint]]:
     """Return for each wanted joint on the ground the triangle that it stands on."""
     height = MARK * linkage.longest
     width = HALF_MARK * height
-    return [(name, Spot(GROUND, x - width, y - height), Spot(GROUND, x + width, y - height))
+    return [(name, LinkPoint(GROUND, x - width, y - height),
+             LinkPoint(GROUND, x + width, y - height))
             for name, (x, y) in ground_frame(linkage).items() if name in wanted]
 
 
-def _cylinder(link: Link, low: float, high: float) -> Iterable[Tuple[str, Spot, Spot]]:
+def _cylinder(link: Link, low: float, high: float) -> Iterable[Tuple[str, LinkPoint, LinkPoint]]:
     """Yield barrel and rod: a barrel takes in the stroke, as far as there is room for it."""
     barrel = min(max(high - low, SHORT_BARREL * low), LONG_BARREL * low)
-    yield BARREL, Spot(link.parent, 0.0, 0.0), Spot(link.parent, barrel, 0.0)
-    yield ROD, Spot(link.name, barrel - high, 0.0), Spot(link.name, 0.0, 0.0)
+    yield BARREL, LinkPoint(link.parent, 0.0, 0.0), LinkPoint(link.parent, barrel, 0.0)
+    yield ROD, LinkPoint(link.name, barrel - high, 0.0), LinkPoint(link.name, 0.0, 0.0)
 
 
 def _block(link: Any, low: float, high: float, frames: Dict[str, dict],
-           half: float) -> Iterable[Tuple[str, Spot, Spot]]:
+           half: float) -> Iterable[Tuple[str, LinkPoint, LinkPoint]]:
     """Yield the guide, on the link that a slide slides on, and the block."""
     x, y = frames[link.name][link.tip]
     start, along = complex(*frames[link.parent][link.joint]), cmath.rect(1.0, link.zero)
     first, last = (start + along * complex(x + end, y) for end in (low - half, high + half))
-    yield GUIDE, Spot(link.parent, first.real, first.imag), Spot(link.parent, last.real, last.imag)
-    yield BLOCK, Spot(link.name, x - half, y), Spot(link.name, x + half, y)
+    yield (GUIDE, LinkPoint(link.parent, first.real, first.imag),
+           LinkPoint(link.parent, last.real, last.imag))
+    yield BLOCK, LinkPoint(link.name, x - half, y), LinkPoint(link.name, x + half, y)
 
 
-def _travels(machine: Machine,
+def _travels(machine: SceneMechanism,
              slides: Sequence[Link]) -> Iterable[Tuple[Link, Tuple[float, float]]]:
     """Yield how far each goes [m] while the inputs take all values that they may, before scale."""
     names = [link.name for link in slides]
@@ -129,7 +131,7 @@ def _travels(machine: Machine,
             yield link, (float(values.min()), float(values.max()))
 
 
-def _values(drive: Drive, scale: float, count: int) -> np.ndarray:
+def _values(drive: InputSettings, scale: float, count: int) -> np.ndarray:
     """Return so many values of an input, all through its ends or its reach, before scale."""
     arcs = [drive.ends] if drive.ends else drive.reach
     values = np.concatenate([np.linspace(low, high, count) for low, high in arcs])

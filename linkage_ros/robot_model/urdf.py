@@ -19,13 +19,13 @@ from xml.sax.saxutils import escape
 from . import bodies
 from .bodies import Body, COLOURS, numbers, Part, Piece, Robot
 from .. import palette
-from ..scene import Machine
+from ..scene import SceneMechanism
 
 # Of a scene most mechanisms are as they were when it is written again.
 _written: WeakKeyDictionary[Part, str] = WeakKeyDictionary()
 
 
-def describe(machines: Iterable[Machine], frame_id: str) -> str:
+def describe(machines: Iterable[SceneMechanism], frame_id: str) -> str:
     """Return mechanisms as one URDF; see `bodies.robot`."""
     return write(bodies.robot(machines, frame_id))
 

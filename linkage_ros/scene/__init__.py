@@ -16,9 +16,8 @@ from dataclasses import dataclass, field as some
 import re
 from typing import Any, Dict, List, Optional, Tuple
 
-from .drive import Drive, FARTHEST, in_words, START
+from .input_settings import FARTHEST, in_words, InputSettings, START
 from .joint_names import check_distinct
-from .machine import FRAME, FRAME_RULE, Machine, read_machine
 from .parameter_file import overrides
 from .parameters import (
     ALL,
@@ -33,11 +32,13 @@ from .parameters import (
     SceneError,
     Values,
 )
+from .scene_mechanism import FRAME, FRAME_NAME, FRAME_RULE, read_machine, SceneMechanism
 from .. import mechanisms
 from ..words import plain_text, quoted
 
-__all__ = ['changed', 'Drive', 'DRIVER', 'FARTHEST', 'in_words', 'INVERSE', 'KINEMATICS', 'load',
-           'Machine', 'OWNER', 'Parameter', 'plain', 'read', 'Scene', 'SceneError', 'START']
+__all__ = ['changed', 'InputSettings', 'DRIVER', 'FARTHEST', 'in_words', 'INVERSE', 'KINEMATICS',
+           'load', 'SceneMechanism', 'OWNER', 'Parameter', 'plain', 'read', 'Scene', 'SceneError',
+           'START']
 
 _NAME = re.compile(r'(?=.{1,64}$)[A-Za-z](_?[A-Za-z0-9])*')
 
@@ -46,8 +47,8 @@ MECHANISMS = Field(
     rule='at least one, each once, of up to 64 letters, digits and single underscores, '
          'a letter first', pattern=_NAME)
 FRAME_ID = Field('string', 'Frame that the poses are in.', readers=(KINEMATICS,),
-                 rule='1 to 100 letters, digits and _ . : - /, the first a letter, digit or _',
-                 pattern=re.compile(r'\w[\w.:/-]{0,99}', re.ASCII))
+                 rule='1 to 100 characters that can be seen, the first a letter, digit or _',
+                 pattern=re.compile(FRAME_NAME))
 FRAME_PREFIX = Field(
     'string', 'Put before the frames of markers and loci, as robot_state_publisher does.',
     readers=(KINEMATICS,), rule=FRAME_RULE, pattern=FRAME)
@@ -58,7 +59,7 @@ RATE = Field('double', 'Crank messages in a second [Hz]; 0: none.', 0.0, 1000.0,
 class Scene:
     """Machines by name, the frame they are in, and the rate of the crank messages [Hz]."""
 
-    machines: Mapping[str, Machine]
+    machines: Mapping[str, SceneMechanism]
     frame_id: str
     frame_prefix: str
     rate: float
@@ -86,16 +87,16 @@ def load(path: str) -> Scene:
     found = {node: overrides(path, f'/{node}') for node in ALL}
     if not any(own is not None for own in found.values()):
         raise SceneError(f"{path} must be YAML with '/**:' and below it 'ros__parameters:'")
-    told = {node: own or {} for node, own in found.items()}
-    merged = {name: value for node in (*ALL, OWNER) for name, value in told[node].items()}
+    given = {node: own or {} for node, own in found.items()}
+    merged = {name: value for node in (*ALL, OWNER) for name, value in given[node].items()}
     scene = read(merged)
-    if all(own == merged for own in told.values()):
+    if all(own == merged for own in given.values()):
         return scene
     # What is for one node alone counts where that node's value does.
     owners = {parameter.name: OWNER if OWNER in parameter.field.readers
               else parameter.field.readers[0] for parameter in scene.parameters}
-    return read({name: told[owner][name] for name, owner in owners.items()
-                 if name in told[owner]})
+    return read({name: given[owner][name] for name, owner in owners.items()
+                 if name in given[owner]})
 
 
 def read(given: Mapping[str, Any], before: Optional[Scene] = None, strict: bool = True) -> Scene:

@@ -11,8 +11,8 @@ from typing import Any, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .drive import Drive, in_words
-from .machine import Machine
+from .input_settings import in_words, InputSettings
+from .scene_mechanism import SceneMechanism
 from ..formula.program import compile_in_background
 from ..linkage.inputs import Arc
 from ..linkage.inverse import CLOSE
@@ -51,9 +51,9 @@ class SceneAnswer(NamedTuple):
     is_singular: bool
 
 
-def present(machine: Machine, positions: Mapping[str, float]) -> List[float]:
+def present(machine: SceneMechanism, positions: Mapping[str, float]) -> List[float]:
     """Return where the inputs are [rad or m], from the last position of each source, else inf."""
-    known = [machine.understood(drive, positions[drive.source], None, None)[0]
+    known = [machine.from_source(drive, positions[drive.source], None, None)[0]
              if drive.source in positions else math.inf for drive in machine.inputs.values()]
     return [value if math.isfinite(value) else math.inf for value in known]
 
@@ -82,7 +82,7 @@ class InverseRequest:
 
     """
 
-    def __init__(self, machine: Machine, outputs: Sequence[str]):
+    def __init__(self, machine: SceneMechanism, outputs: Sequence[str]):
         self._machine, self._drives = machine, list(machine.inputs.values())
         self.outputs = [output or LEVER for output in outputs]
         self._inverse = machine.linkage.inverse(tuple(self.outputs))
@@ -127,16 +127,15 @@ class InverseRequest:
             second and so on; NaN where a value cannot be had.
 
         """
+        inverse, n, many = self._inverse, len(self._units), isinstance(values[0], np.ndarray)
+        each = near is not None and np.size(near[0]) == np.size(values[0])
         values = [value / unit for value, unit in zip(values, self._units)]
         if near is not None:
             near = [input_ / scale for input_, scale in zip(self.inputs_of(near), self._scales)]
-        inverse = self._inverse
-        if np.size(values[0]) >= MANY:
+        if many and np.size(values[0]) >= MANY:
             inverse = self._accelerated()
-        each = near is not None and np.size(near[0]) == np.size(values[0])
-        found, rates = inverse.nearest(values, near, self._ends) if each or not np.ndim(
-            values[0]) else inverse.path(values, near, self._ends)
-        n = len(self._units)
+        found, rates = (inverse.path if many and not each else inverse.nearest)(
+            values, near, self._ends)
         return (self.positions_of([input_ * scale for input_, scale in zip(found, self._scales)]),
                 [rate * (self._units[i % n] / self._scales[i // n] * self._actuators[i // n][0])
                  for i, rate in enumerate(rates)])
@@ -146,7 +145,7 @@ class InverseRequest:
         if self._many is None:
             def make() -> Any:
                 inverse = self._machine.linkage.accelerated().inverse(tuple(self.outputs))
-                inverse.over(*np.zeros((len(self.outputs), MANY)))
+                inverse.path([np.zeros(MANY)] * len(self.outputs))
                 return inverse
 
             self._many = compile_in_background(make)
@@ -290,7 +289,7 @@ class InverseRequest:
         return [[(value * self._units[0], at * scale) for value, at in span] for span in found]
 
 
-def _inside(drive: Drive, value: float) -> float:
+def _inside(drive: InputSettings, value: float) -> float:
     """Return an input between its ends, where a crank's whole periods are one; else NaN."""
     low, high = drive.ends or (value, value)
     if drive.input.turns and not low <= value <= high:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import Optional, Tuple
 
-from . import Drive
+from . import InputSettings
 from ..linkage.inputs import Arc
 
 STEPS, STEP = 1 << 160, 2.0 ** -160
@@ -71,7 +71,7 @@ class Motion:
         return angle, self._speed if ahead else -self._speed or 0.0
 
     @classmethod
-    def of(cls, drive: Drive, since: int = 0) -> Motion:
+    def of(cls, drive: InputSettings, since: int = 0) -> Motion:
         """Return how an input moves from its start."""
         return cls(drive.speed, drive.sweep, drive.start, since, drive.input.turns, drive.period)
 

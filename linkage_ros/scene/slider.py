@@ -15,7 +15,7 @@ from typing import Optional, Tuple
 
 import numpy as np
 
-from . import Machine, Scene
+from . import Scene, SceneMechanism
 from .parameters import Parameter
 from ..cache import cached
 from ..linkage.inputs import Arc
@@ -49,7 +49,7 @@ def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
     return _whole_stops(value, 0.1 * value, 10.1 * value)
 
 
-def _used(machine: Machine) -> Optional[Tuple[float, float]]:
+def _used(machine: SceneMechanism) -> Optional[Tuple[float, float]]:
     """Return between which crank angles it has to be assembled; None: somewhere at least."""
     first, *others = machine.inputs.values()
     if others or not first.input.is_whole(first.reach):

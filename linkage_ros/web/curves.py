@@ -12,7 +12,7 @@ from .poses import Refused, theta_of
 from .settings import shown
 from ..c_code import header
 from ..robot_model import urdf
-from ..scene import Machine
+from ..scene import SceneMechanism
 from ..words import listed, meant, quoted
 
 SAMPLES = 361
@@ -25,7 +25,7 @@ FORCES = {('rad', 'm'): 'N·m/N', ('m', 'rad'): 'N/(N·m)'}
 class Sweep:
     """The first input through its reach at 1 rad/s or 1 m/s, the others held [rad or m]."""
 
-    def __init__(self, machine: Machine, present: Sequence[float]) -> None:
+    def __init__(self, machine: SceneMechanism, present: Sequence[float]) -> None:
         self.linkage, self.input, self._machine = machine.linkage, machine.first.input, machine
         sizes = [machine.scale_of(name) for name in machine.inputs]
         others = [value / size for value, size in zip(present, sizes)][1:]
@@ -88,7 +88,7 @@ class Sweep:
         return np.sort([*at, *(dead for dead in self.dead if x[0] < dead < x[-1])])
 
 
-def curve(machine: Machine, present: Sequence[float], kind: str = POSITION,
+def curve(machine: SceneMechanism, present: Sequence[float], kind: str = POSITION,
           output: Optional[str] = None) -> dict[str, Any]:
     """Return one of KINDS over the first input: x and y in `units`, y None where it has none."""
     if kind not in KINDS:
@@ -114,7 +114,7 @@ def curve(machine: Machine, present: Sequence[float], kind: str = POSITION,
             'dead': sweep.dead.tolist()}
 
 
-def exported(machine: Machine, present: Sequence[float], form: str, frame_id: str) -> str:
+def exported(machine: SceneMechanism, present: Sequence[float], form: str, frame_id: str) -> str:
     """Return as text: 'csv', all kinds of all outputs in rad and m; 'urdf'; or 'c'."""
     if form == 'urdf':
         return urdf.describe([machine], machine.frame_id or frame_id)

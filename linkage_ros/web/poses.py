@@ -13,7 +13,7 @@ from ..linkage.inputs import Arc
 from ..linkage.mechanism import Mechanism
 from ..linkage.nearest_pose import nearest_inputs
 from ..linkage.output_range import ground_frame
-from ..scene import Drive, in_words, Machine, Scene, slider
+from ..scene import in_words, InputSettings, Scene, SceneMechanism, slider
 from ..words import listed, quoted
 
 ARROWS = {'velocity': 'm/s', 'acceleration': 'm/s²', 'force': 'N'}
@@ -28,7 +28,7 @@ class Refused(Exception):
     """What cannot be done, with the reason."""
 
 
-def described(machine: Machine, present: Sequence[float]) -> dict[str, Any]:
+def described(machine: SceneMechanism, present: Sequence[float]) -> dict[str, Any]:
     """
     Return where a mechanism is, in its scene's size, with its inputs at `present` [rad or m].
 
@@ -52,7 +52,7 @@ def described(machine: Machine, present: Sequence[float]) -> dict[str, Any]:
                       for by, size in zip(rates, own)]} for name in names}}
 
 
-def arrows(machine: Machine, present: Sequence[float], kind: str,
+def arrows(machine: SceneMechanism, present: Sequence[float], kind: str,
            speeds: Mapping[str, float]) -> dict[str, Any]:
     """
     Return one of ARROWS at each joint of the first leg: `unit`, and x, y in its plane by joint.
@@ -93,14 +93,14 @@ def number(text: str) -> dict[str, Any]:
     return {'value': float(formula.value({})), 'turns': bool({'pi', 'deg'} & formula.words.keys())}
 
 
-def reached(machine: Machine, present: Sequence[float],
+def reached(machine: SceneMechanism, present: Sequence[float],
             want: Mapping[str, Any]) -> tuple[list[float], str]:
     """
     Return the inputs [rad or m] that do what is wanted as nearly as can be, and what is short.
 
     Parameters
     ----------
-    machine : Machine
+    machine : SceneMechanism
         The mechanism.
     present : sequence of float
         Its inputs.
@@ -128,7 +128,7 @@ def reached(machine: Machine, present: Sequence[float],
     return _output_at(machine, present[0], name, value)
 
 
-def _input_at(machine: Machine, present: Sequence[float], name: str,
+def _input_at(machine: SceneMechanism, present: Sequence[float], name: str,
               value: float) -> tuple[list[float], str]:
     drive, ends = machine.inputs[name], arcs(machine.inputs[name])
     near = min((min(max(float(drive.input.beside(value, (low + high) / 2.0)), low), high)
@@ -144,7 +144,7 @@ def _input_at(machine: Machine, present: Sequence[float], name: str,
     return inputs, f'{name} reaches {in_words(ends)} {drive.input.unit}' if missed else ''
 
 
-def _output_at(machine: Machine, present: float, name: str,
+def _output_at(machine: SceneMechanism, present: float, name: str,
                value: float) -> tuple[list[float], str]:
     linkage, drive = machine.linkage, machine.first
     own, unit = machine.scale_of(drive.input.name), machine.scale_of(name)
@@ -161,7 +161,7 @@ def _output_at(machine: Machine, present: float, name: str,
                              f'{"rad" if linkage.is_angle(name) else "m"}')
 
 
-def _joint_at(machine: Machine, present: Sequence[float], joint: str, place: Any,
+def _joint_at(machine: SceneMechanism, present: Sequence[float], joint: str, place: Any,
               leg: int = 0) -> list[float]:
     if not (isinstance(place, list) and len(place) == 2 and all(map(is_number, place))):
         raise ValueError(f'place must be two finite numbers, not {quoted(place)}')
@@ -183,7 +183,7 @@ def _joint_at(machine: Machine, present: Sequence[float], joint: str, place: Any
             for value, size in zip(found, own)]
 
 
-def arcs(drive: Drive) -> list[Arc]:
+def arcs(drive: InputSettings) -> list[Arc]:
     """Return where an input may be put [rad or m]."""
     return [drive.ends] if drive.ends else list(drive.reach)
 

@@ -40,7 +40,7 @@ from .poses import Refused
 from .settings import Described, RemoteNode, Setting
 from .. import scene
 from ..scene import writing
-from ..scene.machine import IN_SPACE
+from ..scene.scene_mechanism import IN_SPACE
 from ..words import quoted
 
 MARKERS, LOCUS, LIST = '/markers', '/locus', '/list_parameters'
@@ -87,7 +87,7 @@ class ShownMechanism:
     key: str
     settings: dict[str, Setting]
     sources: tuple[str, ...] = ()
-    machine: Optional[scene.Machine] = None
+    machine: Optional[scene.SceneMechanism] = None
     held: dict[str, float] = field(default_factory=dict)
     until: float = 0.0
 
@@ -229,7 +229,7 @@ class SceneView:
             found['arrows'] = poses.arrows(machine, inputs, arrows, dict(speeds))
         return found
 
-    async def _hold(self, mechanism: ShownMechanism, machine: scene.Machine,
+    async def _hold(self, mechanism: ShownMechanism, machine: scene.SceneMechanism,
                     inputs: Sequence[float]) -> None:
         """Stop the inputs where they are wanted."""
         values = {}
@@ -281,7 +281,7 @@ class SceneView:
         except scene.SceneError as error:
             raise Refused(str(error)) from None
 
-    def _state(self, mechanism: ShownMechanism) -> tuple[scene.Machine, list[float]]:
+    def _state(self, mechanism: ShownMechanism) -> tuple[scene.SceneMechanism, list[float]]:
         """Return a machine and its inputs [rad or m] as they were told last, or as they start."""
         if mechanism.machine is None:
             mechanism.machine = mechanism.scene().machines[mechanism.name]
@@ -293,7 +293,7 @@ class SceneView:
         for name, drive in machine.inputs.items():
             told = next((self._told[topic][drive.source] for topic in mechanism.sources
                          if drive.source in self._told.get(topic, ())), None)
-            now = drive.start if told is None else machine.understood(drive, told, None, None)[0]
+            now = drive.start if told is None else machine.from_source(drive, told, None, None)[0]
             now = now if math.isfinite(now) else drive.start
             held = mechanism.held.get(name, now)
             if drive.input.apart(held, now) < ARRIVED * drive.input.size:

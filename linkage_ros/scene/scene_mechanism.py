@@ -9,7 +9,7 @@ from dataclasses import dataclass, field as some
 import re
 from typing import Any, Dict, Mapping, Optional, Sequence, Tuple
 
-from .drive import Drive, read_drive
+from .input_settings import InputSettings, read_settings
 from .joint_names import JointName, read_joint_names
 from .loads import Load, read_loads
 from .parameters import (
@@ -34,9 +34,11 @@ IN_SPACE = ('a linkage in space: pictures, the page and robot models are of link
             'plane')
 TYPES = (*mechanisms.TYPES, *mechanisms.WRITTEN)
 
-# What a frame may be called, or is not.
-FRAME = re.compile(r'(\w[\w.:/-]{0,99})?', re.ASCII)
-FRAME_RULE = 'up to 100 letters, digits and _ . : - /, the first a letter, digit or _'
+# What a frame may be called, as links of robots are: in tf2 no name begins with a slash.
+FRAME_NAME = (r'\w[^\x00-\x1f\x7f-\xa0\u200b-\u200f\u2028-\u202f\u2060-\u206f'
+              r'\ud800-\udfff\ufeff]{0,99}')
+FRAME = re.compile(f'({FRAME_NAME})?')
+FRAME_RULE = 'up to 100 characters that can be seen, the first a letter, digit or _'
 
 TYPE = Field('string', 'Type of the mechanism.', readers=ALL, read_only=True,
              rule=f'one of {", ".join(TYPES)}')
@@ -68,7 +70,7 @@ LOADS = Field('string_array', "Loads that the inputs hold, in the linkage's plan
 
 
 @dataclass(frozen=True)
-class Machine:
+class SceneMechanism:
     """A mechanism in a scene: one leg, its reach and scale, its legs, its look and its inputs."""
 
     name: str
@@ -79,7 +81,7 @@ class Machine:
     mirrored: bool
     points: Tuple[str, ...]
     pose: Tuple[float, ...]
-    inputs: Mapping[str, Drive]
+    inputs: Mapping[str, InputSettings]
     frame_id: str
     joints: Mapping[str, JointName]
     only_named: bool
@@ -98,7 +100,7 @@ class Machine:
         return len(self.linkage.axes) > 2
 
     @property
-    def first(self) -> Drive:
+    def first(self) -> InputSettings:
         """The first input, for most linkages the only one."""
         return next(iter(self.inputs.values()))
 
@@ -121,8 +123,8 @@ class Machine:
             (found,), (rate,) = inverse.nearest((value / unit,), (near / own,), (ends,))
         return found * own, rate * unit / own
 
-    def understood(self, drive: Drive, position: float, speed: Optional[float],
-                   near: Optional[float]) -> Tuple[float, Optional[float]]:
+    def from_source(self, drive: InputSettings, position: float, speed: Optional[float],
+                    near: Optional[float]) -> Tuple[float, Optional[float]]:
         """Return an input and its speed as its source tells, going on from where it was near."""
         value = drive.ratio * position + drive.offset
         speed = None if speed is None else drive.ratio * speed
@@ -131,7 +133,7 @@ class Machine:
         found, rate = self.measured(drive.measures, value, drive.start if near is None else near)
         return found, speed / rate if speed is not None and rate else None
 
-    def told(self, drive: Drive, value: float, speed: float) -> Tuple[float, float]:
+    def to_source(self, drive: InputSettings, value: float, speed: float) -> Tuple[float, float]:
         """Return an input and its speed as its source would tell it."""
         if output := drive.measures:
             own, unit = self.scale_of(drive.input.name), self.scale_of(output)
@@ -160,8 +162,8 @@ class Machine:
         return self.linkage.tracer if self.linkage.tracer in self.points else self.points[-1]
 
 
-def read_machine(name: str, given: Mapping[str, Any], old: Optional[Machine],
-                 strict: bool) -> Machine:
+def read_machine(name: str, given: Mapping[str, Any], old: Optional[SceneMechanism],
+                 strict: bool) -> SceneMechanism:
     """Return a mechanism from its values; the one before, where they are the same."""
     if old and old.is_of(given):
         return old
@@ -175,7 +177,7 @@ def read_machine(name: str, given: Mapping[str, Any], old: Optional[Machine],
     leg_pairs, mirrored = _legs(name, linkage, values)
     points, pose = _points(name, linkage, values), _pose(name, values)
     settled = old.inputs if old else {}
-    inputs = {input_.name: read_drive(name, linkage, input_, reach, scale, values,
+    inputs = {input_.name: read_settings(name, linkage, input_, reach, scale, values,
                                       settled.get(input_.name), strict)
               for input_ in linkage.inputs}
     frame_id = values.take(f'{name}.frame_id', OWN_FRAME_ID, '')
@@ -190,7 +192,7 @@ def read_machine(name: str, given: Mapping[str, Any], old: Optional[Machine],
     if loads and (leg_pairs > 1 or mirrored):
         raise SceneError(f'{name}.loads must be empty where there is more than one leg')
     refuse_unknown(values.left(), [parameter.name for parameter in values.parameters])
-    return Machine(name, linkage, reach, scale, leg_pairs, mirrored, points, pose, inputs,
+    return SceneMechanism(name, linkage, reach, scale, leg_pairs, mirrored, points, pose, inputs,
                    frame_id, joints, only_named, loads, given, tuple(values.parameters))
 
 

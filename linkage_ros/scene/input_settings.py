@@ -40,7 +40,7 @@ SWEEP = Field('double_array', 'Between which values [{1}] the {0} moves to and f
 
 
 @dataclass(frozen=True)
-class Drive:
+class InputSettings:
     """
     How an input moves, an angle [rad] or a length [m], the scale included.
 
@@ -107,16 +107,17 @@ def _scaled(input_: Input, linkage: Mechanism, reach: Tuple[Arc, ...],
             tuple((scale * low, scale * high) for low, high in reach))
 
 
-def read_drive(name: str, linkage: Mechanism, input_: Input, reach: Tuple[Arc, ...], scale: float,
-               values: Values, old: Optional[Drive], strict: bool) -> Drive:
+def read_settings(name: str, linkage: Mechanism, input_: Input, reach: Tuple[Arc, ...],
+                  scale: float, values: Values, old: Optional[InputSettings],
+                  strict: bool) -> InputSettings:
     """Return how an input of a mechanism moves; `old` is how it did before, if it was there."""
     drive = _read(name, *_scaled(input_, linkage, reach, scale), values, old, strict)
     _check_measures(name, linkage, drive)
     return replace(drive, period=linkage.period(linkage.inputs.index(input_)))
 
 
-def _read(name: str, input_: Input, reach: Tuple[Arc, ...], values: Values, old: Optional[Drive],
-          strict: bool) -> Drive:
+def _read(name: str, input_: Input, reach: Tuple[Arc, ...], values: Values,
+          old: Optional[InputSettings], strict: bool) -> InputSettings:
     speed_field, start_field, sweep_field = (
         field.about(input_.name, input_.unit, **(TURNS if field is START and input_.turns else {}))
         for field in (SPEED, START, SWEEP))
@@ -125,17 +126,17 @@ def _read(name: str, input_: Input, reach: Tuple[Arc, ...], values: Values, old:
     chosen = values.left(f'{name}.start')
     start = values.take(f'{name}.start', start_field, 0.0)
     sweep = values.take(f'{name}.sweep', sweep_field, ())
-    told = _told(name, input_, values)
+    source = _source(name, input_, values)
     if sweep:
         _check_sweep(f'{name}.sweep', sweep, input_, reach)
     elif input_.is_whole(reach):
-        return Drive(input_, reach, speed, start, None, None, *told)
+        return InputSettings(input_, reach, speed, start, None, None, *source)
     arcs = [sweep] if sweep else reach
     home = [arc for arc in arcs if input_.holds(arc, start, start)]
     low, high = (home or arcs)[0]
     trimmed = 0.0 if sweep else MARGIN * (high - low)
-    drive = Drive(input_, reach, speed, start, (low + trimmed, high - trimmed),
-                  tuple(sweep) or None, *told)
+    drive = InputSettings(input_, reach, speed, start, (low + trimmed, high - trimmed),
+                          tuple(sweep) or None, *source)
     settled = not strict or old and (old.start, old.sweep) == (drive.start, drive.sweep)
     if chosen and not home and not settled:
         raise SceneError(f'{name}.start must be inside the {"sweep" if sweep else "reach"} '
@@ -143,7 +144,7 @@ def _read(name: str, input_: Input, reach: Tuple[Arc, ...], values: Values, old:
     return drive
 
 
-def _told(name: str, input_: Input, values: Values) -> Tuple[str, float, float, str]:
+def _source(name: str, input_: Input, values: Values) -> Tuple[str, float, float, str]:
     """Return how messages tell of an input: source, ratio, offset, and what is measured."""
     source, measures, ratio, offset = (
         values.take(f'{name}.{key}', field.about(input_.name, input_.unit), default)
@@ -155,7 +156,7 @@ def _told(name: str, input_: Input, values: Values) -> Tuple[str, float, float, 
     return source or f'{mechanism}_{measures or input_.name}', ratio, offset, measures
 
 
-def _check_measures(name: str, linkage: Mechanism, drive: Drive) -> None:
+def _check_measures(name: str, linkage: Mechanism, drive: InputSettings) -> None:
     if not drive.measures:
         return
     key = f'{name}.{drive.input.name}.measures'
