@@ -196,9 +196,12 @@ def test_a_wheel_has_the_library_and_the_page_and_no_commands(copy, tmp_path):
 
 @pytest.mark.long
 @pytest.mark.skipif(not shutil.which('colcon'), reason='colcon is not installed')
-@pytest.mark.parametrize('layout', ['', '--merge-install', '--symlink-install'])
-def test_the_ordinary_colcon_build_of_a_workspace_is_enough(copy, tmp_path, layout):
+@pytest.mark.parametrize('layout, linked', [
+    ('', False), ('--merge-install', False), ('--symlink-install', False), ('', True)])
+def test_the_ordinary_colcon_build_of_a_workspace_is_enough(copy, tmp_path, layout, linked):
     pytest.importorskip('rclpy')
+    if linked:
+        depending_on_the_interfaces(tmp_path / 'src')
     # What building against wheels needs besides.
     flags = [f'-DCMAKE_PREFIX_PATH={sys.prefix}', f'-DPython3_EXECUTABLE={sys.executable}',
              f'-DCMAKE_PROJECT_INCLUDE={ROOT}/wheels/prefix.cmake', '-DBUILD_TESTING=OFF']
@@ -215,6 +218,7 @@ print(node.__file__, node.ServoInverseType.__module__)' && echo $AMENT_PREFIX_PA
     ended = subprocess.run(['bash', '-c', script], cwd=tmp_path, env=clean, timeout=300,
                            text=True, capture_output=True)
     assert ended.returncode == 0, ended.stderr
+    assert (tmp_path / 'install' / 'asker').exists() == linked
     module, prefixes = ended.stdout.splitlines()
     assert module.startswith(str(tmp_path))
     assert module.endswith('linkage_interfaces.srv._servo_inverse')
@@ -222,6 +226,39 @@ print(node.__file__, node.ServoInverseType.__module__)' && echo $AMENT_PREFIX_PA
                    for file in Path(prefix, 'lib', 'linkage_ros').glob('*')}
     assert executables == {'c_code', 'crank_driver', 'from_robot', 'kinematics', 'render', 'scene',
                            'servo_inverse', 'transmission', 'urdf', 'viewer'}
+
+
+def depending_on_the_interfaces(sources):
+    """Write a package that depends on the nested one, linked as docs/install.md says."""
+    (sources / 'linkage_interfaces').symlink_to('linkage_ros/linkage_interfaces')
+    asker = sources / 'asker'
+    asker.mkdir()
+    (asker / 'package.xml').write_text("""\
+        <package format="3">
+          <name>asker</name>
+          <version>1.0.0</version>
+          <description>Asks for inputs.</description>
+          <maintainer email="asker@example.com">asker</maintainer>
+          <license>Apache-2.0</license>
+          <buildtool_depend>ament_cmake</buildtool_depend>
+          <depend>linkage_interfaces</depend>
+          <export><build_type>ament_cmake</build_type></export>
+        </package>""")
+    (asker / 'CMakeLists.txt').write_text("""\
+        cmake_minimum_required(VERSION 3.10)
+        project(asker)
+        find_package(ament_cmake REQUIRED)
+        find_package(linkage_interfaces REQUIRED)
+        ament_package()""")
+
+
+@pytest.mark.skipif(not shutil.which('colcon'), reason='colcon is not installed')
+def test_colcon_builds_the_interfaces_before_what_depends_on_them(copy, tmp_path):
+    depending_on_the_interfaces(tmp_path / 'src')
+    order = subprocess.run(
+        ['colcon', '--log-base', '/dev/null', 'list', '--topological-order', '--names-only'],
+        cwd=tmp_path, timeout=60, check=True, capture_output=True, text=True).stdout.split()
+    assert order[0] == 'linkage_interfaces' and {*order[1:]} == {'asker', 'linkage_ros'}
 
 
 @pytest.mark.skipif(not shutil.which('colcon'), reason='colcon is not installed')
