@@ -128,7 +128,7 @@ clean: ## Remove everything that was made
 $(install)/.built: $(venv)/.installed $(sources)
 	@echo 'Building linkage_interfaces and linkage_ros: a minute, once.'
 	@colcon --log-base $(log) build --build-base $(build) --install-base $(install) \
-	  --event-handlers console_start_end- summary- status- --cmake-args \
+	  --event-handlers console_start_end- summary- --cmake-args \
 	  -DBUILD_TESTING=OFF -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH=$(CURDIR)/$(venv) \
 	  -DCMAKE_PROJECT_INCLUDE=$(CURDIR)/wheels/prefix.cmake -DPython3_EXECUTABLE=$(bin)/python
 	@touch $@
