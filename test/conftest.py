@@ -4,6 +4,7 @@
 """Fixtures; message fields are checked, which is off by default."""
 
 import atexit
+from collections import defaultdict
 import gc
 import os
 
@@ -16,6 +17,21 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 _domain = Domain()
 atexit.register(_domain.release)
 os.environ['ROS_DOMAIN_ID'] = str(_domain.id)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Leave what is beyond the sample of a sweep to the long tests."""
+    sweeps = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker('sample') and not item.get_closest_marker('long'):
+            sweeps[item.nodeid.partition('[')[0]].append(item)
+    for cases in sweeps.values():
+        count, = cases[0].get_closest_marker('sample').args
+        chosen = {round(k * (len(cases) - 1) / max(count - 1, 1)) for k in range(count)}
+        for i, case in enumerate(cases):
+            if i not in chosen:
+                case.add_marker(pytest.mark.long)
 
 
 def pytest_collection_finish():

@@ -25,6 +25,7 @@ What the kinematics node has to publish after any history, worked out by the lib
 """
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import combinations
 import math
 import re
@@ -626,7 +627,7 @@ class Bench:
         x, y, z, roll, pitch, yaw = machine.pose
         turned = rotation(roll, pitch, yaw)
         q = marker.pose.orientation
-        if not np.allclose(turned, matrix(q.x, q.y, q.z, q.w), atol=1e-12):
+        if not np.abs(turned - matrix(q.x, q.y, q.z, q.w)).max() < 1e-12:
             raise Mismatch(f'{topic}: marker {marker.id} is turned')
         at, step = marker.pose.position, bodies.size(machine) / 250.0
         heights = [(x, y, z) + step * layer * turned[:, 2] for layer in LAYERS]
@@ -659,6 +660,7 @@ class Bench:
                 and message.header.frame_id == self.model.frames[name])
 
 
+@lru_cache
 def rotation(roll, pitch, yaw):
     """Return the rotation about the fixed axes x, y, z in turn."""
     def about(i, j, angle):

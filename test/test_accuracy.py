@@ -55,6 +55,7 @@ def check(rows):
     assert not broken(rows), summary(rows)
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize('near', [12, pytest.param(40, marks=pytest.mark.long)])
 @pytest.mark.parametrize('kind, dimensions, branches', CATALOGUE)
 def test_the_catalogue_is_right_to_the_last_digits(kind, dimensions, branches, near):
@@ -80,6 +81,7 @@ def test_velocities_and_joint_rates_are_right(kind):
     check(rows)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('kind, dimensions, branches', [
     case for case in CATALOGUE if case[1] is hard_cases.CATALOGUE[case[0]][0]])
 def test_velocities_and_joint_rates_of_the_catalogue_are_right(kind, dimensions, branches):

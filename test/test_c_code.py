@@ -120,6 +120,7 @@ def library(machines, tmp_path_factory):
     return compiled(tmp_path_factory.mktemp('c'), machines.values())
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
 def test_poses_and_rates_are_those_of_python(library, machines, name, count=300):
     machine = machines[name]
@@ -145,6 +146,7 @@ def test_the_reach_is_that_of_python(machines, name):
     assert scene.in_words(machine.first.reach) in text or len(machine.inputs) > 1
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('name, output', [
     (name, output) for name, outputs in OUTPUTS.items() for output in outputs])
 def test_the_inverse_finds_the_nearest_input(library, machines, name, output):

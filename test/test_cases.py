@@ -73,6 +73,7 @@ def test_its_rates_by_each_input_are_those_of_its_bars(name):
                 assert turning[link.name] == (link.name == linkage.inputs[by].name)
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', CASES)
 def test_arrays_functions_and_machine_code_say_the_same(name):
     linkage, inputs = made(name), poses(name, 6).reshape(3, 2, -1)
@@ -89,6 +90,7 @@ def test_arrays_functions_and_machine_code_say_the_same(name):
         np.testing.assert_allclose(quick[joint], place, rtol=0.0, atol=1e-13 * linkage.longest)
 
 
+@pytest.mark.sample(17)
 @pytest.mark.parametrize('power', [-600, -30, 40, 600])
 @pytest.mark.parametrize('name', CASES)
 def test_a_case_of_another_size_is_the_same_to_the_bit(name, power):
@@ -127,6 +129,7 @@ def test_a_dead_point_is_where_a_transmission_angle_is_flat(name):
         assert linkage.distance_to_dead_point(value, *held) == 0.0
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', CASES)
 def test_the_inverse_finds_the_first_input_from_where_every_joint_is(name):
     linkage, inputs = made(name), poses(name)[1].tolist()

@@ -141,6 +141,7 @@ def test_a_new_dimension_keeps_the_crank_in_its_new_reach(graph):
     assert driver.at(3 * SECOND) == (0.9, 0.0)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('name, value, reason', [
     ('drop.crank.speed', 1000.0, 'drop.crank.speed .*100'),
     ('drop.crank.speed', True, 'drop.crank.speed must be'),

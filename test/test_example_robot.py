@@ -76,6 +76,7 @@ def told():
         return found
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('library', LIBRARIES)
 def test_the_loops_of_the_urdf_are_closed_at_every_pose(told, library):
     robot = library(URDF)

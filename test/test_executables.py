@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+import time
 
 import pytest
 
@@ -42,6 +43,19 @@ def test_a_signal_ends_a_node_quietly(harness, name, stop):
     assert process.end() == (0, '')
 
 
+@pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('name', EXECUTABLES)
+def test_more_signals_than_one_end_a_node_as_quietly(harness, name, stop):
+    """A terminal sends one to the whole group, and a launcher one more to each of it."""
+    process = harness.Process(name, ROOT / 'config' / 'all.yaml')
+    process.line()
+    while not process.has_ended:
+        process.interrupt(stop)
+        time.sleep(1e-4)
+    code, printed = process.end()
+    assert (code, 'Traceback' in printed, 'rror' in printed) == (0, False, False), printed
+
+
 IMPORTS_FOR_EVER = """
 import sys
 import time
@@ -59,6 +73,7 @@ sys.meta_path.insert(0, Slow())
 """
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize('name', EXECUTABLES)
 def test_a_signal_ends_what_is_still_being_imported(harness, tmp_path, name, stop):
@@ -70,6 +85,7 @@ def test_a_signal_ends_what_is_still_being_imported(harness, tmp_path, name, sto
     assert process.end() == (0, '')
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', EXECUTABLES)
 def test_a_thread_that_computes_does_not_hold_up_the_end(harness, name):
     done = subprocess.run([sys.executable, '-c', textwrap.dedent(f"""

@@ -257,6 +257,7 @@ def test_two_robots_of_one_kind(graph, follow):
         assert marked[side][0].markers[0].header.frame_id == f'{side}/base'
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('library', LIBRARIES)
 def test_a_urdf_with_pairs_of_frames(graph, follow, library):
     follow('how-to/existing-urdf')

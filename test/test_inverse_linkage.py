@@ -40,6 +40,7 @@ def test_the_joint_lines_of_an_inverse_are_printed():
         'the inverse of jansen for G.x is searched')
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('kind, outputs', [
     ('four_bar', {'crank', 'AB', 'QB'}), ('jansen', {'crank', 'BC', 'AC', 'BE', 'AE', 'EF', 'DF'}),
     ('klann', {'crank', 'AD', 'BD'}), ('watt', {'crank', 'AB', 'QB'}),
@@ -51,6 +52,7 @@ def test_joint_angles_and_slides_come_apart(kind, outputs):
     assert closed >= outputs
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('kind', [kind for kind in mechanisms.TYPES if kind != 'five_bar'])
 def test_an_assembly_mode_is_a_linkage_that_has_the_pose(kind):
     linkage, rng = mechanisms.create(kind), np.random.default_rng(2)

@@ -83,6 +83,7 @@ def distance(leg, bar):
     return math.dist(leg[bar[0]], leg[bar[1]])
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', LENGTHS)
 def test_links_keep_their_lengths_at_every_angle(graph, name):
     bench = Bench(graph, name, joints=False)
@@ -93,6 +94,7 @@ def test_links_keep_their_lengths_at_every_angle(graph, name):
             assert distance(leg, bar) == pytest.approx(length, abs=1e-12 * longest, rel=0.0)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', LENGTHS)
 def test_markers_are_one_list_of_links_and_one_of_joints(graph, name):
     links, joints = Bench(graph, name).links_and_joints_at(0.3)
@@ -200,6 +202,7 @@ def walk(links, frames, angles, turn, side, ground):
     return found
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('name', [*(name for name in mechanisms.TYPES if len(
     mechanisms.create(name).inputs) == 1), 'walker'])
 def test_joint_angles_along_the_tree_lead_to_the_joints(graph, name):

@@ -7,8 +7,8 @@ from fractions import Fraction
 import math
 import random
 import re
-import time
 
+from effort import few_calls
 from linkage_ros import mechanisms, scene
 from linkage_ros.linkage import joint_lines
 import numpy as np
@@ -232,10 +232,11 @@ def arithmetic(rng, depth):
                        f'({one})', f'({one}-{two})', f'max({one},{two})', f'sqrt({one})'))
 
 
-def test_arithmetic_is_what_python_makes_of_the_same_letters():
+@pytest.mark.parametrize('count', [40, pytest.param(400, marks=pytest.mark.long)])
+def test_arithmetic_is_what_python_makes_of_the_same_letters(count):
     rng, tried = random.Random(5), 0
     known = {**LENGTHS, 'pi': math.pi, 'sqrt': math.sqrt, 'max': max}
-    for _ in range(100):
+    for _ in range(count):
         number = arithmetic(rng, 5)
         try:
             value = eval(number, known)
@@ -246,7 +247,7 @@ def test_arithmetic_is_what_python_makes_of_the_same_letters():
         found = made(f'P ground {number} 0').solve(0.0, ('P',))['P'][0]
         assert found == pytest.approx(value, rel=1e-13, abs=1e-13), number
         tried += 1
-    assert 50 < tried < 100
+    assert 0.5 * count < tried < count
 
 
 @pytest.mark.parametrize('angle, rad', [
@@ -490,14 +491,12 @@ PARSED = ('line', 'number', 'length', 'angle')
 
 def refused(ask, text) -> bool:
     """Return whether a text is refused, as it has to be: soon, and in a short sentence."""
-    start = time.process_time()
     try:
-        ask(text)
+        with few_calls(500_000, text[:60]):
+            ask(text)
         return False
     except ValueError as error:
         said, kind = str(error), type(error)
-    finally:
-        assert time.process_time() - start < 5.0, text[:60]
     assert kind in (ValueError, scene.SceneError), (kind, text[:60])
     assert 10 < len(said) < 300 and said.isprintable(), (text[:60], said)
     return True
@@ -505,12 +504,11 @@ def refused(ask, text) -> bool:
 
 @pytest.mark.filterwarnings('error')
 @pytest.mark.parametrize('role, every', [
-    *((role, 1 if role in PARSED else 5) for role in (*ROLES, *OUTPUTS)),
-    *(pytest.param(role, 1, marks=pytest.mark.long) for role in (*ROLES, *OUTPUTS)
-      if role not in PARSED)])
+    *((role, 2 if role in PARSED else 10) for role in (*ROLES, *OUTPUTS)),
+    *(pytest.param(role, 1, marks=pytest.mark.long) for role in (*ROLES, *OUTPUTS))])
 def test_a_hostile_text_is_refused_in_a_short_sentence(role, every):
     texts = TEXTS[::every]
-    assert len(texts) > 140
+    assert len(texts) >= 1000 // every
     kept = [text for text in texts if not refused({**ROLES, **OUTPUTS}[role], text)]
     assert len(kept) < 0.1 * len(texts) and all(len(text) < 20000 for text in kept)
     if role in PARSED:
@@ -524,7 +522,7 @@ def test_the_lines_that_are_mutated_are_legal(line):
 
 @pytest.mark.filterwarnings('error')
 @pytest.mark.parametrize('count, seed', [
-    (800, 1), pytest.param(60000, 2, marks=pytest.mark.long),
+    (400, 1), pytest.param(60000, 2, marks=pytest.mark.long),
     pytest.param(60000, 3, marks=pytest.mark.long)])
 def test_a_line_with_slips_is_refused_or_makes_a_linkage(count, seed):
     outcomes = [refused(made, text) for text in mutations(count, seed)]
@@ -533,7 +531,7 @@ def test_a_line_with_slips_is_refused_or_makes_a_linkage(count, seed):
 
 def test_what_passes_is_only_what_is_documented():
     number = re.compile(r'[0-9.eE]+|[+*/(),-]|max|sqrt|pi|deg|[gmbc]')
-    for text in mutations(800, 4):
+    for text in mutations(300, 4):
         if not refused(made, text):
             for word in text.split():
                 name = re.fullmatch('[A-Za-z][A-Za-z0-9_]*', word)

@@ -127,6 +127,7 @@ def seen_by(view, machine):
     return off / depth / math.tan(math.radians(22.5)), away
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('path', sorted(CONFIG.glob('*.yaml')), ids=lambda path: path.stem)
 def test_rviz_opens_on_all_of_a_scene_and_sees_its_plane(shown, path):
     machines = scene.load(str(path)).machines

@@ -86,6 +86,7 @@ def check_images(lines, inputs, **dimensions):
             (name[:-1], place) for name, place in places.items() if name.endswith('m')))
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', CASES)
 def test_a_case_has_its_image_in_a_line_askew(name):
     check_images(CASES[name].joints, np.linspace(*CASES[name].path, 5).tolist(),

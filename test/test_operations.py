@@ -4,6 +4,7 @@
 """Every row of the table of operations, by every back end, against multiprecision."""
 
 import ctypes
+from functools import lru_cache
 import inspect
 import math
 import operator
@@ -65,6 +66,7 @@ def numbers(name, special=False):
     return [np.abs(values[0])] if name == 'sqrt' else values
 
 
+@lru_cache(None)
 def bound(name, accelerate=False):
     arguments = [expression.argument(i) for i in range(arity(name))]
     return program.Program([applied(name, arguments)], len(arguments)).bind({}, {}, accelerate)
@@ -140,10 +142,16 @@ def c_library(tmp_path_factory):
     return done
 
 
+@lru_cache(len(NAMES))
+def truths(name, values):
+    """Return what an operation comes to."""
+    return [TRUTH[name](*map(gmpy2.mpfr, map(float, row))) for row in zip(*values)]
+
+
 def off(name, values, found):
     """Return by how many ulps of its own kind of number an operation is off at most."""
     with gmpy2.context(precision=300):
-        true = [TRUTH[name](*map(gmpy2.mpfr, map(float, row))) for row in zip(*values)]
+        true = truths(name, tuple(map(tuple, values)))
         gone = np.array([gmpy2.is_nan(x) for x in true])
         assert np.array_equal(np.isnan(found), gone) and not gone.all()
         return max(float(abs(gmpy2.mpfr(float(value)) - x))

@@ -17,16 +17,17 @@ pytest.importorskip('rclpy')
 from oracle import Bench, everything, history, message, Mismatch, SCENES  # noqa: E402
 from ros_harness import Graph  # noqa: E402
 
-# Of each scene, with machine code and without: 156 histories in all, and 10 000.
-FEW, MANY = range(6), range(6, 391)
-
 # Many more than `.ci/run` has time for.
 EXHAUSTIVE = [pytest.mark.long, pytest.mark.exhaustive]
 
+# Of each scene, with machine code and without: 52 histories in all, 260 and 10 000.
+SEEDS = [pytest.param(range(2), id='few'),
+         pytest.param(range(2, 12), id='some', marks=pytest.mark.long),
+         pytest.param(range(12, 391), id='many', marks=EXHAUSTIVE)]
+
 
 @pytest.mark.parametrize('name', SCENES)
-@pytest.mark.parametrize('seeds', [FEW, pytest.param(MANY, marks=EXHAUSTIVE)],
-                         ids=['few', 'many'])
+@pytest.mark.parametrize('seeds', SEEDS)
 def test_whatever_happens_the_node_publishes_what_the_library_says(name, seeds):
     with Graph() as graph:
         bench = Bench(graph, SCENES[name])
@@ -114,8 +115,11 @@ def test_numbers_are_the_same_at_the_ends_of_the_reach_and_in_many_legs(graph, n
 WITHOUT = 'LINKAGE_ROS_WITHOUT_LLVMLITE'
 
 
+# `make nodes PLAIN=1` runs them so, too.
+@pytest.mark.long
 @pytest.mark.skipif(WITHOUT in os.environ, reason='this is without')
-@pytest.mark.parametrize('which', ['not long', pytest.param('long', marks=EXHAUSTIVE)])
+@pytest.mark.parametrize('which', [
+    'not exhaustive', pytest.param('exhaustive', marks=pytest.mark.exhaustive)])
 def test_all_this_holds_without_llvmlite(tmp_path, which):
     (tmp_path / 'sitecustomize.py').write_text(
         "import sys\nsys.modules['llvmlite'] = None\n")

@@ -134,12 +134,13 @@ def displayed(messages):
     return ids
 
 
-def test_markers_are_gone_wherever_noise_about_the_end_of_the_reach_was(graph, executor):
+@pytest.mark.parametrize('times', [6, pytest.param(30, marks=pytest.mark.long)])
+def test_markers_are_gone_wherever_noise_about_the_end_of_the_reach_was(graph, executor, times):
     scene = Scene(graph, {'mechanisms': ['m', 'b'], 'm.type': 'peaucellier', 'b.type': 'jansen'},
                   ['m/markers', 'm/joint_states', 'b/joint_states'])
     end = scene.node.scene.machines['m'].reach[0][1]
     random = np.random.default_rng(3)
-    for _ in range(30):
+    for _ in range(times):
         scene.settle('m/joint_states', name=['m_crank'], position=[end - 0.1])
         graph.until(lambda: displayed(scene.received['m/markers']))
         for angle in (*(end + random.normal(0.0, 2e-3, 20)).tolist(), *5 * [end + 0.3]):

@@ -29,7 +29,8 @@ ROUNDING = 64 * 2.0 ** -53
 
 # What follows a word, but for the word `along`: j a joint, n a length, a an angle, s a side.
 _FORMS = {
-    'ground': 'nn', 'image': 'jjj', 'crank': 'jn', 'yoke': 'jjj', 'cylinder': 'jjns', 'carriage': 'jjnn', 'block': 'jnn',
+    'ground': 'nn', 'image': 'jjj', 'crank': 'jn', 'yoke': 'jjj', 'cylinder': 'jjns',
+    'carriage': 'jjnn', 'block': 'jnn',
     'dyad': 'jjnns', 'rigid': 'jjnns', 'line': 'jjn', 'mirror': 'jjj', 'parallelogram': 'jjj',
     'antiparallelogram': 'jjj', 'inversor': 'jjnn', 'slot': 'jjnsn', 'slider': 'jnjas'}
 _SLIDER_ALONG = 'jnjjs'

@@ -71,8 +71,9 @@ class Output(NamedTuple):
 
     `what` is 'point', 'angle' or 'slide'; `parts` are bars by their two joints, that of an angle
     and that from which it is counted, from `quarters` of a turn; of one joint is what slides on
-    its line. `needs` are the closures without which it is NaN: none for a driven angle. `by` is the
-    number of the input by which it is differentiated, `TIME` for twice by time, None for a pose.
+    its line. `needs` are the closures without which it is NaN: none for a driven angle. `by` is
+    the number of the input by which it is differentiated, `TIME` for twice by time, None for a
+    pose.
     """
 
     what: str

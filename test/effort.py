@@ -1,0 +1,19 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What something costs, counted: the same on any machine, however busy it is."""
+
+from contextlib import contextmanager
+import cProfile
+
+
+@contextmanager
+def few_calls(most: int, about: str = ''):
+    """Hold that what is done inside calls at most so many functions, those in C included."""
+    profile = cProfile.Profile()
+    try:
+        with profile:
+            yield
+    finally:
+        done = sum(entry.callcount for entry in profile.getstats())
+        assert done <= most, f'{done} calls: {about}'
