@@ -347,15 +347,8 @@ def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
     """
     Differentiate an expression with respect to time.
 
-    Parameters
-    ----------
-    node : Real
-        What is differentiated.
-    rates : dict
-        Rate of each argument, by its index; what is left out stands still.
-    known : dict
-        Derivatives found so far, shared between calls.
-
+    `rates` are those of the arguments, by index; what is left out stands still. `known` are the
+    derivatives found so far, shared between calls.
     """
     def needed(x: Real) -> Iterable[Real]:
         if not x.varies or x.op in STEPS:

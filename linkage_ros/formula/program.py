@@ -266,17 +266,9 @@ class _Variant:
 
 class Program:
     """
-    Some outputs of a linkage, ready to be bound to dimensions.
+    Some outputs of a linkage, ready to be bound to dimensions; of so many arguments.
 
-    Parameters
-    ----------
-    outputs : sequence of Real
-        What is computed.
-    arguments : int
-        How many arguments are given.
-    replaced : mapping, optional
-        What stands for some arguments in the outputs.
-
+    Some arguments in the outputs may be `replaced` by expressions.
     """
 
     def __init__(self, outputs: Sequence[Real], arguments: int = 1,
@@ -418,13 +410,8 @@ class Batch:
     """
     Poses that are solved again and again, in arrays that stay where they are.
 
-    Attributes
-    ----------
-    given : float array (arguments, poses)
-        Where the arguments are put.
-    rows : float array (poses, outputs)
-        What `solve` makes of them.
-
+    The arguments are put into `given` (arguments, poses); `solve` puts the outputs into `rows`
+    (poses, outputs).
     """
 
     def __init__(self, plainly: Callable, loop: Optional[Future], constants: np.ndarray,

@@ -39,20 +39,10 @@ def sampled(lo: float, hi: float, samples: int = SAMPLES, fewest: int = 9) -> np
 
 def drawn(curve: Callable, lo: float, hi: float) -> np.ndarray:
     """
-    Return points of a plane curve, the closer together the more it bends.
+    Return points (n, 2) of a plane curve on an arc, the closer together the more it bends.
 
-    Parameters
-    ----------
-    curve : callable
-        From values of an input, shape (n,), to points, shape (n, 2); NaN where there is none.
-    lo, hi : float
-        The ends of the arc.
-
-    Returns
-    -------
-    float array (n, 2)
-        Between neighbours no point is farther from their chord than CHORD of the curve's size.
-
+    The curve takes values of an input (m,) and returns points (m, 2), NaN where there is none.
+    Between neighbours no point is farther from their chord than CHORD of the curve's size.
     """
     at = sampled(lo, hi, 0, DRAWN)
     places = curve(at)
@@ -86,18 +76,8 @@ def refined(test: Callable, lo: np.ndarray, hi: np.ndarray) -> Tuple[np.ndarray,
     """
     Return, for each bracket, the last angle that is as its start is and the first that is not.
 
-    Parameters
-    ----------
-    test : callable
-        From angles [rad], shape (brackets, n), to whether each is as its start is.
-    lo, hi : float array (brackets,)
-        Starts and ends [rad]; a bracket may run backwards.
-
-    Returns
-    -------
-    (float array, float array)
-        Neighbouring floats.
-
+    The test takes angles [rad] (brackets, n) and returns whether each is as its start is. A
+    bracket may run backwards, from lo to hi; the answers are neighbouring floats.
     """
     lo, hi = np.array(lo, float), np.array(hi, float)
     row = np.arange(len(lo))
@@ -159,22 +139,10 @@ def turns(values: np.ndarray, rates: np.ndarray, least: np.ndarray) -> np.ndarra
 
 def extremes(curve: Callable, lo: float, hi: float, angular: np.ndarray) -> np.ndarray:
     """
-    Return the least and the greatest value of outputs on an arc, and where they have it.
+    Return of outputs on an arc the least value and where, then the greatest: (outputs, 2, 2).
 
-    Parameters
-    ----------
-    curve : callable
-        From values of an input, shape (n,), to the outputs, shape (outputs, n).
-    lo, hi : float
-        The ends of the arc.
-    angular : bool array (outputs,)
-        Which outputs are angles [rad]; they are followed past -pi and pi.
-
-    Returns
-    -------
-    float array (outputs, 2, 2)
-        Of each output the least value and where, then the greatest value and where.
-
+    The curve takes values of an input (n,) and returns the outputs (outputs, n). Those that are
+    `angular` (outputs,) are angles [rad], followed past -pi and pi.
     """
     theta = np.linspace(lo, hi, EVEN)
     value = curve(theta)

@@ -26,23 +26,11 @@ NARROWEST = 2e-15
 
 class Input(NamedTuple):
     """
-    A number that a pose follows from.
+    A number that a pose follows from: an ANGLE [rad] or a LENGTH [m], as users call it.
 
-    Attributes
-    ----------
-    name : str
-        What users call it: 'crank', 'cylinder2'.
-    kind : str
-        ANGLE [rad] or LENGTH [m].
-    low : float
-        All poses lie between this value and `high`: of an angle one turn, of a length its longest
-        stroke.
-    high : float
-        The other end.
-    period : int
-        After how many turns all comes round: more than one where it drives others by gears of
-        fractions.
-
+    All poses lie between `low` and `high`: of an angle one period, of a length its longest stroke.
+    `period` says after how many turns all comes round: more than one where it drives others by
+    gears of fractions.
     """
 
     name: str

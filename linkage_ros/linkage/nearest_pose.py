@@ -21,31 +21,11 @@ STEPS, HALVINGS = 60, 12
 def nearest_inputs(linkage: Mechanism, joint: str, place: Sequence[float],
                    present: Sequence[float], arcs: Sequence[Sequence[Arc]]) -> np.ndarray:
     """
-    Return the inputs that bring a joint nearest to a place.
+    Return the inputs (inputs,) [rad or m] that bring a joint nearest to a place (x, y) [m].
 
-    Parameters
-    ----------
-    linkage : Mechanism
-        What moves.
-    joint : str
-        One of its joints.
-    place : (float, float)
-        Where that is wanted [m].
-    present : sequence of float
-        The inputs as they are [rad or m]; of poses that serve, one near them is taken.
-    arcs : sequence of sequence of (float, float)
-        For each input where it may be.
-
-    Returns
-    -------
-    float array (inputs,)
-        The inputs [rad or m], each on one of its arcs.
-
-    Raises
-    ------
-    ValueError
-        If there is no such joint, or the linkage cannot be assembled on these arcs.
-
+    Of poses that serve, one near the inputs that are `present` is taken. Each input is on one of
+    its `arcs`, a sequence of (low, high). Raises ValueError if there is no such joint, or the
+    linkage cannot be assembled on these arcs.
     """
     goal = np.asarray(place, float)
     if len(linkage.inputs) > 1:
