@@ -32,7 +32,7 @@ VECTOR = ir.VectorType(NUMBER, LANES)
 SHARE = 3 * 2 ** 19
 # The first pose and the one after the last, all poses, then addresses: of the addresses of the
 # arguments, of the constants and of the results.
-SIGNATURE = ctypes.CFUNCTYPE(None, *3 * (ctypes.c_int64,), *3 * (ctypes.c_void_p,))
+ARRAYS_SIGNATURE = ctypes.CFUNCTYPE(None, *3 * (ctypes.c_int64,), *3 * (ctypes.c_void_p,))
 
 
 class Arrays:
@@ -40,7 +40,7 @@ class Arrays:
 
     def __init__(self, operations: Sequence, constants: Sequence[int], outputs: Sequence[int]):
         self._engine = compiled(_module(operations, constants, outputs))
-        self._run = SIGNATURE(self._engine.get_function_address('poses'))
+        self._run = ARRAYS_SIGNATURE(self._engine.get_function_address('poses'))
         self._outputs = len(outputs)
         self._share = SHARE // (1 + len(operations))
 

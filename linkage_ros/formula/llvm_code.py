@@ -27,8 +27,8 @@ if not hasattr(llvm, 'create_pass_builder'):
 
 NUMBER, COUNT = ir.DoubleType(), ir.IntType(64)
 # Poses, addresses of arguments, constants and results, then the strides of results in numbers.
-SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, *3 * (ctypes.c_void_p,),
-                             *2 * (ctypes.c_int64,))
+LOOP_SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, *3 * (ctypes.c_void_p,),
+                                  *2 * (ctypes.c_int64,))
 
 llvm.initialize_native_target()
 llvm.initialize_native_asmprinter()
@@ -105,7 +105,7 @@ class Loop:
     def __init__(self, operations: Sequence, constants: Sequence[int], outputs: Sequence[int]):
         self._engine = compiled(_module(operations, constants, outputs))
         self.address = self._engine.get_function_address('loop')
-        self.run = SIGNATURE(self.address)
+        self.run = LOOP_SIGNATURE(self.address)
 
     @staticmethod
     def arguments(given: np.ndarray, constants: np.ndarray, out: np.ndarray) -> tuple:

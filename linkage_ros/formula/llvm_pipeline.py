@@ -25,7 +25,7 @@ from .program import compile_in_background
 from ..cache import cached
 
 BYTE = ir.IntType(8)
-TYPES = {'i': COUNT, 'f': NUMBER}
+FIELD_TYPES = {'i': COUNT, 'f': NUMBER}
 # Every table is rows of these, whole numbers and addresses ('i8') or floats ('f8').
 # A number of the message: factor * number + plus goes to an address.
 TAKE = np.dtype([('offset', 'i8'), ('to', 'i8'), ('factor', 'f8'), ('plus', 'f8')])
@@ -47,11 +47,11 @@ ENDING = {'changes': CHANGE, 'puts': PUT}
 HEAD = ('length', 'same', 'mask', 'stamp', 'failed')
 
 # What is returned instead of the number of loops that failed.
-OTHER, UNSTAMPED = -1, -2
+OTHER_MESSAGE, UNSTAMPED = -1, -2
 # Where the stamp of a message lies, after the header that says how it is encoded.
 STAMP = 4
 # So near an end of a limit, relatively, it is for others to decide.
-NEAR = 1e-9
+LIMIT_MARGIN = 1e-9
 INFINITE = 0x7FF << 52
 
 
@@ -81,7 +81,7 @@ class Pipeline:
         """
         Take, run and, if no loop failed, do what ends it.
 
-        It returns how many loops failed; OTHER or UNSTAMPED where nothing was done.
+        It returns how many loops failed; OTHER_MESSAGE or UNSTAMPED where nothing was done.
         """
         return self._run(message, len(message), ending.address if ending else 0)
 
@@ -140,8 +140,8 @@ def _module() -> ir.Module:
     write = _Writer(module, 'run', COUNT, COUNT.as_pointer(), BYTE.as_pointer(), COUNT, COUNT)
     table, text, length, ending = write.function.args
     known, tables = _read(write, table, HEAD, TABLES)
-    write.leave(write.icmp_signed('!=', length, known['length']), OTHER)
-    write.leave(_differs(write, known, text), OTHER)
+    write.leave(write.icmp_signed('!=', length, known['length']), OTHER_MESSAGE)
+    write.leave(_differs(write, known, text), OTHER_MESSAGE)
     write.leave(_stamp(write, known, text), UNSTAMPED)
     _take(write, tables['takes'], text)
     _copy(write, tables['copies'])
@@ -196,7 +196,7 @@ class _Writer(Builder):
         with self.each(size) as turn:
             at = self.add(start, self.mul(turn.i, count(kind.itemsize)))
             fields = {name: self.read(self.place(
-                self.add(at, count(field[1])), TYPES[field[0].kind]))
+                self.add(at, count(field[1])), FIELD_TYPES[field[0].kind]))
                 for name, field in (kind.fields or {}).items()}
             yield {'': turn.i, **fields}
 
@@ -253,7 +253,7 @@ def _check_limits(write: _Writer, limits: Any, failed: ir.Value) -> None:
         value = write.fadd(write.fmul(row['factor'], write.read(
             write.place(row['at'], NUMBER))), row['plus'])
         away = size(_folded(write, write.fsub(value, row['middle']), row['turn']))
-        slack = write.fmul(NUMBER(NEAR), write.fadd(size(value), row['half']))
+        slack = write.fmul(NUMBER(LIMIT_MARGIN), write.fadd(size(value), row['half']))
         near = write.fcmp_ordered('<=', away, write.fsub(row['half'], slack))
         place = write.step(write.place(failed, COUNT), row['loop'])
         write.put(write.select(near, write.read(place), count(1)), place)

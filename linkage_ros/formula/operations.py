@@ -157,5 +157,5 @@ OPERATIONS = {row.name: row for row in (
               '{name}_gated({}, {}, {})', lambda do, n, dx, *_: do('gated', dx, *n.args[1:])),
 )}
 # What changes in steps alone.
-STEPS = frozenset(row.name for row in OPERATIONS.values() if row.rate is None)
+WITHOUT_RATE = frozenset(row.name for row in OPERATIONS.values() if row.rate is None)
 COMMUTING = frozenset(row.name for row in OPERATIONS.values() if row.commutes)

@@ -19,7 +19,7 @@ Arc = Tuple[float, float]
 ANGLE, LENGTH = 'angle', 'length'
 
 # Values beyond an end of the reach by no more than this [rad] may be that end, rounded.
-ROUNDED = 1e-12
+ROUNDED_END = 1e-12
 # Arcs below this width [rad] are the rounding of one angle.
 NARROWEST = 2e-15
 
@@ -96,7 +96,7 @@ class Input(NamedTuple):
 
     def on(self, arcs: Sequence[Arc], value: Any) -> Any:
         """Return whether values lie on arcs, whole turns and rounding aside."""
-        value, slack = np.asarray(value), ROUNDED * self.size
+        value, slack = np.asarray(value), ROUNDED_END * self.size
         with np.errstate(invalid='ignore'):
             ahead = [value - low + slack for low, _ in arcs]
             ahead = [gap % self.turn for gap in ahead] if self.turns else ahead

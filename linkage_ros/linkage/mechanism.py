@@ -32,7 +32,7 @@ from ..words import listed, meant, plain_text, quoted
 
 # Lengths beyond these are counted in a power of two of their own, which changes no bit of a
 # result and keeps squares and products of lengths inside the range of float64.
-SMALL, LARGE = 1e-30, 1e30
+SMALL_LENGTH, LARGE_LENGTH = 1e-30, 1e30
 # A ratio whose denominator is larger never comes round; one that takes more turns than these is
 # answered for one turn only, as every turn takes as long as the first.
 MOST_TURNS, MOST_COUNTED = 1000, 60
@@ -692,7 +692,7 @@ class Mechanism:
 def _in_own_unit(dimensions: Mapping, fixed: bool) -> dict:
     """Return dimensions counted in a unit that is a power of two, and that unit in metres."""
     longest = max((np.max(np.abs(length)) for length in dimensions.values()), default=1.0)
-    if fixed or SMALL < longest < LARGE:
+    if fixed or SMALL_LENGTH < longest < LARGE_LENGTH:
         return {**dimensions, UNIT.args[0]: 1.0}
     unit = 2.0 ** np.frexp(longest)[1]
     return {UNIT.args[0]: unit, **{name: length / unit for name, length in dimensions.items()}}
