@@ -10,8 +10,8 @@ lines, what is calculated from them, what gears make of them), and each joint on
 that are written down: half an ulp of the largest coordinate on its line; a gap so small that it
 counts as a change point may be closed. The pin of a crank on the ground is charged only to lines
 that are not drawn on an arm from the ground to that pin: for such an arm half angles keep all
-digits, and the rule holds them to it. For velocities and rates also the velocity of each of those joints is
-rounded, for accelerations their acceleration too, and how the inputs move. The rule is
+digits, and the rule holds them to it. For velocities and rates also the velocity of each of those
+joints is rounded, for accelerations their acceleration too, and how the inputs move. The rule is
 
     error <= 4 x sensitivity + 1 ulp of the result,
 
