@@ -19,30 +19,18 @@ Arc = Tuple[float, float]
 ANGLE, LENGTH = 'angle', 'length'
 
 # Values beyond an end of the reach by no more than this [rad] may be that end, rounded.
-ROUNDED = 1e-12
+ROUNDED_END = 1e-12
 # Arcs below this width [rad] are the rounding of one angle.
 NARROWEST = 2e-15
 
 
 class Input(NamedTuple):
     """
-    A number that a pose follows from.
+    A number that a pose follows from: an ANGLE [rad] or a LENGTH [m], as users call it.
 
-    Attributes
-    ----------
-    name : str
-        What users call it: 'crank', 'cylinder2'.
-    kind : str
-        ANGLE [rad] or LENGTH [m].
-    low : float
-        All poses lie between this value and `high`: of an angle one turn, of a length its longest
-        stroke.
-    high : float
-        The other end.
-    period : int
-        After how many turns all comes round: more than one where it drives others by gears of
-        fractions.
-
+    All poses lie between `low` and `high`: of an angle one period, of a length its longest stroke.
+    `period` says after how many turns all comes round: more than one where it drives others by
+    gears of fractions.
     """
 
     name: str
@@ -108,7 +96,7 @@ class Input(NamedTuple):
 
     def on(self, arcs: Sequence[Arc], value: Any) -> Any:
         """Return whether values lie on arcs, whole turns and rounding aside."""
-        value, slack = np.asarray(value), ROUNDED * self.size
+        value, slack = np.asarray(value), ROUNDED_END * self.size
         with np.errstate(invalid='ignore'):
             ahead = [value - low + slack for low, _ in arcs]
             ahead = [gap % self.turn for gap in ahead] if self.turns else ahead
