@@ -817,7 +817,8 @@ def random_robot(seed):
             robot, count = robot_of(linkage, values), Counter()
             for line in design.joints:
                 name, word, *more = line.split()
-                count[word] += 1
+                # An input with a name of its own is not counted.
+                count[word] += 'called' not in more
                 if 'geared' in more:
                     other, ratio, _, *own = more[more.index('geared') + 1:]
                     called = own[1] if own else f'{word}{count[word]}' if count[word] > 1 else word
