@@ -12,11 +12,13 @@ searched: one input between the extremes of the output, several by steps on the 
 
 from __future__ import annotations
 
-from functools import reduce
+from functools import cached_property, reduce
 from itertools import chain, combinations, islice, product
 import math
 from typing import (
     Any,
+    cast,
+    Dict,
     Iterator,
     List,
     Mapping,
@@ -60,8 +62,9 @@ if TYPE_CHECKING:
 ROUNDING = 32 * 2.0 ** -53
 # An answer is tried so far beside where it was found [rad, sizes], as the reach may end there.
 BESIDE = 16 * 2.0 ** -52 * math.pi
-# At an end of the reach, where rates have no bound, what that makes of an output, as a part.
-ENDED = 1e-7
+# At an end of the reach, where rates have no bound, what that makes of an output, as a part; and
+# from where on that end is near enough for both of its sides to give the same inputs.
+ENDED, STEEP = 1e-7, 10.0
 # What misses by more than this part of the output's size is the answer of another assembly.
 OTHER = 1e-2
 # What is below zero by so many tolerances, a thousandth of its size, is no end of the reach.
@@ -243,10 +246,10 @@ class Inverse:
         if not self.closed:
             return self._distinct(_columns(*self._searched(np.array(values)[:, None])))
         found, n = [], 1 + self._n
-        for row in self._at(values):
+        for mode, row in enumerate(self._at(values)):
             if row[0] == 1.0:
                 found.append((row[1:n], row[n:]))
-            elif row[0] != row[0] and (own := self._own(row[1:n], values)):
+            elif row[0] != row[0] and (own := self._own(mode, row[1:n], values)):
                 found.append(own)
         return self._distinct(found) if len(found) > 1 else found
 
@@ -296,7 +299,7 @@ class Inverse:
                 abs(rate) * where(abs(x) < size, size, abs(x))
                 for rate, x, size in zip(rates[i::n], inputs, self._sizes)), real(0.0)))
             verdict = where(abs(gap) <= allowed, where(
-                abs(gap) <= ENDED * scale, verdict, math.nan), other)
+                allowed <= (1.0 + STEEP) * ROUNDING * scale, verdict, math.nan), other)
         polished = [self._counted(by, x - step)
                     for by, (x, step) in enumerate(zip(inputs, self._steps(gaps, rates)))]
         return [verdict, *polished, *rates]
@@ -331,7 +334,7 @@ class Inverse:
         return tuple(math.atan2(math.sin(x), math.cos(x)) if angular and abs(x) > math.tau else x
                      for x, angular in zip(values, self._angular))
 
-    def _own(self, inputs: Tuple[float, ...], values: Sequence[float],
+    def _own(self, mode: int, inputs: Tuple[float, ...], values: Sequence[float],
              within: bool = True) -> Optional[Found]:
         """Return inputs that a mode gives, and rates, if the linkage has its outputs there."""
         n, at, slack = self._n, self._check.at, ROUNDING
@@ -348,7 +351,9 @@ class Inverse:
         for _ in range(POLISHING):
             gaps, sure, away = self._missed(row, inputs, values, slack)
             if sure:
-                return self._within(inputs) if within else inputs, row[n:]
+                rates = self._rates_at_end(mode, inputs, values, row[n:])
+                return None if rates is None else (
+                    self._within(inputs) if within else inputs, rates)
             if not away <= OTHER:
                 break
             inputs = self._stepped(inputs, row[n:], gaps)
@@ -356,6 +361,36 @@ class Inverse:
                 break
             row = at(*inputs)
         return None
+
+    def _rates_at_end(self, mode: int, inputs: Tuple[float, ...], values: Sequence[float],
+                      rates: Tuple[float, ...]) -> Optional[Tuple[float, ...]]:
+        """
+        Return rates, next to an end of the reach those of the mode, None beyond it.
+
+        There rounding of the inputs moves outputs by far more than rounding. Beyond it the mode
+        has its dyads on other sides than the linkage: the inputs turn back, and their rates have
+        the other sign.
+        """
+        n, closed = self._n, cast(InverseLinkage, self.closed)
+        if np.abs(self._jacobian(rates)).max() < STEEP:
+            return rates
+        if not np.isfinite(rates).all():
+            rows = (self._check.at(*beside) for beside in self._beside(inputs))
+            rates = next((row[n:] for row in rows if np.isfinite(row).all()), rates)
+        start = mode // math.prod(map(len, closed.turns)) * n * n
+        turning = np.reshape(self._inverse_rates.at(*values)[start:start + n * n], (n, n))
+        with np.errstate(all='ignore'):
+            found = 1.0 / turning if n == 1 else np.linalg.inv(turning)
+        same = np.linalg.det(turning @ np.reshape(rates, (n, n)).T)
+        return None if same < 0.0 else tuple(found.T.ravel().tolist())
+
+    @cached_property
+    def _inverse_rates(self) -> Pose:
+        """The code for the rates of each input by each output in all modes."""
+        closed = cast(InverseLinkage, self.closed)
+        return self.linkage.bind(Program([
+            rate for mode in closed.modes for row in mode.rates for rate in row],
+            self._n, closed.given))
 
     def _beside(self, inputs: Tuple[float, ...]) -> Iterator[Tuple[float, ...]]:
         """Yield inputs that differ by rounding, one a little."""
@@ -442,7 +477,7 @@ class Inverse:
             (1, self._row, 0))
         if not (rows[:, 0] == 1.0).all():
             for mode, place in zip(*np.nonzero(np.isnan(rows[:, 0]))):
-                own = self._own(tuple(rows[mode, 1:n + 1, place].tolist()),
+                own = self._own(mode, tuple(rows[mode, 1:n + 1, place].tolist()),
                                 tuple(values[:, place].tolist()))
                 rows[mode, :, place] = (1.0, *own[0], *own[1]) if own else 0.0
             rows.swapaxes(0, 1)[:, rows[:, 0] == 0.0] = np.nan
@@ -558,7 +593,8 @@ class Inverse:
         """
         inputs, rates = self._found(np.array(values, float))
         limits, beside = tuple(ends or (None,) * self._n), near and tuple(np.ravel(near).tolist())
-        found, breaks = np.full((self._n + self._n ** 2, inputs.shape[2]), np.nan), {}
+        found = np.full((self._n + self._n ** 2, inputs.shape[2]), np.nan)
+        breaks: Dict[int, np.ndarray] = {}
         at, known = 0, np.flatnonzero(self._may_be_taken(inputs, limits))
         while (k := int(known.searchsorted(at))) < len(known):
             at = int(known[k])
@@ -768,7 +804,7 @@ class Inverse:
             at = {}
             for mode, last in going.items():
                 if (place := places.get(mode)) and (own := self._own(
-                        self._next_to(place, last), aim, False)):
+                        mode, self._next_to(place, last), aim, False)):
                     at[mode] = own[0]
                     found.append(own)
         return min(found, key=lambda own: math.dist(own[0], near)) if found else None

@@ -46,6 +46,8 @@ if TYPE_CHECKING:
 MOST_SIDES = 5
 # Of the linkage's size, what is at one place; and how often it is looked for a pose.
 NEAR, TRIES = 1e-9, 400
+# What a sum of angles of quarter turns [rad] is rounded to.
+EXACT = 4 * 2.0 ** -51
 # Assembly modes, in all turns, at most.
 MOST_MODES = 64
 
@@ -374,6 +376,11 @@ class _Sketch(Dyads):
     def said(self, value: float) -> str:
         """Return a length as it is."""
         return repr(float(value) + 0.0)
+
+    def quarters(self, start: float) -> Optional[int]:
+        """Return quarter turns: what is added to an angle would cost it its last digits."""
+        quarters = round(start / (0.5 * math.pi))
+        return quarters % 4 if abs(start - 0.5 * math.pi * quarters) < EXACT else None
 
     def called(self, place: complex, body: str) -> str:
         """Return the linkage's own name of a joint, or a new one."""
