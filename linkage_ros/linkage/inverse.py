@@ -36,6 +36,7 @@ from numpy.typing import ArrayLike
 from .analysis import Analysis
 from .arguments import numbers
 from .curves import LEAST
+from .inputs import Input
 from .inverse_linkage import InverseLinkage, taken_apart
 from .inverse_rods import InverseRods, taken_apart as rods_taken_apart
 from .planar import TOLERANCE
@@ -84,6 +85,8 @@ STEP, ALIKE = 0.3, 1e-5
 CLOSE, ULPS = 1e-7, 4 * 2.0 ** -52
 # More than any input.
 LARGE = 1e300
+# Poses in which outputs are compared with those a turn later.
+SAMPLES = 64
 # So many values of a path are looked at together.
 BLOCK = 1024
 
@@ -151,6 +154,9 @@ class Inverse:
         What is asked for, named as `Mechanism.has_output` says.
     closed : InverseLinkage or None
         Its joint lines, assembly modes and their program; None where the inverse is searched.
+    inputs : tuple of Input
+        Those of the linkage. One whose gears come round after very many turns has the period of
+        the outputs; where they have none, it is infinite, and one turn is answered alone.
 
     """
 
@@ -159,14 +165,15 @@ class Inverse:
         if linkage.checked(outputs).shape:
             raise ValueError('the inverse is for one set of dimensions, not for arrays')
         blocks(linkage, outputs)
-        self._n, self._inputs = len(outputs), linkage.inputs
+        self._n = len(outputs)
         self._angular = [linkage.is_angle(name) for name in outputs]
         self._scales = [1.0 if angular else linkage.longest for angular in self._angular]
         self._sizes = [input_.size for input_ in linkage.inputs]
+        self._check, self._choices = linkage.checked(outputs), Cache()
+        self.inputs = tuple(map(self._coming_round, range(self._n), linkage.inputs))
         # Of each input half a period, the period, and below what it is zero.
         self._turned = [(0.5 * input_.turn, input_.turn, LEAST) if input_.turns else
-                        (math.inf, math.inf, LEAST * input_.size) for input_ in linkage.inputs]
-        self._check, self._choices = linkage.checked(outputs), Cache()
+                        (math.inf, math.inf, LEAST * input_.size) for input_ in self.inputs]
         self._rated = linkage.posed((), outputs, outputs)
         self.closed: Union[InverseLinkage, InverseRods, None] = (
             taken_apart if linkage.axes == 'xy' else rods_taken_apart)(linkage, outputs)
@@ -185,6 +192,31 @@ class Inverse:
         if not self.closed:
             return f'the inverse of {self.linkage.type} for {what} is searched'
         return f'# {self.linkage.type} driven by {what}\n{self.closed}'
+
+    def _coming_round(self, by: int, input_: Input) -> Input:
+        """Return an input with the period of the outputs, where its own has too many turns."""
+        if not input_.turns or self.linkage.period(by) == input_.period:
+            return input_
+        geared = self.linkage.geared_to(by)
+        rates = self.linkage.posed((), (), geared).at(*([0.0] * self._n))[
+            by * len(geared):][:len(geared)]
+        return input_._replace(period=next((
+            period for period in (1.0, *(1.0 / abs(rate) for rate in rates if abs(rate) > 1.0))
+            if self._repeats(by, math.tau * period)), math.inf))
+
+    def _repeats(self, by: int, turn: float) -> bool:
+        """Return whether poses are the same after an input has turned by so much [rad]."""
+        parts = np.outer(np.arange(1, SAMPLES + 1), np.sqrt([2, 3, 5, 7, 11, 13, 17, 19][
+            :self._n])) % 1.0
+        inputs = [x.low + part * (x.high - x.low) for x, part in zip(self.linkage.inputs, parts.T)]
+        first = self._check.over(*inputs)[:self._n]
+        inputs[by] = inputs[by] + turn
+        gaps = self._check.over(*inputs)[:self._n] - first
+        for gap, angular, scale in zip(gaps, self._angular, self._scales):
+            gap -= math.tau * np.round(gap / math.tau) * angular
+            gap /= scale
+        return bool(np.all(np.isnan(gaps) == np.isnan(first)) and not np.nanmax(
+            np.abs(gaps), initial=0.0) > ENDED)
 
     # All answers.
 
@@ -777,7 +809,7 @@ class Inverse:
         if self._n > 1:
             inputs, jacobian = self._search.followed(np.array(near), np.array(values))
             return tuple(inputs.tolist()), tuple(jacobian.T.ravel().tolist())
-        first = self._inputs[0]
+        first = self.inputs[0]
         turns, size = first.turns_of(near[0]), self._sizes[0]
         found, rate = self._search.follow(self._rated.at, size, values[0], near[0] - turns)
         if self._search.is_one and first.is_whole(self.linkage.reach()):
@@ -819,7 +851,7 @@ class Inverse:
 
     def _next_to(self, inputs: Sequence[float], near: Sequence[float]) -> Tuple[float, ...]:
         return tuple(x + input_.turn * round((y - x) / input_.turn) if input_.turns else x
-                     for input_, x, y in zip(self._inputs, inputs, near))
+                     for input_, x, y in zip(self.inputs, inputs, near))
 
     # The search for what does not come apart.
 
@@ -828,7 +860,7 @@ class Inverse:
         if self._n == 1:
             inputs = self._search.answers(values[0])[:, None] * self._sizes[0]
             rates = self._rated.over(inputs.ravel())[1].reshape(inputs.shape)
-            return self._inputs[0].wrapped(np.where(
+            return self.inputs[0].wrapped(np.where(
                 np.abs(inputs) < self._turned[0][2], 0.0, inputs)), rates
         found = [self._search.answers(column) for column in values.T]
         most = max((len(each) for each in found), default=0)
@@ -852,7 +884,7 @@ class Inverse:
         """Return the working mode of a pose; see `Answer.signs`."""
         linkage = self.linkage
         cranks = {link.name: link for link in linkage.links
-                  if any(input_.turns and link.name == input_.name for input_ in self._inputs)}
+                  if any(input_.turns and link.name == input_.name for input_ in linkage.inputs)}
         places, signs = linkage.solve(inputs if self._n > 1 else inputs[0]), {}
         for link in linkage.links if linkage.axes == 'xy' else ():
             crank = cranks.get(link.parent)
