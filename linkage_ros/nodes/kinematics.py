@@ -17,9 +17,9 @@ from sensor_msgs.msg import JointState
 
 from . import joint_state_reader, scene_node
 from .driven_mechanism import DrivenMechanism
-from .log import InvalidHandle, Once, RCLError, Throttle
+from .log import InvalidHandle, Once, RCLError
 from .mechanism_model import MechanismModel
-from .message_layout import pack_time, Unreadable
+from .message_layout import pack_time
 from .plan import Planner, Route
 from .scene_joint_states import SceneJointStates
 from .. import scene
@@ -51,7 +51,6 @@ class Kinematics(scene_node.SceneNode):
                                 joint_state_reader.Reader(self._interpret), self._now)
         self._own: frozenset = frozenset()
         self._missing, self._unknown = set(self._inputs), Once(UNKNOWN_NAMES)
-        self._throttle = Throttle(self.get_logger())
         self._patience = self.create_timer(
             PATIENCE, self.guarded('the inputs that nobody sends', self._name_missing),
             clock=Clock(clock_type=ClockType.STEADY_TIME), autostart=False)
@@ -60,10 +59,8 @@ class Kinematics(scene_node.SceneNode):
             next(iter(self.scene.machines.values())).linkage.accelerated()
         except ImportError as error:
             self.get_logger().info(f'{error}; plain Python moves the legs, to the same places')
-        self.create_subscription(
-            JointState, 'crank_states', self.guarded('crank_states', self._receive,
-                                                     self._planner.discard),
-            joint_state_reader.ANY, raw=True)
+        joint_state_reader.subscribe(
+            self, 'crank_states', self._planner.process, self._planner.discard)
 
     def serves(self) -> str:
         """Say which mechanisms it moves."""
@@ -142,14 +139,6 @@ class Kinematics(scene_node.SceneNode):
 
     def _now(self) -> bytes:
         return pack_time(self.get_clock().now().nanoseconds)
-
-    def _receive(self, text: bytes) -> None:
-        try:
-            self._planner.process(text)
-        except Unreadable as error:
-            reason = str(error)
-            self._throttle.warn('unreadable', lambda: (
-                f'crank_states: {len(text)} bytes that are no joint states are ignored: {reason}'))
 
     def _interpret(self, message: JointState) -> Tuple[Tuple[Route, ...], bool]:
         """Return the inputs that a source sets, and whether it says how fast they move."""
