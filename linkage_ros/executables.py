@@ -3,12 +3,12 @@
 
 """The executables that run until a signal: it ends them quietly from this module's import on."""
 
+from collections.abc import Callable
 from importlib import import_module
 import os
 import signal
 import sys
 import threading
-from typing import Callable
 
 
 def _executable(module: str) -> Callable[[], None]:

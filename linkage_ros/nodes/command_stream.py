@@ -173,7 +173,7 @@ class CommandStream:
                 one.has_subscribers for one in self._arrays.values()):
             return
         source = self._reader.source(text)
-        (targets, known), (stamp, positions, speeds) = source.meaning, source.take(text)
+        (targets, known), (stamp, positions, speeds) = source.meaning, source.read(text)
         commands = [self._command(target, positions, speeds if known else None)
                     for target in targets]
         if found := [command for command in commands if command]:

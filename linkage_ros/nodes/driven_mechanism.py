@@ -197,7 +197,7 @@ class DrivenMechanism:
         self._delete(self._displayed)
         self._set_locus(None)
 
-    def let_arrive(self, deadline: float) -> None:
+    def wait_for_deletions(self, deadline: float) -> None:
         """Wait until the deletions have arrived, or until a time on the steady clock [s]."""
         for publisher in (self._markers.publisher, self._locus):
             publisher.wait_for_all_acked(Duration(seconds=max(0.0, deadline - time.monotonic())))

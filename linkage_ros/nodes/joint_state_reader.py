@@ -143,7 +143,7 @@ class Source:
             return text is self._only[0]
         return len(text) == self.size and int.from_bytes(text, 'little') & self.mask == self.same
 
-    def take(self, text: bytes) -> Numbers:
+    def read(self, text: bytes) -> Numbers:
         """Return what a message of this source says."""
         return self._only[1] or self._unpacked(text)
 

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 import sys
@@ -17,7 +16,7 @@ from sensor_msgs.msg import JointState
 
 from . import joint_state_reader, scene_node
 from .driven_mechanism import DrivenMechanism
-from .log import InvalidHandle, Once, RCLError
+from .log import Once
 from .mechanism_model import MechanismModel
 from .message_layout import pack_time
 from .plan import Planner, Route
@@ -28,9 +27,9 @@ from ..words import listed
 
 # After how long inputs that nobody sends are named [s], and how many unknown joint names are
 # warned about.
-PATIENCE, UNKNOWN_NAMES = 5.0, 1000
+MISSING_AFTER, UNKNOWN_NAMES = 5.0, 1000
 # How long the end of the node waits for its deletions of markers to arrive [s].
-FAREWELL = 0.1
+DELETION_TIMEOUT = 0.1
 
 
 class Kinematics(scene_node.SceneNode):
@@ -51,8 +50,8 @@ class Kinematics(scene_node.SceneNode):
                                 joint_state_reader.Reader(self._interpret), self._now)
         self._own: frozenset = frozenset()
         self._missing, self._unknown = set(self._inputs), Once(UNKNOWN_NAMES)
-        self._patience = self.create_timer(
-            PATIENCE, self.guarded('the inputs that nobody sends', self._name_missing),
+        self._missing_timer = self.create_timer(
+            MISSING_AFTER, self.guarded('the inputs that nobody sends', self._name_missing),
             clock=Clock(clock_type=ClockType.STEADY_TIME), autostart=False)
         self.begin()
         try:
@@ -119,20 +118,14 @@ class Kinematics(scene_node.SceneNode):
             self.get_logger().info(f'no robot_description of the whole scene: {error}', once=True)
         return lambda: self._scene_joint_states.describe(text) if models is self._models else None
 
-    def destroy_node(self) -> None:
-        """Delete what is displayed, then end."""
-        with suppress(RCLError, InvalidHandle):
-            self.say_goodbye()
-        super().destroy_node()
-
-    def say_goodbye(self) -> None:
+    def delete_displayed(self) -> None:
         """Delete what is displayed."""
         for one in self._mechanisms.values():
             one.clear()
         # What has not arrived when a process ends is lost.
-        deadline = time.monotonic() + FAREWELL
+        deadline = time.monotonic() + DELETION_TIMEOUT
         for one in self._mechanisms.values():
-            one.let_arrive(deadline)
+            one.wait_for_deletions(deadline)
 
     def _invalidate(self) -> None:
         self._planner.invalidate()
@@ -152,7 +145,7 @@ class Kinematics(scene_node.SceneNode):
     def _note(self, names: Iterable[str], sent: Iterable[str]) -> None:
         """Note which inputs are sent; name those that there are not, each once."""
         if len(self._missing) == len(self._inputs) and not self._missing.isdisjoint(sent):
-            self._patience.reset()
+            self._missing_timer.reset()
         self._missing.difference_update(sent)
         unknown = self._unknown.new(name for name in names if name not in self._inputs
                                     and name not in self._own)
@@ -163,7 +156,7 @@ class Kinematics(scene_node.SceneNode):
 
     def _name_missing(self) -> None:
         """Say once which inputs nobody sends."""
-        self._patience.cancel()
+        self._missing_timer.cancel()
         if self._missing:
             waiting = [name for name in self._inputs if name in self._missing]
             stuck = dict.fromkeys(mechanism for name in waiting

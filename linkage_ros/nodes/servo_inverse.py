@@ -112,7 +112,7 @@ class ServoInverse(scene_node.SceneNode):
         # `kinematics` says what is unreadable.
         with suppress(Unreadable):
             source = self._reader.source(text)
-            positions = source.take(text).positions
+            positions = source.read(text).positions
             self._positions.update((name, positions[place]) for name, place in source.meaning)
 
 
