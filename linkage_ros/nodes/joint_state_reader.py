@@ -39,12 +39,12 @@ class Numbers(NamedTuple):
 
 
 def subscribe(node: Any, topic: str, receive: Callable[[bytes], None],
-              failed: Optional[Callable[[], None]] = None) -> None:
+              failed: Callable[[], None] = lambda: None) -> None:
     """
     Subscribe a SceneNode to joint states as bytes.
 
-    Where `receive` raises Unreadable, they are ignored, which is logged now and then; `failed` is
-    called after any other exception.
+    Where `receive` raises Unreadable, they are ignored, which is logged now and then. After any
+    other exception, which is reported, `failed` is called.
     """
     throttle = Throttle(node.get_logger())
 
@@ -55,9 +55,11 @@ def subscribe(node: Any, topic: str, receive: Callable[[bytes], None],
             reason = str(error)
             throttle.warn(topic, lambda: (f'{topic}: {len(text)} bytes that are no joint states '
                                           f'are ignored: {reason}'))
+        except Exception as error:
+            node.report(topic, error)
+            failed()
 
-    node.create_subscription(JointState, topic, node.guarded(topic, receive_or_ignore, failed),
-                             ANY, raw=True)
+    node.create_subscription(JointState, topic, receive_or_ignore, ANY, raw=True)
 
 
 class Reader:

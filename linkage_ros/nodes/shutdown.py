@@ -34,10 +34,10 @@ class ShutdownHandler:
         self._received, self._sent = socket.socketpair()
         self._sent.setblocking(False)
         Thread(target=self._wait, name='linkage_ros signals', daemon=True).start()
+        signal.set_wakeup_fd(self._sent.fileno(), warn_on_full_buffer=False)
         # Python's own handler would raise KeyboardInterrupt amid a callback.
         self._before = {number: signal.signal(number, lambda *_: None)
                         for number in (signal.SIGINT, signal.SIGTERM)}
-        signal.set_wakeup_fd(self._sent.fileno(), warn_on_full_buffer=False)
         return self
 
     def __exit__(self, *_: Any) -> None:
