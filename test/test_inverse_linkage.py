@@ -8,10 +8,9 @@ import math
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
+from sweeps import EXHAUSTIVE
 from truth import random_linkages
 
-# Many more than `.ci/run` has time for.
-EXHAUSTIVE = [pytest.mark.long, pytest.mark.exhaustive]
 FIVE_BAR = """\
 # five_bar driven by P.x, P.y
 O ground 0.0 0.0

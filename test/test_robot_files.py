@@ -5,6 +5,9 @@
 
 import cmath
 from collections import Counter
+from contextlib import redirect_stdout
+from functools import lru_cache
+import io
 import math
 from pathlib import Path
 import random
@@ -15,19 +18,26 @@ from linkage_ros.robot_files import closing, command, model, readers
 import numpy as np
 import pytest
 from robots import LIBRARIES
+from sweeps import EXHAUSTIVE
 from truth import random_linkages
 
 ROBOTS = Path(__file__).with_name('robot_files')
 
 
-def printed(capsys, name, *more):
+def printed(name, *more):
     """Return what the command prints of a file, as a scene file."""
-    assert command.main([str(ROBOTS / name), *map(str, more)]) == 0
-    return capsys.readouterr().out
+    return _printed(name, (ROBOTS / name).read_bytes(), *more)
+
+
+@lru_cache(None)
+def _printed(name, _, *more):
+    with redirect_stdout(io.StringIO()) as out:
+        assert command.main([str(ROBOTS / name), *map(str, more)]) == 0
+    return out.getvalue()
 
 
 @pytest.fixture
-def imported(capsys, tmp_path):
+def imported(tmp_path):
     """Return a function that reads the scene of a file."""
     pytest.importorskip('yaml')
 
@@ -35,7 +45,7 @@ def imported(capsys, tmp_path):
         if str(name).endswith('.xml'):
             pytest.importorskip('mujoco', reason='MJCF is read by MuJoCo: pip install mujoco')
         file = tmp_path / 'scene.yaml'
-        file.write_text(printed(capsys, name, *more))
+        file.write_text(printed(name, *more))
         return scene.load(str(file)).machines
     return load
 
@@ -116,6 +126,7 @@ URDF = {
                         [('tail_a', 'tail_b'), ('level_a', 'level_b'), ('tool_a', 'tool_b')])}
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('library', LIBRARIES)
 @pytest.mark.parametrize('file', URDF)
 def test_the_joints_of_a_urdf_close_its_loops(imported, file, library):
@@ -149,8 +160,8 @@ def checked(text):
 
 
 @pytest.mark.parametrize('place', ['0 0 0.2', '0 0 0.20001', '0 0.01 0.2', '0 0 0.26'])
-def test_a_scene_is_held_against_its_robot_over_the_range_of_its_motor(capsys, tmp_path, place):
-    text = printed(capsys, written(tmp_path, 'four_bar.urdf', (
+def test_a_scene_is_held_against_its_robot_over_the_range_of_its_motor(tmp_path, place):
+    text = printed(written(tmp_path, 'four_bar.urdf', (
         '<child_origin xyz="0 0 0.2"/>', f'<child_origin xyz="{place}"/>')))
     (count, worst), = checked(text)
     assert count >= 200 and worst < 1e-12 and 'motor from -1.2 to 1.2' in text
@@ -177,7 +188,7 @@ def test_hinges_that_cross_at_the_end_of_a_rod_are_a_ball(imported, capsys, tmp_
     rod = [(hinge, ball), ('name="wrist" type="revolute"', 'name="wrist" type="spherical"')]
     file = written(tmp_path, 'four_bar.urdf', *rod)
     assert ('# Not published: elbow_y, elbow_x, elbow, which no angle in the plane tells.'
-            in printed(capsys, file))
+            in printed(file))
     machine, = imported(file).values()
     assert published(machine, motor=0.4)['shoulder'] == pytest.approx(-0.4)
     loose = written(tmp_path, 'four_bar.urdf', *rod, (
@@ -393,7 +404,7 @@ def test_joints_that_an_equality_ties_together_are_geared(imported, tmp_path):
     assert (right.first.ratio, left.first.ratio) == (2.0, 1.0)
 
 
-def test_names_of_a_file_stay_names(imported, capsys, tmp_path):
+def test_names_of_a_file_stay_names(imported, tmp_path):
     yaml = pytest.importorskip('yaml')
     name = 'jy\n/crank_driver: {ros__parameters: {rate: 1.0}}\n#'
     text = name.replace('\n', '&#10;')
@@ -402,7 +413,7 @@ def test_names_of_a_file_stay_names(imported, capsys, tmp_path):
     evil = file.rename(tmp_path / 'robot\nevil: 2\n#.urdf')
     machine, = imported(evil).values()
     assert published(machine, motor=0.4).keys() == {name, 'finger-1', 'motor'}
-    assert yaml.safe_load(printed(capsys, evil)).keys() == {'/**'}
+    assert yaml.safe_load(printed(evil)).keys() == {'/**'}
 
 
 HALVES = """<mujoco><worldbody><body name="palm" euler="20 30 40">
@@ -506,6 +517,7 @@ DIALECTS = {
         '<axis xyz="0 1 0"/></joint>', '')}
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('dialect', DIALECTS)
 def test_a_loop_is_closed_in_every_way_in_which_tools_write_it(imported, tmp_path, dialect):
     inside, loops = DIALECTS[dialect]
@@ -740,6 +752,7 @@ def check_comes_back(linkage, values, robot, steps):
     return said, moved
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('kind', mechanisms.TYPES)
 def test_a_linkage_of_the_catalogue_comes_back_from_a_robot(kind):
     linkage = mechanisms.create(kind)
@@ -787,11 +800,8 @@ def check_random_robots(seeds):
 
 # Slots and cylinders on one pair of joints; gears of gears; crossed bars on a block.
 @pytest.mark.long
-def test_random_linkages_come_back_from_robots():
-    check_random_robots([79, 84, 129, 179, 191, 301, 361, 531, 616, 643, 681, *range(20)])
-
-
-@pytest.mark.long
-@pytest.mark.exhaustive
-def test_many_random_linkages_come_back_from_robots():
-    check_random_robots(range(20, 120))
+@pytest.mark.parametrize('seeds', [
+    [79, 84, 129, 179, 191, 301, 361, 531, 616, 643, 681, *range(20)],
+    pytest.param(range(20, 120), marks=EXHAUSTIVE)])
+def test_random_linkages_come_back_from_robots(seeds):
+    check_random_robots(seeds)

@@ -23,10 +23,9 @@ from linkage_ros.c_code import header, transmission
 from linkage_ros.c_code.axes import actuators, joints
 import numpy as np
 import pytest
+from sweeps import EXHAUSTIVE, few_and_many
 from truth import random_linkages
 
-# Many more than `.ci/run` has time for.
-EXHAUSTIVE = [pytest.mark.long, pytest.mark.exhaustive]
 ROOT = Path(__file__).parents[1]
 STAND_IN = ROOT / 'test' / 'ros2_control'
 STRICT = ('-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wshadow', '-Werror', '-O2')
@@ -336,10 +335,9 @@ def test_a_transmission_is_proved(tmp_path, compiler):
     proved(written(tmp_path, ROOT / 'examples' / 'leg.yaml'), 'knee', compiler, 5000)
 
 
-@pytest.mark.long
-@pytest.mark.exhaustive
 @pytest.mark.parametrize('compiler', COMPILERS)
-@pytest.mark.parametrize('path', SCENES, ids=lambda path: path.stem)
+@pytest.mark.parametrize('path', few_and_many([], [(path,) for path in SCENES]),
+                         ids=lambda path: path.stem)
 def test_every_scene_is_proved_at_a_hundred_thousand_states(tmp_path, path, compiler):
     package = written(tmp_path, path)
     for name in scene.load(path).machines:
