@@ -109,6 +109,7 @@ def test_loads_beside_another_mechanism_come_with_every_message(graph, executor)
     assert all(len(state.effort) == len(state.name) for state in received)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('wrong', [math.nan, math.inf, 1e308])
 def test_a_speed_that_is_no_number_is_in_no_message(graph, executor, wrong):
     scene = Scene(graph, TWO, ['joint_states'])

@@ -5,7 +5,7 @@
 
 import cmath
 from collections import Counter
-from contextlib import redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout
 from functools import lru_cache
 import io
 import math
@@ -31,7 +31,7 @@ def printed(name, *more):
 
 @lru_cache(None)
 def _printed(name, _, *more):
-    with redirect_stdout(io.StringIO()) as out:
+    with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()):
         assert command.main([str(ROBOTS / name), *map(str, more)]) == 0
     return out.getvalue()
 

@@ -88,6 +88,7 @@ def rows_of(kind, linkage, angles):
     return rows
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('levers', [3, pytest.param(12, marks=pytest.mark.long)])
 @pytest.mark.parametrize('kind', LEVERS)
 def test_servo_angles_and_reductions_of_any_lever_are_right(kind, levers):

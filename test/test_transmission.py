@@ -147,6 +147,7 @@ def expected(machine, inputs):
     return position, rates, joint, signs[:, None] * turning
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
 def test_both_ways_are_those_of_the_scene(library, machines, name):
     machine = machines[name]
@@ -206,6 +207,7 @@ def test_a_singular_pose_is_said(library, machines):
     assert status == 2 and velocity == 0.0 and np.isfinite(position)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
 def test_nothing_that_comes_in_gets_out_as_no_number(library, machines, name):
     machine, rng = machines[name], np.random.default_rng(4)
@@ -239,7 +241,8 @@ def test_the_joints_are_chosen_by_their_names(machines, tmp_path):
 
 
 @pytest.mark.parametrize('seeds', [
-    range(10), pytest.param(range(10, 100), marks=EXHAUSTIVE)])
+    range(3), pytest.param(range(3, 12), marks=pytest.mark.long),
+    pytest.param(range(12, 100), marks=EXHAUSTIVE)])
 def test_random_linkages_go_both_ways(tmp_path, seeds):
     machines = []
     for seed in seeds:
@@ -330,6 +333,7 @@ def proved(package, name, compiler, count, *flags):
     assert tried == count and good > 0.9 * count
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('compiler', COMPILERS)
 def test_a_transmission_is_proved(tmp_path, compiler):
     proved(written(tmp_path, ROOT / 'examples' / 'leg.yaml'), 'knee', compiler, 5000)
