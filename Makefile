@@ -18,8 +18,10 @@ bin := $(CURDIR)/$(venv)/bin
 docs_python := $(CURDIR)/.venv-docs/bin/python
 lint_bin := .venv-lint/bin
 
-requirements := wheels/$(DISTRO).txt wheels/build.txt wheels/demo.txt $(if $(PLAIN),,wheels/fast.txt)
-tools := wheels/dev.txt $(wildcard wheels/dev-$(DISTRO).txt)
+# All that is installed, with hashes: `make lock` writes these files.
+lock := wheels/lock
+requirements := $(lock)/$(DISTRO).txt $(if $(PLAIN),,$(lock)/fast.txt)
+tools := $(lock)/dev-$(DISTRO).txt
 sources := package.xml setup.py setup.cfg resource/linkage_ros wheels/prefix.cmake \
   $(shell find linkage_ros config examples launch linkage_interfaces -type f ! -name '*.pyc' 2>/dev/null)
 
@@ -107,6 +109,10 @@ lint: .venv-lint/.installed ## Check style and types
 	@$(lint_bin)/python -c 'import sys; from xml.dom.minidom import parse; [parse(f) for f in sys.argv[1:]]' \
 	  package.xml linkage_interfaces/package.xml
 
+.PHONY: lock
+lock: .venv-lock/.installed ## Pin with hashes what wheels/*.txt ask for; UPGRADE=1: to the newest
+	@wheels/lock.sh $(if $(UPGRADE),--upgrade)
+
 .PHONY: build
 build: $(install)/.built ## Build both packages
 
@@ -131,20 +137,25 @@ $(venv)/.tools: $(venv)/.installed $(tools)
 	@about='what the tests need.' wheels/install.sh '$(bin)/python' $(venv) $(requirements) $(tools)
 	@touch $@
 
-# What there is to compare with is large: some 2 GB. planegcs has no wheel, and is left out where it
-# does not build.
-.venv-bench/.installed: benchmark/requirements.txt
+# What there is to compare with is large: some 2 GB. planegcs has a wheel for few Pythons, and is left
+# out where it cannot be built.
+.venv-bench/.installed: $(lock)/bench.txt $(lock)/planegcs.txt
 	@about='what there is to compare with: 2 GB, some minutes, once.' wheels/install.sh \
 	  --to-compile '$(PYTHON)' .venv-bench $<
 	@CMAKE_PREFIX_PATH=$$(echo $(CURDIR)/.venv-bench/lib/python*/site-packages/cmeel.prefix) \
-	  .venv-bench/bin/python -m pip install -qq planegcs==0.1.1 2>/dev/null \
+	  about='planegcs.' PATH=$(CURDIR)/.venv-bench/bin:$$PATH \
+	  wheels/install.sh '$(PYTHON)' .venv-bench $(lock)/planegcs.txt \
 	  || echo 'planegcs cannot be built here, and is left out.'
 	@touch $@
 
-.venv-docs/.installed: docs/requirements.txt
+.venv-docs/.installed: $(lock)/docs.txt
 	@about='what draws and what makes the pages.' wheels/install.sh '$(PYTHON)' .venv-docs $<
 	@touch $@
 
-.venv-lint/.installed: wheels/lint.txt
+.venv-lint/.installed: $(lock)/lint.txt
 	@about='what checks style and types.' wheels/install.sh '$(PYTHON)' .venv-lint $<
+	@touch $@
+
+.venv-lock/.installed: $(lock)/lock.txt
+	@about='what pins the rest.' wheels/install.sh '$(PYTHON)' .venv-lock $<
 	@touch $@

@@ -23,7 +23,9 @@ import argparse
 import json
 import math
 import multiprocessing
+import os
 from pathlib import Path
+import pickle
 import platform
 import sys
 
@@ -46,7 +48,7 @@ from truth import (
 EXACT, RATES, LEG = 25, 4, 4
 CHUNK = 50
 # Random linkages of a task, and how many of them also run in machine code, which is slow to make.
-LINKAGES, ACCELERATED = 20, 2
+LINKAGES, ACCELERATED = 20, 1
 UNIT = 2.0 ** -53
 
 
@@ -56,8 +58,15 @@ def main(args=None):
     tasks = [task for kind in options.mechanisms for task in plan(kind, options)]
     tasks += [('linkages', options.grid, (options.seed, 5, i), LINKAGES, False)
               for i in range(options.linkages // LINKAGES)]
-    with multiprocessing.get_context('spawn').Pool(options.jobs) as pool:
-        done = list(tqdm(pool.imap_unordered(run, tasks), total=len(tasks), unit='chunk'))
+    known = recorded(options.journal)
+    left = [task for task in tasks if task not in known]
+    with multiprocessing.get_context('spawn').Pool(options.jobs) as pool, \
+            open(options.journal, 'ab') as journal:
+        for task, result in tqdm(pool.imap_unordered(run, left), total=len(left), unit='chunk'):
+            known[task] = result
+            pickle.dump((task, result), journal)
+            journal.flush()
+    done = [known[task] for task in tasks]
     report = {
         'seed': options.seed, 'samples': options.samples, 'python': platform.python_version(),
         'numpy': np.__version__, 'machine': platform.machine(),
@@ -86,9 +95,22 @@ def parse(args):
                         choices=list(hard_cases.CATALOGUE))
     parser.add_argument('--jobs', type=int, default=2)
     parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--journal', type=Path, default=os.devnull,
+                        help='notes what is done, so that a run that was ended goes on there')
     parser.add_argument('--output', type=Path, metavar='JSON',
                         default=Path(__file__).with_name('results') / 'stability.json')
     return parser.parse_args(args)
+
+
+def recorded(journal):
+    """Return what an earlier run has noted, {task: result}: it is not done again."""
+    known = {}
+    try:
+        with open(journal, 'rb') as file:
+            while True:
+                known.update([pickle.load(file)])
+    except (FileNotFoundError, EOFError):
+        return known
 
 
 def plan(kind, options):
@@ -110,9 +132,9 @@ def plan(kind, options):
 
 
 def run(task):
-    """Run one task with a generator of its own; returns (table, rows)."""
+    """Run one task with a generator of its own; returns the task and its (table, rows)."""
     name, kind, seed, count, rates = task
-    return TASKS[name](kind, np.random.default_rng(seed), count, rates)
+    return task, TASKS[name](kind, np.random.default_rng(seed), count, rates)
 
 
 # --- tasks --------------------------------------------------------------------------------------
@@ -179,8 +201,8 @@ def reach(kind, rng, count, _):
 
 
 def linkages(grid, rng, count, _):
-    """Check random linkages of every word; returns counts, ratios by output, and problems."""
-    made, ratios, found = 0, {}, []
+    """Check random linkages of every word; returns counts, ratios, problems, inverse's times."""
+    made, ratios, found, seconds = 0, {}, [], []
     for i in range(count):
         design = random_linkages.design(rng)
         checks = linkage_checks.CHECKS
@@ -190,11 +212,12 @@ def linkages(grid, rng, count, _):
         if told:
             made += 1
             found += [tuple(problem) for problem in told[0]]
+            seconds += told[2]
             for row in told[1]:
-                output = row.output.what + (' rate' if row.output.by is not None else '')
+                output = row.output.what + ('', ' rate', ' acceleration')[row.output.order]
                 if row.sensitivity and math.isfinite(row.ratio):
                     ratios.setdefault(output, []).append(row.ratio)
-    return 'linkages', (count, made, ratios, found)
+    return 'linkages', (count, made, ratios, found, seconds)
 
 
 TASKS = {'closure': closure, 'catalogue': catalogue, 'random': random, 'servo': servo,
@@ -271,8 +294,7 @@ def accuracy_table(chunks):
         problems = [row.problem for row in rows]
         table.append({
             'mechanism': kind, 'set': label, 'output': output, 'method': method,
-            'samples': len(rows), 'max': float(np.max(ratios)),
-            'p99.9': float(np.quantile(ratios, 0.999)), 'median': float(np.median(ratios)),
+            **quantiles(ratios), 'samples': len(rows),
             'nan': problems.count('NaN'), 'missed_nan': problems.count('missed NaN'),
             'broken': sum(map(bool, problems)),
             'worst': {'theta': worst.theta, 'dimensions': worst.dimensions,
@@ -300,7 +322,7 @@ def reach_table(results):
 def linkages_table(results):
     """Return counts of random linkages, a row an output, and a row a kind of problem."""
     ratios, problems = {}, {}
-    for _, _, by_output, found in results:
+    for _, _, by_output, found, _ in results:
         for output, values in by_output.items():
             ratios.setdefault(output, []).extend(values)
         for kind, text in found:
@@ -308,12 +330,17 @@ def linkages_table(results):
     return {
         'designs': sum(result[0] for result in results),
         'linkages': sum(result[1] for result in results),
-        'outputs': [{'output': output, 'samples': len(values), 'max': float(np.max(values)),
-                     'p99.9': float(np.quantile(values, 0.999)),
-                     'median': float(np.median(values))}
+        'inverse': quantiles([x for result in results for x in result[4]]),
+        'outputs': [{'output': output, **quantiles(values)}
                     for output, values in sorted(ratios.items())],
         'problems': [{'kind': kind, 'count': len(texts), 'examples': texts[:3]}
                      for kind, texts in sorted(problems.items(), key=lambda item: -len(item[1]))]}
+
+
+def quantiles(values):
+    """Return how many values there are, the largest, and two quantiles."""
+    return {'samples': len(values), 'max': float(np.max(values)),
+            'p99.9': float(np.quantile(values, 0.999)), 'median': float(np.median(values))}
 
 
 def grouped(results):
@@ -355,6 +382,7 @@ def show(report):
     for row in table['outputs']:
         print(f'{row["output"]:14}{row["samples"]:8}{row["max"]:9.2g}{row["p99.9"]:9.2g}'
               f'{row["median"]:9.2g}')
+    print('CPU time of a question to the inverse [s]', table['inverse'])
     for row in table['problems']:
         print(f'{row["count"]} x {row["kind"]}: {row["examples"][0]}')
 

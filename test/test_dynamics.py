@@ -5,11 +5,12 @@
 
 import math
 
-from gmpy2 import mpfr
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
-from truth.drawing import DIGITS, draw, Linkage, precisely
+from truth.drawing_accuracy import broken, Motion
+from truth.linkage_checks import Subject
+from truth.random_linkages import Design
 
 BOOM = {'joints': ('O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 left')}
 ELBOW = {'joints': ('O ground 0 0', 'A crank O 1', 'B crank A 0.7 zero O')}
@@ -29,44 +30,17 @@ def one(values):
 
 # --- accelerations ---
 
-@precisely
-def drawn_acceleration(linkage, values, rates, changes):
-    """Return the second derivative by time of all points: differences in 96 digits."""
-    rows, step = linkage.prepared(linkage.numbers), mpfr(2) ** -90
-
-    def at(time):
-        given = [mpfr(v) + mpfr(r) * time + mpfr(c) * time * time / 2
-                 for v, r, c in zip(values, rates, changes)]
-        return draw(DIGITS, linkage, rows, given).points
-
-    before, now, after = at(-step), at(mpfr(0)), at(step)
-    return {name: complex((before[name] - 2 * now[name] + after[name]) / (step * step))
-            for name in now}
-
-
 @pytest.mark.parametrize('name', [*mechanisms.TYPES, 'boom', 'elbow'])
-def test_accelerations_are_those_of_a_drawing(name):
-    mechanism = made(name)
-    design = BOOM if name == 'boom' else ELBOW if name == 'elbow' else None
-    if design:
-        linkage = Linkage(design['joints'], {})
-    else:
-        design = mechanisms.design(name)
-        linkage = Linkage(design.joints, design.dimensions, design.branches)
-    n, rng = len(mechanism.inputs), np.random.default_rng(4)
-    reach = mechanism.reach() if n == 1 else [(0.4, 1.2)]
-    for _ in range(4):
-        theta = rng.uniform(reach[0][0], reach[0][1], n).tolist()
-        if n > 1:
-            theta = rng.uniform(0.4, 1.2, n).tolist()
-        if np.isnan(list(mechanism.solve(one(theta)).values())).any():
-            continue
-        rate, change = rng.uniform(-2.0, 2.0, (2, n)).tolist()
-        found = mechanism.acceleration(one(theta), one(rate), one(change))
-        wanted = drawn_acceleration(linkage, theta, rate, change)
-        size = max(map(abs, wanted.values()))
-        for joint, value in found.items():
-            assert complex(*value) == pytest.approx(wanted[joint], abs=1e-12 * size), joint
+def test_accelerations_keep_the_rule_of_accuracy(name):
+    mechanism, rng = made(name), np.random.default_rng(4)
+    design = mechanism.design
+    subject = Subject(Design(design.joints, mechanism.dimensions, mechanism.branches), rng)
+    low, high = max(mechanism.reach(*subject.held), key=lambda arc: arc[1] - arc[0])
+    given = [[value, *subject.held] for value in rng.uniform(low, high, 4)]
+    motion = Motion(*map(tuple, rng.uniform(-2.0, 2.0, (2, len(mechanism.inputs)))))
+    rows = subject.fitted(np.array(given), motion=motion)
+    assert any(row.output.order == 2 and row.sensitivity for row in rows)
+    assert not broken(rows)
 
 
 @pytest.mark.parametrize('name', [*mechanisms.TYPES, 'boom', 'elbow', 'oscillating'])

@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+import time
 
 import pytest
 
@@ -40,6 +41,19 @@ def test_a_signal_ends_a_node_quietly(harness, name, stop):
     assert re.search(rf'\[{name}\]: ready: .*water_drop', first)
     process.interrupt(stop)
     assert process.end() == (0, '')
+
+
+@pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('name', EXECUTABLES)
+def test_more_signals_than_one_end_a_node_as_quietly(harness, name, stop):
+    """A terminal sends one to the whole group, and a launcher one more to each of it."""
+    process = harness.Process(name, ROOT / 'config' / 'all.yaml')
+    process.line()
+    while not process.has_ended:
+        process.interrupt(stop)
+        time.sleep(1e-4)
+    code, printed = process.end()
+    assert (code, 'Traceback' in printed, 'rror' in printed) == (0, False, False), printed
 
 
 IMPORTS_FOR_EVER = """

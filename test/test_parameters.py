@@ -3,6 +3,7 @@
 
 """Parameters that are set while nodes run: answered one by one, prepared aside, then adopted."""
 
+import json
 import math
 import threading
 
@@ -21,6 +22,7 @@ from rcl_interfaces.msg import (
     Log,  # noqa: E402
     Parameter as ParameterMessage,  # noqa: E402
     ParameterValue,  # noqa: E402
+    SetParametersResult,  # noqa: E402
 )
 from rcl_interfaces.srv import (  # noqa: E402
     DescribeParameters,
@@ -152,6 +154,42 @@ def test_an_empty_list_of_any_type_is_an_empty_list_of_the_right_one(graph):
     result, = Client(graph, node).set(('leg.crank.sweep', empty))
     assert result.successful
     assert node.get_parameter('leg.crank.sweep').type_ == Parameter.Type.DOUBLE_ARRAY
+
+
+# Every list that may be empty.
+EMPTY = 'leg.loads', 'leg.joint_names', 'leg.crank.sweep'
+
+
+@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize('by_file', [True, False])
+def test_an_empty_list_in_a_parameter_file_or_argument_is_one_of_its_type(
+        graph, tmp_path, kind, by_file):
+    values = {**LEG, **dict.fromkeys(EMPTY, [])}
+    path = tmp_path / 'scene.yaml'
+    path.write_text(json.dumps({'/**': {'ros__parameters': values}}))
+    given = ['--params-file', str(path)] if by_file else [
+        word for name, value in values.items() for word in ('-p', f'{name}:={json.dumps(value)}')]
+    node = graph.start(kind, cli_args=['--ros-args', *given])
+    own = [name for name in EMPTY if name in node.fields]
+    assert own
+    for name in own:
+        parameter = node.get_parameter(name)
+        assert parameter.type_ == Parameter.Type[node.fields[name].kind.upper()], name
+        assert scene.plain(parameter.value) == ()
+    client = Client(graph, node)
+    assert [*client.about(own)[1]] == [node.get_parameter(name).type_.value for name in own]
+    assert client.set(('leg.crank.sweep', [0.0, 1.0]))[0].successful
+    assert client.set(('leg.crank.sweep', []))[0].successful
+
+
+@pytest.mark.parametrize('name, allowed', [
+    ('mechanisms', 'a list of texts'), ('leg.points', 'name some of'), ('leg.pose', 'six of them'),
+    ('leg.scale', 'a finite number'), ('leg.type', 'one of water_drop'), ('leg.own', 'allowed')])
+def test_where_no_list_may_be_empty_one_is_refused_in_words(graph, name, allowed):
+    values = {'mechanisms': '[leg]', 'leg.type': 'jansen', name: '[]'}
+    arguments = [word for key, value in values.items() for word in ('-p', f'{key}:={value}')]
+    with pytest.raises(scene.SceneError, match=f'^{name} .*{allowed}'):
+        graph.start(Kinematics, cli_args=['--ros-args', *arguments])
 
 
 def test_a_whole_number_is_taken_for_a_length_and_stays_a_double(graph):
@@ -288,6 +326,26 @@ def test_each_of_many_sets_gets_its_own_answer(graph):
     assert (machine.scale, machine.points, node.scene.frame_id) == (2.0, ('G',), 'map')
 
 
+def test_of_values_of_one_name_in_one_request_the_last_is_validated_and_set(graph):
+    node = graph.start(Kinematics, LEG)
+    validated = []
+    node.add_on_set_parameters_callback(
+        lambda parameters: validated.append(parameters) or SetParametersResult(successful=True))
+    client = Client(graph, node)
+    wanted = [('leg.dimensions.m', 15.0 + 0.01 * i) for i in range(100)]
+    assert all(result.successful for result in client.set(*wanted))
+    assert node.get_parameter('leg.dimensions.m').value == wanted[-1][1]
+    # One time for the request, and one for what follows from it.
+    assert len(validated) <= 2
+    # Where the last cannot be, it is the last of those that can.
+    validated.clear()
+    results = client.set(('leg.scale', 7.0), *wanted[:98], ('leg.dimensions.m', 900.0))
+    assert [result.successful for result in results] == [True] * 99 + [False]
+    assert 'leg.dimensions' in results[-1].reason
+    assert node.get_parameter('leg.dimensions.m').value == wanted[97][1]
+    assert node.get_parameter('leg.scale').value == 7.0 and len(validated) < 20
+
+
 def test_a_set_within_the_process_is_at_once_and_is_kept(graph):
     node = graph.start(Slow, LEG)
     held_up(graph, Client(graph, node))
@@ -317,8 +375,6 @@ def test_a_mistake_while_a_scene_is_prepared_leaves_the_one_before(graph, monkey
 
 
 def test_what_others_have_to_say_about_a_parameter_counts(graph):
-    from rcl_interfaces.msg import SetParametersResult
-
     node = graph.start(Slow, LEG)
     node.add_on_set_parameters_callback(lambda parameters: SetParametersResult(
         successful=not any(p.name == 'leg.scale' for p in parameters), reason='not by me'))

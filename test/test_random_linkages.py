@@ -82,6 +82,29 @@ def test_linkages_of_each_word_hold(word):
     assert not found, report(found)
 
 
+# Linkages that broke the rule once, and where.
+MENDED = {
+    'an antiparallelogram on a short diagonal of another': ((
+        'A ground 0 0', 'C ground 0 -0.44801715381715446', 'D crank A 0.5078326030776525',
+        'E antiparallelogram A D C', 'F antiparallelogram D A E'), (-0.3768893363289174,)),
+    'a cylinder that is nearly nothing beside its bar': ((
+        'P ground 0 0', 'O ground 1 0', 'B cylinder P O 1 left', 'K block B 0.1 0.2'), (1e-6,)),
+    'a carriage just beyond its way along an axis': ((
+        'A ground 0 0', 'B ground 1.4 0', 'C carriage B along A -3.5 0.6'), (-3.5000001,)),
+    'a yoke of a pin that has no place': ((
+        'A ground 0 0', 'B ground 1 0', 'D crank A 1', 'E dyad D B 0.2 0.3 left',
+        'F yoke E A along B'), (2.0,)),
+}
+
+
+@pytest.mark.parametrize('name', MENDED)
+def test_what_once_broke_the_rule_keeps_it(name):
+    joints, given = MENDED[name]
+    subject = checks.Subject(random_linkages.Design(joints, {}, {}), np.random.default_rng(0))
+    motion = drawing_accuracy.Motion((1.0,), (0.3,))
+    assert not drawing_accuracy.broken(subject.fitted(np.array([given]), True, motion=motion))
+
+
 # --- that the check is a check ------------------------------------------------------------------
 
 def test_every_word_comes_up_and_a_third_is_degenerate():

@@ -375,8 +375,62 @@ def test_a_finger_with_a_spring_is_not_driven(capsys, tmp_path):
         '<body name="right_coupler" pos="0 0.0315 -0.0041">',
         '<body name="right_coupler" pos="0 0.0315 -0.0041"><joint name="spring" axis="1 0 0"/>'))
     assert command.main([str(spring)]) == 0
-    assert ('Left out: right_coupler, right_spring_link, right_follower: not driven: 1 more of '
-            'right_spring_link_joint' in re.sub(r'spring, ', '', capsys.readouterr().err))
+    assert re.search('Left out: right_coupler, right_spring_link, right_follower: not driven: '
+                     '1 of right_spring_link_joint, .* must be moved, named by --driven, or held, '
+                     'named by --hold', capsys.readouterr().err)
+
+
+def test_motors_that_hold_each_other_are_named(imported, capsys):
+    file = ROBOTS / 'four_bar.urdf'
+    assert ('motor, shoulder drive it, and hold each other, as 1 of them tell where all is'
+            in refused(capsys, file, '--driven', 'motor', 'shoulder'))
+    assert imported(file, '--driven', 'shoulder')['shoulder']
+
+
+def test_bodies_that_hold_each_other_are_no_linkage(capsys, tmp_path):
+    pytest.importorskip('mujoco')
+    file = written(tmp_path, 'four_bar.xml', (
+        '<connect name="wrist" body1="coupler" body2="rocker" anchor="0.3 0 0"/>',
+        '<weld name="wrist" body1="coupler" body2="rocker"/>'))
+    assert 'it cannot move, as its joints hold each other' in refused(capsys, file)
+
+
+FLAT = [f'{name}={value!r}' for name, value in (
+    ('motor', 0.5 * math.pi), ('elbow', -0.5 * math.pi), ('shoulder', -0.5 * math.pi))]
+
+
+@pytest.mark.parametrize('side', [0, 1])
+def test_bars_in_line_move_on_as_they_are_told(imported, capsys, side):
+    file = ROBOTS / 'four_bar.urdf'
+    line = refused(capsys, file, '--driven', 'motor', '--pose', *FLAT)
+    motor, joint, *ends = re.search(
+        'bars lie in line where the file has them, and with (.*) (.*) is at (.*) as well as at '
+        '(.*): choose by --pose', line).groups()
+    machine, = imported(file, '--driven', 'motor', '--pose', *FLAT, motor,
+                        f'{joint}={ends[side]}').values()
+    robot = LIBRARIES[1](file.read_text())
+    elbows = set()
+    for angle in np.linspace(0.3, 1.2, 10):
+        joints = published(machine, motor=angle)
+        places = robot.places(joints, ['wrist_a', 'wrist_b'])
+        assert places['wrist_a'] == pytest.approx(places['wrist_b'], abs=2e-15)
+        elbows.add(abs(math.remainder(joints['elbow'] + angle, math.tau)) < 1e-12)
+    # One of both ends is a parallelogram's, whose coupler does not turn.
+    start = float(motor.partition('=')[2])
+    is_parallel = {'elbow': -start, 'shoulder': -start}[joint] == pytest.approx(
+        float(ends[side]), abs=0.02)
+    assert elbows == {is_parallel}
+
+
+def test_a_pose_at_the_end_of_its_loops_is_no_side(capsys, tmp_path):
+    # Coupler and rocker lie in line where the crank is up, and do not reach as far elsewhere.
+    file = written(tmp_path, 'four_bar.urdf', (
+        '<limit lower="-1.2" upper="1.2"', '<limit lower="-2" upper="-1"'), (
+        'xyz="0 0 0.2"/><axis', f'xyz="0 0 0.2" rpy="0 {math.atan2(2.0, 3.0)!r} 0"/><axis'), (
+        'xyz="0.3 0 0"/><axis', f'xyz="0.3 0 0" rpy="0 {-math.atan2(3.0, 2.0)!r} 0"/><axis'), (
+        '<parent_origin xyz="0.3 0 0"/>', f'<parent_origin xyz="{13 ** 0.5 / 10 - 0.2!r} 0 0"/>'))
+    assert ('its loops end where the file has motor: choose another pose by --pose motor='
+            in refused(capsys, file, '--driven', 'motor'))
 
 
 def test_a_joint_that_follows_another_is_geared_to_it(imported, tmp_path):
@@ -780,8 +834,8 @@ def random_robot(seed):
                 name, word, *more = line.split()
                 count[word] += 1
                 if 'geared' in more:
-                    other, ratio, _ = more[-3:]
-                    called = f'{word}{count[word]}' if count[word] > 1 else word
+                    other, ratio, _, *own = more[more.index('geared') + 1:]
+                    called = own[1] if own else f'{word}{count[word]}' if count[word] > 1 else word
                     robot.follows[called] = other, float(ratio), 0.0
             return linkage, values, robot, 0.03 * rng.normal(size=(8, len(linkage.inputs)))
     return None

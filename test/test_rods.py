@@ -138,6 +138,19 @@ def test_two_rods_find_every_pose_inside_the_limits(seed, count, poses):
         check_ankle(ankle, window, rng, poses, exact=poses // 100)
 
 
+# Numbers of no robot: axes that lean from all others, far from the points that turn about them.
+@pytest.mark.parametrize('parts', [
+    ([-0.92, -0.12, 0.56], [0.16, 0.5, 0.5], [0.72, -1.36, 1.26], [1.84, 2.15, 1.2],
+     [[-1.45, -0.16, 0.21], [0.32, 0.85, -1.76]], [[-0.77, 1.42, -0.42], [-0.68, 0.64, 0.69]],
+     [[0.17, -1.41, 0.67], [0.37, 0.04, 0.88]], [[1.34, 1.15, -1.79], [0.4, -0.7, 0.38]]),
+    ([-0.97, 0.57, 0.28], [-0.1, -0.88, 0.36], [2.17, -0.56, -2.61], [0.26, 0.26, -0.38],
+     [None, None], [None, None],
+     [[1.29, 0.25, -0.5], [0.05, -0.46, -1.17]], [[-0.55, 0.26, -0.2], [-0.41, -1.34, 1.71]])])
+def test_two_rods_keep_the_rule_where_axes_round_badly(parts):
+    window = np.array([(-0.04, -0.04), (0.04, 0.04)])
+    check_ankle(rods.drawn(*parts), window, np.random.default_rng(1), poses=300, exact=150)
+
+
 def check_assemblies(ankle, window, rng, count):
     """Hold numbers and NaN to all real assemblies; return how many poses are in the window."""
     linkage, motors = driven(ankle, window)

@@ -6,10 +6,12 @@
 from glob import glob
 import math
 import os
+from xml.etree import ElementTree
 
 from linkage_ros import mechanisms, scene
 from linkage_ros.linkage.walker import Assembly
 from linkage_ros.render.cycle import Cycle
+from linkage_ros.robot_model import urdf
 from linkage_ros.scene import slider, writing
 from linkage_ros.scene.joint_names import quoted_name
 from linkage_ros.scene.motion import Motion
@@ -67,6 +69,17 @@ def test_names_that_ros_takes_for_values_are_written_as_texts(tmp_path):
     again = tmp_path / 'again.yaml'
     again.write_text(writing.in_yaml(writing.without_defaults(before)))
     assert scene.load(str(again)).parameters == before.parameters
+
+
+@pytest.mark.parametrize('name', ['my thigh', 'Hüfte', 'toe 1/2 "left" <a&b>', "o'k: #3", '大腿'])
+def test_a_frame_is_called_as_links_of_robots_are(tmp_path, name):
+    before = scene.read({'mechanisms': ['jansen'], 'frame_id': name, 'jansen.frame_id': name})
+    again = tmp_path / 'again.yaml'
+    again.write_text(writing.in_yaml(writing.without_defaults(before)))
+    found = scene.load(str(again))
+    assert (found.frame_id, found.machines['jansen'].frame_id) == (name, name)
+    root = ElementTree.fromstring(urdf.describe(found.machines.values(), name))
+    assert root.find('joint/parent').get('link') == root.find('link').get('name') == name
 
 
 def test_scale_multiplies_every_length():
@@ -162,11 +175,11 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'rate': 1001}, 'rate must be .* from 0 to 1000'),
     ({'rate': 10 ** 5000}, 'rate must be .* from 0 to 1000'),
     ({'frame_id': 3}, 'frame_id must be a text'),
-    *[({'frame_id': text}, 'frame_id must be a text .* 1 to 100 letters') for text in (
-        '', ' ', '/world', 'my world', 'world\n', 'w\0', '\t', '-x', 'w' * 101, 'w' * 10 ** 6,
-        '<world/>', 'w"', "w'", 'w&', 'w\u200bw', '\u2028')],
-    ({'frame_prefix': '/left'}, 'frame_prefix must be a text .* up to 100 letters'),
-    ({'jansen.frame_id': 'my thigh'}, 'jansen.frame_id must be a text .* up to 100 letters'),
+    *[({'frame_id': text}, 'frame_id must be a text .* 1 to 100 characters') for text in (
+        '', ' ', '/world', ' world', 'world\n', 'w\0', '\t', '-x', 'w' * 101, 'w' * 10 ** 6,
+        '<world/>', 'w\u200bw', '\u2028', 'w\u2028', 'w\x85', 'w\ud800')],
+    ({'frame_prefix': '/left'}, 'frame_prefix must be a text .* up to 100 characters'),
+    ({'jansen.frame_id': 'my\nthigh'}, 'jansen.frame_id must be a text .* up to 100 characters'),
     *[({'jansen.joint_names': [text]}, 'jansen.joint_names must be texts such as .* each about '
        'another of crank, BC, .*, not ') for text in (
         '', 'BC', 'BC=', '=shin', 'BC=3', 'BC=left shin', 'ZZ=shin', 'left0_BC=shin', 'BC=shin+',

@@ -445,6 +445,7 @@ const char *{name}_placed(const double *dimension, const double *q, double *posi
     assert tried > 200
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not shutil.which('cmake'), reason='cmake is not installed')
 def test_a_package_is_built_and_tests_itself(tmp_path):
     if not (Path(sys.prefix) / 'share' / 'ament_cmake').is_dir():

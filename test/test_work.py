@@ -61,7 +61,9 @@ def test_for_markers_alone_no_joint_angle_is_computed_and_the_reverse(graph, wor
     assert {key for key in work if key[0] == 'jansen'} == {('jansen', 12, 0, 0)}
     assert {key for key in work if key[0] == 'peaucellier'} == {
         ('peaucellier', 0, 6, 6), ('peaucellier', 0, 6, 0)}
-    assert {key for key in work if key[0] == 'water_drop'} == {('water_drop', 0, 2, 0)}
+    # A message of the turn before, with velocities, may have come late.
+    assert {key[:3] for key in work if key[0] == 'water_drop'} == {('water_drop', 0, 2)}
+    assert ('water_drop', 0, 2, 0) in work
 
 
 def test_a_topic_nobody_listens_to_is_not_built(graph, monkeypatch):
@@ -176,14 +178,13 @@ def test_a_patched_message_reads_like_one_that_is_built(count):
     markers = messages.Markers(
         'walker', 'world', [0.1, 0.2, 0.3, 0.4, 0.5, 0.6], 1.0,
         {0: [(0, 0)], 1: [0]} if count == 1 else {0: [(0, 1), (1, 0)], 1: [0, 1]})
-    states = messages.JointStates()
     names = [f'walker_joint{i}' for i in range(count)]
 
     def drawn(stamp, values):
         return markers.message(stamp, values.reshape(-1, 1 if count == 1 else 2, 2))
 
     def joined(stamp, values):
-        return states.message(stamp, names, values[:count], values[count:])
+        return messages.joint_states(stamp, names, values[:count], values[count:])
 
     for build, kind, size in ((drawn, MarkerArray, 2 * count if count == 1 else 4 * count),
                               (joined, JointState, count), (joined, JointState, 2 * count)):

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Makes a virtual environment of requirement files, or says in one sentence what is missing.
+# Makes a virtual environment of lock files, or says in one sentence what is missing. What is not in
+# them, or has another hash there, is refused; nothing else is asked for, so nothing is resolved.
 #
-#   about='what it is' wheels/install.sh [--to-compile] PYTHON FOLDER REQUIREMENTS...
+#   about='what it is' wheels/install.sh [--to-compile] PYTHON FOLDER LOCK...
 
 to_compile=
 if [ "$1" = --to-compile ]; then to_compile=yes; shift; fi
@@ -36,9 +37,13 @@ mkdir -p "$folder"
   || "$python" -m venv "$folder" >"$log" 2>&1 \
   || stop "The virtual environment $folder cannot be made: $(tail -n 1 "$log")"
 for file; do files+=(-r "$file"); done
-"$folder/bin/python" -m pip install -q "${files[@]}" >"$log" 2>&1 && exit
+"$folder/bin/python" -m pip install -q --require-hashes \
+  --no-build-isolation "${files[@]}" >"$log" 2>&1 && exit
 if grep -qiE 'connection (broken|refused|reset)|new connection|name resolution|timed out|proxy' \
     "$log"; then
   stop "The Python package index cannot be reached: is there a network? (All of it: $log)"
+fi
+if grep -q 'DO NOT MATCH THE HASHES' "$log"; then
+  stop "Refused: $(grep -m 1 'from http\|from file' "$log") has another hash than in $*. (All of it: $log)"
 fi
 stop "pip cannot install what is in $*: $(grep -m 1 ERROR "$log") (All of it: $log)"

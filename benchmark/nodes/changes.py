@@ -23,19 +23,24 @@ from .driving import Process
 
 SCENE, NODE, RATE = '12 legs', ('-m', 'linkage_ros.nodes.kinematics'), 500.0
 ROUNDS, BREAK = 12, 0.25
+# The requests that a change is made of, by its number: of each request names and values.
 CHANGES = {
-    'none': lambda i: {},
-    'dimension': lambda i: {'walker.dimensions.m': 14.0 + 0.02 * i},
-    'branch': lambda i: {'walker.branches.F': (-1) ** i},
-    'scale': lambda i: {'walker.scale': 0.01 + 1e-5 * i},
-    'legs': lambda i: {'walker.leg_pairs': 6 - i % 2},
-    'points': lambda i: {'walker.points': ['O', 'A', 'C', 'G'][i % 2:]},
-    'pose': lambda i: {'walker.pose': [0.01 * i, 0.0, 0.0, 0.0, 0.0, 0.0]},
-    'frame_id': lambda i: {'frame_id': f'frame{i}'},
-    'refused': lambda i: {'walker.dimensions.b': 1.0 + 0.01 * i},
-    '100 at once': lambda i: {'walker.dimensions.m': [14.0 + 0.01 * j + 1e-4 * i
-                                                      for j in range(100)]},
+    'none': lambda i: [],
+    'dimension': lambda i: [[('walker.dimensions.m', 14.0 + 0.02 * i)]],
+    'branch': lambda i: [[('walker.branches.F', (-1) ** i)]],
+    'scale': lambda i: [[('walker.scale', 0.01 + 1e-5 * i)]],
+    'legs': lambda i: [[('walker.leg_pairs', 6 - i % 2)]],
+    'points': lambda i: [[('walker.points', ['O', 'A', 'C', 'G'][i % 2:])]],
+    'pose': lambda i: [[('walker.pose', [0.01 * i, 0.0, 0.0, 0.0, 0.0, 0.0])]],
+    'frame_id': lambda i: [[('frame_id', f'frame{i}')]],
+    'refused': lambda i: [[('walker.dimensions.b', 1.0 + 0.01 * i)]],
+    '100 in one request': lambda i: [[('walker.dimensions.m', value) for value in _hundred(i)]],
+    '100 requests': lambda i: [[('walker.dimensions.m', value)] for value in _hundred(i)],
 }
+
+
+def _hundred(i):
+    return [14.0 + 0.01 * j + 1e-4 * i for j in range(100)]
 
 
 @contextmanager
@@ -60,14 +65,12 @@ def turning(line, rate=RATE):
         thread.join()
 
 
-def change(driver, client, values):
-    """Set parameters, those with a list of values to each in turn; return the seconds it took."""
+def change(driver, client, requests):
+    """Send requests, each names and values, at once; return the seconds until all are answered."""
     asked = time.perf_counter()
-    spread = [{name: value} for name, each in values.items() if name == 'walker.dimensions.m'
-              and isinstance(each, list) for value in each] or [values]
     futures = [client.call_async(SetParameters.Request(parameters=[
-        Parameter(name, value=value).to_parameter_msg() for name, value in one.items()]))
-        for one in spread]
+        Parameter(name, value=value).to_parameter_msg() for name, value in request]))
+        for request in requests]
     driver.until(lambda: all(future.done() for future in futures), 5.0)
     return time.perf_counter() - asked
 
@@ -77,11 +80,11 @@ def gaps(driver, line, client, kind):
     times, found, took = line.heard[0], [], []
     for i in range(ROUNDS):
         driver.wait(BREAK)
-        times.clear()
+        times[:] = times[-1:]
         driver.wait(0.05)
         took.append(1e3 * change(driver, client, CHANGES[kind](i)))
         driver.wait(BREAK)
-        found.append(1e3 * np.diff(times).max())
+        found.append(1e3 * np.diff([*times, time.perf_counter()]).max())
     return found, took
 
 

@@ -19,7 +19,7 @@ import time
 
 from linkage_interfaces.srv import ServoInverse
 from linkage_ros import scene
-from linkage_ros.nodes import driven_mechanism, messages, plan, scene_node
+from linkage_ros.nodes import driven_mechanism, messages, scene_node
 from linkage_ros.nodes.joint_state_reader import ANY
 from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.mechanism_model import MechanismModel
@@ -88,11 +88,6 @@ class FreshModel(MechanismModel):
         publisher = super().publisher(*args)
         publisher.template = None
         return publisher
-
-    def joint_message(self, *args):
-        """Return new joint states."""
-        self._joint_states = messages.JointStates()
-        return super().joint_message(*args)
 
     def marker_message(self, *args):
         """Return new markers."""
@@ -167,9 +162,12 @@ class Fresh(Kinematics):
     """The same node with ordinary messages."""
 
     def __init__(self, **kwargs):
-        # No machine code sends patched ones.
-        driven_mechanism.MechanismModel, plan.plan_llvm = FreshModel, None
-        super().__init__(**kwargs)
+        # Other nodes in this process patch theirs.
+        driven_mechanism.MechanismModel = FreshModel
+        try:
+            super().__init__(**kwargs)
+        finally:
+            driven_mechanism.MechanismModel = MechanismModel
 
 
 KINDS = {'kinematics': Kinematics, 'fresh': Fresh, 'floor': Floor, 'relay': Relay,

@@ -408,9 +408,10 @@ def with_rate(x: Real, *of: Real, formula: Callable) -> Real:
 
 def with_spin(vector: Complex, spin: Rate) -> Complex:
     """Return a vector of constant length with the angular velocity that is given."""
-    x, y = vector.x, vector.y
-    turned = Complex(with_rate(x, *spin.of, formula=lambda *d: -(spin.formula(*d) * y)),
-                     with_rate(y, *spin.of, formula=lambda *d: spin.formula(*d) * x))
+    # Each part changes by the other with its own rate, not by what that is made of.
+    turned = Complex(
+        with_rate(vector.x, *spin.of, formula=lambda *d: -(spin.formula(*d) * turned.y)),
+        with_rate(vector.y, *spin.of, formula=lambda *d: spin.formula(*d) * turned.x))
     turned.spin = spin
     return turned
 

@@ -172,7 +172,7 @@ class Builder:
         shortest, longest = self._stroke(base, pivot, bar)
         word = called or self._numbered('cylinder')
         length = self.drive(Input(word, LENGTH, shortest, longest), geared)
-        found = planar.dyad(self._plain_arm(base, pivot), length, bar, side, longest=longest)
+        found = planar.extended(self._plain_arm(base, pivot), length, bar, side, longest)
         self.limits += found.limits
         link = self._hang(pivot, name, found.second, bar)
         self._place(name, pivot, found.second, link, bar, (base,))
@@ -212,7 +212,7 @@ class Builder:
         self._slide(link, parent, origin, name, place, along, direction)
         start = self.points[origin]
         self.points[name] = Point(
-            start.place + along * place, link, start.span + way, frozenset().union(
+            start.place + planar.on_line(along, place), link, start.span + way, frozenset().union(
                 *({x} | self.points[x].stands_on for x in (origin, towards, *others))))
 
     def block(self, name: str, joint: str, along: Real, across: Real) -> None:
@@ -339,17 +339,24 @@ class Builder:
         to_first, to_second = (self._side(corner, end) for end in (first, second))
         arm = self.arm(second, first)
         opposite = self.points[first].place + to_second.vector
-        offset = -arm.offset(self.points[corner].place, -to_second.vector)
+        start = self.points[corner].place
+        offset = -arm.offset(start, -to_second.vector)
+        place = start + arm.to_opposite(to_first.length, to_second.length) \
+            if isinstance(arm, planar.CrankArm) else None
         self._reflect(name, first, second, arm, opposite, offset,
                       (to_first.vector, to_second.vector), to_second.length, to_first.length,
-                      corner)
+                      corner, place=place)
 
     def _reflect(self, name: str, first: str, second: str, arm: planar.Arm, point: Complex,
                  offset: Real, ends: Sequence[Complex], to_first: Real, to_second: Real,
-                 *others: str) -> None:
-        """Join two bars at a point's mirror image, given its bars from second and first."""
+                 *others: str, place: Optional[Complex] = None) -> None:
+        """
+        Join two bars at a point's mirror image, given its bars from second and first.
+
+        A place that is known in a better way is given.
+        """
         self.folds.append(planar.Limit(offset, planar.TOLERANCE * to_first * to_second))
-        place, from_second, from_first = planar.mirror(arm, point, offset, ends)
+        place, from_second, from_first = planar.mirror(arm, point, offset, ends, place)
         self._pair(name, first, second, planar.Dyad(from_first, from_second, ()), to_first,
                    to_second, *others, place=place)
 

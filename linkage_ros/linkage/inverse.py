@@ -38,7 +38,7 @@ from .inverse_linkage import InverseLinkage, taken_apart
 from .inverse_rods import InverseRods, taken_apart as rods_taken_apart
 from .planar import TOLERANCE
 from .search import blocks, Search, SINGULAR
-from ..cache import cached
+from ..cache import Cache
 from ..formula.expression import (
     argument,
     gated,
@@ -64,6 +64,8 @@ BESIDE = 16 * 2.0 ** -52 * math.pi
 ENDED = 1e-7
 # What misses by more than this part of the output's size is the answer of another assembly.
 OTHER = 1e-2
+# What is below zero by so many tolerances, a thousandth of its size, is no end of the reach.
+FAR = 1e-3 / TOLERANCE
 # Newton steps that may take a closed form's rounding away; each doubles the digits.
 POLISHING = 5
 # Where rates are smaller than this, outputs tell inputs worse than a step of Newton's can mend.
@@ -79,6 +81,8 @@ STEP, ALIKE = 0.3, 1e-5
 CLOSE, ULPS = 1e-7, 4 * 2.0 ** -52
 # More than any input.
 LARGE = 1e300
+# So many values of a path are looked at together.
+BLOCK = 1024
 
 Found = Tuple[Tuple[float, ...], Tuple[float, ...]]
 Ends = Optional[Sequence[Optional[Tuple[float, float]]]]
@@ -159,15 +163,16 @@ class Inverse:
         # Of each input half a period, the period, and below what it is zero.
         self._turned = [(0.5 * input_.turn, input_.turn, LEAST) if input_.turns else
                         (math.inf, math.inf, LEAST * input_.size) for input_ in linkage.inputs]
-        self._check = linkage.checked(outputs)
+        self._check, self._choices = linkage.checked(outputs), Cache()
         self._rated = linkage.posed((), outputs, outputs)
         self.closed: Union[InverseLinkage, InverseRods, None] = (
             taken_apart if linkage.axes == 'xy' else rods_taken_apart)(linkage, outputs)
         if self.closed:
-            # For each mode: 1 if it is an answer, 0 if not, between if that is to be looked at
-            # closer; the inputs and rates.
-            self._solve, self._row = linkage.bind(self._program(self.closed)), 1 + self._n * (
-                self._n + 1)
+            # For each mode: 1 if it is an answer, 0 if not, NaN if that is to be looked at closer;
+            # the inputs and rates.
+            self._rows = self._judged_modes(self.closed)
+            self._row = 1 + self._n * (self._n + 1)
+            self._solve = linkage.bind(Program(self._rows, self._n, self.closed.given))
         else:
             self._search: Any = Analysis(linkage).branches(*outputs) if self._n == 1 else Search(
                 linkage, outputs)
@@ -222,6 +227,7 @@ class Inverse:
         """
         rows = np.broadcast_arrays(*(numbers('values', each) for each in values))
         inputs, rates = self._found(np.stack([row.ravel() for row in rows]))
+        self._single(inputs, rates)
         order = np.lexsort(np.nan_to_num(inputs, nan=np.inf).swapaxes(0, 1)[::-1], axis=0)
         most = max(int(np.isfinite(inputs[:, 0]).sum(axis=0).max(initial=0)), 1)
         parts = (np.moveaxis(np.take_along_axis(part, order[:, None], 0)[:most], 0, -1)
@@ -235,35 +241,45 @@ class Inverse:
             return []
         values = self._reduced(values)
         if not self.closed:
-            return _columns(*self._searched(np.array(values)[:, None]))
+            return self._distinct(_columns(*self._searched(np.array(values)[:, None])))
         found, n = [], 1 + self._n
-        for row in self._rows(values):
+        for row in self._at(values):
             if row[0] == 1.0:
-                found.append((self._within(row[1:n]), row[n:]))
-            elif row[0] > 0.0 and (own := self._own(row[1:n], values)):
+                found.append((row[1:n], row[n:]))
+            elif row[0] != row[0] and (own := self._own(row[1:n], values)):
                 found.append(own)
         return self._distinct(found) if len(found) > 1 else found
 
-    def _rows(self, values: Sequence[float]) -> List[Tuple[float, ...]]:
-        """Return what each assembly mode has to say of values; see `_program`."""
+    def _at(self, values: Sequence[float]) -> List[Tuple[float, ...]]:
+        """Return what each assembly mode has to say of values; see `_judged`."""
         flat, size = self._solve.at(*values), self._row
         return [flat[start:start + size] for start in range(0, len(flat), size)]
 
-    def _program(self, closed: Union[InverseLinkage, InverseRods]) -> Program:
-        """Return the code for all modes, held to the forward formula and polished by it."""
-        n, check, parts = self._n, self.linkage.structure.checked(self.outputs), []
+    def _judged_modes(self, closed: Union[InverseLinkage, InverseRods]) -> List[Real]:
+        """Return what all modes answer, held to the forward formula and polished by it."""
+        n, structure, parts = self._n, self.linkage.structure, []
+        limits = [limit for limit in structure.built.limits if limit.margin.varies]
+        forward = [*structure.checked(self.outputs), *(limit.margin for limit in limits)]
         for mode in closed.modes:
             for turns in product(*closed.turns):
                 inputs = [value + turn for value, turn in zip(mode.inputs, turns)]
-                # What is wanted of a linkage's inputs is told of the inverse's by their place.
-                row = substituted(check, inputs)
-                parts += self._judged(inputs, row[:n], row[n:])
-        return Program(parts, n, closed.given)
+                # What outputs say of a linkage's inputs the inverse's say by their place.
+                row = substituted(forward, inputs)
+                parts += self._judged(inputs, row[:n], row[n:n + n * n], [
+                    margin + FAR * limit.tolerance
+                    for margin, limit in zip(row[n + n * n:], limits)])
+        return parts
 
-    def _judged(self, inputs: Sequence[Real], reached: Sequence[Real],
-                rates: Sequence[Real]) -> List[Real]:
+    def _judged(self, inputs: Sequence[Real], reached: Sequence[Real], rates: Sequence[Real],
+                margins: Sequence[Real]) -> List[Real]:
         """Return whether inputs are an answer, these after a step of Newton's, and their rates."""
-        n, verdict, gaps, close = self._n, real(1.0), [], real(1.0)
+        n, gaps, det = self._n, [], self._determinant(rates)
+        size = math.prod(self._scales) / math.prod(self._sizes)
+        verdict = real(1.0) if det is None else where(
+            NEIGHBOURS * size < abs(det), 1.0, math.nan)
+        # At an end of the reach outputs may be NaN, not where a limit is missed by far.
+        other = reduce(lambda unknown, margin: where(margin < 0.0, 0.0, unknown), margins, where(
+            abs(inputs[0]) < LARGE, math.nan, 0.0))
         for i, (angular, scale) in enumerate(zip(self._angular, self._scales)):
             gap = reached[i] - argument(i)
             if angular and self.outputs[i] in self.linkage.structure.built.driven:
@@ -273,20 +289,36 @@ class Inverse:
                 gap = where(math.pi < gap, gap - math.tau, where(gap < -math.pi, gap + math.tau,
                                                                  gap))
             gaps.append(gap)
+            other = where(OTHER * scale < abs(gap), 0.0, where(
+                abs(gap) <= OTHER * scale, math.nan, other))
+        for i, (gap, scale) in enumerate(zip(gaps, self._scales)):
             allowed = ROUNDING * (scale + sum((
                 abs(rate) * where(abs(x) < size, size, abs(x))
                 for rate, x, size in zip(rates[i::n], inputs, self._sizes)), real(0.0)))
-            verdict = where(abs(gaps[-1]) <= allowed, where(
-                abs(gaps[-1]) <= ENDED * scale, verdict, 0.5), 0.5)
-            close = where(OTHER * scale < abs(gaps[-1]), 0.0, close)
-        return [verdict * gated(close, abs(inputs[0]), 0.0),
-                *(x - step for x, step in zip(inputs, self._steps(gaps, rates))), *rates]
+            verdict = where(abs(gap) <= allowed, where(
+                abs(gap) <= ENDED * scale, verdict, math.nan), other)
+        polished = [self._counted(by, x - step)
+                    for by, (x, step) in enumerate(zip(inputs, self._steps(gaps, rates)))]
+        return [verdict, *polished, *rates]
+
+    def _counted(self, by: int, x: Real) -> Real:
+        """Return an input as it is counted: an angle in the turns from -pi, zero without sign."""
+        half, turn, least = self._turned[by]
+        if math.isfinite(turn):
+            x = x - turn * nearest_integer(x / turn)
+            x = where(half <= x, x - turn, x)
+        return where(abs(x) < least, 0.0, x)
+
+    def _determinant(self, rates: Sequence[Real]) -> Optional[Real]:
+        """Return the determinant of d outputs / d inputs of up to two, None of more."""
+        return None if self._n > 2 else rates[0] if self._n == 1 else (
+            rates[0] * rates[3] - rates[1] * rates[2])
 
     def _steps(self, gaps: Sequence[Real], rates: Sequence[Real]) -> Sequence[Real]:
         """Return the steps of Newton's method where outputs tell inputs well, elsewhere 0."""
-        if self._n > 2:
+        det = self._determinant(rates)
+        if det is None:
             return [real(0.0)] * self._n
-        det = rates[0] if self._n == 1 else rates[0] * rates[3] - rates[1] * rates[2]
         sound = SOUND * math.prod(self._scales) / math.prod(self._sizes) < abs(det)
         det = where(sound, det, math.inf)
         if self._n == 1:
@@ -397,53 +429,58 @@ class Inverse:
 
     def _found(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """
-        Return all answers for values (outputs, questions), in no order, filled up with NaN.
+        Return all answers for values (outputs, questions), in no order, NaN where there is none.
 
         Their shapes are (answers, inputs, questions) and (answers, inputs * outputs, questions).
+        Answers that rounding does not tell from one another are all given.
         """
-        values = np.where(np.isfinite(values), values, np.nan)
-        if any(self._angular) and np.any(np.abs(values) > math.tau):
-            values[self._angular] = np.arctan2(np.sin(values), np.cos(values))[self._angular]
+        values = self._within_turns(values)
         if not self.closed:
             return self._searched(values)
         n, count = self._n, values.shape[1]
         rows = self._solve.over(*values).reshape(-1, self._row, count) if count else np.empty(
             (1, self._row, 0))
-        verdict, inputs, rates = rows[:, 0], rows[:, 1:n + 1].copy(), rows[:, n + 1:].copy()
-        with np.errstate(invalid='ignore'):
-            closer = (verdict > 0.0) & (verdict < 1.0)
-        for mode, place in zip(*np.nonzero(closer & self._may_be(inputs, rows))):
-            if own := self._own(tuple(inputs[mode, :, place].tolist()),
-                                tuple(values[:, place].tolist())):
-                inputs[mode, :, place], rates[mode, :, place] = own
-                closer[mode, place] = False
-        none = closer | ~(verdict > 0.0)
-        return self._single(np.where(none[:, None], np.nan, inputs),
-                            np.where(none[:, None], np.nan, rates))
+        if not (rows[:, 0] == 1.0).all():
+            for mode, place in zip(*np.nonzero(np.isnan(rows[:, 0]))):
+                own = self._own(tuple(rows[mode, 1:n + 1, place].tolist()),
+                                tuple(values[:, place].tolist()))
+                rows[mode, :, place] = (1.0, *own[0], *own[1]) if own else 0.0
+            rows.swapaxes(0, 1)[:, rows[:, 0] == 0.0] = np.nan
+        return rows[:, 1:n + 1], rows[:, n + 1:]
 
-    def _may_be(self, inputs: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Return what may be an answer: what can be assembled, or a little beside."""
-        found = np.isfinite(rows[:, self._n + 1:]).all(axis=1)
-        places = np.nonzero(~found & np.isfinite(inputs).all(axis=1))
-        for beside in self._beside(tuple(inputs.swapaxes(0, 1)[:, places[0], places[1]])):
-            found[places] |= np.isfinite(self._check.over(*beside)[:self._n]).all(axis=0)
-        return found
+    def _within_turns(self, values: np.ndarray) -> np.ndarray:
+        """Return values (outputs, questions) as `_reduced` does; NaN what is not finite."""
+        far = ~(np.abs(values) <= math.tau)
+        if not far.any():
+            return values
+        values = np.where(np.isfinite(values), values, np.nan)
+        far &= np.array(self._angular)[:, None]
+        values[far] = np.arctan2(np.sin(values[far]), np.cos(values[far]))
+        return values
 
-    def _single(self, inputs: np.ndarray, rates: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Return answers as they are counted, NaN what rounding does not tell from another."""
-        for i, input_ in enumerate(self._inputs):
-            inputs[:, i] = input_.wrapped(np.where(
-                np.abs(inputs[:, i]) < LEAST * self._sizes[i], 0.0, inputs[:, i]))
-        for one, two in combinations(range(len(inputs)), 2):
+    def _single(self, inputs: np.ndarray, rates: np.ndarray) -> None:
+        """Make NaN what rounding does not tell from another answer."""
+        doubtful = np.zeros(inputs.shape[2], bool)
+        for one, two in combinations(inputs, 2):
+            away = self._away(one, two)
             with np.errstate(invalid='ignore'):
-                apart = np.max([input_.apart(x, y) / size for input_, size, x, y in zip(
-                    self._inputs, self._sizes, inputs[one], inputs[two])], axis=0)
-                places = np.flatnonzero(apart <= NEIGHBOURS)
-            for place in places:
-                if self._are_one(*((tuple(inputs[k, :, place]), tuple(rates[k, :, place]))
-                                   for k in (one, two))):
-                    inputs[two, :, place] = rates[two, :, place] = np.nan
-        return inputs, rates
+                doubtful |= away <= self._n * NEIGHBOURS ** 2
+        for place in np.flatnonzero(doubtful):
+            here = inputs[:, :, place], rates[:, :, place]
+            kept = self._distinct([(tuple(x), tuple(r)) for x, r in zip(
+                *(part.tolist() for part in here)) if x[0] == x[0]])
+            for part, each in zip(here, zip(*kept)):
+                part[:] = np.nan
+                part[:len(kept)] = each
+
+    def _away(self, inputs: np.ndarray, others: np.ndarray) -> np.ndarray:
+        """Return the squares of how far inputs (inputs, n) are from others, in their sizes."""
+        total: Any = 0.0
+        for x, y, (_, turn, _), size in zip(inputs, others, self._turned, self._sizes):
+            gap = x - y
+            gap = gap - turn * np.rint(gap / turn) if math.isfinite(turn) else gap / size
+            total = total + gap * gap
+        return total
 
     def _one_each(self, values: Any, name: str = 'values') -> Tuple[float, ...]:
         """Return one number for each output; raise ValueError if there are not as many."""
@@ -479,32 +516,27 @@ class Inverse:
             NaN where there is none.
 
         """
-        if set(map(type, (*values, *(near or ())))) == {float}:
-            answers: Sequence[Any] = self._all(tuple(values))
-        else:
-            inputs, rates = self.over(*values)
-            answers = [(inputs[..., k], rates[..., k]) for k in range(inputs.shape[-1])]
-        return self._chosen(answers, near, ends)
-
-    def _chosen(self, answers: Sequence[Any], near: Optional[Sequence[Any]],
-                ends: Ends) -> Tuple[Any, Any]:
-        n, sizes = self._n, self._sizes
-        if not answers:
-            return (math.nan,) * n, (math.nan,) * (n * n)
-        limits = ends or (None,) * n
-        choice = _choice(len(answers), tuple(input_.period * input_.turns for input_ in
-                                             self._inputs), near is not None,
-                         tuple(map(bool, limits)))
-        found = choice(*chain.from_iterable(
-            (*(x / size for x, size in zip(inputs, sizes)),
-             *(rate * sizes[i // n] for i, rate in enumerate(rates)))
-            for inputs, rates in answers),
-            *(TOLERANCE * (math.pi if angular else scale)
-              for angular, scale in zip(self._angular, self._scales)),
-            *(x / size for x, size in zip(near or (), sizes)),
-            *(end / size for pair, size in zip(limits, sizes) if pair for end in pair))
-        return (tuple(x * size for x, size in zip(found[:n], sizes)),
-                tuple(rate / sizes[i // n] for i, rate in enumerate(found[n:])))
+        limits = tuple(ends or (None,) * self._n)
+        given = (*values, *(near or ()), *(float(end) for pair in limits if pair for end in pair))
+        if not self.closed:
+            return self._chosen(self._each(values), near, limits)[1:]
+        choose = self._choice(0, near is not None, tuple(map(bool, limits)))
+        if set(map(type, given)) == {float}:
+            rank, *found = choose.at(*given)
+            if rank != rank:
+                return self._chosen(self._all(tuple(values)), near, limits)[1:]
+            return tuple(found[:self._n]), tuple(found[self._n:])
+        rows = np.broadcast_arrays(*given)
+        flat = np.stack([row.ravel() for row in rows])
+        flat[:self._n] = self._within_turns(flat[:self._n])
+        rank, *found = choose.over(*flat)
+        for place in np.flatnonzero(np.isnan(rank)):
+            values, near, ends = self._split(flat[:, place].tolist(), near is not None, limits)
+            chosen = self._chosen(self._all(tuple(values)), near, ends)[1:]
+            for part, value in zip(found, chain(*chosen)):
+                part[place] = value
+        found = [part.reshape(rows[0].shape) for part in found]
+        return tuple(found[:self._n]), tuple(found[self._n:])
 
     def path(self, values: Sequence[np.ndarray], near: Optional[Sequence[float]] = None,
              ends: Ends = None) -> Tuple[Any, Any]:
@@ -524,18 +556,161 @@ class Inverse:
             As `nearest` does.
 
         """
+        inputs, rates = self._found(np.array(values, float))
+        limits, beside = tuple(ends or (None,) * self._n), near and tuple(np.ravel(near).tolist())
+        found, breaks = np.full((self._n + self._n ** 2, inputs.shape[2]), np.nan), {}
+        at, known = 0, np.flatnonzero(self._may_be_taken(inputs, limits))
+        while (k := int(known.searchsorted(at))) < len(known):
+            at = int(known[k])
+            answers = [(tuple(x), tuple(r)) for x, r in zip(inputs[:, :, at].tolist(), rates[
+                :, :, at].tolist())]
+            rank, place, rate = self._chosen(answers, beside, limits)
+            if place[0] != place[0]:
+                at += 1
+                continue
+            mode = int(rank)
+            if mode not in breaks:
+                breaks[mode] = self._breaks(inputs, mode)
+            stop = min(int(breaks[mode][breaks[mode].searchsorted(at)]) + 1, at + BLOCK)
+            places = self._going_on(inputs[mode, :, at:stop], place, limits)
+            stop = at + places.shape[1]
+            found[:self._n, at:stop], found[self._n:, at:stop] = places, rates[mode, :, at:stop]
+            at, beside = stop, tuple(places[:, -1].tolist())
+        return tuple(found[:self._n]), tuple(found[self._n:])
+
+    def _may_be_taken(self, inputs: np.ndarray, limits: Sequence) -> np.ndarray:
+        """Return for each question whether an answer may lie between the ends."""
+        may = inputs[:, 0] == inputs[:, 0]
+        for by, (pair, (_, turn, _), size) in enumerate(zip(limits, self._turned, self._sizes)):
+            if pair:
+                # What is beyond by more than this no rounding of an output takes to the end.
+                low, high = (end + side * NEIGHBOURS * (size + abs(end))
+                             for end, side in zip(pair, (-1.0, 1.0)))
+                first = inputs[:, by] + (turn * np.ceil((low - inputs[:, by]) / turn)
+                                         if math.isfinite(turn) else 0.0)
+                may &= (low <= first) & (first <= high)
+        return may.any(axis=0)
+
+    def _breaks(self, inputs: np.ndarray, mode: int) -> np.ndarray:
+        """Return after which questions another answer is nearer than that of the same mode."""
+        own = inputs[mode]
+        kept = self._away(own[:, 1:], own[:, :-1])
+        for other in (*inputs[:mode], *inputs[mode + 1:]):
+            kept[self._away(other[:, 1:], own[:, :-1]) <= kept] = np.nan
+        return np.append(np.flatnonzero(kept != kept), own.shape[1] - 1)
+
+    def _going_on(self, inputs: np.ndarray, start: Sequence[float], limits: Sequence
+                  ) -> np.ndarray:
+        """Return inputs that go on from a start, whole turns included, as far as they may."""
+        places = inputs.copy()
+        for row, begin, pair, (_, turn, _) in zip(places, start, limits, self._turned):
+            if math.isfinite(turn):
+                turns = np.rint((row[:-1] - row[1:]) / turn)
+                turns[:1] += round((begin - row[0]) / turn)
+                if turns.any():
+                    row[1:] += turn * np.cumsum(turns)
+            row[0] = begin
+            if pair and len(beyond := np.flatnonzero((row < pair[0]) | (pair[1] < row))):
+                places = places[:, :beyond[0]]
+        return places
+
+    def _each(self, values: Sequence[Any]) -> Sequence[Any]:
+        """Return all answers, floats for floats and arrays for arrays."""
+        if set(map(type, values)) == {float}:
+            return self._all(tuple(values))
         inputs, rates = self.over(*values)
-        rows = np.concatenate([inputs, rates]).transpose(1, 2, 0)
-        near = None if near is None else tuple(np.ravel(near).tolist())
-        n, found = self._n, []
-        for row in rows.tolist():
-            answers = [(each[:n], each[n:]) for each in row if each[0] == each[0]]
-            taken = self._chosen(answers, near, ends)
-            if taken[0][0] == taken[0][0]:
-                near = taken[0]
-            found.append((*taken[0], *taken[1]))
-        columns = np.reshape(found, (len(values[0]), n + n * n)).T
-        return tuple(columns[:n]), tuple(columns[n:])
+        return [(inputs[..., k], rates[..., k]) for k in range(inputs.shape[-1])]
+
+    def _split(self, given: Sequence[float], follows: bool, limits: Sequence) -> Tuple:
+        """Return values, what they are to be near, and the ends, of one list."""
+        each = iter(given)
+        return (tuple(islice(each, self._n)), tuple(islice(each, self._n)) if follows else None,
+                tuple(pair and (next(each), next(each)) for pair in limits))
+
+    def _chosen(self, answers: Sequence[Any], near: Optional[Sequence[Any]],
+                limits: Sequence) -> Tuple[Any, Any, Any]:
+        """Return which of some answers is chosen, its inputs and its rates."""
+        n = self._n
+        if not answers:
+            return 0.0, (math.nan,) * n, (math.nan,) * (n * n)
+        choose = self._choice(len(answers), near is not None, tuple(map(bool, limits)))
+        rank, *found = choose(*chain.from_iterable(chain(*answer) for answer in answers),
+                              *(near or ()), *(end for pair in limits if pair for end in pair))
+        return rank, tuple(found[:n]), tuple(found[n:])
+
+    def _choice(self, count: int, follows: bool, ended: Tuple[bool, ...]) -> Pose:
+        """
+        Return the code that chooses one of some answers, or for 0 that of the modes.
+
+        Given are the answers, each its inputs and rates, or the values; then, if so, the inputs
+        that the answer is to be nearest to, and for each that is to lie between ends, these. What
+        is beyond an end by so little that the outputs do not tell is at the end. Inputs that turn
+        are the same after so many turns. Before the answer its number is returned, NaN where a
+        mode is to be looked at closer.
+        """
+        return self._choices.get_or_make((count, follows, ended), lambda: self._make_choice(
+            count, follows, ended))
+
+    def _make_choice(self, count: int, follows: bool, ended: Tuple[bool, ...]) -> Pose:
+        n, size = self._n, self._n + self._n ** 2
+        total = (count * size or n) + n * follows + 2 * sum(ended)
+        given = list(map(argument, range(total)))
+        values, given = given[:count * size or n], given[count * size or n:]
+        near, ends = given[:n] if follows else [], iter(given[n * follows:])
+        limits = [(next(ends), next(ends)) if each else () for each in ended]
+        rows = [[where(values[i] <= values[i], 1.0, 0.0), *values[i:i + size]] for i in range(
+            0, count * size, size)] or [self._rows[i:i + size + 1] for i in range(
+                0, len(self._rows), size + 1)]
+        unknown = reduce(lambda found, row: where(row[0] <= 1.0, found, math.nan), rows, real(0.0))
+        for value, angular in zip(values, () if count else self._angular):
+            if angular:
+                unknown = unknown + where(abs(value) <= math.tau, 0.0, math.nan)
+        choices = []
+        for rank, (verdict, *row) in enumerate(rows):
+            places, misses = zip(*(self._place(by, row, near, limit)
+                                   for by, limit in enumerate(limits)))
+            if follows:
+                order = [square_root(sum((square((x - y) / size) for x, y, size in zip(
+                    places, near, self._sizes)), real(0.0)))]
+            else:
+                order = [where(row[1] < 0.0, 1.0, 0.0) if n == 1 else real(0.0), *row[:n]]
+            order[0] = reduce(lambda far, miss: where(miss, math.inf, far), chain(*misses),
+                              where(0.5 < verdict, order[0], math.inf))
+            choices.append([*order, real(float(rank)), *places, *row[n:]])
+        many = len(choices[0]) - 1 - size
+        best = reduce(lambda best, other: [where(
+            _before(other[:many], best[:many]), mine, its) for mine, its in zip(
+                other, best)], choices)
+        return self.linkage.bind(Program([best[many] + unknown, *(
+            gated(part, LARGE - best[0], 0.0) for part in best[many + 1:])], total,
+            self.closed.given if self.closed and not count else {}))
+
+    def _place(self, by: int, row: Sequence[Real], near: Sequence[Real],
+               ends: Sequence[Real]) -> Tuple[Real, List[Real]]:
+        """Return where an input is chosen, whole turns aside, and what tells that it is not."""
+        x, size, turn = row[by], self._sizes[by], self._turned[by][1]
+
+        def beside(value: Real, other: Real) -> Real:
+            return value if math.isinf(turn) else value + turn * nearest_integer(
+                (other - value) / turn)
+
+        place = beside(x, near[by]) if near else x
+        if not ends:
+            return place, []
+        speed = reduce(_greater, (
+            abs(rate) * (size / (TOLERANCE * (math.pi if angular else scale)))
+            for rate, angular, scale in zip(
+                row[self._n * (by + 1):], self._angular, self._scales)))
+        slack = size * where(1.0 < CLOSE * speed, 1.0 / speed, CLOSE) + ULPS * (
+            4.0 * size + abs(ends[0]) + abs(ends[1]))
+        low, high = ends[0] - slack, ends[1] + slack
+        first, last = (beside(x, end) for end in ends)
+        if math.isfinite(turn):
+            first = where(first < low, first + turn, first)
+            last = where(high < last, last - turn, last)
+        place = where(place < low, first, where(high < place, last, place)) if near else first
+        inside = where(place < ends[0], ends[0], where(ends[1] < place, ends[1], place))
+        return inside, [place < low, high < place]
 
     def follow(self, values: ArrayLike, near: ArrayLike) -> Found:
         """
@@ -601,7 +776,7 @@ class Inverse:
     def _modes(self, values: Sequence[float], near: Sequence[float]
                ) -> Iterator[Tuple[int, Tuple[float, ...]]]:
         """Yield what each assembly mode answers that has an answer, next to other inputs."""
-        for mode, row in enumerate(self._rows(values)):
+        for mode, row in enumerate(self._at(values)):
             inputs = row[1:self._n + 1]
             if not any(x != x for x in inputs):
                 yield mode, self._next_to(inputs, near)
@@ -617,7 +792,8 @@ class Inverse:
         if self._n == 1:
             inputs = self._search.answers(values[0])[:, None] * self._sizes[0]
             rates = self._rated.over(inputs.ravel())[1].reshape(inputs.shape)
-            return self._single(inputs, np.where(np.isnan(inputs), np.nan, rates))
+            return self._inputs[0].wrapped(np.where(
+                np.abs(inputs) < self._turned[0][2], 0.0, inputs)), rates
         found = [self._search.answers(column) for column in values.T]
         most = max((len(each) for each in found), default=0)
         inputs = np.full((max(most, 1), self._n, len(found)), np.nan)
@@ -664,63 +840,12 @@ def _columns(inputs: np.ndarray, rates: np.ndarray) -> List[Found]:
     return sorted(found)
 
 
-@cached(256)
-def _choice(count: int, periods: Tuple[int, ...], follows: bool, ended: Tuple[bool, ...]) -> Pose:
-    """
-    Return the code that takes one of some answers.
-
-    Given are the answers, each its inputs and rates, the rounding of each output, then, if so, the
-    inputs that the answer is to be nearest to, and for each that is to lie between ends, these.
-    What is beyond an end by so little that the outputs do not tell is at the end. Inputs that turn
-    are the same after so many turns.
-    """
-    n = len(periods)
-    given = iter(map(argument, range(count * (n + n * n) + n + n * follows + 2 * sum(ended))))
-    answers = [([*islice(given, n)], [*islice(given, n * n)]) for _ in range(count)]
-    rounding, near = [*islice(given, n)], [*islice(given, n * follows)]
-    ends = [(next(given), next(given)) if each else () for each in ended]
-    choices = []
-    for rank, (inputs, rates) in enumerate(answers):
-        places, away = [], real(rank)
-        if n == 1 and not follows:
-            away = away + where(rates[0] < 0.0, float(count), 0.0)
-        misses: List[Real] = []
-        for j, (x, period) in enumerate(zip(inputs, periods)):
-            speed = reduce(_greater, (abs(rate) / each for rate, each in zip(
-                rates[n * j:n * j + n], rounding)))
-            place, missed = _place(x, period * math.tau, near[j] if follows else None, ends[j],
-                                   where(1.0 < CLOSE * speed, 1.0 / speed, CLOSE))
-            places.append(place)
-            misses += missed
-        if follows:
-            away = square_root(sum((square(x - y) for x, y in zip(places, near)), real(0.0)))
-        away = reduce(lambda far, miss: where(miss, math.inf, far), misses, away)
-        choices.append([where(inputs[0] <= inputs[0], away, math.inf), *places, *rates])
-    away, *taken = reduce(lambda best, other: [
-        where(other[0] < best[0], mine, its) for mine, its in zip(other, best)], choices)
-    total = count * (n + n * n) + n + n * follows + 2 * sum(ended)
-    return Program([gated(part, LARGE - away, 0.0) for part in taken], total).bind({}, {})
-
-
 def _greater(x: Real, y: Real) -> Real:
     return where(x < y, y, x)
 
 
-def _place(x: Real, turn: float, near: Optional[Real], ends: Sequence[Real],
-           slack: Real) -> Tuple[Real, List[Real]]:
-    """Return where an input is taken, whole turns aside, and what tells that it is not."""
-    def beside(value: Real, other: Real) -> Real:
-        return value + turn * nearest_integer((other - value) / turn) if turn else value
-
-    place = x if near is None else beside(x, near)
-    if not ends:
-        return place, []
-    slack = slack + ULPS * (4.0 + abs(ends[0]) + abs(ends[1]))
-    low, high = ends[0] - slack, ends[1] + slack
-    first, last = (beside(x, end) for end in ends)
-    if turn:
-        first = where(first < low, first + turn, first)
-        last = where(high < last, last - turn, last)
-    place = first if near is None else where(place < low, first, where(high < place, last, place))
-    inside = where(place < ends[0], ends[0], where(ends[1] < place, ends[1], place))
-    return inside, [place < low, high < place]
+def _before(one: Sequence[Real], other: Sequence[Real]) -> Real:
+    """Return whether numbers come before others, the first that differ telling."""
+    (x, *rest), (y, *others) = one, other
+    return 0.5 < where(x < y, 1.0, where(y < x, 0.0, where(_before(rest, others), 1.0, 0.0))) \
+        if rest else x < y

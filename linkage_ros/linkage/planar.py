@@ -95,6 +95,13 @@ def turned(along: Complex, theta: Real, length: Real) -> Complex:
         (theta, *turning.of), lambda rate, *rates: rate + turning.formula(*rates)))
 
 
+def on_line(along: Complex, place: Real) -> Complex:
+    """Return what is so far along a direction; where that has no value, neither part has one."""
+    # A product with zero is left out, and with it that it has no value.
+    return Complex(*(gated(part * place, abs(place), real(0.0)) if part.value == 0.0
+                     else part * place for part in (along.x, along.y)))
+
+
 class Limit(NamedTuple):
     """
     A margin that is negative, by more than the tolerance, where a linkage cannot be assembled.
@@ -227,6 +234,16 @@ class CrankArm(Arm):
                                       exact_sum(g, m, -radius) * exact_sum(g, m, radius),
                                       exact_sum(g, -m, -radius) * exact_sum(g, -m, radius))
 
+    def to_opposite(self, first: Real, second: Real) -> Complex:
+        """
+        Return the vector from a corner of an antiparallelogram to the opposite one.
+
+        Its bars first and second [m] from that corner end at the arm's end and its foot. Both are
+        the parallel sides of a trapezoid, whose product is |first^2 - second^2|.
+        """
+        power = gated((first - second) * (first + second), self.square, real(0.0))
+        return self.vector * (power / self.square)
+
     def _half_angle_limit(self, radius: Real, size: Real, sign: float, start: Real,
                           end: Real) -> Limit:
         gm, s, h = 4.0 * self._g * self._m, self._s, self._h
@@ -291,50 +308,77 @@ class Dyad(NamedTuple):
     limits: Tuple[Limit, ...]
 
 
-def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True,
-         longest: Optional[Real] = None) -> Dyad:
+def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) -> Dyad:
     """
     Return the RRR dyad on an arm: circles of radius first [m] and second [m] about its ends.
 
     The joint is foot + w (u + i v) with u = 1/2 + (r1 - r2)(r1 + r2) / 2|w|^2 and
     v = side sqrt((r1 + r2)^2 - |w|^2) sqrt(|w|^2 - (r1 - r2)^2) / 2|w|^2; left of the arm for
-    side = +1. At a change point of a crank arm the branch goes on smoothly if `smooth`. Where the
-    first bar is a cylinder, its longest length [m] is given, and returned is its direction.
+    side = +1. At a change point of a crank arm the branch goes on smoothly if `smooth`.
     """
     radius = first + second
-    size = radius if longest is None else longest + second
-    limits = (arm.within(radius, size), arm.beyond(first - second, size)) \
-        if longest is None else arm.stroke(first, second, size)
-    roots = [x.smooth if smooth and x.smooth else x.root() for x in limits]
-    twice = 2.0 * arm.square
-    skew = (first - second) * (first + second) / twice
-    v = roots[0] * roots[1] / twice * side
-    skew = _known_with(v, arm.vector, skew)
-    u = 0.5 + skew
-    bars = arm.vector * Complex(u, v), arm.vector * Complex(skew - 0.5, v)
-    bars = bars if longest is None else (bars[0] / first, bars[1])
+    limits = arm.within(radius, radius), arm.beyond(first - second, radius)
+    v = _height(arm, limits, side, smooth)
+    skew = _known_with(v, arm.vector, (first - second) * radius / (2.0 * arm.square))
+    u, turning = 0.5 + skew, spin(arm.vector)
 
-    turning = spin(arm.vector)
-
-    def with_turning(bar: Complex, along: Real, length: Real) -> Complex:
-        """Add to the arm's turning that of a bar, along + i v, on the arm."""
-        return with_spin(bar, Rate(
+    def bar(along: Real, length: Real) -> Complex:
+        """Return the bar along + i v on the arm, which adds its own turning to the arm's."""
+        return with_spin(arm.vector * Complex(along, v), Rate(
             (v, skew, *turning.of), lambda dv, dskew, *rates: turning.formula(*rates) + (
                 (along * dv - v * dskew) * arm.square / square(length))))
 
-    def with_growing(barrel: Complex) -> Complex:
-        """Add a barrel's turning, as its length and the arm's square grow: nothing cancels."""
-        length = arm.length
-        power = arm.square - square(second) if length is None else \
-            (length - second) * (length + second)
-        return with_spin(barrel, Rate(
-            (first, arm.square, *turning.of), lambda dc, dw, *rates: turning.formula(*rates) - (
-                dc * (square(first) - power) / (2.0 * first) + dw * (
-                    arm.square - square(first) + square(second)) / (4.0 * arm.square)) / (
-                        v * arm.square)))
+    return Dyad(bar(u, first), bar(skew - 0.5, second), limits)
 
-    return Dyad(with_turning(bars[0], u, first) if longest is None else with_growing(bars[0]),
-                with_turning(bars[1], skew - 0.5, second), limits)
+
+def _height(arm: Arm, limits: Sequence[Limit], side: float, smooth: bool) -> Real:
+    """Return how far the joint of a dyad is to the left of its arm, as a part of that."""
+    within, beyond = (x.smooth if smooth and x.smooth else x.root() for x in limits)
+    return within * beyond / (2.0 * arm.square) * side
+
+
+def extended(arm: Arm, first: Real, second: Real, side: float, longest: Real) -> Dyad:
+    """
+    Return the dyad whose first bar is a cylinder c, up to `longest` [m]; of that the direction.
+
+    With a bar r, u = (|w|^2 - r^2 + c^2) / 2|w|^2. As the cylinder grows, both turn by c / (v
+    |w|^2) for each metre, the barrel by (1 - (|w|^2 - r^2) / c^2) / 2 of that: nothing cancels
+    where the bar is as long as the arm, and c and v vanish together.
+    """
+    limits = arm.stroke(first, second, longest + second)
+    length = arm.length
+    power = arm.square - square(second) if length is None else \
+        (length - second) * (length + second)
+    v = _height(arm, limits, side, False)
+    u = _known_with(v, arm.vector, (power + square(first)) / (2.0 * arm.square))
+    growth, turning = _growth(arm, first, second, v), spin(arm.vector)
+
+    def with_growing(bar: Complex, grown: Real, widened: Real) -> Complex:
+        """Add to the arm's turning a bar's, as the cylinder grows and the arm's square does."""
+        return with_spin(bar, Rate(
+            (first, arm.square, *turning.of), lambda dc, dw, *rates: turning.formula(*rates) - (
+                growth * (dc * grown + dw * widened / (4.0 * first * arm.square)))))
+
+    return Dyad(with_growing(arm.vector * Complex(u, v) / first, 0.5 - 0.5 * power / square(first),
+                             arm.square - square(first) + square(second)),
+                with_growing(arm.vector * Complex(u - 1.0, v), real(1.0),
+                             -(power + square(first))), limits)
+
+
+def _growth(arm: Arm, first: Real, second: Real, v: Real) -> Real:
+    """
+    Return how a cylinder's growing turns the other bar of its dyad: c / (v |w|^2).
+
+    On an arm of constant length d that hardly changes where c and v vanish together, as they do
+    where the bar r is as long: what it changes by has nothing that cancels.
+    """
+    growth = first / (v * arm.square)
+    if (d := arm.length) is None:
+        return growth
+    apart = (second - d, second + d)
+    return with_rate(growth, first, formula=lambda rate: growth * rate * (
+        first / ((apart[1] - first) * (apart[1] + first))
+        - square(apart[0]) / (first * (first - apart[0]) * (first + apart[0]))))
 
 
 def _known_with(other: Real, vector: Complex, part: Real) -> Real:
@@ -359,16 +403,17 @@ def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
     return Complex(0.5 + (first - second) * (first + second) / twice, height / twice * side)
 
 
-def mirror(arm: Arm, point: Complex, offset: Real,
-           ends: Sequence[Complex]) -> Tuple[Complex, ...]:
+def mirror(arm: Arm, point: Complex, offset: Real, ends: Sequence[Complex],
+           image: Optional[Complex] = None) -> Tuple[Complex, ...]:
     """
     Return the mirror image of a point in the line of an arm, and the bars from both ends to it.
 
     The point's offset from the arm and, for each end of it, its foot first, the bar to the point
-    are given; a bar's image turns twice as fast as the arm, less what the bar itself turns.
+    are given, and the image where it is known in a better way; a bar's image turns twice as fast
+    as the arm, less what the bar itself turns.
     """
     across, turning, bars = arm.across(point, offset), spin(arm.vector), []
-    image = point + across
+    image = image or point + across
     for bar in ends:
         own = spin(bar)
         bars.append(with_spin(bar + across, Rate(

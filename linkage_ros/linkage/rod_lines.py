@@ -234,8 +234,7 @@ class _Joint:
         self.shift: Optional[Real] = None
         self.limits = (numbers[6], numbers[7]) if len(numbers) > 6 else None
         if numbers:
-            self.origin, self.direction = Vector(*numbers[:3]), Vector(*numbers[3:6])
-            self.hinge = Hinge(self.origin, self.direction.unit())
+            self.hinge = Hinge(Vector(*numbers[:3]), Vector(*numbers[3:6]))
 
     def moved(self, point: Vector, back: bool = False) -> Vector:
         """Return a point of the link as its parent sees it, or the other way round."""
@@ -290,7 +289,7 @@ class _Drawing:
     def _check_joint(self, joint: _Joint) -> None:
         if joint.line.word == 'fixed':
             return
-        length = joint.direction.length()
+        length = joint.hinge.direction.length()
         if length.value is None or length.value <= 0.0:
             self._demand(joint.line, length, 'its axis has no direction')
         if joint.limits:
@@ -445,11 +444,11 @@ class _Drawing:
             builder.links.append(Link(name, _links(line)[0], place, kind, real(0.0), place))
             builder.joint_values[name] = value
         if joint and line.word != 'fixed':
-            self._point(f'{name}_origin', _End(name, joint.origin))
+            self._point(f'{name}_origin', _End(name, joint.hinge.origin))
         for end in self._ends(line) if joint is None else ():
             self._point(f'{name}_{end.link}', end)
             if end.link != GROUND and self._joints[end.link].line.word != 'fixed':
-                length = end.point.minus(self._joints[end.link].origin).length()
+                length = end.point.minus(self._joints[end.link].hinge.origin).length()
                 builder.bars.append(Bar(f'{end.link}_origin', f'{name}_{end.link}', length))
         if line.word in _RODS:
             first, second = (f'{name}_{link}' for link in _links(line))

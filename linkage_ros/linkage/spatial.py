@@ -86,10 +86,13 @@ class Vector(NamedTuple):
         return abs(parts[0]) if len(parts) == 1 else square_root(
             sum(map(square, parts), real(0.0)))
 
+    def over(self, divisor: Number) -> Vector:
+        """Return a quotient."""
+        return Vector(self.x / divisor, self.y / divisor, self.z / divisor)
+
     def unit(self) -> Vector:
         """Return the direction."""
-        length = self.length()
-        return Vector(self.x / length, self.y / length, self.z / length)
+        return self.over(self.length())
 
 
 class Turn(NamedTuple):
@@ -152,17 +155,22 @@ class Pivot(NamedTuple):
 
 
 class Hinge(NamedTuple):
-    """An axis in space: a point of it, and its direction, a unit vector."""
+    """An axis in space: a point of it, and its direction, a vector of any length."""
 
     origin: Vector
-    axis: Vector
+    direction: Vector
+
+    @property
+    def axis(self) -> Vector:
+        """The direction as a unit vector."""
+        return self.direction.unit()
 
     def circle(self, point: Vector) -> Circle:
-        """Return the way of a point that turns about the axis."""
-        arm = point.minus(self.origin)
-        across = self.axis.cross(arm)
-        return Circle(self.origin.plus(self.axis.times(self.axis.dot(arm))),
-                      across.cross(self.axis), across)
+        """Return the way of a point that turns about the axis; it is the point at angle zero."""
+        # Of the direction as given: a unit vector is rounded, and not quite of length one.
+        across = self.direction.cross(point.minus(self.origin))
+        u = across.cross(self.direction).over(self.direction.dot(self.direction))
+        return Circle(point.minus(u), u, across.over(self.direction.length()))
 
     def turned(self, point: Vector, turn: Turn) -> Vector:
         """Return where a turn takes a point."""
@@ -278,12 +286,11 @@ class Universal:
 
     def __init__(self, first: Hinge, second: Hinge, home: Sequence[Real]):
         self._first = first
-        leaning = first.axis.cross(second.axis)
-        self.sine = leaning.length()
-        x = leaning.cross(first.axis).unit()
+        leaning = first.direction.cross(second.direction)
+        self.sine = leaning.length() / (first.direction.length() * second.direction.length())
+        x = leaning.cross(first.direction).unit()
         self._frame = x, first.axis.cross(x), first.axis
-        self._second = Hinge(self.seen(second.origin), self._seen(second.axis))
-        self._home = home
+        self._second, self._home = second, home
 
     def _seen(self, vector: Vector) -> Vector:
         return Vector(*(vector.dot(axis) for axis in self._frame))
@@ -299,7 +306,7 @@ class Universal:
     def bars(self, rods: Sequence[Rod]) -> List[Tuple[Vector, Circle, Real]]:
         """Return rods in the frame of the first hinge: pivot, way of the end, length."""
         return [(rod.pivot._replace(way=self.frame_way(rod.pivot.way)).place,
-                 self._second.circle(self.seen(rod.end)), rod.length) for rod in rods]
+                 self.frame_way(self._second.circle(rod.end)), rod.length) for rod in rods]
 
     def solved(self, rods: Sequence[Rod]) -> Tuple[Turn, Turn, Limit]:
         """Return both turns that two rods make, and what is below zero where none is found."""
@@ -307,7 +314,9 @@ class Universal:
         c1, c2 = map(cosine, self._home)
         s1, s2 = map(sine, self._home)
         step = real(0.0)
-        for _ in range(STEPS):
+        for left in reversed(range(STEPS)):
+            if not left:  # what the steps before have added to the length of both
+                (c1, s1), (c2, s2) = _on_circle(c1, s1), _on_circle(c2, s2)
             rows = [_row(*bar, c1, s1, c2, s2) for bar in bars]
             d1, d2 = _solution(rows, [-_gap(row.rod, bar[2]) for row, bar in zip(rows, bars)])
             (c1, s1), (c2, s2) = _stepped(c1, s1, d1), _stepped(c2, s2, d2)
@@ -365,6 +374,12 @@ def _stepped(c: Real, s: Real, step: Real) -> Tuple[Real, Real]:
     by = 1.0 / (1.0 + square_)
     cos, sin = (1.0 - square_) * by, step * by
     return c * cos - s * sin, s * cos + c * sin
+
+
+def _on_circle(c: Real, s: Real) -> Tuple[Real, Real]:
+    """Return a cosine and a sine, of which rounding has moved the squares' sum from one."""
+    by = 1.5 - 0.5 * (square(c) + square(s))
+    return c * by, s * by
 
 
 def within(value: Real, low: Real, high: Real, tolerance: Real) -> List[Limit]:

@@ -8,18 +8,7 @@ from __future__ import annotations
 from itertools import chain
 import math
 import time
-from typing import (
-    Any,
-    Callable,
-    Dict,
-    Iterable,
-    List,
-    Mapping,
-    NamedTuple,
-    Optional,
-    Sequence,
-    Tuple,
-)
+from typing import Any, Callable, Iterable, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 from sensor_msgs.msg import JointState
@@ -27,10 +16,10 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from . import joint_state_reader
-from .message_layout import NEVER, pack, PatchedPublisher, unpack, Unreadable
-from .messages import JointStates
-from .publishers import TrackedPublisher
-from .throttle import Once, Throttle
+from .log import Once, Throttle
+from .message_layout import NEVER, pack_time, unpack, Unreadable
+from .messages import joint_states
+from .publishers import PatchedPublisher, TrackedPublisher
 from .worker import Worker
 from ..cache import Cache
 from ..scene.inverse_request import InverseRequest
@@ -51,11 +40,11 @@ class Target(NamedTuple):
     named: str
     machine: SceneMechanism
     request: InverseRequest
-    places: Tuple[int, ...]
-    names: Tuple[JointName, ...]
+    places: tuple[int, ...]
+    names: tuple[JointName, ...]
 
     @property
-    def actuators(self) -> List[str]:
+    def actuators(self) -> list[str]:
         """What moves the inputs: of one that is measured elsewhere, the input itself."""
         return [f'{self.machine.name}_{drive.input.name}' if drive.measures else drive.source
                 for drive in self.machine.inputs.values()]
@@ -73,7 +62,7 @@ class Target(NamedTuple):
         values = ', '.join(f'{positions[place]:.6g}' for place in self.places)
         return f'{self.named} cannot be {values}: {self.request.reason(*self._values(positions))}'
 
-    def _values(self, positions: Sequence[float]) -> List[float]:
+    def _values(self, positions: Sequence[float]) -> list[float]:
         return [name.sign * (positions[place] - name.offset)
                 for name, place in zip(self.names, self.places)]
 
@@ -87,7 +76,7 @@ class Command(NamedTuple):
     speeds: Optional[Sequence[float]]
 
     @property
-    def efforts(self) -> List[float]:
+    def efforts(self) -> list[float]:
         """What actuators give at rest against the loads [N m or N]; 0 where there are none."""
         machine = self.target.machine
         if not machine.loads:
@@ -103,30 +92,20 @@ class CommandStream:
     The outputs come on `wanted_states` and `wanted_trajectory`. Every answer is the one that goes
     on from the last; an output out of reach leaves its actuator at the last good command. A
     trajectory is computed in a worker's thread; a newer one replaces it.
-
-    Parameters
-    ----------
-    node : SceneNode
-        Whose topics they are.
-    mechanisms : iterable of str
-        The mechanisms of its scene.
-    present : callable
-        From a mechanism to where its inputs are; infinite where that is not known.
-
+    `present` tells of a SceneMechanism where its inputs are; infinite where that is not known.
     """
 
     def __init__(self, node: Any, mechanisms: Iterable[str],
-                 present: Callable[[SceneMechanism], List[float]]):
+                 present: Callable[[SceneMechanism], list[float]]):
         self._present, self._logger, self._clock = present, node.get_logger(), node.get_clock()
         self._commands = TrackedPublisher(node, JointState, 'servo_commands', 10)
         self._arrays = {name: TrackedPublisher(node, Float64MultiArray, f'{name}/commands', 10)
                         for name in mechanisms}
         self._trajectories = TrackedPublisher(node, JointTrajectory, 'servo_trajectory', 10)
-        self._message, self._throttle = JointStates(), Throttle(self._logger)
-        self._unknown = Once(UNKNOWN_NAMES)
+        self._throttle, self._unknown = Throttle(self._logger), Once(UNKNOWN_NAMES)
         self._machines: Mapping[str, SceneMechanism] = {}
-        self._last: Dict[str, Command] = {}
-        self._searches: Dict[str, float] = {}
+        self._last: dict[str, Command] = {}
+        self._searches: dict[str, float] = {}
         self._worker = Worker(node, node.report)
         node.create_subscription(JointState, 'wanted_states', node.guarded(
             'wanted_states', self._receive), joint_state_reader.ANY, raw=True)
@@ -145,7 +124,7 @@ class CommandStream:
         """End the trajectory that is being computed."""
         self._worker.end()
 
-    def _output(self, named: str) -> Optional[Tuple[SceneMechanism, str, JointName]]:
+    def _output(self, named: str) -> Optional[tuple[SceneMechanism, str, JointName]]:
         """Return whose output others call so, its own name and how that differs."""
         for machine in self._machines.values():
             own = {name.name: (joint, name) for joint, name in machine.joints.items()}
@@ -155,9 +134,9 @@ class CommandStream:
                 return machine, joint, name
         return None
 
-    def _targets(self, names: Sequence[str]) -> Tuple[List[Target], List[str], List[str]]:
+    def _targets(self, names: Sequence[str]) -> tuple[list[Target], list[str], list[str]]:
         """Return the targets of names, those that are none, and reasons for what is left out."""
-        found: Dict[str, List[Tuple]] = {}
+        found: dict[str, list[tuple]] = {}
         targets, unknown, reasons = [], [], []
         for place, named in enumerate(names):
             if output := self._output(named):
@@ -181,7 +160,7 @@ class CommandStream:
                 reasons.append(str(error))
         return targets, unknown, reasons
 
-    def _interpret(self, message: JointState) -> Tuple[List[Target], bool]:
+    def _interpret(self, message: JointState) -> tuple[list[Target], bool]:
         """Return the targets that a message has positions for, and whether it has speeds."""
         targets, unknown, reasons = self._targets(message.name[:len(message.position)])
         for reason in reasons:
@@ -206,7 +185,8 @@ class CommandStream:
         commands = [self._command(target, positions, speeds if known else None)
                     for target in targets]
         if found := [command for command in commands if command]:
-            self._send(pack(self._clock.now().to_msg()) if stamp == NEVER else stamp, found)
+            now = stamp == NEVER and pack_time(self._clock.now().nanoseconds)
+            self._send(now or stamp, found)
 
     def _near(self, target: Target) -> Sequence[float]:
         """Return where inputs were last, or are; else where they start."""
@@ -239,7 +219,7 @@ class CommandStream:
         if self._commands.has_subscribers:
             if any(command.target.machine.loads for command in commands):
                 efforts = [effort for command in commands for effort in command.efforts]
-                self._commands.publish(self._message.message(
+                self._commands.publish(joint_states(
                     unpack(stamp), names, values, speeds if moving else (),
                     () if any(map(math.isnan, efforts)) else efforts))
             else:
@@ -250,11 +230,11 @@ class CommandStream:
             if publisher.has_subscribers:
                 publisher.publish(Float64MultiArray(data=command.positions))
 
-    def _publisher(self, key: Tuple[Tuple[str, ...], bool]) -> PatchedPublisher:
+    def _publisher(self, key: tuple[tuple[str, ...], bool]) -> PatchedPublisher:
         names, moving = key
         n = len(names)
         return PatchedPublisher(
-            self._commands.publisher, lambda stamp, values: self._message.message(
+            self._commands.publisher, lambda stamp, values: joint_states(
                 stamp, names, values[:n], values[n:]), (1 + moving) * n, self._logger)
 
     def _receive_trajectory(self, message: JointTrajectory) -> None:
@@ -278,7 +258,7 @@ class CommandStream:
         self._logger.error(f'wanted_trajectory is refused: {error}')
 
     def _solve(self, message: JointTrajectory, targets: Sequence[Target],
-               near: List[Sequence[float]], jumps: List[bool]) -> Optional[Callable[[], None]]:
+               near: list[Sequence[float]], jumps: list[bool]) -> Optional[Callable[[], None]]:
         """Return what publishes the actuators' trajectory; None if a newer one has come."""
         solved = JointTrajectory(header=message.header, joint_names=[
             name for target in targets for name in target.actuators])
@@ -296,7 +276,7 @@ class CommandStream:
 
 
 def _solved_point(i: int, point: JointTrajectoryPoint, n: int, targets: Sequence[Target],
-                  near: List[Sequence[float]], jumps: Sequence[bool]) -> JointTrajectoryPoint:
+                  near: list[Sequence[float]], jumps: Sequence[bool]) -> JointTrajectoryPoint:
     """Return the actuators' point of a trajectory, and put where inputs are then into near."""
     if len(point.positions) != n or len(point.velocities) not in (0, n):
         raise ValueError(f'point {i} must have {n} positions, and as many velocities or '

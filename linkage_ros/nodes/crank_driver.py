@@ -7,16 +7,16 @@ from __future__ import annotations
 
 import sys
 from time import monotonic_ns, time_ns
-from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from rclpy.clock import Clock, ClockType
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from . import scene_node
-from .message_layout import pack, PatchedPublisher
-from .messages import JointStates
-from .publishers import TrackedPublisher
+from .message_layout import pack_time
+from .messages import joint_states
+from .publishers import PatchedPublisher, TrackedPublisher
 from .. import scene
 from ..scene.motion import Motion
 from ..words import listed
@@ -27,33 +27,14 @@ JUMP = 10 ** 8
 # In thirty years [ns] nobody waits for the next message.
 LONGEST_PERIOD = 1e18
 
-SECOND = 10 ** 9
-
-
-class Stamp(NamedTuple):
-    """A time as it is in a message."""
-
-    sec: int
-    nanosec: int
-
-
 class CrankDriver(scene_node.SceneNode):
     """
     Publishes every input as a function of the node's time, on `crank_states`.
 
-    Parameters
-    ----------
-    in_process : sequence of rclpy.node.Node
-        Nodes of the same process: they get the messages without the middleware if nobody else
-        subscribes to the topic.
-
-    Attributes
-    ----------
-    system_time : callable
-        What time it is [ns], where no other is simulated.
-
+    Nodes `in_process` get the messages without the middleware if nobody else subscribes.
     """
 
+    # What time it is [ns], where no other is simulated.
     system_time = staticmethod(time_ns)
 
     def __init__(self, in_process: Sequence[Any] = (), **kwargs: Any):
@@ -95,10 +76,10 @@ class CrankDriver(scene_node.SceneNode):
         """Send these joints from now on."""
         if sources == self._names:
             return
-        joint_states, n = JointStates(), len(sources)
+        n = len(sources)
         self._names, self._message = sources, PatchedPublisher(
             self._publisher,
-            lambda stamp, values: joint_states.message(stamp, sources, values[:n], values[n:]),
+            lambda stamp, values: joint_states(stamp, sources, values[:n], values[n:]),
             2 * n, self.get_logger())
 
     def _pace(self, rate: float) -> None:
@@ -133,7 +114,7 @@ class CrankDriver(scene_node.SceneNode):
         now = self._settled()
         if self._publisher.has_subscribers:
             positions, speeds = zip(*[self._position(*sent, now) for sent in self._sent])
-            self._message.publish(pack(Stamp(*divmod(now, SECOND))), [positions + speeds])
+            self._message.publish(pack_time(now), [positions + speeds])
 
     def _position(self, key: Tuple[str, str], drive: scene.InputSettings,
                   now: int) -> Tuple[float, float]:
@@ -156,19 +137,9 @@ class CrankDriver(scene_node.SceneNode):
 
 class InProcessPublisher:
     """
-    Publishes joint states; nodes of this process get them without the middleware.
+    Publishes joint states; `nodes` of this process get them without the middleware.
 
     While there are other subscribers these nodes get them as the others do: each message once.
-
-    Parameters
-    ----------
-    node : rclpy.node.Node
-        Who publishes them.
-    name : str
-        Their topic.
-    nodes : sequence of rclpy.node.Node
-        Who else is in this process.
-
     """
 
     def __init__(self, node: Any, name: str, nodes: Sequence[Any]):

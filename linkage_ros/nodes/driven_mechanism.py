@@ -16,26 +16,16 @@ from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from . import messages
+from .log import Throttle
 from .mechanism_model import MechanismModel, Pose
-from .message_layout import PatchedPublisher
-from .publishers import LATCHED, TrackedPublisher
-from .throttle import Throttle
+from .publishers import LATCHED, PatchedPublisher, TrackedPublisher
 from .. import scene
 from ..linkage.walker import Solution
 
 
 class DrivenMechanism:
     """
-    The state and the topics of one mechanism.
-
-    Parameters
-    ----------
-    node : rclpy.node.Node
-        Whose topics they are.
-    machine : SceneMechanism
-        The mechanism.
-    changed : callable
-        Called when subscribers come or go.
+    The state and the topics of one mechanism; `changed` is called when subscribers come or go.
 
     Attributes
     ----------

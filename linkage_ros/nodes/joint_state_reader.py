@@ -14,7 +14,7 @@ from array import array
 from collections import OrderedDict
 from contextlib import suppress
 from struct import Struct
-from typing import Any, Callable, Dict, NamedTuple, Optional, Tuple
+from typing import Any, Callable, Dict, NamedTuple, Optional, Set, Tuple
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
@@ -25,8 +25,7 @@ from .message_layout import deserialized, HEADER, MessageLayout, NoLayout, pack
 ANY = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 # Sources that are cached, of messages up to so many bytes; arrangements of names among those of
-# one length. Where there are more, one in so many messages is cached: that costs more than it
-# saves if the source is soon dropped again.
+# one length. Where there are more, one message in so many is laid out.
 SOURCES, LONGEST, ARRANGEMENTS, SAMPLED = 256, 1 << 16, 4, 256
 
 
@@ -42,78 +41,48 @@ class Reader:
     """
     Tells the sources of serialised joint states.
 
-    Parameters
-    ----------
-    interpret : callable
-        From a message to the `meaning` of its source, which all its messages share.
-
+    `interpret` makes of a message what all of its source share, their `meaning`.
     """
 
     def __init__(self, interpret: Callable[[JointState], Any]):
         self._interpret = interpret
-        # By length, then by the bytes that count: a mask, and the sources by those bytes.
-        self._sources: Dict[int, Dict[int, Dict[int, Source]]] = {}
-        # The same ones, the latest used last.
-        self._used: OrderedDict[Source, None] = OrderedDict()
+        # By the length of messages masks of the bytes that count; by those the sources, of which
+        # the latest used is the last.
+        self._masks: Dict[int, Set[int]] = {}
+        self._sources: OrderedDict[Tuple[int, int, int], Source] = OrderedDict()
         self._missed = 0
 
     def source(self, text: bytes) -> Source:
-        """
-        Return the source of a message.
-
-        Raises
-        ------
-        Unreadable
-            If the bytes are no joint states.
-
-        """
-        alike = self._sources.get(len(text), {})
-        number = int.from_bytes(text, 'little') if alike else 0
-        for mask, sources in alike.items():
-            if source := sources.get(number & mask):
-                self._used.move_to_end(source)
+        """Return the source of a message; raise Unreadable if the bytes are no joint states."""
+        size, masks = len(text), self._masks.get(len(text), set())
+        number = int.from_bytes(text, 'little') if masks else 0
+        for mask in masks:
+            if source := self._sources.get((size, mask, number & mask)):
+                self._sources.move_to_end((size, mask, number & mask))
                 return source
         message = deserialized(text, JointState)
         self._missed += 1
-        crowded = len(self._used) == SOURCES or len(alike) == ARRANGEMENTS
+        is_full = len(self._sources) == SOURCES or len(masks) == ARRANGEMENTS
         source = Source(text, message, self._interpret(message),
-                        not (crowded and self._missed % SAMPLED))
-        if source.size and len(text) <= LONGEST:
-            self._cache(source)
+                        size <= LONGEST and not (is_full and self._missed % SAMPLED))
+        if source.size and (source.mask in masks or len(masks) < ARRANGEMENTS):
+            if len(self._sources) == SOURCES:
+                self._drop_oldest()
+            self._masks.setdefault(size, set()).add(source.mask)
+            self._sources[size, source.mask, source.same] = source
         return source
 
-    def _cache(self, source: Source) -> None:
-        alike = self._sources.get(source.size, {})
-        if source.mask not in alike and len(alike) == ARRANGEMENTS:
-            return
-        if len(self._used) == SOURCES:
-            self._drop(self._used.popitem(last=False)[0])
-        self._sources.setdefault(source.size, {}).setdefault(source.mask, {})[source.same] = source
-        self._used[source] = None
-
-    def _drop(self, source: Source) -> None:
-        alike = self._sources[source.size]
-        del alike[source.mask][source.same]
-        if not alike[source.mask]:
-            del alike[source.mask]
-        if not alike:
-            del self._sources[source.size]
+    def _drop_oldest(self) -> None:
+        (size, mask, _), _ = self._sources.popitem(last=False)
+        if not any(key[:2] == (size, mask) for key in self._sources):
+            self._masks[size].remove(mask)
+            if not self._masks[size]:
+                del self._masks[size]
 
 
 class Source:
     """
     How messages of a source are told from others, and how their numbers are read.
-
-    Parameters
-    ----------
-    text : bytes
-        A message, serialised.
-    message : JointState
-        The same.
-    meaning
-        What else is known of all its messages.
-    is_lasting : bool
-        Whether more messages than this are expected.
 
     Attributes
     ----------
@@ -135,7 +104,6 @@ class Source:
                 self._lay_out(text, MessageLayout(text, message), numbers)
 
     def _lay_out(self, text: bytes, layout: MessageLayout, numbers: Numbers) -> None:
-        """Find out how numbers are read, by a message and what it says."""
         (self.positions, self._first), (self.velocities, count) = layout.numbers[:2]
         end = self.positions + 8 * self._first
         self._unpack = Struct(f'<{HEADER}x8s{self.positions - HEADER - 8}x{self._first}d'

@@ -17,12 +17,11 @@ from sensor_msgs.msg import JointState
 
 from . import joint_state_reader, scene_node
 from .driven_mechanism import DrivenMechanism
-from .incidents import InvalidHandle, RCLError
+from .log import InvalidHandle, Once, RCLError, Throttle
 from .mechanism_model import MechanismModel
-from .message_layout import pack, Unreadable
+from .message_layout import pack_time, Unreadable
 from .plan import Planner, Route
 from .scene_joint_states import SceneJointStates
-from .throttle import Once, Throttle
 from .. import scene
 from ..robot_model import bodies, urdf
 from ..words import listed
@@ -74,11 +73,15 @@ class Kinematics(scene_node.SceneNode):
         """Refuse what has no robot model; SceneError says why."""
         for name, machine in new.machines.items():
             before = self.scene.machines[name]
-            if not machine.in_space and (
-                    machine is not before or new.frame_id != self.scene.frame_id):
+            if machine.in_space:
+                continue
+            if machine is not before:
                 bodies.size(machine)
-                # Nothing else that is refused depends on dimensions, whose travels take long.
-                bodies.robot([replace(machine, linkage=before.linkage)], new.frame_id)
+            # Of dimensions and sweeps nothing else is refused, and their travels take long.
+            alike = replace(machine, linkage=before.linkage, reach=before.reach,
+                            inputs=before.inputs)
+            if alike != before or new.frame_id != self.scene.frame_id:
+                bodies.robot([alike], new.frame_id)
 
     def prepare(self, new: scene.Scene) -> Any:
         """Return the model of each mechanism, another for each that has changed, and its robot."""
@@ -138,7 +141,7 @@ class Kinematics(scene_node.SceneNode):
         self._planner.invalidate()
 
     def _now(self) -> bytes:
-        return pack(self.get_clock().now().to_msg())
+        return pack_time(self.get_clock().now().nanoseconds)
 
     def _receive(self, text: bytes) -> None:
         try:

@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState
 from visualization_msgs.msg import MarkerArray
 
 from . import messages
-from .message_layout import PatchedPublisher
+from .publishers import PatchedPublisher
 from .. import scene
 from ..cache import Cache
 from ..linkage.mechanism import Mechanism
@@ -28,15 +28,12 @@ ARRANGEMENTS = 128
 
 
 class Pose(NamedTuple):
-    """
-    What the numbers of a solution are good for; it selects the messages made of them.
-
-    `assembled` has a byte for each leg, or is None where all are assembled; `moving` tells whether
-    all velocities are finite, `loaded` whether all efforts are.
-    """
+    """What the numbers of a solution are good for; it selects the messages made of them."""
 
     solution: Solution
+    # A byte for each leg; None where all are assembled.
     assembled: Optional[bytes]
+    # Whether all velocities are finite, and all efforts.
     moving: bool
     loaded: bool
 
@@ -56,18 +53,8 @@ class MechanismModel:
     """
     What a mechanism needs to be published; immutable but for its caches.
 
-    Parameters
-    ----------
-    machine : SceneMechanism
-        The mechanism.
-    frame_id, prefix : str
-        The frame of its pose, and what is put before it in markers.
-
-    Raises
-    ------
-    SceneError
-        If it has no robot model.
-
+    `frame_id` is the frame of its pose, and what `prefix` is put before in markers. Raises
+    SceneError if it has no robot model.
     """
 
     def __init__(self, machine: scene.SceneMechanism, frame_id: str, prefix: str):
@@ -81,7 +68,6 @@ class MechanismModel:
         drawn = machine.name, prefix + frame_id, machine.pose
         self._points, shown = _shown(machine)
         self._drawn = *drawn, bodies.size(machine), shown
-        self._joint_states = messages.JointStates()
         self._solutions, self._conversions = Cache(), Cache(self._conversion)
         self._publishers = Cache(size=ARRANGEMENTS)
 
@@ -133,11 +119,7 @@ class MechanismModel:
         return pose._replace(assembled=assembled.tobytes())
 
     def conversion(self, layout: Layout) -> Optional[Tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """
-        Return how values become those of the robot's joints; None if they do as they are.
-
-        That is factors, what is added, and the indices of what is wrapped to half a turn.
-        """
+        """Return factors, offsets and what is wrapped for the robot's joints; None if plain."""
         return None if self._is_plain else self._conversions[layout]
 
     def _conversion(self, layout: Layout) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -156,16 +138,12 @@ class MechanismModel:
     def joint_message(self, pose: Pose, values: np.ndarray, stamp: Any) -> JointState:
         """Return the joint states of the assembled legs."""
         names, positions, velocities, efforts = self.joints(pose, values)
-        return self._joint_states.message(
+        return messages.joint_states(
             stamp, names.tolist(), positions, velocities if pose.moving else (),
             efforts if pose.loaded else ())
 
     def joints(self, pose: Pose, values: np.ndarray) -> List[np.ndarray]:
-        """
-        Return names, positions, velocities and efforts of the joints that are published.
-
-        Velocities are empty where they are not solved; only inputs have an effort other than 0.
-        """
+        """Return names, positions, velocities, if solved, and efforts of published joints."""
         layout, n, legs = pose.solution.layout, len(self.inputs), pose.legs()
         chosen = self._published.copy()
         chosen[n:].reshape(layout.legs, -1)[np.isin(np.arange(layout.legs), legs, invert=True)] = 0

@@ -13,7 +13,7 @@ message says.
 from __future__ import annotations
 
 import struct
-from typing import Any, Callable, List, Optional, Sequence, Tuple
+from typing import Any, Callable, List, Tuple
 
 from builtin_interfaces.msg import Time
 import numpy as np
@@ -39,6 +39,11 @@ _DOUBLES = {'double': 1, 'geometry_msgs/Point': 3}
 def pack(stamp: Time) -> bytes:
     """Return a stamp as it is in a message."""
     return _STAMP.pack(stamp.sec, stamp.nanosec)
+
+
+def pack_time(nanoseconds: int) -> bytes:
+    """Return a time [ns] as the stamp of a message has it."""
+    return _STAMP.pack(*divmod(nanoseconds, 10 ** 9))
 
 
 def unpack(stamp: bytes) -> Time:
@@ -70,12 +75,8 @@ class MessageLayout:
     """
     Where the numbers lie in a message, and which other bytes count.
 
-    Parameters
-    ----------
-    text : bytes
-        A message, serialised.
-    message : ROS message
-        The same; of types without arrays of fixed size and without wide strings.
+    The message is given serialised and as it is; it is of a type without arrays of fixed size and
+    without wide strings. Raises NoLayout if it is encoded otherwise.
 
     Attributes
     ----------
@@ -85,11 +86,6 @@ class MessageLayout:
         For each sequence of float64 or points where its numbers begin, and how many they are.
     fixed : uint8 array
         A mask of the bytes that are neither number nor padding.
-
-    Raises
-    ------
-    NoLayout
-        If it is encoded otherwise.
 
     """
 
@@ -163,26 +159,11 @@ class MessageLayout:
 
 class Template:
     """
-    The bytes of a message whose stamp and float64 values change.
+    The bytes of a message whose stamp and float64 values change; `message` as last patched.
 
-    Parameters
-    ----------
-    build : callable
-        From a stamp and `count` floats, an array, to a message that shows some of them, and else
-        no numbers in its sequences but zero.
-    count : int
-        How many values the message is made from.
-
-    Attributes
-    ----------
-    message : memoryview
-        The bytes as they were last patched.
-
-    Raises
-    ------
-    NoLayout
-        If a patched message reads differently from one that is built.
-
+    `build` makes, from a stamp and an array of `count` floats, a message that shows some of them,
+    and else no numbers in its sequences but zero. Raises NoLayout if a patched message reads
+    differently from one that is built.
     """
 
     def __init__(self, build: Callable, count: int):
@@ -214,57 +195,13 @@ class Template:
         return bytes(self.message)
 
     def places(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return where in memory numbers lie, which value each is, and where the stamps lie."""
-        own, start = np.flatnonzero(self._sources <= len(self._values)), _address(self._numbers)
-        own = own[self._sources[own] > 0]
-        stamps = [start - len(LEAD) - HEADER + place.start for place in self._stamps]
-        return start + 8 * own, self._sources[own] - 1, np.array(stamps, int)
+        """Return where in `message` values lie, which value each is, and where the stamps lie."""
+        own = np.flatnonzero((self._sources > 0) & (self._sources <= len(self._values)))
+        return HEADER + 8 * own, self._sources[own] - 1, np.array(
+            [place.start - len(LEAD) for place in self._stamps], int)
 
     def _check(self, build: Callable, layout: MessageLayout, count: int) -> None:
         stamp, values = Time(sec=12, nanosec=345), np.linspace(-1.5, 7.25, count)
         if not layout.is_same(self.patched(pack(stamp), values),
                               serialize_message(build(stamp, values))):
             raise NoLayout('a patched message does not read back as it was written')
-
-
-def _address(array: np.ndarray) -> int:
-    return array.__array_interface__['data'][0]
-
-
-class PatchedPublisher:
-    """
-    Publishes one message again and again with other values.
-
-    Parameters
-    ----------
-    publisher : rclpy.publisher.Publisher
-        Where it goes.
-    build, count
-        As for Template.
-    logger : rclpy logger
-        Logs once if messages have to be built one by one.
-
-    Attributes
-    ----------
-    template : Template or None
-        The bytes that are patched, where that can be done.
-
-    """
-
-    def __init__(self, publisher: Any, build: Callable, count: int, logger: Any):
-        self.publisher = publisher
-        self._build = build
-        self.template: Optional[Template] = None
-        try:
-            self.template = Template(build, count)
-        except NoLayout as reason:
-            logger.warning(f'{publisher.topic_name}: {reason}; publishing ordinary messages',
-                           once=True)
-
-    def publish(self, stamp: bytes, values: Sequence[Any]) -> None:
-        """Publish the message with this stamp, packed, and values, one array after the other."""
-        joined: Any = np.concatenate(values) if len(values) > 1 else values[0]
-        if self.template:
-            self.publisher.publish(self.template.patched(stamp, joined))
-        else:
-            self.publisher.publish(self._build(unpack(stamp), joined))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from array import array
 import math
-from typing import Any, Dict, List, Mapping, Sequence, Tuple
+from typing import Any, Mapping, Sequence
 
 from geometry_msgs.msg import Point, Pose, Quaternion
 import numpy as np
@@ -43,21 +43,13 @@ def _rgba(colour: str) -> ColorRGBA:
 FACE = _rgba(palette.PLATE)
 
 
-class JointStates:
-    """The joint states of one mechanism, or of several cranks."""
-
-    def __init__(self) -> None:
-        self._message = JointState()
-
-    def message(self, stamp: Any, names: Sequence[str], positions: Any, velocities: Any = (),
-                efforts: Any = ()) -> JointState:
-        """Return joints [rad or m], their velocities and efforts, where they are known."""
-        self._message.header.stamp = stamp
-        self._message.name = names
-        self._message.position = array('d', positions)
-        self._message.velocity = array('d', velocities)
-        self._message.effort = array('d', efforts)
-        return self._message
+def joint_states(stamp: Any, names: Sequence[str], positions: Any, velocities: Any = (),
+                 efforts: Any = ()) -> JointState:
+    """Return joints [rad or m], their velocities and efforts, where they are known."""
+    message = JointState(name=names, position=array('d', positions),
+                         velocity=array('d', velocities), effort=array('d', efforts))
+    message.header.stamp = stamp
+    return message
 
 
 class Markers:
@@ -68,20 +60,11 @@ class Markers:
     ----------
     name : str
         The mechanism: the markers' namespace.
-    frame_id : str
-        Frame of the pose.
-    pose : sequence of float
-        Of the linkage's plane: x, y, z [m], roll, pitch, yaw [rad].
-    size : float
-        The longest bar [m].
+    frame_id, pose, size
+        The frame of the linkage's plane, x, y, z [m], roll, pitch, yaw [rad]; the longest bar [m].
     shown : mapping
         What each marker shows, by its id: joints, ends of lines or corners, by their place among
         the points.
-
-    Attributes
-    ----------
-    ids : frozenset of int
-        Of the markers that there are.
 
     """
 
@@ -89,46 +72,26 @@ class Markers:
                  shown: Mapping[int, Sequence]):
         self._shown = [(_marker(name, id_, frame_id, pose, size), np.array(points, int).ravel())
                        for id_, points in shown.items() if points]
-        self._message = MarkerArray(markers=[marker for marker, _ in self._shown])
         self.ids = frozenset(marker.id for marker, _ in self._shown)
-        self._points: Dict[Tuple[int, int], List[Point]] = {}
 
     def message(self, stamp: Any, places: np.ndarray, grounded: Sequence[int] = (0,)
                 ) -> MarkerArray:
         """
         Return the markers of some legs.
 
-        Parameters
-        ----------
-        stamp : builtin_interfaces.msg.Time
-            The time.
-        places : float array (legs, points, 2 or 3)
-            Where the points are [m].
-        grounded : sequence of int
-            Legs whose ground is shown, one for each ground that there is.
-
+        `places` (legs, points, 2 or 3) is where the points are [m], `grounded` the legs whose
+        ground is shown, one for each ground that there is.
         """
         for marker, points in self._shown:
             marker.header.stamp = stamp
             legs = places[grounded] if marker.id == GROUND_ID else places
-            marker.points = self._filled(marker.id, legs[:, points].reshape(
-                -1, places.shape[-1]).tolist())
+            marker.points = [Point(**dict(zip('xyz', place))) for place in legs[:, points].reshape(
+                -1, places.shape[-1]).tolist()]
             if marker.type == Marker.TRIANGLE_LIST:
                 # With colours of their own RViz shows both sides of faces so, lit or not.
                 face = FACE if marker.id == PLATES_ID else marker.color
                 marker.colors = [face] * (len(marker.points) // 3)
-        return self._message
-
-    def _filled(self, id_: int, places: List) -> List[Point]:
-        """Return points at places; for as many as before, the same ones."""
-        points = self._points.get((id_, len(places)))
-        if points is None:
-            points = self._points[id_, len(places)] = [Point() for _ in places]
-        for point, (x, y, *z) in zip(points, places):
-            point.x, point.y = x, y
-            if z:
-                point.z, = z
-        return points
+        return MarkerArray(markers=[marker for marker, _ in self._shown])
 
 
 def locus(name: str, frame_id: str, pose: Sequence[float], places: np.ndarray,

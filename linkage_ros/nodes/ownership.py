@@ -63,17 +63,7 @@ class Announcer:
 
 
 class Follower:
-    """
-    Sets the parameters of a node to the owner's values.
-
-    Parameters
-    ----------
-    node : SceneNode
-        Who follows.
-    parameters : SceneParameters
-        Its parameters.
-
-    """
+    """Sets the parameters of a node to the owner's values."""
 
     def __init__(self, node: Any, parameters: SceneParameters):
         self._node, self._parameters = node, parameters
@@ -98,19 +88,9 @@ class Follower:
         wanted = {name: value for name, value in {**self._refused, **values}.items()
                   if name in self._owned and not fields[name].read_only
                   and value != self._present(name)}
-        refused = self._follow(dict(sorted(wanted.items())))
+        refused = self._parameters.follow(dict(sorted(wanted.items())))
         self._refused = {name: wanted[name] for name in refused}
         self._warn('refused', wrong + [*refused.values()], 'values that cannot be followed')
-
-    def _follow(self, values: Mapping[str, Any]) -> Dict[str, str]:
-        """Set values, all together or else half by half; return why not, by name."""
-        reason = self._parameters.follow(values) if values else ''
-        if not reason:
-            return {}
-        if len(values) == 1:
-            return dict.fromkeys(values, reason)
-        items, half = [*values.items()], len(values) // 2
-        return {**self._follow(dict(items[:half])), **self._follow(dict(items[half:]))}
 
     def _present(self, name: str) -> Any:
         return scene.plain(self._node.get_parameter_or(name).value)

@@ -8,18 +8,7 @@ from __future__ import annotations
 from contextlib import contextmanager, suppress
 from copy import copy
 from shlex import quote
-from typing import (
-    AbstractSet,
-    Any,
-    Callable,
-    Dict,
-    Iterator,
-    List,
-    Mapping,
-    Optional,
-    Sequence,
-    Tuple,
-)
+from typing import Any, Callable, Iterator, Mapping, Optional, Sequence
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -40,24 +29,17 @@ from ..words import elided, quoted
 class Undeclared(ParameterNotDeclaredException):
     """A name that no parameter has; the text says so."""
 
-    def __init__(self, text: str):
-        Exception.__init__(self, text)
+    __init__ = Exception.__init__
 
 
 class SceneParameters:
     """
     Declares what a node acts on, and turns every change into a scene or a refusal.
 
-    Parameters
-    ----------
-    node : rclpy.node.Node
-        Whose parameters they are; made with `automatically_declare_parameters_from_overrides`.
-    role : str
-        One of scenes.ALL: which parameters it acts on.
-    check : callable
-        Raises SceneError for a scene that the node cannot act on; quick.
-    changed : callable
-        Called with the parameters that have changed, after `scene` has.
+    The node is made with `automatically_declare_parameters_from_overrides`. `role`, one of
+    scenes.ALL, tells which parameters it acts on. `check` raises SceneError for a scene that it
+    cannot act on; `changed` is called with the parameters that have changed, after `scene` has.
+    Raises SceneError if the values that the node was started with make no scene.
 
     Attributes
     ----------
@@ -68,21 +50,18 @@ class SceneParameters:
     is_given : bool
         Whether the node was started with any of the scene's parameters.
 
-    Raises
-    ------
-    SceneError
-        If the values that the node was started with make no scene.
-
     """
 
     def __init__(self, node: Node, role: str, check: Callable[[scenes.Scene], None],
-                 changed: Callable[[List[scenes.Parameter]], None]):
+                 changed: Callable[[list[scenes.Parameter]], None]):
         self._node, self._role, self._check, self._changed = node, role, check, changed
         # Whose value counts instead of an own one, and whether that is being followed.
         self.owner_of: Callable[[str], Optional[str]] = lambda name: None
         self._is_followed = self._is_derived = False
-        given = {name: one.value for name, one in node.get_parameters_by_prefix('').items()}
-        self.scene = scenes.read({name: scenes.plain(value) for name, value in given.items()})
+        # A parameter file's empty list has no type and no value.
+        given = {name: () if one.value is None else scenes.plain(one.value)
+                 for name, one in node.get_parameters_by_prefix('').items()}
+        self.scene = scenes.read(given)
         own = [one for one in self.scene.parameters if role in one.field.readers]
         self.fields = {one.name: one.field for one in own}
         of_scene = given.keys() & {one.name for one in self.scene.parameters}
@@ -93,18 +72,13 @@ class SceneParameters:
         self._declare(own)
         self._candidate = self.scene
         # By name: the mechanism and the value that a range was found for.
-        self._ends: Dict[str, Tuple[Any, Any, Any]] = {}
+        self._ends: dict[str, tuple[Any, Any, Any]] = {}
         node.add_pre_set_parameters_callback(self._typed_alike)
         node.add_on_set_parameters_callback(self._validate)
         node.add_post_set_parameters_callback(self._adopt)
 
-    def set_together(self, messages: Sequence[ParameterMessage]) -> AbstractSet[int]:
-        """
-        Set the parameters of a request that can be read, if all of them can be set; return whose.
-
-        One by one the values of another scene cannot be: a leg of mixed sizes cannot be assembled.
-        What is returned are the places of the parameters that have been set.
-        """
+    def set_readable(self, messages: Sequence[ParameterMessage]) -> dict[int, SetParametersResult]:
+        """Set what can be read of a request; return the results by their place in it."""
         readable = {}
         for i, one in enumerate(messages):
             with suppress(scenes.SceneError, KeyError, ValueError):
@@ -112,19 +86,34 @@ class SceneParameters:
                 if not self.fields[one.name].read_only:
                     self._value(parameter)
                     readable[i] = parameter
-        if len({one.name for one in messages}) < len(messages) or not readable:
-            return frozenset()
-        result = self._node.set_parameters_atomically([*readable.values()])
-        return readable.keys() if result.successful else frozenset()
+        return dict(zip(readable, self._set_together([*readable.values()])))
 
-    def follow(self, values: Mapping[str, Any]) -> str:
-        """Set values that another node owns; return why not, or nothing."""
-        parameters = [Parameter(name, value=value) for name, value in values.items()]
+    def follow(self, values: Mapping[str, Any]) -> dict[str, str]:
+        """Set values that another node owns; return why not, by name."""
         self._is_followed = True
         try:
-            return str(self._node.set_parameters_atomically(parameters).reason)
+            results = self._set_together([
+                Parameter(name, value=value) for name, value in values.items()])
         finally:
             self._is_followed = False
+        return {name: result.reason for name, result in zip(values, results)
+                if not result.successful}
+
+    def _set_together(self, parameters: list[Parameter]) -> list[SetParametersResult]:
+        """
+        Set parameters, all at once or else half by half; return a result for each.
+
+        One by one the values of another scene cannot be: a leg of mixed sizes cannot be assembled.
+        Of a name that comes several times only the last value is validated and set.
+        """
+        if not parameters:
+            return []
+        result = self._node.set_parameters_atomically(
+            [*{one.name: one for one in parameters}.values()])
+        if result.successful or len(parameters) == 1:
+            return [result] * len(parameters)
+        half = len(parameters) // 2
+        return self._set_together(parameters[:half]) + self._set_together(parameters[half:])
 
     def ranged(self, name: str, descriptor: ParameterDescriptor) -> ParameterDescriptor:
         """Return a parameter's descriptor with the range of its slider about its value."""
@@ -157,19 +146,19 @@ class SceneParameters:
 
     def _declare(self, own: Sequence[scenes.Parameter]) -> None:
         descriptors = {field: _descriptor(field, field.read_only)
-                       for field in set(self.fields.values())}
-        self._node.declare_parameters('', [
-            (one.name, one.value, copy(descriptors[one.field])) if one.value != () else
-            (one.name, None, _descriptor(one.field, read_only=False))
-            for one in own], ignore_override=True)
+                       for field in {one.field for one in own}}
         # The type of an empty list does not follow from its value.
         empty = [one for one in own if one.value == ()]
+        self._node.declare_parameters('', [
+            (one.name, one.value, copy(descriptors[one.field])) if one.value != () else
+            (one.name, None, _descriptor(one.field, read_only=False)) for one in own],
+            ignore_override=True)
         self._node.set_parameters_atomically([_parameter(one) for one in empty])
         for one in empty:
             if one.field.read_only:
-                self._node.set_descriptor(one.name, _descriptor(one.field, read_only=True))
+                self._node.set_descriptor(one.name, descriptors[one.field])
 
-    def _typed_alike(self, parameters: List[Parameter]) -> List[Parameter]:
+    def _typed_alike(self, parameters: list[Parameter]) -> list[Parameter]:
         """Return parameters in their own types: 3 for 3.0, and lists that are empty."""
         for one in parameters:
             if not self._node.has_parameter(one.name):
@@ -187,7 +176,7 @@ class SceneParameters:
             # It is refused in words by what comes next.
             return parameter
 
-    def _validate(self, parameters: List[Parameter]) -> SetParametersResult:
+    def _validate(self, parameters: list[Parameter]) -> SetParametersResult:
         if self._is_derived:
             return SetParametersResult(successful=True)
         try:
@@ -217,7 +206,7 @@ class SceneParameters:
                 + quote(quoted(list(value) if isinstance(value, tuple) else value)))
         return value
 
-    def _adopt(self, parameters: List[Parameter]) -> None:
+    def _adopt(self, parameters: list[Parameter]) -> None:
         if self._is_derived or self._candidate is self.scene:
             return
         changed = self._candidate.changed_from(self.scene)

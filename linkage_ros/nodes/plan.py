@@ -18,8 +18,8 @@ import numpy as np
 
 from .driven_mechanism import DrivenMechanism
 from .joint_state_reader import Reader, Source
-from .message_layout import PatchedPublisher
 from .plan_python import PythonExecutor
+from .publishers import PatchedPublisher
 from .scene_joint_states import SceneJointStates
 from ..cache import Cache
 from ..linkage.walker import Solution
@@ -59,14 +59,11 @@ class Message(NamedTuple):
 
 @dataclass(eq=False)
 class Output:
-    """
-    What poses are published as.
-
-    `is_regular` tells whether all poses that a plan solves are; `compiled` is its executor's.
-    """
+    """What poses are published as; `is_regular` tells whether all that a plan solves are."""
 
     messages: List[Message]
     is_regular: bool
+    # What the executor in machine code makes of it.
     compiled: Any = None
 
 
@@ -74,16 +71,7 @@ class Plan:
     """
     What the messages of one source set off.
 
-    Parameters
-    ----------
-    source : Source, optional
-        How they are read; None: nothing is read, the mechanisms are published as they are.
-    routes : sequence of Route
-        The inputs that they set.
-    mechanisms : sequence of DrivenMechanism
-        What is published: what the routes lead to.
-    planner : Planner
-        The state that all plans share.
+    Without a source nothing is read, and the mechanisms are published as they are.
 
     Attributes
     ----------
@@ -93,8 +81,6 @@ class Plan:
         The inputs that are read; measured ones are set before a plan runs.
     solved : list of (DrivenMechanism, Solution)
         What is solved, and how.
-    stamp : int64 array (1,)
-        The stamp of the last message, of whatever plan.
 
     """
 
@@ -164,20 +150,10 @@ class Planner:
     """
     The plans of a scene, by what selects them, and the state that they share.
 
-    Parameters
-    ----------
-    mechanisms : sequence of DrivenMechanism
-        All of the scene.
-    scene_joint_states : SceneJointStates
-        The topics of the whole scene.
-    reader : Reader
-        Tells the sources of messages; what it hands on with a source is a list of Routes and
-        whether the source says how fast its inputs move.
-    now : callable
-        Returns the time, packed, for messages that have no stamp.
-
     Attributes
     ----------
+    now : callable
+        Returns the time, packed, for messages that have no stamp.
     stamp : int64 array (1,)
         The stamp of the last message that set an input.
     version : int
@@ -195,15 +171,7 @@ class Planner:
         self._last: Optional[Plan] = None
 
     def process(self, text: bytes) -> None:
-        """
-        Do all that a message sets off.
-
-        Raises
-        ------
-        Unreadable
-            If the bytes are no message.
-
-        """
+        """Do all that a message sets off; raise Unreadable if the bytes are none."""
         if self._last is None or not self._last.run(text):
             source = self._reader.source(text)
             plan = self._plan(source, text)
@@ -216,7 +184,7 @@ class Planner:
         self._last = None
 
     def discard(self) -> None:
-        """Forget all poses: what was being done has failed half way."""
+        """Drop all poses: what was being done has failed half way."""
         self.invalidate()
         for one in self.mechanisms:
             one.pose = None

@@ -22,15 +22,7 @@ def executor(plan: Any) -> Any:
 
 
 class LlvmExecutor:
-    """
-    Takes the steps of a plan in one call, from tables of addresses.
-
-    Parameters
-    ----------
-    plan : Plan
-        What is to be done.
-
-    """
+    """Takes the steps of a plan in one call, from tables of addresses."""
 
     def __init__(self, plan: Any):
         self._plan = plan
@@ -141,9 +133,11 @@ def _conversion(mechanism: Any, solution: Solution) -> np.ndarray:
 
 def _puts(message: Any) -> np.ndarray:
     """Return what is put into the bytes of a message."""
-    numbers, sources, stamps = message.publisher.template.places()
+    template = message.publisher.template
+    numbers, sources, stamps = template.places()
+    start = native.address(np.frombuffer(template.message, np.uint8))
     values = np.concatenate([native.addresses(values) for values in message.values])
     rows = np.empty(len(numbers) + len(stamps), native.PUT)
     rows['from'] = np.append(values[sources], np.full(len(stamps), native.address(message.stamp)))
-    rows['to'] = np.append(numbers, stamps)
+    rows['to'] = start + np.append(numbers, stamps)
     return rows

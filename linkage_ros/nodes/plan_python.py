@@ -13,15 +13,7 @@ from .message_layout import NEVER
 
 
 class PythonExecutor:
-    """
-    Takes the steps of a plan one by one.
-
-    Parameters
-    ----------
-    plan : Plan
-        What is to be done.
-
-    """
+    """Takes the steps of a plan one by one."""
 
     def __init__(self, plan: Any):
         self._plan, self._solved = plan, frozenset(mechanism for mechanism, _ in plan.solved)

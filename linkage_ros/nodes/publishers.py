@@ -1,38 +1,29 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Publishers that track their subscriber count, so that no message has to ask for it."""
+"""Publishers that track their subscriber count, and those that patch a message of theirs."""
 
 from __future__ import annotations
 
-from typing import Any, Callable
+from typing import Any, Callable, Optional, Sequence
 
+import numpy as np
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-# For what is published once and wanted by every later subscriber.
+from .message_layout import NoLayout, Template, unpack
+
+# For what is published once, for every later subscriber.
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class TrackedPublisher:
     """
-    A publisher that knows whether it has subscribers.
+    A publisher whose `has_subscribers` is of the middleware's last event: no message asks for it.
 
-    Parameters
-    ----------
-    node, type_, name, qos
-        As for `Node.create_publisher`.
-    changed : callable
-        Called on the executor's thread when the first subscriber comes and when the last leaves.
-    own : int
-        Subscriptions of this process that do not count.
-
-    Attributes
-    ----------
-    has_subscribers : bool
-        Whether there are more subscriptions than those, as of the last event of the middleware.
-
+    Of the subscriptions `own` of this process do not count. `changed` is called on the executor's
+    thread when the first subscriber comes and when the last leaves.
     """
 
     def __init__(self, node: Node, type_: Any, name: str, qos: Any,
@@ -47,3 +38,30 @@ class TrackedPublisher:
         if has_subscribers != self.has_subscribers:
             self.has_subscribers = has_subscribers
             self._changed()
+
+
+class PatchedPublisher:
+    """
+    Publishes one message again and again with other values, `build` and `count` as for Template.
+
+    Its `template` has the bytes that are patched, or is None where that cannot be done: then
+    ordinary messages are built, which is logged once.
+    """
+
+    def __init__(self, publisher: Any, build: Callable, count: int, logger: Any):
+        self.publisher = publisher
+        self._build = build
+        self.template: Optional[Template] = None
+        try:
+            self.template = Template(build, count)
+        except NoLayout as reason:
+            logger.warning(f'{publisher.topic_name}: {reason}; publishing ordinary messages',
+                           once=True)
+
+    def publish(self, stamp: bytes, values: Sequence[Any]) -> None:
+        """Publish the message with this stamp, packed, and values, one array after the other."""
+        joined: Any = np.concatenate(values) if len(values) > 1 else values[0]
+        if self.template:
+            self.publisher.publish(self.template.patched(stamp, joined))
+        else:
+            self.publisher.publish(self._build(unpack(stamp), joined))

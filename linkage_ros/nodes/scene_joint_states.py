@@ -12,9 +12,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from .mechanism_model import MechanismModel, Pose
-from .message_layout import PatchedPublisher
-from .messages import JointStates
-from .publishers import LATCHED, TrackedPublisher
+from .messages import joint_states
+from .publishers import LATCHED, PatchedPublisher, TrackedPublisher
 from ..cache import Cache
 
 # Arrangements of the message that are cached.
@@ -25,16 +24,8 @@ class SceneJointStates:
     """
     Publishes `joint_states` and `robot_description`.
 
-    Parameters
-    ----------
-    node : rclpy.node.Node
-        Whose topics they are.
-    sources : iterable of str
-        The joints that it receives on `crank_states`: where that is the same topic, they are not
-        published again.
-    changed : callable
-        Called when subscribers come or go.
-
+    `sources` are the joints on `crank_states`: where that is the same topic, they are not
+    published again. `changed` is called when subscribers come or go.
     """
 
     def __init__(self, node: Any, sources: Iterable[str], changed: Callable[[], None]):
@@ -44,7 +35,7 @@ class SceneJointStates:
             node, JointState, 'joint_states', 10, changed, int(same))
         self._descriptions = node.create_publisher(String, 'robot_description', LATCHED)
         self._received = frozenset(sources if same else ())
-        self._logger, self._message = node.get_logger(), JointStates()
+        self._logger = node.get_logger()
         self._publishers = Cache(self._publisher, ARRANGEMENTS)
         self._description = ''
 
@@ -82,6 +73,6 @@ class SceneJointStates:
         chosen = [name not in self._received for name in names]
         loaded = {pose.loaded for _, pose in poses if pose.solution.layout.efforts} == {True}
         moving = all(pose.moving for _, pose in poses)
-        return self._message.message(
+        return joint_states(
             stamp, names[chosen].tolist(), positions[chosen], velocities[chosen] if moving else (),
             efforts[chosen] if loaded else ())

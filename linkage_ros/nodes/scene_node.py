@@ -11,7 +11,7 @@ import gc
 import sys
 from typing import Any, Callable, Iterable, Iterator, List, Mapping, Optional
 
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import ParameterDescriptor
 from rcl_interfaces.srv import SetParameters
 import rclpy
 from rclpy.clock import Clock, ClockType
@@ -19,10 +19,11 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import get_logger
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
-from .incidents import Incidents, refused
+from .log import Incidents, refused
 from .ownership import Announcer, Follower
 from .parameters import SceneParameters
 from .shutdown import ShutdownHandler
@@ -61,13 +62,7 @@ class SceneNode(Node):
     """
 
     def __init__(self, name: str, **kwargs: Any):
-        try:
-            super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
-        except ValueError as error:
-            # The client library has no type for an empty list, and does not say whose it is.
-            raise scenes.SceneError(
-                f'no list may be empty in a parameter file, leave it out: mechanisms must be at '
-                f'least one, points some joints ({error})') from None
+        super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
         incidents = Incidents(self.get_logger(), lambda: not self.context.ok())
         self.guarded, self.report = incidents.guarded, incidents.report
         self._worker = Worker(self, incidents.report)
@@ -138,6 +133,13 @@ class SceneNode(Node):
         """Return in words what the node does, for its first message."""
         return listed(self.scene.machines, 200)
 
+    def declare_parameters(self, namespace: str, parameters: Any, ignore_override: bool = False
+                           ) -> List[Parameter]:
+        """Declare parameters; an empty list of a parameter file has no type of its own."""
+        for _, *value, descriptor in (one for one in parameters if len(one) > 2):
+            descriptor.dynamic_typing = descriptor.dynamic_typing or value == [None]
+        return super().declare_parameters(namespace, parameters, ignore_override)
+
     def describe_parameter(self, name: str) -> ParameterDescriptor:
         """Describe a parameter, with the range of its slider around the present value."""
         return self._parameters_of_scene.ranged(name, super().describe_parameter(name))
@@ -154,15 +156,14 @@ class SceneNode(Node):
         super().destroy_node()
 
     def _respond(self, callback: Callable, request: Any, response: Any) -> Any:
-        if isinstance(request, SetParameters.Request) and len(request.parameters) > 1:
-            is_set = self._parameters_of_scene.set_together(request.parameters)
-            for i, one in enumerate(request.parameters):
-                if i in is_set:
-                    response.results.append(SetParametersResult(successful=True))
-                else:
-                    self._respond(callback, SetParameters.Request(parameters=[one]), response)
-            return response
         try:
+            if isinstance(request, SetParameters.Request) and len(request.parameters) > 1:
+                results = self._parameters_of_scene.set_readable(request.parameters)
+                response.results = [results.get(i) or self._respond(
+                    callback, SetParameters.Request(parameters=[one]),
+                    SetParameters.Response()).results[0]
+                    for i, one in enumerate(request.parameters)]
+                return response
             return callback(request, response)
         except Exception as error:
             self.report('a request', error)

@@ -21,17 +21,7 @@ class ShutdownHandler:
     Catches SIGINT and SIGTERM in a thread, so that none interrupts a callback.
 
     The first one sets `is_over` and calls `wake`; whoever spins then stops. Where that takes
-    longer than PATIENCE, the process says its last words and ends with exit code 0.
-
-    Attributes
-    ----------
-    wake : callable, optional
-        Ends the executor's waiting.
-    last_words : callable, optional
-        Called before the process ends amid a callback.
-    is_over : bool
-        Whether there was a signal.
-
+    longer than PATIENCE, `last_words` are said, and the process ends with exit code 0.
     """
 
     def __init__(self) -> None:
@@ -58,15 +48,16 @@ class ShutdownHandler:
         self._sent.close()
 
     def _wait(self) -> None:
+        # Open to the end: another signal would not find where to write, and print that.
         with self._received:
             if not self._received.recv(1):
                 return
-        self.is_over = True
-        if self.wake:
-            self.wake()
-        if not self._left.wait(PATIENCE):
-            if self.last_words:
-                self.last_words()
-            sys.stdout.flush()
-            sys.stderr.flush()
-            os._exit(0)
+            self.is_over = True
+            if self.wake:
+                self.wake()
+            if not self._left.wait(PATIENCE):
+                if self.last_words:
+                    self.last_words()
+                sys.stdout.flush()
+                sys.stderr.flush()
+                os._exit(0)

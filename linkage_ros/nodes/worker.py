@@ -23,13 +23,8 @@ class Worker:
     """
     A thread that does one job after the other, while there are any.
 
-    Parameters
-    ----------
-    node : rclpy.node.Node
-        What the jobs return is called on the thread of its executor.
-    failed : callable
-        Called on the worker's thread with what was being done, and the exception that ended it.
-
+    What a job returns is called on the thread of the node's executor. `failed` is called on the
+    worker's thread with what was being done, and the exception that ended it.
     """
 
     def __init__(self, node: Any, failed: Callable[[str, Exception], None]):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 import math
-from typing import Dict, Iterable, List, Mapping, Tuple
+from typing import Dict, Iterable, List, Mapping, NamedTuple, Tuple
 
 import numpy as np
 
@@ -22,6 +22,9 @@ NEAR = 1e-6
 STARTS, CLOSED = 24, 1e-10
 # A pose that is farther by less than this factor, and this [rad], is as near.
 ALIKE, ALIKE_LENGTH, DISTINCT = 1.2, 1e-3, 1e-3
+# Loops that are less stiff, of their size, are at a dead point, from which motors step aside by
+# this [rad, or of the size].
+FOLDED, ASIDE = 1e-6, 0.1
 
 
 def check_names(robot: Robot, names: Iterable[str]) -> None:
@@ -70,20 +73,39 @@ def _with_followers(robot: Robot) -> Robot:
         abs(value - positions[name]) > 0.0 for name, value in late.items()) else robot
 
 
-def closed(robot: Robot) -> Tuple[Robot, List[str], Dict[str, str], List[str]]:
+class Closed(NamedTuple):
     """
-    Return a robot with its loops closed, and what else there is to be known of it.
+    A robot with its loops closed.
 
-    That is what is to be said, why joints stay open, and which cannot move.
+    Attributes
+    ----------
+    said : list of str
+        What is to be said of it.
+    open_ones : dict
+        Why joints stay open, by their names.
+    stiff : list of str
+        Joints that cannot move.
+    faults : dict
+        What is wrong with the motors of joints' loops, by the joints' names.
 
-    Motors stay where they are, if their loops can be closed so.
     """
+
+    robot: Robot
+    said: List[str]
+    open_ones: Dict[str, str]
+    stiff: List[str]
+    faults: Dict[str, str]
+
+
+def closed(robot: Robot) -> Closed:
+    """Return a robot with its loops closed; motors stay where they are, where they can."""
     robot = _with_followers(robot)
     moves: Dict[str, np.ndarray] = {}
     positions: Dict[str, float] = {}
     said: List[str] = []
     why: Dict[str, str] = {}
     stiff: List[str] = []
+    faults: Dict[str, str] = {}
     for component in components(robot):
         names = [name for name in component.positions if name in robot.driven]
         try:
@@ -94,11 +116,62 @@ def closed(robot: Robot) -> Tuple[Robot, List[str], Dict[str, str], List[str]]:
             continue
         if component.gap(poses)[0] < CLOSED:
             stiff += component.immobile(poses)
+            fault = _fault(component, poses, names, stiff)
+            faults.update((joint.name, fault) for joint in component.joints if fault)
         moves.update(component.moves(poses))
         positions.update((name, float(value[0])) for name, value in component.read(poses).items())
         if moved:
             said.append(moved)
-    return robot.displaced(displaced(robot, moves), positions), said, why, stiff
+    return Closed(robot.displaced(displaced(robot, moves), positions), said, why, stiff, faults)
+
+
+def _fault(component: Component, poses: Poses, motors: List[str], stiff: List[str]) -> str:
+    """Return why motors do not tell a pose, if they do not."""
+    if {*component.positions} <= {*stiff}:
+        return 'it cannot move, as its joints hold each other'
+    ways = component.free_ways(poses, component.held([]))[:, component.held(motors)]
+    count = int(np.linalg.matrix_rank(ways, 1e-6)) if ways.size else 0
+    if count < len(motors):
+        return (f'{listed(motors)} drive it, and hold each other, as {count} of them tell where '
+                'all is: name these by --driven')
+    loose, count = component.loose(poses, motors) if motors else ([], 0)
+    return f'not driven: {count} of {listed(loose)} must be moved, named by --driven, or held, ' \
+        'named by --hold' if count else ''
+
+
+def _check_unfolded(component: Component, poses: Poses, motors: List[str], least: float) -> None:
+    """Raise ValueError if bars lie in line, so that a pose can be left in two ways."""
+    if not motors:
+        # Some joint shall move it, but not one that just this pose stops.
+        ways = component.free_ways(poses, component.held([]), least)
+        if len(ways) <= component.nullity(component.held([])):
+            return
+        motors = component.most_moved(ways)
+    still = component.held(motors)
+    ways = component.free_ways(poses, still, least)
+    for way in ways if len(ways) > component.nullity(still) else ():
+        aside = ASIDE * component.unit * way[None]
+        back = component.closed(component.stepped(poses, aside), still, 40)
+        if np.max(np.abs(component.away(back.positions - poses.positions))) < 0.3 * ASIDE:
+            _refuse_fold(component, poses, motors, 3.0 * aside)
+
+
+def _refuse_fold(component: Component, poses: Poses, motors: List[str], aside: np.ndarray) -> None:
+    """Raise ValueError with both poses next to one in which bars lie in line."""
+    still = component.held(motors)
+    for ahead in (ASIDE, -ASIDE):
+        step = component.towards_limits(motors, ahead)
+        both = Poses(*map(np.concatenate, zip(*(component.closed(
+            component.stepped(poses, step + side), still, 40) for side in (aside, -aside)))))
+        name, first, second = component.farthest_apart(both, 1.0)
+        if np.max(component.gap(both)) < CLOSED and abs(first - second) > DISTINCT:
+            where = ' '.join(f'{motor}={float(component.read(both)[motor][0]):.3g}'
+                             for motor in motors)
+            raise ValueError(f'bars lie in line where the file has them, and with {where} {name} '
+                             f'is at {first:.3g} as well as at {second:.3g}: choose by --pose '
+                             f'{where} {name}=...')
+    raise ValueError(f'its loops end where the file has {listed(motors)}: choose another pose '
+                     f'by --pose {motors[0]}=...')
 
 
 def nearest(component: Component, names: List[str], followers: List[str]) -> Tuple[Poses, str]:
@@ -113,6 +186,7 @@ def nearest(component: Component, names: List[str], followers: List[str]) -> Tup
     poses = component.closed(start, still)
     if gap < NEAR and component.gap(poses)[0] < max(CLOSED, 1e-3 * gap) \
             and np.linalg.norm(component.away(poses.positions)) < 1e3 * max(gap, CLOSED):
+        _check_unfolded(component, poses, names, max(FOLDED, 3.0 * math.sqrt(gap)))
         return poses, ''
     # Where they must, joints that follow others move as well, and then motors.
     found, held_now = start, names
@@ -125,7 +199,8 @@ def nearest(component: Component, names: List[str], followers: List[str]) -> Tup
             break
     said = '' if held_now or not names else \
         f'{", ".join(names)} moved: their loops cannot be closed where the file has them.'
-    determined = component.determined(found, component.held(held_now)) if held_now else 1.0
+    determined = ~component.free(component.free_ways(found, component.held(held_now))) \
+        if held_now else 1.0
     away = np.linalg.norm(component.away(found.positions) * determined, axis=1)
     nearest_one = int(np.argmin(away))
     for i in np.flatnonzero(away < ALIKE * away[nearest_one] + ALIKE_LENGTH):

@@ -87,8 +87,9 @@ class _NotPlaced(ValueError):
 def described(robot: Robot) -> Tuple[Dict[str, Any], List[str]]:
     """Return the parameters of a robot's scene, and what is left out and what was checked."""
     given: Dict[str, Any] = {'mechanisms': []}
-    robot, said, open_ones, stiff = closing.closed(robot)
+    robot, said, open_ones, stiff, faults = closing.closed(robot)
     for group in loops.groups(robot, stiff):
+        fault = next((faults[joint.name] for joint in group.joints if joint.name in faults), '')
         left = group.joints
         for part in group.parts if group.why else [group]:
             try:
@@ -100,7 +101,8 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str]]:
             except (ArithmeticError, ValueError) as error:
                 if not group.why:
                     bodies = error.bodies if isinstance(error, _NotPlaced) else _bodies(left)
-                    said.append(f'Left out: {", ".join(bodies)}: {error}.')
+                    reason = error if WRONG in str(error) else fault or error
+                    said.append(f'Left out: {", ".join(bodies)}: {reason}.')
                 continue
             given['mechanisms'].append(name)
             given.update(parameters)
@@ -108,13 +110,13 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str]]:
             done = {joint.name for joint in part.joints}
             left = [joint for joint in left if joint.name not in done]
         if group.why and left:
-            said += _in_space(robot, group._replace(joints=left), open_ones, given)
+            said += _in_space(robot, group._replace(joints=left), open_ones, fault, given)
     if not given['mechanisms']:
         raise command.RequestError(' '.join(said) or 'no joint of this robot closes a loop')
     return given, said
 
 
-def _in_space(robot: Robot, group: loops.Group, open_ones: Mapping[str, str],
+def _in_space(robot: Robot, group: loops.Group, open_ones: Mapping[str, str], fault: str,
               given: Dict[str, Any]) -> List[str]:
     """Add the mechanism of loops that are not planar; return what is said of it."""
     try:
@@ -124,7 +126,7 @@ def _in_space(robot: Robot, group: loops.Group, open_ones: Mapping[str, str],
         name, parameters, said = rods.described(robot, group, given['mechanisms'])
     except (ArithmeticError, ValueError) as error:
         return [f'Left out: {", ".join(_bodies(group.joints))}: {group.why}; '
-                f'as rods in space: {error}.']
+                + (fault or f'as rods in space: {error}') + '.']
     given['mechanisms'].append(name)
     given.update(parameters)
     return said
@@ -170,7 +172,8 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
         for joint in group.joints:
             if group.ground in joint.bodies and joint.position is not None:
                 other = Drawing(robot, loops.flat(robot, group, [joint.name]), [joint.name])
-                if not other.left and [each.source for each in other.drives] == [joint.name]:
+                if (not other.left or _free(other)[0] < 0) and [
+                        each.source for each in other.drives] == [joint.name]:
                     other.measured = next(each for each in other.loop.joints
                                           if each.name == motors[0])
                     return other
@@ -184,10 +187,16 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
     return best
 
 
+def _free(drawing: Drawing) -> Tuple[int, List[Joint]]:
+    """Return in how many ways bodies that are left can move, and the joints that hold them."""
+    held = [joint for joint in drawing.loop.joints if {*joint.bodies} & {*drawing.left}]
+    return 3 * len(drawing.left) - 2 * len(held) - sum(
+        joint in drawing.driven for joint in held), held
+
+
 def _why(drawing: Drawing) -> str:
     """Return why bodies are left."""
-    held = [joint for joint in drawing.loop.joints if {*joint.bodies} & {*drawing.left}]
-    free = 3 * len(drawing.left) - 2 * len(held) - sum(joint in drawing.driven for joint in held)
+    free, held = _free(drawing)
     names = ', '.join(joint.name for joint in held if joint.position is not None)
     between = [joint.name for joint in held if joint in drawing.driven
                and {*joint.bodies} <= {*drawing.left}]

@@ -21,6 +21,8 @@ from ..command import RequestError
 
 # A pose moves by no more than this in a step [rad, or parts of the size].
 STRIDE = 0.5
+# After a step this small [rad, or of the size] the next is rounding: steps square.
+STILL = 1e-10
 # Bodies in loops that are closed together.
 MOST = 100
 # Hinges nearer to each other [m] cross in a point.
@@ -163,6 +165,11 @@ class Component:
         self._first = np.cumsum([0, *counts])[:-1]
         self._is_ball, self._slides = (np.array(
             [each.kind == kind for each in self._elements], bool) for kind in (BALL, SLIDE))
+        self._are_balls = np.array([each.kind == BALL or any(
+            np.linalg.norm(each.place - other.place) < TOGETHER
+            and np.linalg.norm(np.cross(each.axis, other.axis)) > 0.1
+            for other in self._elements if HINGE == each.kind == other.kind)
+            for each in self._elements], bool)
         self._place, self._axis = (np.array([getattr(each, key) for each in self._elements]
                                             ).reshape(-1, 3) for key in ('place', 'axis'))
         self._parents = np.array([each.parent for each in self._elements], int)
@@ -235,6 +242,24 @@ class Component:
     def held(self, names: Sequence[str]) -> np.ndarray:
         """Return which columns are of the joints that are named."""
         return np.array([self._elements[i].joint.name in names for i in self._column], bool)
+
+    def most_moved(self, ways: np.ndarray) -> List[str]:
+        """Return the joint with a name that some ways move the most."""
+        sizes = np.linalg.norm(ways, axis=0) * [
+            self._elements[i].joint.position is not None for i in self._column]
+        return [self._elements[self._column[int(np.argmax(sizes))]].joint.name]
+
+    def towards_limits(self, names: Sequence[str], part: float) -> np.ndarray:
+        """Return a step of joints by some part [rad, or of the size], within their limits."""
+        step = np.zeros(len(self._column))
+        for name in names:
+            i, column, sign, start = self.column(name)
+            low, high = self._elements[i].joint.limits or (-math.inf, math.inf)
+            change = part * self.unit[column]
+            if not low <= start + change <= high:
+                change = abs(change) if start < low else -abs(change) if start > high else -change
+            step[column] = sign * change
+        return step
 
     def column(self, name: str) -> Tuple[int, int, float, float]:
         """Return the element and the column of a joint, its sign in these, and its position."""
@@ -364,7 +389,7 @@ class Component:
             far = np.max(np.abs(step), axis=1, initial=0.0)[:, None]
             step *= np.minimum(1.0, STRIDE / np.maximum(far, STRIDE)) * self.unit
             poses = self.stepped(poses, step)
-            if np.all(far < 1e-15):
+            if np.all(far < STILL):
                 break
         return poses
 
@@ -385,22 +410,35 @@ class Component:
 
         Hinges that cross in a point, as a ball does, do not count: a rod's pose in a file is any.
         """
-        balls = np.array([each.kind == BALL or any(
-            np.linalg.norm(each.place - other.place) < TOGETHER
-            and np.linalg.norm(np.cross(each.axis, other.axis)) > 0.1
-            for other in self._elements if HINGE == each.kind == other.kind)
-            for each in self._elements], bool)
         turned = positions - math.tau * np.round(positions / math.tau)
-        return np.where(self._slides, positions / self.size, turned) * ~balls
+        return np.where(self._slides, positions / self.size, turned) * ~self._are_balls
 
-    def determined(self, poses: Poses, still: np.ndarray) -> np.ndarray:
-        """Return 1.0 for each joint that cannot move while others are still, or else 0.0."""
+    def free_ways(self, poses: Poses, still: np.ndarray, least: float = 3e-4) -> np.ndarray:
+        """
+        Return in which ways joints of the first pose can move, a row each, at least at first.
+
+        Loops that are less stiff than `least`, of their size, do not count.
+        """
         slope = self.errors(poses.some(np.arange(1)), True)[1][0][:, ~still]
         _, values, ways = np.linalg.svd(slope)
-        free = np.zeros(len(self._elements))
-        np.maximum.at(free, self._column[~still], np.linalg.norm(
-            ways[np.sum(values > 3e-4 * self.size):], axis=0))
-        return (free < 1e-6).astype(float)
+        found = np.zeros((len(ways) - np.sum(values > least * self.size), len(still)))
+        found[:, ~still] = ways[len(ways) - len(found):]
+        return found
+
+    def free(self, ways: np.ndarray) -> np.ndarray:
+        """Return which elements move in some ways."""
+        moved = np.zeros(len(self._elements))
+        np.maximum.at(moved, self._column, np.linalg.norm(ways, axis=0))
+        return moved > 1e-6
+
+    def loose(self, poses: Poses, motors: Sequence[str]) -> Tuple[List[str], int]:
+        """Return joints that move though motors do not, and how many of them say where all is."""
+        ways = self.free_ways(poses, self.held(motors))
+        # What a rod on balls spins on does not count.
+        ways = ways * ~self._are_balls[self._column]
+        names = [each.joint.name for each, moves in zip(self._elements, self.free(ways))
+                 if moves and each.joint.position is not None]
+        return names, int(np.linalg.matrix_rank(ways, 1e-6)) if names else 0
 
     def farthest_apart(self, two: Poses, determined: Any) -> Tuple[str, float, float]:
         """Return the joint that two poses have the farthest apart, and where each has it."""
@@ -416,17 +454,15 @@ class Component:
         """Return the joints with a name that cannot move near the first pose, closed."""
         still = self.held([])
         rng = np.random.default_rng(3)
-        free = np.zeros(len(still))
+        moved = np.zeros(len(self._elements), bool)
         for _ in range(3):
-            slope = self.errors(poses, True)[1][0]
-            _, values, ways = np.linalg.svd(slope)
-            ways = ways[np.sum(values > 3e-4 * self.size):]
-            free = np.maximum(free, np.linalg.norm(ways, axis=0))
+            ways = self.free_ways(poses, still)
+            moved |= self.free(ways)
             step = ways.T @ rng.normal(size=len(ways))
             step *= 0.1 / max(np.max(np.abs(step), initial=0.0), 0.1)
             poses = self.closed(self.stepped(poses, step[None] * self.unit), still)
-        return [each.joint.name for i, each in enumerate(self._elements)
-                if each.joint.position is not None and free[self._column == i].max() < 1e-6]
+        return [each.joint.name for each, moves in zip(self._elements, moved)
+                if each.joint.position is not None and not moves]
 
     def read(self, poses: Poses) -> Dict[str, np.ndarray]:
         """Return where joints with a name are [rad or m]; those of cuts are wrapped."""

@@ -32,7 +32,7 @@ from .parameters import (
     SceneError,
     Values,
 )
-from .scene_mechanism import FRAME, FRAME_RULE, read_machine, SceneMechanism
+from .scene_mechanism import FRAME, FRAME_NAME, FRAME_RULE, read_machine, SceneMechanism
 from .. import mechanisms
 from ..words import plain_text, quoted
 
@@ -47,8 +47,8 @@ MECHANISMS = Field(
     rule='at least one, each once, of up to 64 letters, digits and single underscores, '
          'a letter first', pattern=_NAME)
 FRAME_ID = Field('string', 'Frame that the poses are in.', readers=(KINEMATICS,),
-                 rule='1 to 100 letters, digits and _ . : - /, the first a letter, digit or _',
-                 pattern=re.compile(r'\w[\w.:/-]{0,99}', re.ASCII))
+                 rule='1 to 100 characters that can be seen, the first a letter, digit or _',
+                 pattern=re.compile(FRAME_NAME))
 FRAME_PREFIX = Field(
     'string', 'Put before the frames of markers and loci, as robot_state_publisher does.',
     readers=(KINEMATICS,), rule=FRAME_RULE, pattern=FRAME)

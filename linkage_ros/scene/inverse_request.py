@@ -127,16 +127,15 @@ class InverseRequest:
             second and so on; NaN where a value cannot be had.
 
         """
+        inverse, n, many = self._inverse, len(self._units), isinstance(values[0], np.ndarray)
+        each = near is not None and np.size(near[0]) == np.size(values[0])
         values = [value / unit for value, unit in zip(values, self._units)]
         if near is not None:
             near = [input_ / scale for input_, scale in zip(self.inputs_of(near), self._scales)]
-        inverse = self._inverse
-        if np.size(values[0]) >= MANY:
+        if many and np.size(values[0]) >= MANY:
             inverse = self._accelerated()
-        each = near is not None and np.size(near[0]) == np.size(values[0])
-        found, rates = inverse.nearest(values, near, self._ends) if each or not np.ndim(
-            values[0]) else inverse.path(values, near, self._ends)
-        n = len(self._units)
+        found, rates = (inverse.path if many and not each else inverse.nearest)(
+            values, near, self._ends)
         return (self.positions_of([input_ * scale for input_, scale in zip(found, self._scales)]),
                 [rate * (self._units[i % n] / self._scales[i // n] * self._actuators[i // n][0])
                  for i, rate in enumerate(rates)])
@@ -146,7 +145,7 @@ class InverseRequest:
         if self._many is None:
             def make() -> Any:
                 inverse = self._machine.linkage.accelerated().inverse(tuple(self.outputs))
-                inverse.over(*np.zeros((len(self.outputs), MANY)))
+                inverse.path([np.zeros(MANY)] * len(self.outputs))
                 return inverse
 
             self._many = compile_in_background(make)

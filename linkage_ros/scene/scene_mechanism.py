@@ -34,9 +34,11 @@ IN_SPACE = ('a linkage in space: pictures, the page and robot models are of link
             'plane')
 TYPES = (*mechanisms.TYPES, *mechanisms.WRITTEN)
 
-# What a frame may be called, or is not.
-FRAME = re.compile(r'(\w[\w.:/-]{0,99})?', re.ASCII)
-FRAME_RULE = 'up to 100 letters, digits and _ . : - /, the first a letter, digit or _'
+# What a frame may be called, as links of robots are: in tf2 no name begins with a slash.
+FRAME_NAME = (r'\w[^\x00-\x1f\x7f-\xa0\u200b-\u200f\u2028-\u202f\u2060-\u206f'
+              r'\ud800-\udfff\ufeff]{0,99}')
+FRAME = re.compile(f'({FRAME_NAME})?')
+FRAME_RULE = 'up to 100 characters that can be seen, the first a letter, digit or _'
 
 TYPE = Field('string', 'Type of the mechanism.', readers=ALL, read_only=True,
              rule=f'one of {", ".join(TYPES)}')

@@ -29,12 +29,13 @@ ROUNDING = 64 * 2.0 ** -53
 
 # What follows a word, but for the word `along`: j a joint, n a length, a an angle, s a side.
 _FORMS = {
-    'ground': 'nn', 'crank': 'jn', 'cylinder': 'jjns', 'carriage': 'jjnn', 'block': 'jnn',
+    'ground': 'nn', 'image': 'jjj', 'crank': 'jn', 'yoke': 'jjj', 'cylinder': 'jjns',
+    'carriage': 'jjnn', 'block': 'jnn',
     'dyad': 'jjnns', 'rigid': 'jjnns', 'line': 'jjn', 'mirror': 'jjj', 'parallelogram': 'jjj',
     'antiparallelogram': 'jjj', 'inversor': 'jjnn', 'slot': 'jjnsn', 'slider': 'jnjas'}
 _SLIDER_ALONG = 'jnjjs'
 _INPUTS = 'crank', 'cylinder', 'carriage'
-SLIDING = 'cylinder', 'carriage', 'slot', 'slider'
+SLIDING = 'cylinder', 'carriage', 'yoke', 'slot', 'slider'
 _SIDES = {'left': 1, 'right': -1, 'out': 1, 'in': -1}
 
 
@@ -108,7 +109,7 @@ class Floats:
     def divided(x, y):
         """Return a quotient; one by nothing is not a number."""
         with np.errstate(all='ignore'):
-            return x / y
+            return np.divide(x, y)
 
     @staticmethod
     def pi():
@@ -333,7 +334,11 @@ class Linkage:
         self.lines = [line._replace(side=(branches or {}).get(line.names[0], line.side))
                       for line in self.lines]
         self.inputs = [line for line in self.lines if line.word in _INPUTS and not line.geared]
-        self.fixed = {line.names[0] for line in self.lines if line.word == 'ground'}
+        self.fixed = set()
+        for line in self.lines:
+            if line.word == 'ground' or line.word in ('image', *LAID) \
+                    and self.fixed.issuperset(line.joints):
+                self.fixed.add(line.names[0])
         self.cranks = [line.names[0] for line in self.lines
                        if line.word == 'crank' and self.fixed.issuperset(line.joints)]
         self.placed = [name for line in self.lines for name in line.names]
@@ -345,7 +350,7 @@ class Linkage:
         self.driven_names = set(self._drives.values())
         self._links()
         self._stand()
-        self._templates = {}
+        self.half_angles = {i: self._pin_by_half_angles(line) for i, line in enumerate(self.lines)}
 
     def values(self, moved=None, literal=None):
         """Return the numbers of every line, with dimensions or literals moved."""
@@ -422,7 +427,7 @@ class Linkage:
                 self._body(i, joints[1], names[0])
             elif line.word == 'block':
                 self._on_block(i, joints[0], names[0])
-            elif line.word in LAID:
+            elif line.word in LAID and names[0] not in self.fixed:
                 self.body_of(*joints).append(names[0])
 
     def _body(self, _, first, second):
@@ -459,7 +464,7 @@ class Linkage:
             if line.word == 'block':
                 joints = (*joints, self.line_of_block(joints[0]))
             below = set().union(*(self.stands[name] for name in joints), joints)
-            needs = set().union(*(self.closures[name] for name in joints))
+            needs = frozenset().union(*(self.closures[name] for name in joints))
             if line.word in closed:
                 needs = needs | {line.names[0]}
             for name in line.names:
@@ -507,15 +512,19 @@ class Linkage:
         return self.base(numbers, first, second)
 
     def _fixed(self, numbers, name):
-        i = next(i for i, line in enumerate(self.lines) if name in line.names)
-        return mpc(*numbers[i])
+        i, line = next((i, line) for i, line in enumerate(self.lines) if name in line.names)
+        at = [self._fixed(numbers, joint) for joint in line.joints]
+        if line.word == 'ground':
+            return mpc(*numbers[i])
+        return _reflected(DIGITS, *at)[0] if line.word == 'image' else LAID[line.word](
+            *at, numbers[i], line.side)
 
     def prepared(self, numbers):
         """Return the numbers of every line, those of templates turned into what is laid on."""
         rows = []
         for line, row in zip(self.lines, numbers):
             if line.word in LAID:
-                base = self.base(numbers, *line.joints)
+                base = self._distance(numbers, *line.joints)
                 row = (LAID[line.word](mpc(0), mpc(base), row, line.side) / base,)
             elif line.word == 'slider' and len(row) > 1:
                 row = (row[0], DIGITS.turned(row[1]), row[1])
@@ -545,6 +554,15 @@ class Linkage:
             if pin in self.cranks and foot in self.fixed and foot != self._crank(pin).joints[0]:
                 return foot, pin
         return None
+
+    def _pin_by_half_angles(self, line):
+        """Return the crank pin at an arm from the ground, or on a line there; none: empty."""
+        if line.word == 'slider' and self.fixed.issuperset(line.joints[1:]):
+            return line.joints[0] if line.joints[0] in self.cranks else ''
+        if line.word not in ('dyad', 'inversor', 'slot', 'mirror', 'antiparallelogram'):
+            return ''
+        arm = self.arm_of_crank(line._replace(joints=line.joints[-2:]))
+        return arm[1] if arm else ''
 
     def _crank(self, pin):
         return next(line for line in self.lines if pin in line.names)
@@ -683,14 +701,17 @@ def draw(do, linkage, rows, values, way=None, turns=None, moved=None):
     Return the `Drawing` of a linkage.
 
     `rows` are its numbers as `prepared`, `values` those of its inputs, `way` how it passes its
-    change points, `moved` what is added to joints.
+    change points, `moved` what is added to joints. The pin of a crank is so moved only for what is
+    drawn from its coordinates, not on an arm from the ground to it.
     """
     way, moved = way or {}, moved or {}
     points, gaps, slides, folds, arms, lines = {}, {}, {}, {}, {}, {}
     driven = linkage.driven(rows, values)
-    angle_of = {}
+    angle_of, pins = {}, {}
     for i, (line, row) in enumerate(zip(linkage.lines, rows)):
-        word, name, at = line.word, line.names[0], [points[joint] for joint in line.joints]
+        word, name, at = line.word, line.names[0], [
+            pins[joint] if joint == linkage.half_angles[i] else points[joint]
+            for joint in line.joints]
         side = line.side
         if word == 'ground':
             points[name] = do.point(*row)
@@ -712,6 +733,10 @@ def draw(do, linkage, rows, values, way=None, turns=None, moved=None):
             points[name] = at[0] + lines[name] * driven[i]
             # It has no place beyond its way.
             gaps[name] = do.least(driven[i] - row[0], row[1] - driven[i])
+        elif word == 'yoke':
+            lines[name] = _unit(do, at[2] - at[1])
+            slides[name] = ((at[0] - at[1]) * lines[name].conjugate()).real
+            points[name] = at[1] + lines[name] * slides[name]
         elif word == 'block':
             on = linkage.line_of_block(line.joints[0])
             points[name] = at[0] + lines[on] * do.point(*row)
@@ -725,12 +750,11 @@ def draw(do, linkage, rows, values, way=None, turns=None, moved=None):
             arms[name] = abs(at[1] - at[0])
         elif word in LAID:
             points[name] = at[0] + (at[1] - at[0]) * row[0]
+        elif word == 'image':
+            points[name], _ = _reflected(do, *at)
         elif word == 'mirror':
-            arm, spoke = at[2] - at[1], at[0] - at[1]
-            ratio = do.divided(spoke, arm)
-            points[name] = at[1] + arm * ratio.conjugate()
-            folds[name] = ratio.imag
-            arms[name] = abs(arm)
+            points[name], folds[name] = _reflected(do, *at)
+            arms[name] = abs(at[2] - at[1])
         elif word == 'antiparallelogram':
             arm, middle = at[2] - at[1], (at[1] + at[2]) / 2
             ratio = do.divided(at[0] - middle, arm)
@@ -758,12 +782,21 @@ def draw(do, linkage, rows, values, way=None, turns=None, moved=None):
             gaps[name] = square / (row[0] * row[0])
             slides[name] = seen.real + side * do.root(square)
             points[name] = at[1] + along * slides[name]
+        if name in linkage.cranks:
+            pins[name] = points[name]
         for each in line.names:
             if each in moved:
                 points[each] = points[each] + moved[each]
-                if word == 'slider':
-                    slides[name] = ((points[each] - at[1]) * along.conjugate()).real
-    return Drawing(points, gaps, slides, folds, arms, lines)
+                if word in ('slider', 'yoke'):
+                    slides[name] = ((points[each] - at[1]) * lines[name].conjugate()).real
+    return Drawing({**points, **pins}, gaps, slides, folds, arms, lines)
+
+
+def _reflected(do, point, first, second):
+    """Return a point's image in the line of two others, and how far it was from that."""
+    arm = second - first
+    ratio = do.divided(point - first, arm)
+    return first + arm * ratio.conjugate(), ratio.imag
 
 
 def _unit(do, vector):

@@ -6,17 +6,20 @@ How far an answer about any linkage may be from its drawing, where joints hang o
 
 A result is measured in units of its *sensitivity*: what moving each thing that is rounded by half
 ulp does to the true result. Rounded are the inputs (angles, lengths, dimensions, numbers in the
-lines, what is calculated from them, what gears make of them), and each joint on the way but ground
-joints and the pins of cranks on the ground: half an ulp of the largest coordinate on its line; a
-gap so small that it counts as a change point may be closed. For velocities and rates also the
-velocity of each of those joints. The rule is
+lines, what is calculated from them, what gears make of them), and each joint on the way but those
+of the ground: half an ulp of the largest coordinate on its line; a gap so small that it counts as
+a change point may be closed. The pin of a crank on the ground is charged only to lines that are
+not drawn on an arm from the ground to that pin: for such an arm half angles keep all digits, and
+the rule holds them to it. For velocities and rates also the velocity of each of those joints is
+rounded, for accelerations their acceleration too, and how the inputs move. The rule is
 
     error <= 4 x sensitivity + 1 ulp of the result,
 
-for velocities and rates 8 x both, with a number wherever everything that the joint stands on can
-be assembled and NaN wherever it cannot; within `GRAZE` sensitivities of a limit, of a cylinder's
-within `LOOSER` times as much, either will do. Angles are compared modulo a turn, so that their
-ulp is that of pi.
+for velocities, rates and accelerations 8 x both, with a number wherever everything that the joint
+stands on can be assembled and NaN wherever it cannot; within `GRAZE` sensitivities of a limit, of
+a cylinder's within `LOOSER` times as much, either will do. What hangs on an arm that is no longer
+than what the rule lets its ends be off has no direction that could be right. Angles are compared
+modulo a turn, so that their ulp is that of pi.
 """
 
 import math
@@ -28,7 +31,8 @@ import numpy as np
 
 from .drawing import DIGITS, draw, half_ulp, Linkage, precisely, SLIDING
 
-RULE, RATE_RULE = 4.0, 8.0
+# By how often an output is differentiated.
+RULES = 4.0, 8.0, 8.0
 GRAZE = 32.0
 # The limits of a cylinder are as exact as its longest length.
 LOOSER = 8
@@ -38,14 +42,38 @@ with gmpy2.context(gmpy2.get_context(), precision=320):
     STEP = mpfr(2) ** -100
 
 
+TIME = 'time'
+
+
+class Motion(NamedTuple):
+    """How fast each input moves, and how that changes."""
+
+    speeds: tuple
+    changes: tuple
+
+    def at(self, given, time):
+        """Return where the inputs are at a time, given where they are at zero."""
+        return [value + speed * time + change * time * time / 2
+                for value, speed, change in zip(given, self.speeds, self.changes)]
+
+    def moved(self, side):
+        """Yield motions of which one number is half an ulp off."""
+        for part, numbers in enumerate(self):
+            for i, number in enumerate(numbers):
+                if number:
+                    off = *numbers[:i], number + side * half_ulp(number), *numbers[i + 1:]
+                    yield Motion(*(off if k == part else row for k, row in enumerate(self)))
+
+
 class Output(NamedTuple):
     """
     One thing that a mechanism answers, and the joints that it stands on.
 
     `what` is 'point', 'angle' or 'slide'; `parts` are bars by their two joints, that of an angle
     and that from which it is counted, from `quarters` of a turn; of one joint is what slides on
-    its line. `needs` are the joints without which it is NaN: none for a driven angle. `by` is the
-    number of the input by which it is differentiated, None for a pose.
+    its line. `needs` are the closures without which it is NaN: none for a driven angle. `by` is
+    the number of the input by which it is differentiated, `TIME` for twice by time, None for a
+    pose.
     """
 
     what: str
@@ -56,8 +84,13 @@ class Output(NamedTuple):
     by: object = None
 
     def __str__(self):
-        rate = '' if self.by is None else f' by input {self.by}'
+        rate = ('', f' by input {self.by}', ' by time twice')[self.order]
         return f'{self.what} {self.name}{rate}'
+
+    @property
+    def order(self):
+        """How often it is differentiated."""
+        return 0 if self.by is None else 2 if self.by == TIME else 1
 
 
 class Row(NamedTuple):
@@ -75,7 +108,7 @@ class Row(NamedTuple):
 
 def outputs(linkage, links):
     """Return all outputs of a pose, given a mechanism's links."""
-    found = [Output('point', name, ((name,),), (name,)) for name in linkage.placed]
+    found = [Output('point', name, ((name,),), linkage.closures[name]) for name in linkage.placed]
     slides = iter(line.names[0] for line in linkage.lines if line.word in SLIDING)
     bars = {}
     for link in links:
@@ -84,25 +117,62 @@ def outputs(linkage, links):
         parent = zero or ((bars[link.parent],) if link.parent in bars else ())
         bars[link.name] = (next(slides),) if slides_on else (link.joint, link.tip)
         parts = (bars[link.name], *parent * (not slides_on))
+        needs = set().union(*(linkage.closures[joint] for part in parts for joint in part))
+        if link.name in linkage.driven_names:  # it is as given, but for a carriage beyond its way
+            tip = bars[link.name][0]
+            needs = {tip} if linkage.placing(tip).word == 'carriage' else set()
         found.append(Output(
-            'slide' if slides_on else 'angle', link.name, parts,
-            () if link.name in linkage.driven_names and linkage.placing(
-                parts[0][0]).word != 'carriage' else sum(parts, ()),
+            'slide' if slides_on else 'angle', link.name, parts, frozenset(needs),
             0 if zero or slides_on else round(link.zero / (math.pi / 2))))
     return found
 
 
-def answers(mechanism, values, poses, rates):
+def answers(mechanism, values, poses, rates=False, motion=None):
     """Return {output: array} of a mechanism at values of its inputs, shape (n, inputs)."""
-    given = values.T if len(mechanism.inputs) > 1 else values[:, 0]
-    points, angles = mechanism.solve(given), mechanism.joint_angles(given)
-    found = {out: (points if out.what == 'point' else angles)[out.name] for out in poses}
+    def each(row):
+        return row if len(mechanism.inputs) > 1 else row[0]
+
+    given, found = each(values.T), {}
+    asked = [(None, mechanism.solve(given), mechanism.joint_angles(given))]
     for by in range(len(mechanism.inputs) if rates else 0):
-        points = mechanism.velocity(given, by=by)
-        angles = mechanism.joint_rates(given, by=by)
+        asked.append((by, mechanism.velocity(given, by=by), mechanism.joint_rates(given, by=by)))
+    if motion:
+        moving = given, each(motion.speeds), each(motion.changes)
+        asked.append((TIME, mechanism.acceleration(*moving),
+                      mechanism.joint_accelerations(*moving)))
+    for by, points, angles in asked:
         found.update((out._replace(by=by),
                       (points if out.what == 'point' else angles)[out.name]) for out in poses)
     return found
+
+
+def differentiated(poses, inputs, rates, motion):
+    """Return outputs, then all rates of them by each input, and their accelerations, if asked."""
+    ways = [None, *range(inputs if rates else 0), *([TIME] if motion else ())]
+    return [out._replace(by=by) for by in ways for out in poses]
+
+
+class _Move(NamedTuple):
+    """
+    What is drawn when something is moved.
+
+    Joints are moved by `joints`, and along each way through the pose, by its number, with the
+    speeds and accelerations in `moving`.
+    """
+
+    numbers: object
+    given: list
+    ways: tuple
+    joints: dict = {}
+    moving: dict = {}
+
+
+class _Way(NamedTuple):
+    """A way through a pose, and how often outputs are differentiated along it."""
+
+    motion: Motion
+    order: int
+    unit: object = 1
 
 
 class _Moved(NamedTuple):
@@ -145,31 +215,32 @@ class Measure:
         return self._moved[side]
 
     @precisely
-    def at(self, given, rates=False):
-        """Return the `Truth` at values of the inputs."""
+    def at(self, given, rates=False, motion=None):
+        """Return the `Truth` at values of the inputs, for a `Motion` with accelerations."""
         given = [mpfr(value) for value in given]
+        ways = self._ways(rates, motion)
         now = self._drawn(self._nominal, given)
         grazed = self._undirected(now)
         if grazed:
             given = [value + unit * mpfr(2) ** -NUDGE
                      for value, unit in zip(given, self._units)]
             now = self._drawn(self._nominal, given)
-        values = self._values(now, self._nominal, given, {}, {}, rates)
+        values = self._values(now, _Move(self._nominal, given, ways))
         closures, arms = {**now.gaps}, now.arms
         bent = dict.fromkeys(arms, mpfr(0))
         spread, slack = [mpfr(0)] * len(values), dict.fromkeys(closures, mpfr(0))
-        speeds = self._speeds(given) if rates else []
+        speeds = [self._speeds(given, way) for way in ways]
         for side in (1, -1):
             one_side, one_slack = [mpfr(0)] * len(values), dict.fromkeys(closures, mpfr(0))
-            for moved in self._moves(now, given, speeds, side):
-                drawn = self._drawn(*moved[:3])
-                for i, (old, new) in enumerate(zip(values, self._values(drawn, *moved, rates))):
+            for move in self._moves(now, given, ways, speeds, side):
+                drawn = self._drawn(move.numbers, move.given, move.joints)
+                for i, (old, new) in enumerate(zip(values, self._values(drawn, move))):
                     one_side[i] += self._distance(i, old, new)
                 for name, gap in closures.items():
                     one_slack[name] += abs(drawn.gaps[name] - gap)
                 for name, arm in arms.items():
                     bent[name] += abs(drawn.arms[name] - arm)
-            for moved in self._displaced(now.points, self._pinned, side):
+            for moved in self._displaced(now.points, self.linkage.fixed, side):
                 drawn = self._drawn(self._nominal, given, moved)
                 for name, gap in closures.items():
                     one_slack[name] += abs(drawn.gaps[name] - gap)
@@ -184,11 +255,21 @@ class Measure:
             if self._lines[name].word in ('carriage', 'cylinder'):
                 slack[name] = LOOSER * (slack[name] + half_ulp(self.linkage.longest))
         states = {name: _state(gap, slack[name]) for name, gap in closures.items()}
-        states.update((name, 'undirected') for name, arm in arms.items()
+        states.update((name, 'adrift' if arm <= RULES[0] * bent[name] else 'undirected')
+                      for name, arm in arms.items()
                       if states.get(name, 'meets') == 'meets' and arm <= GRAZE * bent[name])
         states.update((name, 'grazes') for name in grazed if states.get(name) != 'fails')
         states.update((name, 'slips') for name in self._undirected(now))
         return Truth(values, [float(x) for x in spread], states, closures, slack)
+
+    def _ways(self, rates, motion):
+        """Return the ways through a pose along which it is differentiated."""
+        still = (0,) * len(self._units)
+        found = [_Way(Motion((*still[:i], unit, *still[i + 1:]), still), 1, unit)
+                 for i, unit in enumerate(self._units if rates else ())]
+        if motion:
+            found.append(_Way(Motion(*(tuple(map(mpfr, row)) for row in motion)), 2))
+        return tuple(found)
 
     def _undirected(self, drawn):
         """Return the joints that are hung on an arm of no length."""
@@ -198,26 +279,29 @@ class Measure:
     def _drawn(self, numbers, given, moved=None):
         return draw(DIGITS, self.linkage, numbers.rows, given, self._way, numbers.turns, moved)
 
-    def _moves(self, now, given, speeds, side):
-        """Yield what is drawn when one thing is moved: numbers, inputs, joints, velocities."""
+    def _moves(self, now, given, ways, speeds, side):
+        """Yield a `_Move` for each thing that is rounded."""
+        still = _Move(self._nominal, given, ways)
         for numbers in self._sides(side):
-            yield numbers, given, {}, {}
+            yield still._replace(numbers=numbers)
         for i, value in enumerate(given):
             if value:
                 size = min(abs(value), math.pi) if self.linkage.inputs[i].turns else value
-                yield (self._nominal, [*given[:i], value + side * half_ulp(size), *given[i + 1:]],
-                       {}, {})
+                yield still._replace(
+                    given=[*given[:i], value + side * half_ulp(size), *given[i + 1:]])
         rows = self._nominal.rows
         for i, slack in self.linkage.geared(rows, given):
             moved = [*rows[:i], (*rows[i][:-1], rows[i][-1] + side * slack), *rows[i + 1:]]
-            yield self._nominal._replace(rows=moved), given, {}, {}
-        hung = [name for name in self.linkage.placed if name not in self._pinned]
+            yield still._replace(numbers=self._nominal._replace(rows=moved))
+        hung = [name for name in self.linkage.placed if name not in self.linkage.fixed]
         for moved in self._displaced(now.points, hung, side):
-            yield self._nominal, given, moved, {}
-        for by, speed in enumerate(speeds):
-            for moved in self._displaced(speed, hung, side):
-                yield (self._nominal, given, {},
-                       {(name, by): step for name, step in moved.items()})
+            yield still._replace(joints=moved)
+        for i, (way, motion) in enumerate(zip(ways, speeds)):
+            for k, row in enumerate(motion):
+                for moved in self._displaced(row, hung, side):
+                    yield still._replace(moving={i: (moved, {})[::-1 if k else 1]})
+            for other in way.motion.moved(side) if way.order == 2 else ():
+                yield still._replace(ways=(*ways[:i], way._replace(motion=other), *ways[i + 1:]))
 
     def _displaced(self, places, names, side):
         """Yield joints, each with what half an ulp adds to its x or y."""
@@ -232,26 +316,28 @@ class Measure:
         return max(abs(part) for each in (name, *self._lines[name].joints)
                    for part in (places[each].real, places[each].imag))
 
-    def _speeds(self, given):
-        """Return the velocities of the joints by each input."""
-        found = []
-        for by, unit in enumerate(self._units):
-            before, after = (self._drawn(self._nominal, _stepped(given, by, step * unit)).points
-                             for step in (-STEP, STEP))
-            found.append({name: (after[name] - before[name]) / (2 * STEP * unit)
-                          for name in after})
-        return found
+    def _speeds(self, given, way):
+        """Return the velocities of the joints on a way, and the accelerations if these count."""
+        before, now, after = (self._drawn(self._nominal, way.motion.at(given, time)).points
+                              for time in (-STEP, mpfr(0), STEP))
+        return [{name: _change(before[name], now[name], after[name], order + 1) / way.unit
+                 for name in now} for order in range(way.order)]
 
-    def _values(self, drawn, numbers, given, moved, moving, rates):
-        values = self._poses(drawn)
-        for by, unit in enumerate(self._units if rates else []):
-            before, after = (self._poses(self._drawn(
-                numbers, _stepped(given, by, step),
-                {**moved, **{name: velocity * step for (name, each), velocity in moving.items()
-                             if each == by}})) for step in (-STEP * unit, STEP * unit))
-            values += [_difference(out, x, y) / (2 * STEP * unit)
-                       for out, x, y in zip(self.poses, before, after)]
+    def _values(self, drawn, move):
+        values = now = self._poses(drawn)
+        for i, way in enumerate(move.ways):
+            before, after = (self._poses(self._on_way(move, i, time)) for time in (-STEP, STEP))
+            values = values + [_difference(out, *each, way.order) / way.unit
+                               for out, *each in zip(self.poses, before, now, after)]
         return values
+
+    def _on_way(self, move, i, time):
+        """Return the drawing at a time on a way through a pose."""
+        joints, unit = dict(move.joints), move.ways[i].unit
+        for step, moved in zip((time * unit, time * time / 2), move.moving.get(i, ())):
+            joints.update((name, joints.get(name, 0) + moving * step)
+                          for name, moving in moved.items())
+        return self._drawn(move.numbers, move.ways[i].motion.at(move.given, time), joints)
 
     def _poses(self, drawn):
         found = []
@@ -276,13 +362,12 @@ class Measure:
         At a limit that is reached it is 'either', and on an arm whose direction is all rounding
         'maybe' a number, which then is to be right.
         """
-        needs = {states[name] for joint in output.needs
-                 for name in self.linkage.closures[joint] if name in states}
+        needs = {states[name] for name in output.needs if name in states}
         if needs <= {'meets'}:
             return 'number'
         if 'fails' in needs:
             return 'nan' if 'slips' not in needs else 'any'
-        if 'slips' in needs:
+        if needs & {'slips', 'adrift'}:
             return 'any'
         return 'either' if 'grazes' in needs else 'maybe'
 
@@ -291,7 +376,7 @@ class Truth(NamedTuple):
     """
     True outputs, poses first, and what half an ulp does to them; the same of the closures' gaps.
 
-    The state of a closure is 'meets', 'undirected', 'grazes', 'slips' or 'fails'.
+    The state of a closure is 'meets', 'undirected', 'adrift', 'grazes', 'slips' or 'fails'.
     """
 
     values: list
@@ -308,11 +393,6 @@ def turned_bar(output, drawn):
     return bars[0] * bars[1].conjugate() if bars[1:] else bars[0]
 
 
-def _stepped(given, by, step):
-    """Return values of the inputs, one of them a step further on."""
-    return [value + step if i == by else value for i, value in enumerate(given)]
-
-
 def _state(gap, slack):
     if abs(gap) <= GRAZE * slack:
         return 'grazes' if gap >= 0 else 'slips'
@@ -326,19 +406,25 @@ def _turned(old, new):
     return DIGITS.direction(turned)
 
 
-def _difference(out, before, after):
-    return _turned(before, after) if out.what == 'angle' else after - before
+def _difference(out, before, now, after, order):
+    """Return how an output changes on its way, or how that changes; a bar's angle from now on."""
+    if out.what == 'angle':
+        before, now, after = _turned(now, before), mpfr(0), _turned(now, after)
+    return _change(before, now, after, order)
+
+
+def _change(before, now, after, order):
+    return (after - before) / (2 * STEP) if order == 1 else (
+        before - 2 * now + after) / (STEP * STEP)
 
 
 @precisely
-def judge(measure, given, found, rates=False, exact=None):
+def judge(measure, given, found, rates=False, exact=None, motion=None):
     """Return the `Row` of each output at values of the inputs, shape (n, inputs)."""
     rows = []
     for index, row in enumerate(given):
-        truth = exact[index] if exact else measure.at(row, rates)
-        outs = list(measure.poses)
-        for by in range(len(row) if rates else 0):
-            outs += [out._replace(by=by) for out in measure.poses]
+        truth = exact[index] if exact else measure.at(row, rates, motion)
+        outs = differentiated(measure.poses, len(row), rates, motion)
         for i, out in enumerate(outs):
             rows.append(_row(out, row, found[out][index], truth.values[i],
                              truth.sensitivity[i], measure.due(out, truth.states)))
@@ -346,19 +432,20 @@ def judge(measure, given, found, rates=False, exact=None):
 
 
 def _row(out, given, result, value, spread, due):
-    error, ratio, problem, rate = math.nan, 0.0, '', out.by is not None
-    if np.all(np.isnan(result)) or (rate and due != 'number' and np.any(np.isinf(result))):
+    error, ratio, problem, rate = math.nan, 0.0, '', out.order > 0
+    rule = RULES[out.order]
+    if np.all(np.isnan(result)) or (rate and due != 'number' and not np.all(np.isfinite(result))):
         problem = 'NaN' if due == 'number' else ''
     elif due == 'nan' or due == 'number' and np.any(np.isnan(result)):
         problem = 'missed NaN'
     elif due in ('number', 'maybe') or due == 'either' and not rate:
         error = float(_error(out, result, value))
         ulp = np.spacing(math.pi if out.what == 'angle' and not rate else np.max(np.abs(result)))
-        excess = max(0.0, error - float(ulp) * (RATE_RULE if rate else 1.0))
+        excess = max(0.0, error - float(ulp) * (rule if rate else 1.0))
         # What the differencing leaves of a rate of zero is no error.
         still = rate and not spread and not np.any(result)
         ratio = 0.0 if not excess or still else excess / spread if spread else math.inf
-        problem = 'rule' if not ratio <= (RATE_RULE if rate else RULE) else ''
+        problem = 'rule' if not ratio <= rule else ''
     return Row(out, tuple(map(float, given)), problem, math.inf if 'NaN' in problem else ratio,
                error, spread, result, value)
 

@@ -24,7 +24,7 @@ NEAR = (0.0, 0.0, 0.0, 1e-16, 1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9)
 # The words, and how often they come up.
 WORDS = {
     'dyad': 6, 'rigid': 2, 'line': 2, 'mirror': 2, 'parallelogram': 1, 'antiparallelogram': 1,
-    'inversor': 1, 'slot': 2, 'slider': 3, 'block': 2, 'geared': 2,
+    'inversor': 1, 'slot': 2, 'slider': 3, 'yoke': 1, 'block': 2, 'image': 1, 'geared': 2,
 }
 # What adds an input or is geared to one, and how often.
 INPUTS = {'crank': 3, 'cylinder': 1, 'carriage': 1}
@@ -131,7 +131,7 @@ class _Writer:
 
     @property
     def _fixed(self):
-        return [name for name, kind in self._kind.items() if kind == 'ground']
+        return [name for name, kind in self._kind.items() if kind in ('ground', 'image')]
 
     @property
     def _pins(self):
@@ -140,7 +140,7 @@ class _Writer:
 
     @property
     def _moving(self):
-        return [name for name, kind in self._kind.items() if kind != 'ground']
+        return [name for name, kind in self._kind.items() if kind not in ('ground', 'image')]
 
     def _number(self, value, positive=True):
         """Return a text for a number in units of the size; positive unless it may be negative."""
@@ -353,6 +353,30 @@ class _Writer:
         self._lines.append(f'{name} carriage {origin} along {towards} {" ".join(ends)}{gear}')
         self._put(name, self._place[origin] + along / abs(along) * value, 'carriage')
         self._slide(name, along)
+
+    def _yoke(self):
+        origin, towards = self._guide()
+        pin = self._pick(self._moving)
+        if not origin or pin in (origin, towards):
+            return
+        along = self._place[towards] - self._place[origin]
+        seen = (self._place[pin] - self._place[origin]) / along
+        name = self._name()
+        self._lines.append(f'{name} yoke {pin} {origin} along {towards}')
+        self._put(name, self._place[origin] + along * seen.real, 'yoke')
+        self._slide(name, along)
+
+    def _image(self):
+        if len(self._fixed) < 3:
+            return
+        point, *line = map(str, self._rng.choice(self._fixed, 3, replace=False))
+        p, q = (self._place[end] for end in line)
+        place = p + (q - p) * ((self._place[point] - p) / (q - p)).conjugate()
+        if self._distance(*line) > 1e-3 and min(
+                abs(place - other) for other in self._place.values()) > 1e-3:
+            name = self._name()
+            self._lines.append(f'{name} image {point} {" ".join(line)}')
+            self._put(name, place, 'image')
 
     def _slide(self, joint, along):
         """Note the direction in which a joint slides, the first one that it has."""
