@@ -58,7 +58,6 @@ from rcl_interfaces.msg import (  # noqa: E402
     ParameterValue,
 )
 import rclpy  # noqa: E402
-from rclpy.logging import get_logger  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from ros_harness import Graph, Process  # noqa: E402
@@ -1156,8 +1155,13 @@ def unpacked(text):
         for marker in message.markers)
 
 
+def feed_of_a_leg():
+    """Return the feed of a leg's markers, which logs nothing."""
+    return Feed('/leg/markers', '/leg', MarkerArray, int, lambda text, subject: None)
+
+
 def test_what_is_read_without_unpacking_is_what_unpacking_gives():
-    topic = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    topic = feed_of_a_leg()
     looks = []
     for text in (walker(1), walker(2), walker(3), walker(4, legs=1), walker(5),
                  walker(6, width=2.0), walker(7, frame='earth'), walker(8), FILLED, FILLED):
@@ -1172,7 +1176,7 @@ def test_from_its_second_message_on_a_topic_is_not_unpacked_whatever_else_is_in_
     looked = []
     monkeypatch.setattr(feed, 'deserialized', lambda *args: (
         looked.append(args) or message_layout.deserialized(*args)))
-    topic = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    topic = feed_of_a_leg()
     for step in range(5):
         message = deserialize_message(walker(step), MarkerArray)
         message.markers.insert(1, Marker(
@@ -1185,7 +1189,7 @@ def test_from_its_second_message_on_a_topic_is_not_unpacked_whatever_else_is_in_
 
 
 def test_markers_that_are_gone_are_drawn_no_more():
-    topic = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    topic = feed_of_a_leg()
     topic.newest = walker(1)
     assert set(topic.drawn()[0]) == {0, 1}
     one = deserialize_message(walker(2), MarkerArray)
@@ -1226,7 +1230,7 @@ def swapped(message):
 
 
 def test_markers_in_the_other_byte_order_are_drawn_alike():
-    topic = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    topic = feed_of_a_leg()
     for step in (1, 2, 3):
         text = walker(step)
         topic.newest = swapped(deserialize_message(text, MarkerArray))
@@ -1261,7 +1265,7 @@ def hostile(rng, text):
 
 def test_of_what_cannot_be_drawn_nothing_stays():
     rng = np.random.default_rng(5)
-    topic = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    topic = feed_of_a_leg()
     for step, text in enumerate(hostile(rng, walker(0))):
         for topic.newest in (text, walker(step)):
             looks, records = topic.drawn()
@@ -1278,7 +1282,7 @@ def test_of_what_cannot_be_drawn_nothing_stays():
 
 
 def test_markers_with_ever_new_ids_are_not_gathered():
-    topic = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    topic = feed_of_a_leg()
     for step in range(50):
         message = deserialize_message(walker(step), MarkerArray)
         for marker in message.markers:
