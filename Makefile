@@ -98,7 +98,7 @@ nodes: build $(venv)/.tools ## Run the tests of the nodes alone; with PLAIN=1 wh
 
 # Hours; what is left without those that are marked exhaustive takes minutes.
 .PHONY: long
-long: build $(venv)/.tools ## Run the long tests; WHICH='long and not exhaustive': in minutes
+long: build $(venv)/.tools ## Run the long tests; WHICH='long and not exhaustive' or WHICH=slow: in minutes
 	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 --dist worksteal -m '$(or $(WHICH),long)'
 
 .PHONY: lint

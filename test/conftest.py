@@ -22,7 +22,7 @@ os.environ['ROS_DOMAIN_ID'] = str(_domain.id)
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Leave what is beyond the sample of a sweep to the long tests."""
+    """Leave what is beyond the sample of a sweep to the slow tests, which are long."""
     sweeps = defaultdict(list)
     for item in items:
         if item.get_closest_marker('sample') and not item.get_closest_marker('long'):
@@ -32,7 +32,10 @@ def pytest_collection_modifyitems(items):
         chosen = {round(k * (len(cases) - 1) / max(count - 1, 1)) for k in range(count)}
         for i, case in enumerate(cases):
             if i not in chosen:
-                case.add_marker(pytest.mark.long)
+                case.add_marker(pytest.mark.slow)
+    for item in items:
+        if item.get_closest_marker('slow'):
+            item.add_marker(pytest.mark.long)
 
 
 def pytest_collection_finish():

@@ -82,6 +82,7 @@ def test_mujoco_sees_the_loops_of_a_model_closed(imported, file):
         assert error(file, joints) < 1e-14
 
 
+@pytest.mark.slow
 def test_mujoco_sees_both_fingers_of_a_gripper_closed(imported):
     fingers = imported('gripper.xml').values()
     assert [finger.frame_id for finger in fingers] == ['palm', 'palm']
@@ -142,6 +143,7 @@ def test_the_joints_of_a_urdf_close_its_loops(imported, file, library):
             assert places[first] == pytest.approx(places[second], abs=2e-15)
 
 
+@pytest.mark.slow
 def test_an_input_swings_within_the_limits_of_its_joint_and_its_reach(imported, tmp_path):
     # The cylinder is as long as its pins are apart, plus its joint's position.
     file, limit = 'boom.urdf', 'lower="-0.3" upper="0.3"'
@@ -209,6 +211,7 @@ def test_a_motor_at_the_knee_drives_as_well(imported, tmp_path):
         assert places['front_foot'] == pytest.approx(places['back_foot'], abs=2e-15)
 
 
+@pytest.mark.slow
 def test_a_rack_drives_a_finger_and_a_motor_on_that_its_tip(imported):
     rack, tip = imported('rack.sdf').values()
     assert [rack.frame_id, tip.frame_id] == ['palm', 'finger']
@@ -369,6 +372,7 @@ def test_rods_that_hold_each_other_are_named(capsys, tmp_path):
             in refused(capsys, file))
 
 
+@pytest.mark.slow
 def test_a_finger_with_a_spring_is_not_driven(capsys, tmp_path):
     pytest.importorskip('mujoco')
     spring = written(tmp_path, 'gripper.xml', (
@@ -433,6 +437,7 @@ def test_a_pose_at_the_end_of_its_loops_is_no_side(capsys, tmp_path):
             in refused(capsys, file, '--driven', 'motor'))
 
 
+@pytest.mark.slow
 def test_a_joint_that_follows_another_is_geared_to_it(imported, tmp_path):
     axis, loops = '<axis xyz="0 -1 0"/>', tmp_path / 'loops.yaml'
     file = written(tmp_path, 'five_bar.urdf', (
@@ -447,6 +452,7 @@ def test_a_joint_that_follows_another_is_geared_to_it(imported, tmp_path):
         assert places['front_foot'] == pytest.approx(places['back_foot'], abs=2e-15)
 
 
+@pytest.mark.slow
 def test_joints_that_an_equality_ties_together_are_geared(imported, tmp_path):
     pytest.importorskip('mujoco')
     both = written(tmp_path, 'gripper.xml', (
@@ -481,6 +487,7 @@ HALVES = """<mujoco><worldbody><body name="palm" euler="20 30 40">
   <actuator><position joint="motor"/></actuator></mujoco>"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('weld', ['relpose="0.32 0 0 0.8 0 0.6 0"',
                                   'relpose="0.2 0 0 1 0 0 0" anchor="-0.12 0 0.01"'])
 def test_halves_that_are_welded_apart_are_one_rod(imported, tmp_path, weld):
@@ -605,6 +612,7 @@ def test_where_both_sides_fit_a_pose_has_to_choose(imported, capsys, tmp_path):
     assert found[0] == pytest.approx(-found[1]) and found[1] > 0.1
 
 
+@pytest.mark.slow
 def test_a_joint_that_is_held_moves_nothing(imported, tmp_path):
     pytest.importorskip('mujoco')
     spring = written(tmp_path, 'gripper.xml', (
@@ -646,6 +654,7 @@ def test_a_motor_between_two_moving_links_is_measured(imported, tmp_path):
         assert found == pytest.approx({'motor': -angle, 'shoulder': angle}, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_loop_of_too_many_links_is_refused_at_once(capsys, tmp_path):
     file, count = tmp_path / 'chain.urdf', 3000
     links = ''.join(f'<link name="l{i}"/>' for i in range(count + 1))

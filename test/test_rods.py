@@ -139,6 +139,7 @@ def test_two_rods_find_every_pose_inside_the_limits(seed, count, poses):
 
 
 # Numbers of no robot: axes that lean from all others, far from the points that turn about them.
+@pytest.mark.slow
 @pytest.mark.parametrize('parts', [
     ([-0.92, -0.12, 0.56], [0.16, 0.5, 0.5], [0.72, -1.36, 1.26], [1.84, 2.15, 1.2],
      [[-1.45, -0.16, 0.21], [0.32, 0.85, -1.76]], [[-0.77, 1.42, -0.42], [-0.68, 0.64, 0.69]],
@@ -171,6 +172,7 @@ def check_assemblies(ankle, window, rng, count):
     return there.sum()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('seed, count, poses', few_and_many([(3, 2, 500)], [
     (2000 + seed, 5, 10000) for seed in range(20)]))
 def test_no_pose_is_of_another_assembly(seed, count, poses):
@@ -201,6 +203,7 @@ def test_limits_with_a_second_or_a_singular_pose_are_refused(seed, count):
     assert check_windows(seed, count) > 0.3 * count
 
 
+@pytest.mark.slow
 def test_of_limits_that_are_too_wide_the_largest_that_can_be_are_named():
     wide = [line.replace('-50deg 30deg', '-110deg 90deg') for line in G1]
     with pytest.raises(ValueError, match='there may be a second pose in these limits; the largest '

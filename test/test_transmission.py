@@ -240,6 +240,7 @@ def test_the_joints_are_chosen_by_their_names(machines, tmp_path):
         np.testing.assert_allclose(position, expected(leg, inputs)[0], atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('seeds', [
     range(3), pytest.param(range(3, 12), marks=pytest.mark.long),
     pytest.param(range(12, 100), marks=EXHAUSTIVE)])
@@ -362,6 +363,7 @@ def refusals(tmp_path_factory):
     return folder / 'configure'
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('words, said', [
     (['parameter', 'a', '90'], ''),
     (['parameter', 'a', 'wide'], "must be a number [m], not 'wide'"),
@@ -392,6 +394,7 @@ def test_other_dimensions_are_those_of_another_linkage(refusals):
         assert back == pytest.approx(angle, abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
 def test_any_dimensions_are_those_of_python(tmp_path):
     given = {'mechanisms': [*mechanisms.TYPES, 'odd'],

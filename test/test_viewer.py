@@ -407,6 +407,7 @@ def test_a_dragged_lever_is_where_it_was_dragged_to_and_stays_there(show):
     assert running.values('lever.crank.start') == [servo]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('lengths, sign', [
     ((80.0, 150.0, 0.0), 1.0), ((80.0, 150.0, 25.0), -1.0), ((1.0, 150.0, 0.0), 1.0)])
 def test_a_lever_that_is_dragged_beyond_its_reach_goes_to_its_end(show, lengths, sign):
@@ -558,6 +559,7 @@ def test_velocity_and_acceleration_are_the_slopes_of_the_curves(name, output):
         np.testing.assert_allclose(ratio[known], effort[known], rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_node_that_is_silent_at_first_is_waited_for_and_not_guessed(show, monkeypatch):
     asked, answered = settings.RemoteNode.parameters, asyncio.Event()
 
@@ -689,6 +691,7 @@ def test_arithmetic_is_read_by_the_library(lever, text, answer):
         assert {**said, **answer} == said and said['reason'] == ''
 
 
+@pytest.mark.slow
 def test_nobody_is_listened_to_while_nobody_looks(show, monkeypatch):
     monkeypatch.setattr(scene_view, 'SECONDS_TO_LINGER', 0.2)
     running = show(LEG)
@@ -1263,6 +1266,7 @@ def hostile(rng, text):
         yield from (spoilt(part, number) for part in range(4))
 
 
+@pytest.mark.slow
 def test_of_what_cannot_be_drawn_nothing_stays():
     rng = np.random.default_rng(5)
     topic = feed_of_a_leg()
@@ -2054,6 +2058,7 @@ def test_mechanisms_of_one_name_in_two_namespaces_are_told_apart(graph, show, lo
     looked_at(running, doing)
 
 
+@pytest.mark.slow
 @needs_browser
 def test_a_foreign_page_is_not_let_in(address, tmp_path):
     async def look():
