@@ -6,10 +6,10 @@ What closed inverses of the catalogue cost: CPU time beside that of a pose.
 
     python -m benchmark.inverse [--document]
 
-All answers to one question in plain Python, beside `function()` for all points; arrays of 100000
-questions by machine code, beside as many poses, of some (needs llvmlite); and the first question, from the
-joint lines on, in a process of its own. `python -m benchmark.c_code` has the inverses in C. With
---document the table goes into docs/performance.md.
+All answers to one question in plain Python, beside `function()` for all points; arrays of
+100000 questions by machine code, beside as many poses, of some (needs llvmlite); and the first
+question, from the joint lines on, in a process of its own. `python -m benchmark.c_code` has the
+inverses in C. With --document the table goes into docs/performance.md.
 """
 
 import argparse

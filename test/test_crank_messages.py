@@ -88,6 +88,7 @@ def test_bytes_that_are_no_joint_states_are_passed_over_with_one_warning(graph, 
     assert len(hand.warnings('no joint states')) == 1
 
 
+@pytest.mark.slow
 def test_whatever_bytes_come_the_node_goes_on_and_publishes_finite_numbers(graph):
     hand = Hand(graph)
     random = np.random.default_rng(5)

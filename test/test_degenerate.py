@@ -360,6 +360,7 @@ def test_a_block_on_a_short_bar_of_a_kite_keeps_the_digits_of_its_slide():
     assert not any(row.problem for row in rows) and max(slides) < 4.0
 
 
+@pytest.mark.slow
 def test_the_reach_of_what_hangs_on_rounding_is_found_in_so_many_calls():
     # F is where A is: the mirror line F-A has a direction of rounding, and so has all behind it.
     lines = ('A ground -0.552 0', 'B ground 0 -0.4465', 'C ground 0 0',

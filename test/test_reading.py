@@ -285,6 +285,7 @@ SEEDS = {
 }
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('seed', SEEDS)
 def test_mutated_messages_read_as_they_do_when_they_are_deserialised(reader, seed):
     random = np.random.default_rng(len(seed))

@@ -98,6 +98,7 @@ def test_an_ankle_on_a_cross_is_imported(tmp_path, capsys, seed):
     assert np.abs(np.array(rods.gaps(ankle, motors, *found))[:, there]).max() < 1e-15
 
 
+@pytest.mark.slow
 def test_without_limits_the_largest_are_taken_and_said(tmp_path, capsys):
     machine, said = imported(tmp_path, turning(4), None, capsys)
     assert 'these are the largest shown to have one at most: pitch from -' in said

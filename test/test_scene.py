@@ -51,6 +51,7 @@ def test_without_parameters_the_scene_is_the_catalogue():
     assert scene.read({}).rate == 50.0
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('file', sorted(glob(os.path.join(CONFIG, '*.yaml'))))
 def test_a_scene_is_written_as_the_few_values_that_tell_it(file, tmp_path):
     before = scene.load(file)
@@ -363,6 +364,7 @@ def lengths(given):
                   if '.dimensions.' in p.name]
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize('given', [*TYPES.values(), SMALL, SIGNED, SWEPT, {'jansen.scale': 5e-324},
                                    {'jansen.scale': 1e308}],
                          ids=[*TYPES, 'small', 'signed', 'swept', 'least', 'most'])
