@@ -573,6 +573,27 @@ def test_a_loop_is_closed_in_every_way_in_which_tools_write_it(imported, tmp_pat
         assert joints['elbow'] == pytest.approx(-angle, abs=1e-14)
 
 
+BALLS = '{pin_loops: [], ball_loops: [{parent: coupler, child: rocker, parent_xyz: [0.3, 0, 0], ' \
+    'child_xyz: [0, 0, 0.2]}], ball_upgrades: [elbow], actuated_joints: [motor]}'
+PAIRS = '{closed_loop: [[wrist_a, wrist_b]], type: [3d], name_mot: [motor], ' \
+    'joint_name: [elbow], joint_type: [%s]}'
+
+
+@pytest.mark.parametrize('text', [BALLS, PAIRS % 'SPHERICAL', PAIRS % 'UJOINT_YX'])
+def test_joints_of_the_tree_are_what_a_file_of_loops_makes_them(imported, capsys, tmp_path, text):
+    file, loops = tmp_path / 'four_bar.urdf', tmp_path / 'loops.yaml'
+    # A transmission is of the open tree.
+    file.write_text(CUT.sub('<transmission name="t"><joint name="shoulder"/></transmission>',
+                            (ROBOTS / 'four_bar.urdf').read_text()))
+    loops.write_text(text)
+    machine, = imported(file, '--loops', loops).values()
+    for angle in (-1.1, 0.0, 0.7):
+        assert published(machine, motor=angle) == pytest.approx(
+            {'motor': angle, 'shoulder': -angle}, abs=1e-14)
+    loops.write_text(text.replace('elbow', 'elbwo'))
+    assert "there is no joint 'elbwo'" in refused(capsys, file, '--loops', loops)
+
+
 def test_xacro_has_to_be_run_first(capsys, tmp_path):
     file = tmp_path / 'robot.xacro'
     file.write_text('<robot name="r"><xacro:property name="a" value="1"/></robot>')
