@@ -59,20 +59,21 @@ class Poses(NamedTuple):
         return Poses(self.positions[which], self.moved[which])
 
 
+def top(home: Dict[str, str], body: str) -> str:
+    """Return the body that stands for all that are joined with one."""
+    while home[body] != body:
+        home[body] = body = home[home[body]]
+    return body
+
+
 def trees(robot: Robot) -> Tuple[Dict[str, Tuple[str, Joint]], List[Joint]]:
     """Return on which body, by which joint, each body hangs, and the joints that close loops."""
     home = {body: body for body in robot.frames}
-
-    def top(body: str) -> str:
-        while home[body] != body:
-            home[body] = body = home[home[body]]
-        return body
-
     near: Dict[str, List[Tuple[str, Joint]]] = {body: [] for body in robot.frames}
     cuts = []
     for joint in sorted(robot.joints, key=lambda joint: (
             joint.is_cut, joint.name not in robot.driven, _TREE.get(joint.kind, 1))):
-        ends = [top(body) for body in joint.bodies]
+        ends = [top(home, body) for body in joint.bodies]
         if joint.is_cut or ends[0] == ends[1]:
             cuts.append(joint)
             continue
