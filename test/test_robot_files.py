@@ -15,6 +15,7 @@ import re
 
 from linkage_ros import mechanisms, scene
 from linkage_ros.robot_files import closing, command, model, readers
+from linkage_ros.robot_files.spatial import trees
 import numpy as np
 import pytest
 from robots import LIBRARIES
@@ -594,6 +595,27 @@ def test_a_loop_is_closed_in_every_way_in_which_tools_write_it(imported, tmp_pat
         assert joints['elbow'] == pytest.approx(-angle, abs=1e-14)
 
 
+BALLS = '{pin_loops: [], ball_loops: [{parent: coupler, child: rocker, parent_xyz: [0.3, 0, 0], ' \
+    'child_xyz: [0, 0, 0.2]}], ball_upgrades: [elbow], actuated_joints: [motor]}'
+PAIRS = '{closed_loop: [[wrist_a, wrist_b]], type: [3d], name_mot: [motor], ' \
+    'joint_name: [elbow], joint_type: [%s]}'
+
+
+@pytest.mark.parametrize('text', [BALLS, PAIRS % 'SPHERICAL', PAIRS % 'UJOINT_YX'])
+def test_joints_of_the_tree_are_what_a_file_of_loops_makes_them(imported, capsys, tmp_path, text):
+    file, loops = tmp_path / 'four_bar.urdf', tmp_path / 'loops.yaml'
+    # A transmission is of the open tree.
+    file.write_text(CUT.sub('<transmission name="t"><joint name="shoulder"/></transmission>',
+                            (ROBOTS / 'four_bar.urdf').read_text()))
+    loops.write_text(text)
+    machine, = imported(file, '--loops', loops).values()
+    for angle in (-1.1, 0.0, 0.7):
+        assert published(machine, motor=angle) == pytest.approx(
+            {'motor': angle, 'shoulder': -angle}, abs=1e-14)
+    loops.write_text(text.replace('elbow', 'elbwo'))
+    assert "there is no joint 'elbwo'" in refused(capsys, file, '--loops', loops)
+
+
 def test_xacro_has_to_be_run_first(capsys, tmp_path):
     file = tmp_path / 'robot.xacro'
     file.write_text('<robot name="r"><xacro:property name="a" value="1"/></robot>')
@@ -860,6 +882,77 @@ def check_random_robots(seeds):
         except command.command.RequestError as error:
             assert re.search('closes a loop|not of dyads|it cannot move', str(error))
     assert moved > len(seeds) // 2
+
+
+def words(place):
+    return ' '.join(repr(float(number)) for number in place)
+
+
+def fixed(link, name, place):
+    return (f'<link name="{name}"/><joint name="{name}_fixed" type="fixed"><parent link="{link}"/>'
+            f'<child link="{name}"/><origin xyz="{words(place)}"/></joint>')
+
+
+# What closes a hinge about z, in any dialect: of its name, its links and its place on both.
+CLOSINGS = [
+    lambda name, one, other, at, to: (
+        f'<constraint name="{name}" type="revolute"><parent link="{one}"/><parent_origin '
+        f'xyz="{words(at)}"/><parent_axis xyz="0 0 1"/><child link="{other}"/><child_origin '
+        f'xyz="{words(to)}"/><child_axis xyz="0 0 1"/></constraint>'),
+    lambda name, one, other, at, to: (
+        f'<loop_joint name="{name}" type="continuous"><link1 link="{one}" xyz="{words(at)}" '
+        f'rpy="0 0 1"/><link2 link="{other}" xyz="{words(to)}" rpy="0 0 2"/><axis xyz="0 0 1"/>'
+        '</loop_joint>'),
+    lambda name, one, other, at, to: (
+        f'<loop name="{name}" type="revolute"><predecessor link="{one}"><origin '
+        f'xyz="{words(at)}"/></predecessor><successor link="{other}"><origin xyz="{words(to)}"/>'
+        '</successor><axis xyz="0 0 1"/></loop>'),
+    lambda name, one, other, at, to: (
+        f'<gazebo><joint name="{name}" type="revolute"><parent>{one}</parent><child>{other}'
+        f'</child><pose>{words(to)} 0 0 0</pose><axis><xyz>0 0 1</xyz></axis></joint></gazebo>'),
+    lambda name, one, other, at, to: (
+        f'<ball_constraint><ball_constraint_body_A name="{one}"/><ball_constraint_p_AP '
+        f'value="{words(at)}"/><ball_constraint_body_B name="{other}"/><ball_constraint_p_BQ '
+        f'value="{words(to)}"/></ball_constraint>'),
+    lambda name, one, other, at, to: (
+        fixed(one, f'closing_{name}_1', at) + fixed(other, f'closing_{name}_2', to))]
+
+
+def as_urdf(robot, rng):
+    """Return a robot of cuts as URDF, each loop closed in a dialect of its own."""
+    for joint in robot.joints:
+        joint.is_cut = joint.name.startswith('cut_')
+    text = model.urdf(robot)
+    closings = ''.join(CLOSINGS[rng.integers(len(CLOSINGS))](
+        f'c{i}', *cut.bodies, *cut.places) for i, cut in enumerate(trees(robot)[1]))
+    return text.replace('</robot>', f'{closings}</robot>')
+
+
+def check_dialects(folder, seeds):
+    moved = 0
+    for seed in seeds:
+        if not (made := random_robot(seed)):
+            continue
+        linkage, values, robot, steps = made
+        file = folder / f'{seed}.urdf'
+        file.write_text(as_urdf(robot, np.random.default_rng(seed)))
+        again = readers.read(str(file))
+        again.driven, again.follows = robot.driven, robot.follows
+        try:
+            moved += check_comes_back(linkage, values, again, steps if len(steps[0]) > 1
+                                      else steps.ravel())[1] > 0
+        except command.command.RequestError as error:
+            assert re.search('closes a loop|not of dyads|it cannot move', str(error)), seed
+    assert moved > len(seeds) // 2
+
+
+def test_random_linkages_come_back_in_any_dialect(tmp_path):
+    check_dialects(tmp_path, range(6))
+
+
+@pytest.mark.long
+def test_more_random_linkages_come_back_in_any_dialect(tmp_path):
+    check_dialects(tmp_path, range(6, 40))
 
 
 # Slots and cylinders on one pair of joints; gears of gears; crossed bars on a block.

@@ -14,7 +14,7 @@ from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
 import numpy as np
 
 from . import check, closing, loops, model, readers, rods
-from .dyads import Drawing, Drive, short
+from .dyads import Drawing, short, Source
 from .robot import FARTHEST, Joint, plain, Robot
 from .. import command, mechanisms, scene
 from ..linkage.mechanism import Mechanism
@@ -203,11 +203,11 @@ def _why(drawing: Drawing) -> str:
         if free == 0 else f'held more than once by {names}')
 
 
-def _checked(robot: Robot, drawing: Drawing, taken: Sequence[str]
+def _checked(robot: Robot, drawing: Drawing, others: Sequence[str]
              ) -> Tuple[str, Dict[str, Any], List[str]]:
     """Return a mechanism's name and parameters, and what is to be said, once it has its pose."""
     name = plain(drawing.moved_by[0].name, 60)
-    name = f'{name}_{len(taken)}' if name in taken else name
+    name = f'{name}_{len(others)}' if name in others else name
     loop, given = drawing.loop, {
         f'{name}.{key}': value for key, value in _parameters(drawing)}
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
@@ -229,16 +229,16 @@ def _checked(robot: Robot, drawing: Drawing, taken: Sequence[str]
     said.append(found.said(name))
     said += [f'{joint} has its ends {gap:.2g} m apart along its axis, on which no angle depends.'
              for joint, gap in loop.across.items()]
-    told = {called.name for called in machine.joints.values() if called.published}
-    told |= {joint.name for joint in drawing.moved_by}
+    published = {called.name for called in machine.joints.values() if called.published}
+    published |= {joint.name for joint in drawing.moved_by}
     own = {one.name for joint in loop.joints if drawing.parts.keys() >= {*joint.bodies}
            for one in joint.hinges}
-    if lost := [joint for joint in robot.positions if joint in own - told]:
+    if lost := [joint for joint in robot.positions if joint in own - published]:
         said.append(f'Not published: {", ".join(lost)}, which no angle in the plane tells.')
     return name, given, said
 
 
-def _sweep(drive: Drive, read: scene.InputSettings) -> Optional[Tuple[float, float]]:
+def _sweep(drive: Source, read: scene.InputSettings) -> Optional[Tuple[float, float]]:
     """Return between which ends the limits of its joint let an input move, in its reach."""
     if drive.ends is None:
         return None

@@ -14,7 +14,7 @@ from .robot import Joint, Robot, SLIDE
 from ..linkage.dyads import bar_name, Dyads, Hinge, Motor, Pin, short, Slide
 
 
-class Drive(NamedTuple):
+class Source(NamedTuple):
     """An input, ratio * position + offset of its source; its ends, if its joint has limits."""
 
     name: str
@@ -31,7 +31,7 @@ class Drawing(Dyads):
 
     Attributes
     ----------
-    drives : list of Drive
+    drives : list of Source
     driven : list of Joint
         The joints that drive the lines.
     measured : Joint, optional
@@ -41,7 +41,7 @@ class Drawing(Dyads):
 
     def __init__(self, robot: Robot, loop: Loop, drives: Sequence[str]):
         self.loop, self._robot = loop, robot
-        self.drives: List[Drive] = []
+        self.drives: List[Source] = []
         self.measured: Optional[Joint] = None
         self.driven = [joint for joint in loop.joints if joint.name in drives]
         pins: List[Dict[str, complex]] = []
@@ -118,7 +118,7 @@ class Drawing(Dyads):
                 said = self.said(offset) if word != 'crank' else short(
                     math.remainder(offset, math.tau))
                 return number, f' geared {other.name} {gear!r} {said}'
-        self.drives.append(Drive(word + number, source, ratio, offset, ratio * (
+        self.drives.append(Source(word + number, source, ratio, offset, ratio * (
             self._robot.positions.get(source) or 0.0) + offset, ends))
         return number, ''
 

@@ -11,7 +11,7 @@ from typing import Collection, Dict, List, Mapping, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from .robot import BALL, FIXED, HINGE, Joint, Robot, SLIDE
-from .spatial import blocks, trees
+from .spatial import blocks, top, trees
 
 # What joints of a planar loop may be.
 FLAT = (HINGE, SLIDE, BALL)
@@ -116,17 +116,11 @@ def _blocks(robot: Robot, home: Mapping[str, str], joints: Sequence[Joint]) -> L
 def _merged(robot: Robot, home: Mapping[str, str], rigid: Sequence[Joint]) -> Dict[str, str]:
     """Return the body that each has become one with; the root keeps its name."""
     home = dict(home)
-
-    def top(body: str) -> str:
-        while home[body] != body:
-            home[body] = body = home[home[body]]
-        return body
-
     for joint in rigid:
-        first, second = sorted((top(body) for body in joint.bodies), key=top(
-            robot.root).__ne__)
+        first, second = sorted((top(home, body) for body in joint.bodies), key=top(
+            home, robot.root).__ne__)
         home[second] = first
-    return {body: top(body) for body in home}
+    return {body: top(home, body) for body in home}
 
 
 def _on(home: Mapping[str, str], joints: Sequence[Joint]) -> List[Joint]:

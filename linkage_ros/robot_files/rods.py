@@ -115,7 +115,7 @@ class Rods:
         """Return the other end of a ball of a rod: its link and place."""
         other = joint.bodies[joint.bodies[0] == body]
         if other not in self._bodies:
-            raise ValueError(f'{joint.name} holds {body} to {other}, which is a rod, too')
+            raise ValueError(f'{joint.name} holds {body} to {other}, which hangs on rods alone')
         return f'{self._bodies[other]} {self._text(joint.places[joint.bodies[1] == other])}'
 
     def _rod(self, body: str, held: Tuple[Joint, ...]) -> None:
@@ -185,7 +185,7 @@ def _on_bodies(joints: Sequence[Joint]) -> Dict[str, List[Joint]]:
             for joint in joints for body in joint.bodies}
 
 
-def described(robot: Robot, group: Group, taken: Sequence[str]
+def described(robot: Robot, group: Group, others: Sequence[str]
               ) -> Tuple[str, Dict[str, Any], List[str]]:
     """
     Return a mechanism's name, its parameters, and what is to be said of it.
@@ -197,7 +197,7 @@ def described(robot: Robot, group: Group, taken: Sequence[str]
         raise ValueError('not driven: its motors must be named by --driven')
     lines, said = _lines(found)
     name = f'{next(iter(found.inputs))}_rods'
-    name = f'{name}_{len(taken)}' if name in taken else name
+    name = f'{name}_{len(others)}' if name in others else name
     given = {f'{name}.{key}': value for key, value in found.parameters(lines)}
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     ends = _ranges(machine, found)

@@ -59,20 +59,21 @@ class Poses(NamedTuple):
         return Poses(self.positions[which], self.moved[which])
 
 
+def top(home: Dict[str, str], body: str) -> str:
+    """Return the body that stands for all that are joined with one."""
+    while home[body] != body:
+        home[body] = body = home[home[body]]
+    return body
+
+
 def trees(robot: Robot) -> Tuple[Dict[str, Tuple[str, Joint]], List[Joint]]:
     """Return on which body, by which joint, each body hangs, and the joints that close loops."""
     home = {body: body for body in robot.frames}
-
-    def top(body: str) -> str:
-        while home[body] != body:
-            home[body] = body = home[home[body]]
-        return body
-
     near: Dict[str, List[Tuple[str, Joint]]] = {body: [] for body in robot.frames}
     cuts = []
     for joint in sorted(robot.joints, key=lambda joint: (
             joint.is_cut, joint.name not in robot.driven, _TREE.get(joint.kind, 1))):
-        ends = [top(body) for body in joint.bodies]
+        ends = [top(home, body) for body in joint.bodies]
         if joint.is_cut or ends[0] == ends[1]:
             cuts.append(joint)
             continue
@@ -176,9 +177,6 @@ class Component:
         self._ways = np.where(self._is_ball[self._column, None], np.eye(3)[
             (np.arange(len(self._column)) - self._first[self._column]) % 3],
             self._axis[self._column])
-        x, y, z = self._axis.T
-        zero = np.zeros_like(x)
-        self._skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
         self.unit = np.where(self._slides[self._column], self.size, 1.0)
         self._cut_ends = [[self._end(found, body) for body in cut.bodies] for cut in self._cuts]
         self._equations()
@@ -298,21 +296,13 @@ class Component:
 
     def stepped(self, poses: Poses, step: np.ndarray) -> Poses:
         """Return poses with a step of the columns [rad or m] more."""
-        positions, moved = poses.positions.copy(), poses.moved.copy()
-        one = self._first[~self._is_ball]
-        positions[:, ~self._is_ball] += step[:, one]
+        positions, balls = poses.positions.copy(), self._is_ball
+        positions[:, ~balls] += step[:, self._first[~balls]]
         angle = np.where(self._slides, 0.0, positions)
-        turn = np.eye(3) + np.sin(angle)[..., None, None] * self._skew \
-            + (1.0 - np.cos(angle))[..., None, None] * (self._skew @ self._skew)
-        made = np.zeros_like(moved)
-        made[..., 3, 3] = 1.0
-        made[..., :3, :3] = turn
-        made[..., :3, 3] = self._place - np.einsum('peij,ej->pei', turn, self._place) \
-            + (positions - angle)[..., None] * self._axis
-        moved[:, ~self._is_ball] = made[:, ~self._is_ball]
-        for i in np.flatnonzero(self._is_ball):
-            own = step[:, self._first[i]:self._first[i] + 3]
-            moved[:, i] = turned(own, self._place[i]) @ moved[:, i]
+        moved = turned(angle[..., None] * self._axis, self._place)
+        moved[..., :3, 3] += (positions - angle)[..., None] * self._axis
+        own = step[:, self._first[balls, None] + np.arange(3)]
+        moved[:, balls] = turned(own, self._place[balls]) @ poses.moved[:, balls]
         return Poses(positions, moved)
 
     def _twists(self, frames: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
@@ -462,12 +452,14 @@ def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def turned(turn: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Return displacements that turn by vectors (poses, 3) about a place."""
-    angle = np.linalg.norm(turn, axis=1)
-    x, y, z = (turn / np.where(angle, angle, 1.0)[:, None]).T
-    zero, sin, cos = np.zeros_like(x), np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
-    skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
-    made = np.tile(np.eye(4), (len(turn), 1, 1))
-    made[:, :3, :3] += sin * skew + (1.0 - cos) * skew @ skew
-    made[:, :3, 3] = place - made[:, :3, :3] @ place
+    """Return displacements that turn by vectors (..., 3) about places."""
+    angle = np.linalg.norm(turn, axis=-1)
+    x, y, z = np.moveaxis(turn / np.where(angle, angle, 1.0)[..., None], -1, 0)
+    zero, (sin, cos) = np.zeros_like(x), (
+        function(angle)[..., None, None] for function in (np.sin, np.cos))
+    skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
+    made = np.zeros((*x.shape, 4, 4))
+    made[..., :3, :3] = np.eye(3) + sin * skew + (1.0 - cos) * skew @ skew
+    made[..., :3, 3] = place - np.einsum('...ij,...j->...i', made[..., :3, :3], place)
+    made[..., 3, 3] = 1.0
     return made

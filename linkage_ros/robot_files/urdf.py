@@ -192,25 +192,26 @@ class Reader:
                 axis = _vector(cut.get('axis', (0, 0, 1)))
                 self._close(str(cut.get('name', f'{key}[{i}]')), kind,
                             (cut['parent'], cut['child']), own, axis)
-        for name, kind in zip(loops.get('joint_name', ()), loops.get('joint_type', ())):
+        changes = [*zip(loops.get('joint_name', ()), loops.get('joint_type', ())),
+                   *((name, 'SPHERICAL') for name in loops.get('ball_upgrades', ()))]
+        for name, kind in changes:
             self._change(name, str(kind).upper())
         # What it says of motors is of the closed robot, transmissions are of the open tree.
-        self.robot.driven = [*loops.get('independent', ()), *loops.get('name_mot', ())] \
-            or self.robot.driven
+        self.robot.driven = [name for key in ('independent', 'name_mot', 'actuated_joints')
+                             for name in loops.get(key, ())] or self.robot.driven
 
     def _change(self, name: str, kind: str) -> None:
         """Make a joint of the tree one of another type, about axes of its frame."""
-        for joint in self.robot.joints:
-            if joint.name == name:
-                joint.position, joint.limits = None, None
-                if kind.startswith('UJOINT'):
-                    self.robot.joints.remove(joint)
-                    first, second = ('XYZ'.index(x) for x in kind[-2:])
-                    self.robot.join(name, UNIVERSAL, joint.bodies, at(
-                        joint.places[0], joint.turns[0]), np.eye(3)[first],
-                        second=joint.turns[0][:, second])
-                    return
-                joint.kind = {'SPHERICAL': BALL, 'FIXED': FIXED}.get(kind, kind)
+        joint = next((joint for joint in self.robot.joints if joint.name == name), None)
+        if joint is None:
+            raise RequestError(f'there is no joint {name!r} to be made {kind}')
+        joint.position, joint.limits = None, None
+        joint.kind = {'SPHERICAL': BALL, 'FIXED': FIXED}.get(kind, kind)
+        if kind.startswith('UJOINT'):
+            self.robot.joints.remove(joint)
+            first, second = ('XYZ'.index(x) for x in kind[-2:])
+            self.robot.join(name, UNIVERSAL, joint.bodies, at(joint.places[0], joint.turns[0]),
+                            np.eye(3)[first], second=joint.turns[0][:, second])
 
 
 def _vector(said: Any) -> np.ndarray:

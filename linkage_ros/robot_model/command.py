@@ -20,12 +20,12 @@ def main(args: Optional[List[str]] = None) -> int:
     return command.run(NAME, show, args, NEEDS)
 
 
-def show(args: Optional[List[str]], told: Optional[scene.Scene] = None) -> None:
-    """Print what a command line asks for, of its scene or of one that ROS told."""
+def show(args: Optional[List[str]], given: Optional[scene.Scene] = None) -> None:
+    """Print what a command line asks for, of its scene or of one that ROS has."""
     asked = parser().parse_args(args)
-    if told and asked.scene:
+    if given and asked.scene:
         raise command.RequestError('the scene comes as SCENE or with --ros-args, not with both')
-    found = told or (scene.load(asked.scene) if asked.scene else scene.read({}))
+    found = given or (scene.load(asked.scene) if asked.scene else scene.read({}))
     if asked.format == 'urdf' and asked.density:
         raise command.RequestError('--density is for sdf and mjcf: a URDF has no masses here')
     robot = bodies.robot(command.chosen(found.machines, asked.mechanism), found.frame_id,

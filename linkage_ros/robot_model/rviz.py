@@ -10,6 +10,7 @@ from typing import Any, Dict, Iterable, Mapping, Tuple
 
 import numpy as np
 
+from ..robot_files.elements import pose
 from ..scene import SceneMechanism
 
 GROUP = 'rviz_common/Group'
@@ -89,12 +90,8 @@ def _seen(machine: SceneMechanism) -> Tuple[np.ndarray, np.ndarray]:
     places = places[np.isfinite(places).all(axis=1)]
     if machine.mirrored:
         places = np.concatenate([places, places * (-1.0, 1.0)])
-    x, y, z, roll, pitch, yaw = machine.pose
-    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(one), math.sin(one)) for one in (roll, pitch, yaw))
-    turn = np.array([[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-                     [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-                     [-sp, cp * sr, cp * cr]])
-    return places @ turn[:, :2].T + (x, y, z), turn[:, 2]
+    seen = pose(*machine.pose)
+    return places @ seen[:3, :2].T + seen[:3, 3], seen[:3, 2]
 
 
 def _renamed(group, name, namespace):

@@ -64,10 +64,10 @@ def shapes(machine: SceneMechanism) -> List[Shape]:
     return sorted(found, key=lambda shape: shape.kind != GUIDE)
 
 
-def drawn(machine: SceneMechanism, wanted: Collection[str]) -> List[Shape]:
-    """Return what is drawn where these joints are wanted; rods are drawn as other bars are."""
+def drawn(machine: SceneMechanism, names: Collection[str]) -> List[Shape]:
+    """Return what is drawn of these joints; rods are drawn as other bars are."""
     return [shape for shape in shapes(machine)
-            if shape.kind != ROD and {shape.slide.joint, shape.slide.tip} <= set(wanted)]
+            if shape.kind != ROD and {shape.slide.joint, shape.slide.tip} <= set(names)]
 
 
 def cranks(linkage: Mechanism, parent: Optional[str] = None) -> List[Tuple[str, str]]:
@@ -77,11 +77,11 @@ def cranks(linkage: Mechanism, parent: Optional[str] = None) -> List[Tuple[str, 
             if link.name in names and parent in (None, link.parent)]
 
 
-def plates(linkage: Mechanism, wanted: Collection[str]) -> List[Tuple[str, str, str]]:
-    """Return three by three the wanted joints whose bars are a triangle of one link."""
+def plates(linkage: Mechanism, names: Collection[str]) -> List[Tuple[str, str, str]]:
+    """Return three by three those joints whose bars are a triangle of one link."""
     bars = set(map(frozenset, linkage.bars))
     return [corners for frame in linkage.frames.values()
-            for corners in combinations([name for name in frame if name in wanted], 3)
+            for corners in combinations([name for name in frame if name in names], 3)
             if bars.issuperset(map(frozenset, combinations(corners, 2)))
             and _area(*(complex(*frame[name]) for name in corners)) > FLAT * linkage.longest ** 2]
 
@@ -90,13 +90,13 @@ def _area(p: complex, q: complex, r: complex) -> float:
     return abs(((q - p).conjugate() * (r - p)).imag) / 2.0
 
 
-def marks(linkage: Mechanism, wanted: Collection[str]) -> List[Tuple[str, LinkPoint, LinkPoint]]:
-    """Return for each wanted joint on the ground the triangle that it stands on."""
+def marks(linkage: Mechanism, names: Collection[str]) -> List[Tuple[str, LinkPoint, LinkPoint]]:
+    """Return for each of these joints on the ground the triangle that it stands on."""
     height = MARK * linkage.longest
     width = HALF_MARK * height
     return [(name, LinkPoint(GROUND, x - width, y - height),
              LinkPoint(GROUND, x + width, y - height))
-            for name, (x, y) in ground_frame(linkage).items() if name in wanted]
+            for name, (x, y) in ground_frame(linkage).items() if name in names]
 
 
 def _cylinder(link: Link, low: float, high: float) -> Iterable[Tuple[str, LinkPoint, LinkPoint]]:
