@@ -5,10 +5,10 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from copy import copy
 from shlex import quote
-from typing import Any, Callable, Iterator, Mapping, Optional, Sequence
+from typing import Any, Callable, Mapping, Optional, Sequence
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -18,7 +18,6 @@ from rcl_interfaces.msg import (
     SetParametersResult,
 )
 from rclpy.exceptions import ParameterNotDeclaredException
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from .. import scene as scenes
@@ -52,7 +51,7 @@ class SceneParameters:
 
     """
 
-    def __init__(self, node: Node, role: str, check: Callable[[scenes.Scene], None],
+    def __init__(self, node: Any, role: str, check: Callable[[scenes.Scene], None],
                  changed: Callable[[list[scenes.Parameter]], None]):
         self._node, self._role, self._check, self._changed = node, role, check, changed
         # Whose value counts instead of an own one, and whether that is being followed.
@@ -188,7 +187,7 @@ class SceneParameters:
         except scenes.SceneError as error:
             return SetParametersResult(successful=False, reason=str(error))
         except Exception as error:
-            self._node.get_logger().error(f'internal error: {error!r}')
+            self._node.report('a changed parameter', error)
             return SetParametersResult(
                 successful=False, reason=elided(f'internal error: {error!r}', 299))
         self._candidate = candidate
@@ -218,17 +217,12 @@ class SceneParameters:
         derived = [_parameter(one) for one in changed if one.name in self.fields
                    and one.name not in given and not one.field.read_only]
         if derived:
-            with self._deriving():
+            self._is_derived = True
+            try:
                 self._node.set_parameters_atomically(derived)
+            finally:
+                self._is_derived = False
         self._changed(changed)
-
-    @contextmanager
-    def _deriving(self) -> Iterator[None]:
-        self._is_derived = True
-        try:
-            yield
-        finally:
-            self._is_derived = False
 
 
 def _kind(field: Any) -> Parameter.Type:
