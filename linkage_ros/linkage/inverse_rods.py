@@ -13,7 +13,7 @@ from __future__ import annotations
 from itertools import product
 from typing import Dict, List, Optional, TYPE_CHECKING
 
-from .inverse_linkage import Mode, MOST_SIDES
+from .inverse_linkage import InverseLinkage, Mode, MOST_SIDES
 from .quantities import Names, Structure
 from .rod_lines import turning_rods
 from ..formula.expression import derivative, Real
@@ -22,43 +22,26 @@ if TYPE_CHECKING:
     from .mechanism import Mechanism
 
 
-class InverseRods:
-    """
-    The assembly modes of a linkage driven by its outputs; see `InverseLinkage`.
-
-    Raises ValueError if what is left cannot be solved, or is drawn at a dead point.
-    """
-
-    def __init__(self, linkage: Mechanism, outputs: Names):
-        driven = linkage.driven_by(*outputs)
-        self.outputs, self.design = outputs, driven.design
-        self.lines = self.design.joints
-        rods = turning_rods(self.design.lines, outputs)
-        if len(rods) > MOST_SIDES:
-            raise ValueError(f'more than {2 ** MOST_SIDES} assembly modes')
-        self.branches = dict.fromkeys(rods, 1)
-        self.turns = ((0.0,),) * len(outputs)
-        self.given: Dict[Real, Real] = {}
-        names = [input_.name for input_ in linkage.inputs]
-        self.modes = tuple(self._mode({**linkage.branches, **dict(zip(rods, sides))}, names)
-                           for sides in product((1, -1), repeat=len(rods)))
-
-    def _mode(self, sides: Dict[str, int], names: List[str]) -> Mode:
-        structure = Structure(self.design, sides)
-        rows = [structure.output(name) for name in names]
-        known: List[Dict[Real, Real]] = [{} for _ in self.outputs]
-        return Mode(structure, tuple(rows), tuple(
-            tuple(derivative(value, {by: 1.0}, each) for by, each in enumerate(known))
-            for value in rows))
-
-    def __str__(self) -> str:
-        return '\n'.join(f'{line}    # at {name}' if name in self.outputs else line
-                         for line in self.lines for name in [line.split()[0]])
-
-
-def taken_apart(linkage: Mechanism, outputs: Names) -> Optional[InverseRods]:
+def taken_apart(linkage: Mechanism, outputs: Names) -> Optional[InverseLinkage]:
     """Return the inverse of rods for outputs, None where no closed form is known."""
     try:
-        return InverseRods(linkage, outputs)
+        design = linkage.driven_by(*outputs).design
+        rods = tuple(turning_rods(design.lines, outputs))
+        if len(rods) > MOST_SIDES:
+            return None
+        names = [input_.name for input_ in linkage.inputs]
+        modes = tuple(_mode(
+            Structure(design, {**linkage.branches, **dict(zip(rods, sides))}), names, outputs)
+            for sides in product((1, -1), repeat=len(rods)))
+        return InverseLinkage(design.joints, {name: (name, 1.0, 0.0) for name in outputs}, rods,
+                              modes, ((0.0,),) * len(outputs), {})
     except ValueError:
         return None
+
+
+def _mode(structure: Structure, names: List[str], outputs: Names) -> Mode:
+    rows = tuple(structure.output(name) for name in names)
+    known: List[Dict[Real, Real]] = [{} for _ in outputs]
+    return Mode(structure, rows, tuple(
+        tuple(derivative(value, {by: 1.0}, each) for by, each in enumerate(known))
+        for value in rows))

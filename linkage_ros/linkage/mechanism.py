@@ -678,23 +678,9 @@ class Mechanism:
         """
         Return one value of the input that gives an output a value, and d output / d input there.
 
-        Parameters
-        ----------
-        output, value
-            As for `input_for`.
-        near : float or array-like, optional
-            The answer nearest to this is taken, a crank's with whole turns included. Default: the
-            least on the working branch, where the output grows with the input, as lever and crank
-            turn the same way; if there is none, the least.
-        ends : (float, float), optional
-            The lowest and the highest value [rad or m] that may be taken. Default: any; of a
-            crank without near, those of one turn from -pi.
-
-        Returns
-        -------
-        (float or array, float or array)
-            In the shape of value and near broadcast; NaN where there is none.
-
+        Parameters and the choice are those of `Inverse.nearest`, `ends` those of the one input:
+        without `near` the working branch, on which lever and crank turn the same way. Floats, or
+        arrays in the shape of value and near broadcast; NaN where there is none.
         """
         inverse, _ = self._held(output, ())
         given = [x if type(x) is float else numbers(name, x)
@@ -706,43 +692,15 @@ class Mechanism:
         """
         Return the input that gives an output a value, going on from another without a jump.
 
-        Parameters
-        ----------
-        output : str
-            What `input_for` takes, of a linkage with one input.
-        value : float
-            What the output is [rad or m].
-        near : float
-            Where the input was [rad or m]; whole turns of a crank are kept.
-
-        Returns
-        -------
-        (float, float)
-            The input [rad or m], between the dead points and extremes of the output that `near` is
-            between, and d output / d input there; NaN if the output has no such value there.
-
+        See `Inverse.follow`, for a linkage with one input: the input [rad or m], whole turns kept,
+        and d output / d input there; NaN beyond the next dead point or extreme of the output.
         """
         (found,), (rate,) = self._held(output, ())[0].follow(value, near)
         return found, rate
 
     def inputs_for(self, outputs: Sequence[str], values: ArrayLike,
                    near: Optional[ArrayLike] = None) -> List[Answer]:
-        """
-        Return all values of the inputs that give as many outputs the values that are wanted.
-
-        Parameters
-        ----------
-        outputs, values
-            As for `inverse` and `Inverse.all`.
-        near : array-like (inputs,), optional
-            Values of the inputs [rad or m] to which the answers are brought by whole turns, the
-            nearest first, a length being counted in parts of about its stroke.
-
-        Returns
-        -------
-        list of Answer
-
-        """
+        """Return what `Inverse.all` does: all values of the inputs for those of outputs."""
         return self.inverse(outputs).all(values, near)
 
     def follow_inputs(self, outputs: Sequence[str], values: ArrayLike,
