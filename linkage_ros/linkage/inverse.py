@@ -414,10 +414,14 @@ class Inverse:
         mode //= math.prod(map(len, closed.turns))
         turning = np.reshape(self._choices.get_or_make(mode, lambda: self.linkage.bind(Program(
             [*chain(*closed.modes[mode].rates)], n, closed.given))).at(*values), (n, n))
-        with np.errstate(all='ignore'):
-            found = 1.0 / turning if n == 1 else np.linalg.inv(turning)
-        same = np.linalg.det(turning @ np.reshape(rates, (n, n)).T)
-        return None if same < 0.0 else tuple(found.T.ravel().tolist())
+        if np.linalg.det(turning @ np.reshape(rates, (n, n)).T) < 0.0:
+            return None
+        try:
+            with np.errstate(all='ignore'):
+                found = 1.0 / turning if n == 1 else np.linalg.inv(turning)
+        except np.linalg.LinAlgError:
+            return rates
+        return tuple(found.T.ravel().tolist())
 
     def _beside(self, inputs: Tuple[float, ...]) -> Iterator[Tuple[float, ...]]:
         """Yield inputs that differ by rounding, one a little."""
