@@ -65,7 +65,7 @@ ROUNDING = 32 * 2.0 ** -53
 BESIDE = 16 * 2.0 ** -52 * math.pi
 # At an end of the reach, where rates have no bound, what that makes of an output, as a part; and
 # from where on that end is near enough for both of its sides to give the same inputs.
-ENDED, STEEP = 1e-7, 10.0
+ENDED, STEEP = 1e-7, 1e4
 # What misses by more than this part of the output's size is the answer of another assembly.
 OTHER = 1e-2
 # What is below zero by so many tolerances, a thousandth of its size, is no end of the reach.
@@ -300,9 +300,14 @@ class Inverse:
                 inputs = [value + turn for value, turn in zip(mode.inputs, turns)]
                 # What outputs say of a linkage's inputs the inverse's say by their place.
                 row = substituted(forward, inputs)
-                parts += self._judged(inputs, row[:n], row[n:n + n * n], [
+                verdict, *answer = self._judged(inputs, row[:n], row[n:n + n * n], [
                     margin + FAR * limit.tolerance
                     for margin, limit in zip(row[n + n * n:], limits)])
+                if n == 1:
+                    # The lesser rate is the more exact.
+                    answer[1] = where(self._scales[0] / self._sizes[0] < abs(answer[1]),
+                                      1.0 / mode.rates[0][0], answer[1])
+                parts += [verdict, *answer]
         return parts
 
     def _judged(self, inputs: Sequence[Real], reached: Sequence[Real], rates: Sequence[Real],
@@ -406,7 +411,7 @@ class Inverse:
         the other sign.
         """
         n, closed = self._n, cast(InverseLinkage, self.closed)
-        if np.abs(self._jacobian(rates)).max() < STEEP:
+        if np.abs(self._jacobian(rates)).max() < (STEEP if n > 1 else 1.0):
             return rates
         if not np.isfinite(rates).all():
             rows = (self._check.at(*beside) for beside in self._beside(inputs))
