@@ -8,8 +8,8 @@ What closed inverses of the catalogue cost: CPU time beside that of a pose.
 
 All answers to one question in plain Python, beside `function()` for all points; arrays of
 100000 questions by machine code, beside as many poses, of some (needs llvmlite); and the first
-question, from the joint lines on, in a process of its own. `python -m benchmark.c_code` has the
-inverses in C. With --document the table goes into docs/performance.md.
+question in a process of its own. `python -m benchmark.c_code` has the inverses in C. With
+--document the table goes into docs/performance.md.
 """
 
 import argparse
@@ -109,7 +109,7 @@ def main():
                   '100000 x poses', 'first question [ms]'), rows)
     print(text)
     if options.document:
-        document.write('performance.md', 'inverse', text)
+        document.write('performance.md', text, 'measured: inverse')
 
 
 if __name__ == '__main__':

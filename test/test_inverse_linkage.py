@@ -62,7 +62,7 @@ def test_an_assembly_mode_is_a_linkage_that_has_the_pose(kind):
         if not closed:
             continue
         given = np.array([ratio * linkage.joint_angles(theta, (name,))[name] + offset
-                          for name, ratio, offset in closed.driving])
+                          for name, ratio, offset in closed.drives.values()])
         modes = [mode.linkage.built for mode in closed.modes]
         drawn = [custom(*closed.lines) if not closed.branches else mechanisms.create(
             'custom', joints=closed.lines, branches=dict(mode.linkage.branches))

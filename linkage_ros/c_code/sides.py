@@ -11,7 +11,7 @@ on, velocities by the exact Jacobians, efforts by their transposes, so that no p
 from importlib.resources import files
 from itertools import product
 import math
-from typing import Dict, Iterator, List, Sequence, Tuple, Union
+from typing import Dict, Iterator, List, Sequence, Tuple
 
 from .axes import actuators, Axis, axis, joints, start
 from .code import Code, open_linkage
@@ -20,7 +20,6 @@ from ..formula.expression import Real, real
 from ..formula.program import Program
 from ..linkage.builder import in_metres
 from ..linkage.inverse_linkage import InverseLinkage
-from ..linkage.inverse_rods import InverseRods
 from ..scene import SceneMechanism
 
 # In double and in single precision: below which part of its size a Jacobian is singular, and in a
@@ -227,7 +226,7 @@ class Sides:
             f'{value} + {turn} * floor{code.suffix}((near[{i}] - {value}) / {turn} + '
             f'{code.literal(0.5)})')
 
-    def _modes(self, tag: str, closed: Union[InverseLinkage, InverseRods],
+    def _modes(self, tag: str, closed: InverseLinkage,
                values: Sequence[str]) -> Tuple[str, int]:
         """Return the function for the inputs of all assembly modes, and how many there are."""
         inputs, number = self.machine.linkage.inputs, self.code.number

@@ -13,8 +13,9 @@ searched: one input between the extremes of the output, several by steps on the 
 from __future__ import annotations
 
 from functools import cached_property, reduce
-from itertools import chain, combinations, islice, product
+from itertools import chain, combinations, product
 import math
+import operator
 from typing import (
     Any,
     cast,
@@ -27,7 +28,6 @@ from typing import (
     Sequence,
     Tuple,
     TYPE_CHECKING,
-    Union,
 )
 
 import numpy as np
@@ -38,7 +38,7 @@ from .arguments import numbers
 from .curves import LEAST
 from .inputs import Input
 from .inverse_linkage import InverseLinkage, Mode, taken_apart
-from .inverse_rods import InverseRods, taken_apart as rods_taken_apart
+from .inverse_rods import taken_apart as rods_taken_apart
 from .planar import TOLERANCE
 from .search import blocks, Search, SINGULAR
 from ..cache import Cache
@@ -65,7 +65,7 @@ ROUNDING = 32 * 2.0 ** -53
 BESIDE = 16 * 2.0 ** -52 * math.pi
 # At an end of the reach, where rates have no bound, what that makes of an output, as a part; and
 # from where on that end is near enough for both of its sides to give the same inputs.
-ENDED, STEEP = 1e-7, 10.0
+ENDED, STEEP = 1e-7, 1e4
 # What misses by more than this part of the output's size is the answer of another assembly.
 OTHER = 1e-2
 # What is below zero by so many tolerances, a thousandth of its size, is no end of the reach.
@@ -174,7 +174,7 @@ class Inverse:
         # Of each input half a period, the period, and below what it is zero.
         self._turned = [(0.5 * input_.turn, input_.turn, LEAST) if input_.turns else
                         (math.inf, math.inf, LEAST * input_.size) for input_ in self.inputs]
-        self.closed: Union[InverseLinkage, InverseRods, None] = (
+        self.closed: Optional[InverseLinkage] = (
             taken_apart if linkage.axes == 'xy' else rods_taken_apart)(linkage, outputs)
         if self.closed:
             # For each mode: 1 if it is an answer, 0 if not, NaN if that is to be looked at closer;
@@ -294,10 +294,10 @@ class Inverse:
         flat, size = self._solve.at(*values), self._row
         return [flat[start:start + size] for start in range(0, len(flat), size)]
 
-    def _judged_modes(self, closed: Union[InverseLinkage, InverseRods]) -> List[Real]:
+    def _judged_modes(self, closed: InverseLinkage) -> List[Real]:
         """Return what all modes answer, held to the forward formula and polished by it."""
         n, structure, parts = self._n, self.linkage.structure, []
-        if n == 2 and isinstance(closed, InverseRods) and closed.is_own:
+        if n == 2 and closed.is_own:
             return [part for mode in closed.modes for part in self._own_mode(mode)]
         limits = [limit for limit in structure.built.limits if limit.margin.varies]
         forward = [*structure.checked(self.outputs), *(limit.margin for limit in limits)]
@@ -306,9 +306,14 @@ class Inverse:
                 inputs = [value + turn for value, turn in zip(mode.inputs, turns)]
                 # What outputs say of a linkage's inputs the inverse's say by their place.
                 row = substituted(forward, inputs)
-                parts += self._judged(inputs, row[:n], row[n:n + n * n], [
+                verdict, *answer = self._judged(inputs, row[:n], row[n:n + n * n], [
                     margin + FAR * limit.tolerance
                     for margin, limit in zip(row[n + n * n:], limits)])
+                if n == 1:
+                    # The lesser rate is the more exact.
+                    answer[1] = where(self._scales[0] / self._sizes[0] < abs(answer[1]),
+                                      1.0 / mode.rates[0][0], answer[1])
+                parts += [verdict, *answer]
         return parts
 
     def _own_mode(self, mode: Mode) -> List[Real]:
@@ -338,14 +343,16 @@ class Inverse:
                 gap = where(math.pi < gap, gap - math.tau, where(gap < -math.pi, gap + math.tau,
                                                                  gap))
             gaps.append(gap)
-            other = where(OTHER * scale < abs(gap), 0.0, where(
-                abs(gap) <= OTHER * scale, math.nan, other))
+            other = where(NEIGHBOURS * scale < abs(gap), 0.0, where(
+                abs(gap) <= NEIGHBOURS * scale, math.nan, other))
         for i, (gap, scale) in enumerate(zip(gaps, self._scales)):
+            speeds = [abs(rate) for rate in rates[i::n]]
             allowed = ROUNDING * (scale + sum((
-                abs(rate) * where(abs(x) < size, size, abs(x))
-                for rate, x, size in zip(rates[i::n], inputs, self._sizes)), real(0.0)))
+                speed * where(abs(x) < size, size, abs(x))
+                for speed, x, size in zip(speeds, inputs, self._sizes)), real(0.0)))
+            steepest = reduce(_greater, map(operator.mul, speeds, self._sizes))
             verdict = where(abs(gap) <= allowed, where(
-                allowed <= (1.0 + STEEP) * ROUNDING * scale, verdict, math.nan), other)
+                steepest <= STEEP * scale, verdict, math.nan), other)
         polished = [self._counted(by, x - step)
                     for by, (x, step) in enumerate(zip(inputs, self._steps(gaps, rates)))]
         return [verdict, *polished, *rates]
@@ -418,25 +425,22 @@ class Inverse:
         the other sign.
         """
         n, closed = self._n, cast(InverseLinkage, self.closed)
-        if np.abs(self._jacobian(rates)).max() < STEEP:
+        if np.abs(self._jacobian(rates)).max() < (STEEP if n > 1 else 1.0):
             return rates
         if not np.isfinite(rates).all():
             rows = (self._check.at(*beside) for beside in self._beside(inputs))
             rates = next((row[n:] for row in rows if np.isfinite(row).all()), rates)
-        start = mode // math.prod(map(len, closed.turns)) * n * n
-        turning = np.reshape(self._inverse_rates.at(*values)[start:start + n * n], (n, n))
-        with np.errstate(all='ignore'):
-            found = 1.0 / turning if n == 1 else np.linalg.inv(turning)
-        same = np.linalg.det(turning @ np.reshape(rates, (n, n)).T)
-        return None if same < 0.0 else tuple(found.T.ravel().tolist())
-
-    @cached_property
-    def _inverse_rates(self) -> Pose:
-        """The code for the rates of each input by each output in all modes."""
-        closed = cast(InverseLinkage, self.closed)
-        return self.linkage.bind(Program([
-            rate for mode in closed.modes for row in mode.rates for rate in row],
-            self._n, closed.given))
+        mode //= math.prod(map(len, closed.turns))
+        turning = np.reshape(self._choices.get_or_make(mode, lambda: self.linkage.bind(Program(
+            [*chain(*closed.modes[mode].rates)], n, closed.given))).at(*values), (n, n))
+        if np.linalg.det(turning @ np.reshape(rates, (n, n)).T) < 0.0:
+            return None
+        try:
+            with np.errstate(all='ignore'):
+                found = 1.0 / turning if n == 1 else np.linalg.inv(turning)
+        except np.linalg.LinAlgError:
+            return rates
+        return tuple(found.T.ravel().tolist())
 
     def _beside(self, inputs: Tuple[float, ...]) -> Iterator[Tuple[float, ...]]:
         """Yield inputs that differ by rounding, one a little."""
@@ -598,6 +602,7 @@ class Inverse:
 
         """
         limits = tuple(ends or (None,) * self._n)
+        near = None if near is None else tuple(near)
         given = (*values, *(near or ()), *(float(end) for pair in limits if pair for end in pair))
         if not self.closed:
             return self._chosen(self._each(values), near, limits)[1:]
@@ -607,16 +612,15 @@ class Inverse:
             if rank != rank:
                 return self._chosen(self._all(tuple(values)), near, limits)[1:]
             return tuple(found[:self._n]), tuple(found[self._n:])
-        rows = np.broadcast_arrays(*given)
-        flat = np.stack([row.ravel() for row in rows])
+        arrays = np.broadcast_arrays(*given)
+        flat = np.stack([each.ravel() for each in arrays])
         flat[:self._n] = self._within_turns(flat[:self._n])
-        rank, *found = choose.over(*flat)
-        for place in np.flatnonzero(np.isnan(rank)):
-            values, near, ends = self._split(flat[:, place].tolist(), near is not None, limits)
-            chosen = self._chosen(self._all(tuple(values)), near, ends)[1:]
-            for part, value in zip(found, chain(*chosen)):
-                part[place] = value
-        found = [part.reshape(rows[0].shape) for part in found]
+        rows = choose.over(*flat)
+        for place in np.flatnonzero(np.isnan(rows[0])):
+            one = flat[:2 * self._n, place].tolist()
+            rows[1:, place] = [*chain(*self._chosen(
+                self._all(tuple(one[:self._n])), near and one[self._n:], limits)[1:])]
+        found = [row.reshape(arrays[0].shape) for row in rows[1:]]
         return tuple(found[:self._n]), tuple(found[self._n:])
 
     def path(self, values: Sequence[np.ndarray], near: Optional[Sequence[float]] = None,
@@ -703,12 +707,6 @@ class Inverse:
         inputs, rates = self.over(*values)
         return [(inputs[..., k], rates[..., k]) for k in range(inputs.shape[-1])]
 
-    def _split(self, given: Sequence[float], follows: bool, limits: Sequence) -> Tuple:
-        """Return values, what they are to be near, and the ends, of one list."""
-        each = iter(given)
-        return (tuple(islice(each, self._n)), tuple(islice(each, self._n)) if follows else None,
-                tuple(pair and (next(each), next(each)) for pair in limits))
-
     def _chosen(self, answers: Sequence[Any], near: Optional[Sequence[Any]],
                 limits: Sequence) -> Tuple[Any, Any, Any]:
         """Return which of some answers is chosen, its inputs and its rates."""
@@ -720,20 +718,19 @@ class Inverse:
                               *(near or ()), *(end for pair in limits if pair for end in pair))
         return rank, tuple(found[:n]), tuple(found[n:])
 
-    def _choice(self, count: int, follows: bool, ended: Tuple[bool, ...]) -> Pose:
+    def _choice(self, *what: Any) -> Pose:
+        """Return the code that `_make_choice` makes."""
+        return self._choices.get_or_make(what, lambda: self._make_choice(*what))
+
+    def _make_choice(self, count: int, follows: bool, ended: Tuple[bool, ...]) -> Pose:
         """
         Return the code that chooses one of some answers, or for 0 that of the modes.
 
         Given are the answers, each its inputs and rates, or the values; then, if so, the inputs
         that the answer is to be nearest to, and for each that is to lie between ends, these. What
-        is beyond an end by so little that the outputs do not tell is at the end. Inputs that turn
-        are the same after so many turns. Before the answer its number is returned, NaN where a
-        mode is to be looked at closer.
+        is beyond an end by so little that the outputs do not tell is at the end. Before the answer
+        its number is returned, NaN where a mode is to be looked at closer.
         """
-        return self._choices.get_or_make((count, follows, ended), lambda: self._make_choice(
-            count, follows, ended))
-
-    def _make_choice(self, count: int, follows: bool, ended: Tuple[bool, ...]) -> Pose:
         n, size = self._n, self._n + self._n ** 2
         total = (count * size or n) + n * follows + 2 * sum(ended)
         given = list(map(argument, range(total)))

@@ -37,7 +37,6 @@ from ..formula.expression import (
     spin,
     square_root,
 )
-from ..formula.program import Program
 
 if TYPE_CHECKING:
     from .mechanism import Mechanism
@@ -73,81 +72,88 @@ class Mode(NamedTuple):
     rates: Tuple[Tuple[Real, ...], ...]
 
 
-class InverseLinkage:
+class InverseLinkage(NamedTuple):
     """
     The joint lines of an inverse linkage, and its assembly modes.
 
     Attributes
     ----------
     lines : tuple of str
-        Its joint lines [m]; its inputs are those of `driving`, in the order of the lines.
-    driving : tuple of (str, float, float)
-        For each of its inputs an output, and the ratio and offset that make it the input's value.
+        Its joint lines [m].
+    drives : dict
+        For each of its inputs, by what its line places and in the order of the lines: an output,
+        and the ratio and offset that make it the input's value.
+    branches : tuple of str
+        The joints whose dyads have two sides.
     modes : tuple of Mode
-        One for each choice of the sides of its dyads.
+        One for each choice of these sides.
     turns : tuple of tuple of float
         For each input what may be added to what a mode tells [rad]: 0, and whole turns of what it
         is read from, until all comes round.
-    program : Program
-        From the outputs [rad or m] to the inputs of each mode, the modes one after the other; for
-        floats, arrays, machine code and C.
+    given : dict
+        What stands for the inputs of the modes: outputs, as arguments of a program.
+    is_own : bool
+        Whether the linkage itself has no other side: then all modes are its own.
 
     """
 
-    def __init__(self, outputs: Names, sketch: _Sketch):
-        self.outputs = outputs
-        lines = joint_lines.parse(sketch.lines)
-        used = {name for read in sketch.reads for end in read.ends for name in end.joints}
-        for line in lines[::-1]:
-            if used & {*line.names}:
-                used |= {*line.stands_on}
-        lines = [line for line in lines if used & {*line.names}]
-        drives = [line.names[0] for line in lines if line.drives]
-        self.driving = tuple(sketch.driving[name] for name in drives)
-        if {name for name, *_ in self.driving} != {*outputs} or len(drives) != len(outputs):
-            raise ValueError('these outputs do not tell the inputs')
-        self.lines = tuple(line.text for line in lines)
-        self.branches = joint_lines.branches(lines)
-        if len(self.branches) > MOST_SIDES:
-            raise ValueError(f'more than {2 ** MOST_SIDES} assembly modes')
-        self.design = Design('inverse', {}, self.lines, lines[-1].names[0])
-        self.turns = tuple(read.turns for read in sketch.reads)
-        if 2 ** len(self.branches) * math.prod(map(len, self.turns)) > MOST_MODES:
-            raise ValueError('too many turns')
-        self.modes = tuple(self._mode(sketch, dict(zip(self.branches, signs)))
-                           for signs in product((1, -1), repeat=len(self.branches)))
-        given = [ratio * argument(outputs.index(name)) + offset
-                 for name, ratio, offset in self.driving]
-        # An argument is told from others by its place.
-        self.given = {leaf: value for mode in self.modes for leaf, value in zip(
-            mode.linkage.built.arguments, given)}
-        self.program = Program(
-            [value for mode in self.modes for value in mode.inputs], len(outputs),
-            self.given)
-
-    def _mode(self, sketch: _Sketch, signs: Dict[str, int]) -> Mode:
-        structure = Structure(self.design, signs)
-        inputs, rates = [], []
-        for read in sketch.reads:
-            if read.name in self.outputs:
-                value, row = argument(self.outputs.index(read.name)), [
-                    real(float(read.name == name)) for name in self.outputs]
-            else:
-                value, turning = _told(structure.built, *read.ends)
-                found = {name: _rate(value, turning, {i: ratio})
-                         for i, (name, ratio, _) in enumerate(self.driving)}
-                row = [found[name] for name in self.outputs]
-            inputs.append((value - read.offset) / read.ratio)
-            rates.append(tuple(rate / read.ratio for rate in row))
-        return Mode(structure, tuple(inputs), tuple(rates))
+    lines: Tuple[str, ...]
+    drives: Dict[str, Tuple[str, float, float]]
+    branches: Tuple[str, ...]
+    modes: Tuple[Mode, ...]
+    turns: Tuple[Tuple[float, ...], ...]
+    given: Dict[Real, Real]
+    is_own: bool = False
 
     def __str__(self) -> str:
-        said = {name: f'{name}' if (ratio, offset) == (1.0, 0.0) else
-                f'{ratio:g} {name} {"-" if offset < 0.0 else "+"} {abs(offset):.6g}'
-                for name, ratio, offset in self.driving}
-        driven = iter(self.driving)
-        return '\n'.join(f'{line.text}    # at {said[next(driven)[0]]}' if line.drives
-                         else line.text for line in self.design.lines)
+        said = {}
+        for place, (name, ratio, offset) in self.drives.items():
+            said[place] = f'    # at {name}' if (ratio, offset) == (1.0, 0.0) else (
+                f'    # at {ratio:g} {name} {"-" if offset < 0.0 else "+"} {abs(offset):.6g}')
+        return '\n'.join(line + said.get(line.split()[0], '') for line in self.lines)
+
+
+def _of_sketch(outputs: Names, sketch: _Sketch) -> InverseLinkage:
+    """Return the inverse linkage that a sketch has come to; raise ValueError if it is none."""
+    lines = joint_lines.parse(sketch.lines)
+    used = {name for read in sketch.reads for end in read.ends for name in end.joints}
+    for line in lines[::-1]:
+        if used & {*line.names}:
+            used |= {*line.stands_on}
+    lines = [line for line in lines if used & {*line.names}]
+    drives = {line.names[0]: sketch.driving[line.names[0]] for line in lines if line.drives}
+    if sorted(name for name, *_ in drives.values()) != sorted(outputs):
+        raise ValueError('these outputs do not tell the inputs')
+    branches, turns = joint_lines.branches(lines), tuple(read.turns for read in sketch.reads)
+    if len(branches) > MOST_SIDES:
+        raise ValueError(f'more than {2 ** MOST_SIDES} assembly modes')
+    if 2 ** len(branches) * math.prod(map(len, turns)) > MOST_MODES:
+        raise ValueError('too many turns')
+    design = Design('inverse', {}, tuple(line.text for line in lines), lines[-1].names[0])
+    modes = tuple(_mode(Structure(design, dict(zip(branches, signs))), outputs, sketch.reads, [
+        *drives.values()]) for signs in product((1, -1), repeat=len(branches)))
+    given = [ratio * argument(outputs.index(name)) + offset
+             for name, ratio, offset in drives.values()]
+    # An argument is told from others by its place.
+    return InverseLinkage(design.joints, drives, tuple(branches), modes, turns, {
+        leaf: value for mode in modes for leaf, value in zip(mode.linkage.built.arguments, given)})
+
+
+def _mode(structure: Structure, outputs: Names, reads: Sequence[_Read],
+          driving: Sequence[Tuple[str, float, float]]) -> Mode:
+    inputs, rates = [], []
+    for read in reads:
+        if read.name in outputs:
+            value, row = argument(outputs.index(read.name)), [
+                real(float(read.name == name)) for name in outputs]
+        else:
+            value, turning = _input_of(structure.built, *read.ends)
+            found = {name: _rate(value, turning, {i: ratio})
+                     for i, (name, ratio, _) in enumerate(driving)}
+            row = [found[name] for name in outputs]
+        inputs.append((value - read.offset) / read.ratio)
+        rates.append(tuple(rate / read.ratio for rate in row))
+    return Mode(structure, tuple(inputs), tuple(rates))
 
 
 class _End(NamedTuple):
@@ -183,7 +189,7 @@ def taken_apart(linkage: Mechanism, outputs: Names) -> Optional[InverseLinkage]:
     grounds = (GROUND,) if absolute else (GROUND, *(link.name for link in linkage.links))
     for ground in grounds:
         try:
-            return InverseLinkage(outputs, _Sketch(linkage, outputs, ground, pose))
+            return _of_sketch(outputs, _Sketch(linkage, outputs, ground, pose))
         except ValueError:
             continue
     return None
@@ -452,7 +458,7 @@ class _Sketch(Dyads):
         return _End((one, two), ((end - start) / along,))
 
 
-def _told(built: Any, one: _End, other: _End, line: Optional[_End] = None) -> Tuple[
+def _input_of(built: Any, one: _End, other: _End, line: Optional[_End] = None) -> Tuple[
         Real, Sequence[Tuple[float, Complex]]]:
     """Return the value of an input, and the vectors of which its angle is the sum."""
     if one.places:

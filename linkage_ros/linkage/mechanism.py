@@ -511,11 +511,9 @@ class Mechanism:
         """
         Return one value of the input that gives an output a value, and d output / d input there.
 
-        That is the answer nearest to `near`, a crank's with whole turns included; by default the
-        least on the working branch, where the output grows with the input, as lever and crank turn
-        the same way; if there is none, the least. `ends` are the lowest and the highest value that
-        may be taken; by default any, of a crank without near those of one turn from -pi. Both have
-        the shape of value and near broadcast; NaN where there is none.
+        Parameters and the choice are those of `Inverse.nearest`, `ends` those of the one input:
+        without `near` the working branch, on which lever and crank turn the same way. Floats, or
+        arrays in the shape of value and near broadcast; NaN where there is none.
         """
         inverse, _ = self._held(output, ())
         given = [x if type(x) is float else numbers(name, x)
@@ -525,22 +523,17 @@ class Mechanism:
 
     def follow(self, output: str, value: float, near: float) -> Tuple[float, float]:
         """
-        Return the input that gives an output a value, and d output / d input, without a jump.
+        Return the input that gives an output a value, going on from another without a jump.
 
-        The input [rad or m], whole turns of a crank kept, is between the dead points and extremes
-        of the output that `near` is between, where it was; NaN if there is no such value there.
+        See `Inverse.follow`, for a linkage with one input: the input [rad or m], whole turns kept,
+        and d output / d input there; NaN beyond the next dead point or extreme of the output.
         """
         (found,), (rate,) = self._held(output, ())[0].follow(value, near)
         return found, rate
 
     def inputs_for(self, outputs: Sequence[str], values: ArrayLike,
                    near: Optional[ArrayLike] = None) -> List[Answer]:
-        """
-        Return all values of the inputs that give as many outputs values; see `Inverse.all`.
-
-        With `near` (inputs,) they are brought by whole turns next to these, the nearest first, a
-        length being counted in parts of about its stroke.
-        """
+        """Return what `Inverse.all` does: all values of the inputs for those of outputs."""
         return self.inverse(outputs).all(values, near)
 
     def follow_inputs(self, outputs: Sequence[str], values: ArrayLike,
