@@ -71,6 +71,12 @@ def test_names_that_ros_takes_for_values_are_written_as_texts(tmp_path):
     assert scene.load(str(again)).parameters == before.parameters
 
 
+def test_a_list_of_nothing_is_not_written_as_ros_reads_none(tmp_path):
+    text = writing.in_yaml({'mechanisms': ['jansen'], 'jansen.joint_names': [],
+                            'jansen.loads': ()})
+    assert '[]' not in text and 'joint_names' not in text and 'loads' not in text
+
+
 @pytest.mark.parametrize('name', ['my thigh', 'Hüfte', 'toe 1/2 "left" <a&b>', "o'k: #3", '大腿'])
 def test_a_frame_is_called_as_links_of_robots_are(tmp_path, name):
     before = scene.read({'mechanisms': ['jansen'], 'frame_id': name, 'jansen.frame_id': name})
