@@ -15,7 +15,7 @@ from matplotlib import pyplot
 import numpy as np
 
 ROOT = Path(__file__).parents[1]
-COLOURS = palette.BLUE, palette.ORANGE, palette.GREEN
+COLOURS = palette.BAR, palette.DRIVEN, palette.GREEN
 
 
 def bucket(folder):
@@ -34,17 +34,18 @@ def bucket(folder):
     for inputs, shade in zip(found[::20], (0.25, 0.45, 0.7, 1.0)):
         place = linkage.solve(inputs)
         for first, second in (*linkage.bars, *linkage.cylinders):
-            left.plot(*np.transpose([place[first], place[second]]), color=palette.BLUE,
+            left.plot(*np.transpose([place[first], place[second]]), color=palette.BAR,
                       alpha=shade, linewidth=1.2)
     left.plot(*np.transpose([linkage.solve(inputs)['T'] for inputs in found]),
-              color=palette.VERMILION, linewidth=2.0)
+              color=palette.LOCUS, linewidth=2.0)
     left.set(aspect='equal', xlabel='x [m]', ylabel='y [m]')
     for own, input_, colour, beside in zip(np.transpose(found), linkage.inputs, COLOURS,
                                            (6, 0, -6)):
         right.plot(1.2 * way, own, color=colour)
         right.annotate(input_.name, (1.2, own[-1]), xytext=(4, beside), textcoords='offset points',
                        va='center', color=colour)
-    right.set(xlabel='way of the bucket [m]', ylabel='length [m]', xlim=(0.0, 1.6))
+    right.margins(y=0.1)
+    right.set(xlabel='way of the bucket [m]', ylabel='length [m]', xlim=(0.0, 1.75))
     figure.savefig(folder / 'commands.png', dpi=100)
 
 
@@ -61,6 +62,7 @@ def torque(folder):
         place = int(np.argmax(held))
         axes.annotate(name, (np.degrees(theta[place]), held[place]), xytext=(8, 4),
                       textcoords='offset points', color=colour)
+    axes.margins(y=0.12)
     axes.axhline(0.0, color=palette.FRAME, linewidth=0.8)
     axes.set(xlabel='crank angle [degrees]', ylabel='torque [N m]', xlim=(-180, 180),
              xticks=range(-180, 181, 60))

@@ -450,3 +450,15 @@ def test_readings_are_written_beside_or_below_each_other():
         for one, other in itertools.combinations(boxes, 2):
             assert (min(one.x1, other.x1) <= max(one.x0, other.x0)
                     or min(one.y1, other.y1) <= max(one.y0, other.y0))
+
+
+@pytest.mark.parametrize('name', scene.load(str(ROOT / 'pictures' / 'words.yaml')).machines)
+def test_no_name_is_on_a_joint_or_on_another(name):
+    shown = scene.load(str(ROOT / 'pictures' / 'words.yaml')).machines[name]
+    picture = picture_of(shown, size=(360, 270), trace='none', parts=USUAL - {'axes', 'title'})
+    picture.show(0.0)
+    names = picture.panels[0].moving[-1].artists
+    boxes = [text.get_window_extent(picture.figure.canvas.get_renderer()) for text in names]
+    joints = [text.axes.transData.transform(text.xy) for text in names]
+    assert not any(box.contains(*joint) for box in boxes for joint in joints)
+    assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))

@@ -329,7 +329,7 @@ def changed(text, rng):
     ) + text[high:]
 
 
-@pytest.mark.parametrize('count', [8, pytest.param(60, marks=pytest.mark.long)])
+@pytest.mark.parametrize('count', [4, pytest.param(60, marks=pytest.mark.slow)])
 @pytest.mark.parametrize('ending', ['sdf', 'urdf', 'xml'])
 def test_whatever_is_in_a_file_it_is_read_or_refused_in_one_sentence(
         capsys, tmp_path, ending, count):

@@ -1897,6 +1897,7 @@ import('/picture.js').then(({ Picture }) => {
 })"""
 
 
+@pytest.mark.slow
 @needs_browser
 def test_titles_are_written_beside_or_below_each_other_wherever_they_are(address, tmp_path):
     async def look():

@@ -333,8 +333,12 @@ class Names:
         distance = axes.figure.dpi / 72 * (5 + 8 * unit)
         self._distances = [distance * (1.4 if name in in_slots else 1.0)
                            for name in machine.points]
+        size = 8 + 6 * unit
+        # By how much half of a name is wider than half of one letter [pixels].
+        self._wider = [0.25 * size * (len(name) - 1) * axes.figure.dpi / 72
+                       for name in machine.points]
         self.artists = [axes.annotate(
-            name, (0.0, 0.0), (0.0, 0.0), textcoords='offset points', fontsize=8 + 6 * unit,
+            name, (0.0, 0.0), (0.0, 0.0), textcoords='offset points', fontsize=size,
             ha='center', va='center', zorder=100, animated=True, path_effects=HALO,
             annotation_clip=False, in_layout=False) for name in machine.points]
 
@@ -344,13 +348,16 @@ class Names:
         obstacles = [
             [joints[:, self._bars[:, 0]], joints[:, self._bars[:, 1]]], [joints, joints],
             [joints[:, self._fixed], joints[:, self._fixed] - 1j * self._pivot], *self._curves()]
-        for text, index, distance in zip(self.artists, self._index, self._distances):
-            tried = joints[:, [index]] + distance * self.DIRECTIONS
-            room = np.min([clearance(tried, *lines) for lines in obstacles], axis=0)
+        for text, index, distance, wider in zip(
+                self.artists, self._index, self._distances, self._wider):
+            offsets = distance * self.DIRECTIONS + wider * self.DIRECTIONS.real
+            tried = joints[:, [index]] + offsets
+            room = np.min([clearance(tried + end, *lines) for lines in obstacles
+                           for end in {-wider, 0.0, wider}], axis=0)
             room = np.nan_to_num(np.minimum(room, distance))
-            best = distance * self.DIRECTIONS[room.mean(axis=0).argmax()]
+            best = offsets[room.mean(axis=0).argmax()]
             text.set_position(np.array([best.real, best.imag]) * 72 / self._axes.figure.dpi)
-            name, half = joints[:, [index]] + best, 0.5 * distance
+            name, half = joints[:, [index]] + best, 0.5 * distance + wider
             obstacles.append([name - half, name + half])
 
     def _curves(self):
