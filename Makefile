@@ -89,20 +89,20 @@ docs: .venv-docs/.installed ## Build the documentation to docs/_build/html/ and 
 .PHONY: test
 test: build $(venv)/.tools ## Run the tests, but for the long ones, and say what they cover
 	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m slipcover --source linkage_ros \
-	  --json --out $(build)/coverage.json -m pytest -n 2 -m 'not long'
+	  --json --out $(build)/coverage.json -m pytest -n 2 --dist worksteal -m 'not long'
 	@python .ci/coverage.py $(build)/coverage.json
 
 # What starts nodes runs alike without machine code.
 .PHONY: nodes
 nodes: build $(venv)/.tools ## Run the tests of the nodes alone; with PLAIN=1 where llvmlite is not installed
 	@$(if $(PLAIN),! python -c 'import llvmlite' 2>/dev/null)
-	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 -m 'not long' \
+	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 --dist worksteal -m 'not long' \
 	  $$(grep -lE 'ros_harness|\(graph' test/test_*.py)
 
 # Hours; what is left without those that are marked exhaustive takes minutes.
 .PHONY: long
-long: build $(venv)/.tools ## Run the long tests; WHICH='long and not exhaustive': in minutes
-	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 -m '$(or $(WHICH),long)'
+long: build $(venv)/.tools ## Run the long tests; WHICH='long and not exhaustive' or WHICH=slow: in minutes
+	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 --dist worksteal -m '$(or $(WHICH),long)'
 
 .PHONY: lint
 lint: .venv-lint/.installed ## Check style and types
