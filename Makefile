@@ -112,6 +112,13 @@ lint: .venv-lint/.installed ## Check style and types
 	@$(lint_bin)/python -c 'import sys; from xml.dom.minidom import parse; [parse(f) for f in sys.argv[1:]]' \
 	  package.xml linkage_interfaces/package.xml
 
+# ament_copyright accepts no SPDX heads, so it is not among them.
+.PHONY: ament
+ament: .venv-ament/.installed ## Check style as ament_flake8 and ament_pep257 do
+	@git ls-files -z '*.py' | xargs -0 .venv-ament/bin/python -m flake8 --config setup.cfg
+	@git ls-files -z '*.py' | xargs -0 .venv-ament/bin/python -m pydocstyle --config=setup.cfg \
+	  --property-decorators=''
+
 .PHONY: lock
 lock: .venv-lock/.installed ## Pin with hashes what wheels/*.txt ask for; UPGRADE=1: to the newest
 	@wheels/lock.sh $(if $(UPGRADE),--upgrade)
@@ -159,6 +166,10 @@ $(venv)/.tools: $(venv)/.installed $(tools)
 
 .venv-lint/.installed: $(lock)/lint.txt
 	@about='what checks style and types.' wheels/install.sh '$(PYTHON)' .venv-lint $<
+	@touch $@
+
+.venv-ament/.installed: $(lock)/ament.txt
+	@about='what ament checks style with.' wheels/install.sh '$(PYTHON)' .venv-ament $<
 	@touch $@
 
 .venv-lock/.installed: $(lock)/lock.txt

@@ -55,7 +55,7 @@ class Assembly(NamedTuple):
 
     @property
     def points(self):
-        """The joints that move, in the order in which they can be found."""
+        """Return the joints that move, in the order in which they can be found."""
         return ('A', *(step.name for step in self.steps))
 
     def pin(self, cosine, sine):

@@ -241,6 +241,7 @@ AIMS = {'gcc -O3': {OURS: 4.0, FAST: 0.5}, 'gcc -O3, this CPU': {OURS: 4.0, FAST
         'gcc -O3, this CPU, vector sine': {FAST: 1.5}}
 PEERS = {
     'formulas': ('original formulas', 'sympy, lambdified'),
+    'compilers': ('the same operations',),
     'tables': ('table, cubic spline',),
     'root finders': ('Newton, 72 stored poses', 'Newton, pose before', 'scipy fsolve, pose before',
                      'scipy least_squares, pose before', 'casadi rootfinder, pose before'),

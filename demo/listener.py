@@ -105,4 +105,3 @@ class Listener:
     def _turn(self):
         self._watch()
         self._executor.spin_once(timeout_sec=0.1)
-

@@ -404,7 +404,7 @@ class Bench:
                                              for name in self.model.scene.machines
                                              for topic, kind in [('locus', Marker),
                                                                  ('robot_description', String)])]}
-        self._said = {topic: None for topic in self._latched}
+        self._said = dict.fromkeys(self._latched)
         (subscription,) = [s for s in self.node.subscriptions
                            if s.topic_name == self._crank.topic_name]
         callback = subscription.callback

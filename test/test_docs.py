@@ -188,7 +188,7 @@ def test_the_reference_has_a_summary_of_what_it_describes(page):
         elif kind.startswith('auto') and kind != 'autosummary':
             full = name if name.startswith('linkage_ros.') else f'{module}.{name}'
             assert pkgutil.resolve_name(full) is not None
-            described.add(name)
+            described.add(full.removeprefix(f'{module}.'))
     summary = re.search(r'autosummary::\n   :nosignatures:\n\n((?:   .*\n)+)', text)[1].split()
     assert described <= set(summary)
 

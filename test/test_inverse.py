@@ -136,7 +136,7 @@ def test_answers_ascend_in_one_turn_and_give_the_value_back(kind):
         size = math.pi if turned(linkage, output) else linkage.longest
         assert (np.abs(back[given]) < 1e-11 * size).all(), output
         nearest = linkage.input_for(output, wanted, near=theta + 4 * math.pi,
-                                      others=held(linkage))
+                                    others=held(linkage))
         away = np.abs(nearest - theta - 4 * math.pi)
         assert (away <= np.nanmin(np.abs(answers - theta[:, None]), axis=1) + 1e-12).all()
 

@@ -17,6 +17,7 @@ from truth import hard_cases
 
 native = pytest.importorskip('linkage_ros.formula.llvm_code')
 
+
 class Code(native.Loop):
     """Machine code that counts how often it is made and run; it is made when it may be."""
 

@@ -213,5 +213,5 @@ def test_the_measure_sees_a_flaw_in_the_last_digits_and_a_wrong_nan():
     for output, value in ((output, found[output]) for output in moving):
         for flawed in (value * (1.0 + 1e-12) + 1e-12, np.full_like(value, np.nan)):
             rows = drawing_accuracy.judge(measure, given, {**found, output: flawed}, True,
-                                  [truth])
+                                          [truth])
             assert {row.output for row in drawing_accuracy.broken(rows)} == {output}

@@ -753,7 +753,7 @@ def test_links_are_where_other_readers_of_a_urdf_have_them(tmp_path, seed, libra
     file.write_text(text)
     robot = readers.read(str(file))
     positions = {name: float(rng.uniform(-3.0, 3.0)) for name in robot.positions}
-    there = library(text).places({name: 0.0 for name in positions} | positions, names)
+    there = library(text).places(dict.fromkeys(positions, 0.0) | positions, names)
     here = closing.posed(robot, positions).frames
     for name in names:
         assert here[name][:3, 3] == pytest.approx(there[name], abs=1e-12)

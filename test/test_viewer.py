@@ -1005,8 +1005,8 @@ def test_the_page_is_served_with_nothing_from_outside(address, name):
     named = re.findall(r"""(?:src|href|from|url\()\s*=?\s*["']([^"']+)["']""", text)
     assert all((PAGE / one).is_file() for one in named)
     addresses = set(re.findall(r'https?://[^\s"\'`]+', text))
-    assert addresses <= {'http://www.apache.org/licenses/LICENSE-2.0', 'http://www.w3.org/2000/svg',
-                         'https://github.com/leeoniya/uPlot'}
+    assert addresses <= {'http://www.apache.org/licenses/LICENSE-2.0',
+                         'http://www.w3.org/2000/svg', 'https://github.com/leeoniya/uPlot'}
 
 
 @pytest.mark.parametrize('name', ['%2e%2e%2fserver.py', 'server.py', 'none.html', 'page/main.js'])
@@ -1377,8 +1377,8 @@ def test_nodes_that_end_and_come_again_are_drawn_again(graph, show):
 
     async def use(url):
         async with Page(url) as page:
-            for scene in (LEG, LEG, {**RATE, 'mechanisms': ['drop'], 'drop.type': 'water_drop'}):
-                await come_and_go(page, scene)
+            for given in (LEG, LEG, {**RATE, 'mechanisms': ['drop'], 'drop.type': 'water_drop'}):
+                await come_and_go(page, given)
 
     asyncio.run(use(running.viewer.url))
 

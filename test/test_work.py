@@ -83,7 +83,7 @@ def test_the_nodes_own_ears_on_joint_states_are_nobody_who_listens(graph, work):
     turn([0.1] * 4, graph.listen(MarkerArray, 'jansen/markers'))
     assert {key[0] for key in work} == {'jansen'}
     states = graph.listen(JointState, 'joint_states')
-    graph.until(lambda: turn([0.2] * 4, states) and len(set(key[0] for key in work)) == 4)
+    graph.until(lambda: turn([0.2] * 4, states) and len({key[0] for key in work}) == 4)
 
 
 def test_a_scene_with_plain_names_changes_no_number(graph, monkeypatch):

@@ -6,9 +6,9 @@
 from importlib import import_module
 
 FAMILIES = (
-    'ours', 'compiled_c', 'original', 'sympy_expression', 'table', 'newton', 'scipy_solvers',
-    'casadi_rootfinder', 'pylinkage_step', 'planegcs_sketch', 'solvespace_sketch',
-    'pinocchio_loops', 'drake_ik', 'mujoco_steps',
+    'ours', 'compiled_c', 'cffi_c', 'numba_functions', 'original', 'sympy_expression', 'table',
+    'newton', 'scipy_solvers', 'casadi_rootfinder', 'pylinkage_step', 'planegcs_sketch',
+    'solvespace_sketch', 'pinocchio_loops', 'drake_ik', 'mujoco_steps',
 )
 
 

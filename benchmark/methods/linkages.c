@@ -8,7 +8,9 @@
  * Sines are taken block by block before the rest, which the compiler can then do in vectors.
  */
 
+#ifndef _GNU_SOURCE
 #define _GNU_SOURCE
+#endif
 #include <math.h>
 
 #ifdef VECTOR_SINE

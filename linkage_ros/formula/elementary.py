@@ -35,7 +35,7 @@ ARCTANGENT = (3.33333333333329318027e-01, -1.99999999998764832476e-01, 1.4285714
               -3.65315727442169155270e-02, 1.62858201153657823623e-02)
 # From the first slope on, angles are counted from the second's: its angle, and the digits after.
 ARCTANGENT_STARTS = ((0.4375, 0.5, 4.63647609000806093515e-01, 2.26987774529616870924e-17),
-          (0.6875, 1.0, 7.85398163397448278999e-01, 3.06161699786838301793e-17))
+                     (0.6875, 1.0, 7.85398163397448278999e-01, 3.06161699786838301793e-17))
 # What pi is more than math.pi.
 REST_OF_PI = 1.2246467991473532e-16
 # Between these, halves lose nothing and sums are finite.

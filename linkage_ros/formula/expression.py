@@ -53,7 +53,7 @@ class Real:
 
     @property
     def value(self) -> Optional[float]:
-        """The number of a constant leaf, None for anything else."""
+        """Return the number of a constant leaf, None for anything else."""
         return self.args[0] if self.op == 'constant' else None
 
     def __add__(self, other: Number) -> Real:

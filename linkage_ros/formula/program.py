@@ -248,7 +248,7 @@ class _Variant:
 
     @cached_property
     def loop(self) -> Future:
-        """The code for many poses as machine code, which is made beside what goes on."""
+        """Return the code for many poses as machine code, which is made beside what goes on."""
         def make() -> Any:
             from .llvm_code import Loop
 
@@ -258,7 +258,7 @@ class _Variant:
 
     @cached_property
     def arrays(self) -> Any:
-        """The code for arrays of poses as machine code."""
+        """Return the code for arrays of poses as machine code."""
         from .llvm_arrays import Arrays
 
         return Arrays(*self.listing.operations())
@@ -316,7 +316,7 @@ class Pose:
 
     @cached_property
     def at(self) -> Callable:
-        """The function from the arguments, floats, to the outputs of one set of dimensions."""
+        """Return the function from floats to the outputs of one set of dimensions."""
         return self.variant.float(*self.constants, self._quietly)
 
     @cached_property

@@ -77,7 +77,7 @@ class Formula:
 
     @property
     def degree(self) -> Degree:
-        """The power of a length that it is: 0, 1, ...; None if it is zero, NaN if it is none."""
+        """Return the power of a length that it is: 0, 1, ...; None if zero, NaN if none."""
         return self._worked_out(lambda leaf: 1 if leaf in self.names else 0 if leaf else None,
                                 _DEGREES)
 

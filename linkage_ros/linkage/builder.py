@@ -134,7 +134,7 @@ class Builder:
 
     @property
     def grounded(self) -> Tuple[str, ...]:
-        """The joints on the ground."""
+        """Return the joints on the ground."""
         return tuple(name for name, point in self.points.items() if point.home == GROUND)
 
     def ground(self, name: str, x: Number, y: Number) -> None:
@@ -568,7 +568,7 @@ class Builder:
         origin = self.points[start]
         stands_on = frozenset().union(*({x} | self.points[x].stands_on for x in (start, *others)))
         self.points[name] = Point(place or origin.place + vector, link, origin.span + length,
-                                   stands_on)
+                                  stands_on)
         self._bar(start, name, vector, length, link)
 
     def _bar(self, first: str, second: str, vector: Complex, length: Number,

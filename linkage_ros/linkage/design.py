@@ -34,12 +34,12 @@ class Design:
 
     @property
     def words(self) -> Any:
-        """The module that reads and draws the lines."""
+        """Return the module that reads and draws the lines."""
         return rod_lines if self.in_space else joint_lines
 
     @cached_property
     def lines(self) -> List[joint_lines.Line]:
-        """The joints as constructions."""
+        """Return the joints as constructions."""
         return self.words.parse(self.joints)
 
     @cached_property
@@ -49,5 +49,5 @@ class Design:
 
     @cached_property
     def branches(self) -> dict:
-        """The assembly sign, +1 or -1, of each joint that has two."""
+        """Return the assembly sign, +1 or -1, of each joint that has two."""
         return self.words.branches(self.lines)

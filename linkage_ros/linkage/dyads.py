@@ -158,7 +158,7 @@ class Dyads:
 
     @property
     def left(self) -> List[str]:
-        """The bodies that are not placed."""
+        """Return the bodies that are not placed."""
         return [body for body in self.on if body not in self.parts]
 
     def seen(self, body: str, place: complex) -> complex:

@@ -35,7 +35,7 @@ MOST = 100
 def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Callable,
          places: Callable) -> List[Arc]:
     """
-    Return the arcs (lo, hi) of the first input on which every margin is at least zero.
+    Return where every margin is at least zero: arcs of the first input, each (lo, hi).
 
     Parameters
     ----------

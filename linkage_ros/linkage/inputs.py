@@ -44,7 +44,7 @@ class Input(NamedTuple):
 
     @property
     def turn(self) -> float:
-        """The angle [rad] after which all comes round."""
+        """Return the angle [rad] after which all comes round."""
         return math.tau * self.period
 
     @property
@@ -54,17 +54,17 @@ class Input(NamedTuple):
 
     @property
     def quantity(self) -> str:
-        """What it is, for messages: 'crank angle'."""
+        """Return what it is, for messages: 'crank angle'."""
         return f'{self.name} {self.kind}'
 
     @property
     def unit(self) -> str:
-        """What it is counted in, for messages."""
+        """Return what it is counted in, for messages."""
         return 'rad' if self.kind == ANGLE else 'm'
 
     @property
     def size(self) -> float:
-        """The power of two [m] in which a stroke is about as long as a turn."""
+        """Return the power of two [m] in which a stroke is about as long as a turn."""
         return 1.0 if self.kind == ANGLE else 2.0 ** (math.frexp(self.high - self.low)[1] - 2)
 
     def counted(self) -> Input:

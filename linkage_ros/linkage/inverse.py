@@ -113,7 +113,7 @@ class Answer(NamedTuple):
     @property
     def signs(self) -> Mapping[str, int]:
         """
-        The working mode.
+        Return the working mode.
 
         For each link that hangs on an input crank, by its name, the side to which it turns off
         from the line between the crank's joints, +1 left; and 'det', the sign of the determinant
@@ -124,7 +124,7 @@ class Answer(NamedTuple):
     @property
     def margin(self) -> float:
         """
-        The least singular value of d outputs / d inputs by the greatest or 1.
+        Return the least singular value of d outputs / d inputs by the greatest or 1.
 
         0 where the inputs cannot move the outputs some way, or not hold them. Lengths are counted
         in parts of the longest bar or about the stroke, angles in rad.
@@ -138,7 +138,7 @@ class Answer(NamedTuple):
 
     @property
     def mode(self) -> str:
-        """The signs as text: 'AP+ CP- det-'."""
+        """Return the signs as text: 'AP+ CP- det-'."""
         return ' '.join(f'{name}{"0+-"[sign]}' for name, sign in self.signs.items())
 
 

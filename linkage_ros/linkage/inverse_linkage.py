@@ -500,5 +500,3 @@ def _rate(value: Real, turning: Sequence[Tuple[float, Complex]],
         turned = spin(bar)
         total = total + sign * turned.formula(*(derivative(x, speeds, known) for x in turned.of))
     return total
-
-

@@ -126,7 +126,7 @@ class Line(NamedTuple):
 
     @property
     def stands_on(self) -> Tuple[str, ...]:
-        """The joints that it is constructed from."""
+        """Return the joints that it is constructed from."""
         return tuple(arg.text for arg in self.arguments if arg.kind in _JOINTS)
 
     @property
@@ -138,12 +138,12 @@ class Line(NamedTuple):
 
     @property
     def called(self) -> str:
-        """The name that it gives its input or what is geared; empty: the usual one."""
+        """Return the name that it gives its input or what is geared; empty: the usual one."""
         return next((arg.text for arg in self.arguments if arg.kind == 'NAME'), '')
 
     @property
     def sides(self) -> Tuple[str, ...]:
-        """The words for its branches of +1 and -1, if it has two."""
+        """Return the words for its branches of +1 and -1, if it has two."""
         return next((('left', 'right') if kind == 'left|right' else ('out', 'in')
                      for kind, _, _ in self.arguments if '|' in kind), ())
 
@@ -200,7 +200,7 @@ def _mirrored(lines: List[Line], mirror: Line) -> List[Line]:
             continue
         if line.word == 'ground':
             found.append(parsed(f'{line.names[0]}{mirror.names[0]} image {line.names[0]} '
-                                 f'{" ".join(mirror.stands_on)}')._replace(text=mirror.text))
+                                f'{" ".join(mirror.stands_on)}')._replace(text=mirror.text))
             continue
         args = [_image(line.word, arg, '' if arg.text in own else mirror.names[0])
                 for arg in line.arguments if arg.option not in ('geared', 'called')]

@@ -150,7 +150,7 @@ class Mechanism:
 
     @cached_property
     def bar_lengths(self) -> Mapping:
-        """The length [m] of each bar."""
+        """Return the length [m] of each bar."""
         return MappingProxyType({(bar.first, bar.second): self._metres(bar.length)
                                  for bar in self.structure.built.bars})
 
@@ -164,7 +164,7 @@ class Mechanism:
 
     @property
     def longest(self) -> float:
-        """The longest bar [m]; where there is none, the longest way of an input."""
+        """Return the longest bar [m]; where there is none, the longest way of an input."""
         return max(self.bar_lengths.values(),
                    default=max(input_.high - input_.low for input_ in self.inputs))
 

@@ -231,7 +231,7 @@ class Structure:
 
     @property
     def closures(self) -> List[Limit]:
-        """What vanishes where a dyad, a slot, a slider or a kite stretches or folds."""
+        """Return what vanishes where a dyad, a slot, a slider or a kite stretches or folds."""
         return [limit for limit in (*self.built.limits, *self.built.folds)
                 if limit.margin.varies and limit not in self.built.ways]
 

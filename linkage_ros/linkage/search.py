@@ -262,4 +262,3 @@ def _polished(q: np.ndarray, missed: Callable, moved: Callable) -> np.ndarray:
         trial = moved(q, -(np.linalg.pinv(jacobian) @ gap[..., None])[..., 0])
         q = np.where((missed(trial)[1] < size)[:, None], trial, q)
     return q
-

@@ -159,7 +159,7 @@ class Hinge(NamedTuple):
 
     @property
     def axis(self) -> Vector:
-        """The direction as a unit vector."""
+        """Return the direction as a unit vector."""
         return self.direction.unit()
 
     def leaning(self, other: Hinge) -> Real:

@@ -125,7 +125,7 @@ class Assembly:
 
     @property
     def all_joints(self) -> List[str]:
-        """The joints of all legs, with what their names begin with."""
+        """Return the joints of all legs, with what their names begin with."""
         return [prefix + joint for prefix in self.legs for joint in self.joints]
 
     @cached_property

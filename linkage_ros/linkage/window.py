@@ -65,7 +65,7 @@ class HeldBy(NamedTuple):
 
     @property
     def sides(self) -> Tuple[float, ...]:
-        """The sides of a crank on which a pose may have it; one where no crank turns."""
+        """Return the sides of a crank on which a pose may have it; one where no crank turns."""
         return (1.0, -1.0) if self.length is not None and any(self.pivot.u) else (0.0,)
 
     def pivots(self, poses: np.ndarray, side: float) -> Vector:

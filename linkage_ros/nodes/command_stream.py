@@ -45,7 +45,7 @@ class Target(NamedTuple):
 
     @property
     def actuators(self) -> list[str]:
-        """What moves the inputs: of one that is measured elsewhere, the input itself."""
+        """Return what moves the inputs: of one that is measured elsewhere, the input itself."""
         return [f'{self.machine.name}_{drive.input.name}' if drive.measures else drive.source
                 for drive in self.machine.inputs.values()]
 
@@ -77,7 +77,7 @@ class Command(NamedTuple):
 
     @property
     def efforts(self) -> list[float]:
-        """What actuators give at rest against the loads [N m or N]; 0 where there are none."""
+        """Return what actuators give at rest against the loads [N m or N], else 0."""
         machine = self.target.machine
         if not machine.loads:
             return [0.0] * len(self.inputs)

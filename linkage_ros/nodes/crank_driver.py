@@ -27,6 +27,7 @@ JUMP = 10 ** 8
 # In thirty years [ns] nobody waits for the next message.
 LONGEST_PERIOD = 1e18
 
+
 class CrankDriver(scene_node.SceneNode):
     """
     Publishes every input as a function of the node's time, on `crank_states`.

@@ -60,7 +60,7 @@ class DrivenMechanism:
 
     @property
     def model(self) -> MechanismModel:
-        """What it is made of; it is adopted before the first message comes."""
+        """Return what it is made of; it is adopted before the first message comes."""
         assert self._model
         return self._model
 

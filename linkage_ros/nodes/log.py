@@ -58,7 +58,7 @@ class Once:
 
     @property
     def ending(self) -> str:
-        """What the last warning ends with."""
+        """Return what the last warning ends with."""
         return '; no more will be named' if len(self._seen) == self._most else ''
 
 

@@ -73,7 +73,7 @@ class MechanismModel:
 
     @cached_property
     def marker_array(self) -> messages.Markers:
-        """The markers' message."""
+        """Return the markers' message."""
         return messages.Markers(*self._drawn)
 
     def latched(self) -> Tuple[str, Optional[Any]]:
@@ -173,11 +173,12 @@ def _shown(machine: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
     # A plate is drawn instead of its bars: the message is the smaller for it.
     edges = {frozenset(edge) for plate in plates for edge in combinations(plate, 2)}
     bars = [bar for bar in linkage.bars if bar not in cranks and frozenset(bar) not in edges]
-    pieces: Dict[int, list] = {messages.LINKS_ID: [*bars, *linkage.cylinders],
-              messages.JOINTS_ID: [(name,) for name in wanted],
-              messages.GUIDES_ID: [], messages.BODIES_ID: [], messages.CRANKS_ID: cranks,
-              messages.DRIVEN_ID: [], messages.PLATES_ID: plates,
-              messages.GROUND_ID: shapes.marks(linkage, wanted)}
+    pieces: Dict[int, list] = {
+        messages.LINKS_ID: [*bars, *linkage.cylinders],
+        messages.JOINTS_ID: [(name,) for name in wanted],
+        messages.GUIDES_ID: [], messages.BODIES_ID: [], messages.CRANKS_ID: cranks,
+        messages.DRIVEN_ID: [], messages.PLATES_ID: plates,
+        messages.GROUND_ID: shapes.marks(linkage, wanted)}
     for shape in shapes.drawn(machine, wanted):
         id_ = (messages.GUIDES_ID if shape.kind == shapes.GUIDE else messages.DRIVEN_ID
                if shape.slide.name in machine.inputs else messages.BODIES_ID)

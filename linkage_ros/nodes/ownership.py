@@ -86,8 +86,8 @@ class Follower:
             self._compare(event, values)
         # What could not be may be now.
         changed = {name: value for name, value in {**self._refused, **values}.items()
-                  if name in self._owned and not fields[name].read_only
-                  and value != self._present(name)}
+                   if name in self._owned and not fields[name].read_only
+                   and value != self._present(name)}
         refused = self._parameters.follow(dict(sorted(changed.items())))
         self._refused = {name: changed[name] for name in refused}
         self._warn('refused', wrong + [*refused.values()], 'values that cannot be followed')
@@ -107,8 +107,8 @@ class Follower:
         followed = machines.keys() - missing - unlike.keys()
         self._owned = {name for name in here if '.' in name and name.partition('.')[0] in followed}
         self._warn('unlike', [f'{name} is {quoted(here[name])} here and '
-                             f'{quoted(values[name])} there' for name in unlike.values()],
-                  'another mechanism, which is not followed')
+                              f'{quoted(values[name])} there' for name in unlike.values()],
+                   'another mechanism, which is not followed')
         self._warn('missing', sorted(missing), 'other mechanisms')
         if started:
             self._warned.pop('values', None)

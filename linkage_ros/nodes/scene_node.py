@@ -78,7 +78,7 @@ class SceneNode(Node):
 
     @property
     def scene(self) -> scenes.Scene:
-        """What the parameters say."""
+        """Return what the parameters say."""
         return self._parameters_of_scene.scene
 
     @property
@@ -88,7 +88,7 @@ class SceneNode(Node):
 
     @property
     def fields(self) -> Mapping[str, scenes.Field]:
-        """The parameters that it acts on."""
+        """Return the parameters that it acts on."""
         return self._parameters_of_scene.fields
 
     @property
@@ -297,14 +297,14 @@ def _refuse_namesake(node: Node, others: Iterable[Node]) -> None:
     if name in {other.get_name() for other in others}:
         node.destroy_node()
         raise scenes.SceneError(f'two nodes would be called {name}; to rename one of them: '
-                               '-r kinematics:__node:=NAME')
+                                '-r kinematics:__node:=NAME')
 
 
 def _refuse_arguments(args: Any) -> None:
     unknown = remove_ros_args(args)[1:]
     if unknown:
         raise scenes.SceneError(f'unknown argument {quoted(unknown[0])}: there are none but '
-                               'those of ROS, after --ros-args')
+                                'those of ROS, after --ros-args')
 
 
 def _failed(name: str, error: Any) -> int:

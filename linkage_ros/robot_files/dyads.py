@@ -67,7 +67,7 @@ class Drawing(Dyads):
 
     @property
     def moved_by(self) -> List[Joint]:
-        """The joints that move it: where its motor is between moving links, that."""
+        """Return the joints that move it: where its motor is between moving links, that."""
         return [self.measured] if self.measured else self.driven
 
     @property

@@ -57,7 +57,7 @@ class Joint:
 
     @property
     def hinges(self) -> List['Joint']:
-        """The hinges that it is made of, or itself."""
+        """Return the hinges that it is made of, or itself."""
         return [one for part in self.parts for one in part.hinges] or [self]
 
     @property
@@ -126,7 +126,7 @@ class Robot:
 
     @property
     def positions(self) -> Dict[str, float]:
-        """The positions of all joints that have a name."""
+        """Return the positions of all joints that have a name."""
         return {joint.name: joint.position for joint in self.joints if joint.position is not None}
 
     def source(self, name: str) -> Tuple[str, float, float]:

@@ -103,7 +103,7 @@ class Joint(NamedTuple):
 
     @property
     def axis(self) -> Tuple[float, float, float]:
-        """The direction in which it turns or slides."""
+        """Return the direction in which it turns or slides."""
         return (self.sign, 0.0, 0.0) if self.kind == 'prismatic' else (0.0, 0.0, self.sign)
 
 
@@ -138,14 +138,14 @@ class Part:
 
     @cached_property
     def joints(self) -> List[str]:
-        """What the joints are called, those that are fixed as well."""
+        """Return what the joints are called, those that are fixed as well."""
         return [name for body in self.bodies for name in (
             body.joint.name if body.joint else f'{body.name}_fixed',
             *(f'{point.name}_fixed' for point in body.points))]
 
     @cached_property
     def links(self) -> List[str]:
-        """What the bodies and their points are called."""
+        """Return what the bodies and their points are called."""
         return [name for body in self.bodies for name in (
             body.name, *(point.name for point in body.points))]
 
@@ -160,7 +160,7 @@ class Robot:
 
     @property
     def bodies(self) -> List[Body]:
-        """The bodies of all mechanisms."""
+        """Return the bodies of all mechanisms."""
         return [body for part in self.parts for body in part.bodies]
 
     def check_names(self, whose: str) -> None:

@@ -54,7 +54,7 @@ def adapted(config: dict, machines: Mapping[str, SceneMechanism], frame_id: str,
     places = [i for i, display in enumerate(displays) if display['Class'] == GROUP]
     pattern = displays[places[0]]
     displays[places[0]:places[-1] + 1] = [_renamed(pattern, name, namespace)
-                                           for name in machines]
+                                          for name in machines]
     manager['Global Options']['Fixed Frame'] = frame_id
     made['Visualization Manager']['Views']['Current'].update(_camera(machines.values()))
     for display in _all(displays):

@@ -282,7 +282,7 @@ class InverseRequest:
 
     @cached_property
     def _spans(self) -> List[List[Tuple[float, float]]]:
-        """The least and the greatest value on each arc, with the input there."""
+        """Return the least and the greatest value on each arc, with the input there."""
         scale = self._scales[0]
         found = self._machine.linkage.extremes(self.outputs[0], [
             (low / scale, high / scale) for low, high in self._arcs])

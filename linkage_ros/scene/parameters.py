@@ -92,7 +92,7 @@ class Field:
 
     @property
     def allowed(self) -> str:
-        """What it may be, in words."""
+        """Return what it may be, in words."""
         words = [KINDS[self.kind][1]]
         if self.positive:
             words.append('above 0')

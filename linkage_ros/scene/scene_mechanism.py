@@ -101,7 +101,7 @@ class SceneMechanism:
 
     @property
     def first(self) -> InputSettings:
-        """The first input, for most linkages the only one."""
+        """Return the first input, for most linkages the only one."""
         return next(iter(self.inputs.values()))
 
     def scale_of(self, output: str) -> float:
@@ -158,7 +158,7 @@ class SceneMechanism:
 
     @property
     def tracer(self) -> str:
-        """The joint whose curve is shown, the linkage's own tracer if it is wanted."""
+        """Return the joint whose curve is shown, the linkage's own tracer if it is wanted."""
         return self.linkage.tracer if self.linkage.tracer in self.points else self.points[-1]
 
 
@@ -178,7 +178,7 @@ def read_machine(name: str, given: Mapping[str, Any], old: Optional[SceneMechani
     points, pose = _points(name, linkage, values), _pose(name, values)
     settled = old.inputs if old else {}
     inputs = {input_.name: read_settings(name, linkage, input_, reach, scale, values,
-                                      settled.get(input_.name), strict)
+                                         settled.get(input_.name), strict)
               for input_ in linkage.inputs}
     frame_id = values.take(f'{name}.frame_id', OWN_FRAME_ID, '')
     only_named = values.take(f'{name}.only_named', ONLY_NAMED, False)
@@ -193,7 +193,7 @@ def read_machine(name: str, given: Mapping[str, Any], old: Optional[SceneMechani
         raise SceneError(f'{name}.loads must be empty where there is more than one leg')
     refuse_unknown(values.left(), [parameter.name for parameter in values.parameters])
     return SceneMechanism(name, linkage, reach, scale, leg_pairs, mirrored, points, pose, inputs,
-                   frame_id, joints, only_named, loads, given, tuple(values.parameters))
+                          frame_id, joints, only_named, loads, given, tuple(values.parameters))
 
 
 def _linkage(name: str, type_: str, values: Values) -> Tuple[Mechanism, Tuple[Arc, ...]]:

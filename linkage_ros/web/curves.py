@@ -74,7 +74,6 @@ class Sweep:
         factor = 1.0 / self._size if kind == VELOCITY else 1.0
         return {name: value * factor * size(name) for name, value in found.items()}
 
-
     def poles(self, kind: str, name: str) -> np.ndarray:
         """Return inputs [rad or m] across which a quantity is not followed: it may be infinite."""
         if kind in (POSITION, TRANSMISSION):

@@ -494,7 +494,7 @@ class SceneView:
         mechanism.machine = None
         for client in self.clients:
             client.tell((mechanism.key, name), {'op': 'value', 'mechanism': mechanism.key,
-                                            'name': name, 'value': setting.value})
+                                                'name': name, 'value': setting.value})
 
 
 def _read(given: Mapping[str, Any]) -> scene.Scene:

@@ -19,7 +19,7 @@ try:
 except ImportError as error:
     raise ImportError('viewer needs aiohttp: apt install python3-aiohttp, or pip install '
                       'aiohttp') from error
-from .bridge import Bridge
+from .bridge import Bridge  # noqa: I100
 from .scene_view import SceneView
 
 VIEWER = 'viewer'

@@ -241,14 +241,14 @@ def judge(case, found, links, rates=False, exact=None) -> List[Row]:
     exact = exact or [truth(case, theta, links, rates) for theta in case.thetas]
     top = _top_speeds(case, links) if rates else {}
     return [row_of(case, theta, output, results[index], exact[index],
-                 _due(case.kind, output, exact[index].closures, links), top)
+                   _due(case.kind, output, exact[index].closures, links), top)
             for index, theta in enumerate(case.thetas) for output, results in found.items()]
 
 
 def verdict(case, angle, output, result, exact):
     """Return the `Row` of one result that depends on every closure of its truth."""
     return row_of(case, angle, output, np.asarray(result), exact,
-                due_of(exact.closures.values()), {})
+                  due_of(exact.closures.values()), {})
 
 
 def _due(kind, output, closures, links):

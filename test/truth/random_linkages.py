@@ -137,7 +137,7 @@ class _Writer:
 
     @property
     def _pins(self):
-        """The pins of cranks on the ground, or of whatever moves if there are none."""
+        """Return the pins of cranks on the ground, or of whatever moves if there are none."""
         return [name for name, kind in self._kind.items() if kind == 'crank'] or self._moving
 
     @property

@@ -145,7 +145,7 @@ class Ankle(NamedTuple):
 
     @property
     def lines(self):
-        """The lines of it, without limits."""
+        """Return the lines of it, without limits."""
         def text(vector):
             return ' '.join(map(repr, map(float, vector)))
 
