@@ -131,7 +131,8 @@ class Subject:
 
     def away(self, value, others):
         """Return how far a value of the first input is from the nearest of others."""
-        return min((abs((value - other + math.pi) % TURN - math.pi) if self.turns
+        turn = self.inputs[0].turn
+        return min((abs((value - other + turn / 2) % turn - turn / 2) if self.turns
                     else abs(value - other) for other in others), default=math.inf)
 
     def place(self, output, drawing, unit):
