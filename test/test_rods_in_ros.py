@@ -10,10 +10,14 @@ import numpy as np
 import pytest
 
 pytest.importorskip('rclpy')
+pytest.importorskip('linkage_interfaces')
 
+from linkage_interfaces.srv import InputsFor  # noqa: E402
 from linkage_ros import mechanisms  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
+from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
+from test_command_stream import Stream  # noqa: E402
 from test_rods import G1  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 
@@ -54,6 +58,46 @@ def test_markers_are_in_space(graph):
     ends = np.array([(p.x, p.y, p.z) for p in lines.points]).reshape(-1, 2, 3)
     lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
     np.testing.assert_allclose(lengths, list(linkage.bar_lengths.values()), atol=1e-15)
+
+
+def test_a_stream_of_pitch_and_roll_becomes_commands_of_the_motors(graph, capfd):
+    stream, linkage = Stream(graph, SCENE), mechanisms.create('rods', joints=G1)
+    drawn = linkage.driven_by('pitch', 'roll')
+    names, motors = ['left_ankle_pitch', 'left_ankle_roll'], ('right', 'left')
+    for pitch, roll in ((0.0, 0.0), (-0.4, 0.1), (0.3, -0.2), (0.4, 0.1), (-0.8, 0.0)):
+        command = stream.want(names, [pitch, 0.1 - roll], [1.0, -2.0])
+        angles = drawn.joint_angles((pitch, roll), motors)
+        rates = [drawn.joint_rates((pitch, roll), motors, by) for by in (0, 1)]
+        for source, motor in zip(('motor_a', 'motor_b'), motors):
+            position, velocity = command[source]
+            assert position == pytest.approx(angles[motor], abs=1e-13)
+            assert velocity == pytest.approx(
+                1.0 * rates[0][motor] + 2.0 * rates[1][motor], rel=1e-9)
+    last = {source: (position, 0.0) for source, (position, _) in command.items()}
+    for pitch, roll in ((0.6, 0.05), (0.0, 0.3), (math.nan, 0.0)):
+        assert stream.want(names, [pitch, 0.1 - roll], [1.0, 1.0]) == last
+    assert 'cannot be 0.6, 0.05: pitch, roll at 0.6, 0.05 is nowhere in the reach' \
+        in capfd.readouterr().err
+
+
+def test_a_service_gives_all_motors_of_a_pose_and_the_nearest_first(graph):
+    node, linkage = graph.start(ServoInverse, SCENE), mechanisms.create('rods', joints=G1)
+    client = graph.node.create_client(InputsFor, 'inputs_for')
+    pose = {'outputs': ['pitch', 'roll'], 'values': [-0.1, 0.05]}
+    response = graph.call(client, InputsFor.Request(**pose))
+    assert response.success and response.names == ['motor_a', 'motor_b']
+    answers = np.reshape(response.positions, (-1, 2))
+    assert len(answers) == len(response.modes) == 4 and not any(response.singular)
+    for answer in answers:
+        back = linkage.joint_angles(answer, ['pitch', 'roll'])
+        np.testing.assert_allclose([*back.values()], pose['values'], atol=1e-14)
+        near = (answer + [0.3 + 2.0 * math.pi, -0.3]).tolist()
+        first = node.answer_together(InputsFor.Request(near=near, **pose), InputsFor.Response())
+        np.testing.assert_allclose(first.positions[:2], answer + [2.0 * math.pi, 0.0], atol=1e-12)
+    for values in ((0.6, 0.0), (0.0, -0.3)):
+        refused = graph.call(client, InputsFor.Request(**{**pose, 'values': values}))
+        assert not refused.success and not refused.positions
+        assert 'is nowhere in the reach' in refused.message
 
 
 def test_the_example_s_rods_are_closed_in_its_own_urdf(graph):

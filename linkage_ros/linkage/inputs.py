@@ -18,6 +18,9 @@ Arc = Tuple[float, float]
 
 ANGLE, LENGTH = 'angle', 'length'
 
+# The reach of gears that come round after more turns than these is that of one turn: every turn
+# takes as long as the first.
+MOST_COUNTED = 60
 # Values beyond an end of the reach by no more than this [rad] may be that end, rounded.
 ROUNDED_END = 1e-12
 # Arcs below this width [rad] are the rounding of one angle.
@@ -30,14 +33,14 @@ class Input(NamedTuple):
 
     All poses lie between `low` and `high`: of an angle one period, of a length its longest stroke.
     `period` says after how many turns all comes round: more than one where it drives others by
-    gears of fractions.
+    gears of fractions, infinite where it never does.
     """
 
     name: str
     kind: str = ANGLE
     low: Any = -math.pi
     high: Any = math.pi
-    period: int = 1
+    period: float = 1
 
     @property
     def turn(self) -> float:
@@ -47,7 +50,7 @@ class Input(NamedTuple):
     @property
     def turns(self) -> bool:
         """Whether it is the same a turn later."""
-        return self.kind == ANGLE
+        return self.kind == ANGLE and self.period < math.inf
 
     @property
     def quantity(self) -> str:
@@ -57,12 +60,12 @@ class Input(NamedTuple):
     @property
     def unit(self) -> str:
         """What it is counted in, for messages."""
-        return 'rad' if self.turns else 'm'
+        return 'rad' if self.kind == ANGLE else 'm'
 
     @property
     def size(self) -> float:
         """The power of two [m] in which a stroke is about as long as a turn."""
-        return 1.0 if self.turns else 2.0 ** (math.frexp(self.high - self.low)[1] - 2)
+        return 1.0 if self.kind == ANGLE else 2.0 ** (math.frexp(self.high - self.low)[1] - 2)
 
     def counted(self) -> Input:
         """Return the same input counted in its size."""

@@ -11,12 +11,12 @@ assembly mode for each choice of sides, the first as drawn.
 from __future__ import annotations
 
 from itertools import product
-from typing import Dict, List, Optional, TYPE_CHECKING
+from typing import Dict, List, Optional, Tuple, TYPE_CHECKING
 
 from .inverse_linkage import Mode, MOST_SIDES
 from .quantities import Names, Structure
 from .rod_lines import turning_rods
-from ..formula.expression import derivative, Real
+from ..formula.expression import argument, derivative, Real, real, substituted
 
 if TYPE_CHECKING:
     from .mechanism import Mechanism
@@ -30,26 +30,31 @@ class InverseRods:
     """
 
     def __init__(self, linkage: Mechanism, outputs: Names):
-        driven = linkage.driven_by(*outputs)
-        self.outputs, self.design = outputs, driven.design
-        self.lines = self.design.joints
+        self.design = linkage.driven_by(*outputs).design
+        self.outputs, self.lines, n = outputs, self.design.joints, len(outputs)
         rods = turning_rods(self.design.lines, outputs)
         if len(rods) > MOST_SIDES:
             raise ValueError(f'more than {2 ** MOST_SIDES} assembly modes')
         self.branches = dict.fromkeys(rods, 1)
-        self.turns = ((0.0,),) * len(outputs)
+        self.turns = ((0.0,),) * n
         self.given: Dict[Real, Real] = {}
-        names = [input_.name for input_ in linkage.inputs]
-        self.modes = tuple(self._mode({**linkage.branches, **dict(zip(rods, sides))}, names)
-                           for sides in product((1, -1), repeat=len(rods)))
+        # Whether the linkage itself has no other side: then all modes are its own.
+        self.is_own = not turning_rods(linkage.design.lines, ())
+        # Drawn once: sides are arguments, too, until each mode has its own.
+        structure = Structure(self.design, {**linkage.branches, **{
+            rod: argument(n + i) for i, rod in enumerate(rods)}})
+        values = [structure.output(input_.name) for input_ in linkage.inputs]
+        known: List[Dict[Real, Real]] = [{} for _ in outputs]
+        rates = [derivative(value, {by: 1.0}, each)
+                 for value in values for by, each in enumerate(known)]
+        self.modes = tuple(self._mode(structure, values + rates, sides)
+                           for sides in product((1.0, -1.0), repeat=len(rods)))
 
-    def _mode(self, sides: Dict[str, int], names: List[str]) -> Mode:
-        structure = Structure(self.design, sides)
-        rows = [structure.output(name) for name in names]
-        known: List[Dict[Real, Real]] = [{} for _ in self.outputs]
-        return Mode(structure, tuple(rows), tuple(
-            tuple(derivative(value, {by: 1.0}, each) for by, each in enumerate(known))
-            for value in rows))
+    def _mode(self, structure: Structure, row: List[Real], sides: Tuple[float, ...]) -> Mode:
+        n = len(self.outputs)
+        row = substituted(row, [*map(argument, range(n)), *map(real, sides)])
+        return Mode(structure, tuple(row[:n]), tuple(
+            tuple(row[at:at + n]) for at in range(n, n + n * n, n)))
 
     def __str__(self) -> str:
         return '\n'.join(f'{line}    # at {name}' if name in self.outputs else line

@@ -22,7 +22,7 @@ from .arguments import checked_dimensions, numbers
 from .builder import in_metres, UNIT
 from .design import Design
 from .input_range import arcs
-from .inputs import Arc, Input
+from .inputs import Arc, Input, MOST_COUNTED
 from .inverse import Answer, Inverse
 from .quantities import LinkPoint, Points, structure_of
 from ..cache import Cache
@@ -33,9 +33,8 @@ from ..words import listed, meant, plain_text, quoted
 # Lengths beyond these are counted in a power of two of their own, which changes no bit of a
 # result and keeps squares and products of lengths inside the range of float64.
 SMALL_LENGTH, LARGE_LENGTH = 1e-30, 1e30
-# A ratio whose denominator is larger never comes round; one that takes more turns than these is
-# answered for one turn only, as every turn takes as long as the first.
-MOST_TURNS, MOST_COUNTED = 1000, 60
+# A ratio whose denominator is larger never comes round.
+MOST_TURNS = 1000
 # Values of expressions of dimensions that are held: some twenty times those of Jansen's leg.
 MOST_VALUES = 10000
 # Quantities of joints; all others are of links.
@@ -135,7 +134,8 @@ class Mechanism:
         self._evaluated: dict = {}
         self._poses, self._placers, self.cache = Cache(), Cache(), Cache()
         self.inputs = tuple(map(self._counted_input, range(len(built.inputs)), built.inputs))
-        self.geared = tuple(built.driven.keys() - {input_.name for input_ in self.inputs})
+        own = {input_.name for input_ in self.inputs}
+        self.geared = tuple(name for name in built.driven if name not in own)
         self.links = tuple(link._replace(zero=np.asarray(self.value(link.zero)).tolist())
                            for link in built.links)
 
@@ -441,10 +441,9 @@ class Mechanism:
                 f'{self.type} has no output {quoted(output)}; allowed: distance(A,B) and '
                 f'angle(A,B) of two joints, {listed(named)}{meant(output, named)}')
 
-    def geared_to(self, input_: str) -> List[str]:
-        """Return the links that an input drives by gears."""
-        driven = self.structure.built.driven
-        return [name for name in self.geared if driven[name][0].name == input_]
+    def geared_to(self, by: int) -> List[str]:
+        """Return the links that one of the inputs drives by gears."""
+        return [name for name in self.geared if self.moves(name, by)]
 
     # --- the inverse ---
 

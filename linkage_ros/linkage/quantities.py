@@ -69,7 +69,7 @@ Points = Tuple[Union[str, LinkPoint], ...]
 class Structure:
     """A design drawn with its branches: what all mechanisms of that kind share."""
 
-    def __init__(self, design: Design, branches: Mapping[str, int]):
+    def __init__(self, design: Design, branches: Mapping[str, Any]):
         self.built = Builder()
         given = {'inputs': design.inputs} if design.inputs else {}
         design.words.draw(self.built, design.lines, joint_lines.symbols_of(

@@ -35,8 +35,11 @@ from .inputs import ANGLE, Input, LENGTH
 from .joint_lines import check_numbers, formula, Line, parsed
 from .planar import Limit, TOLERANCE
 from .spatial import (
+    Circle,
+    drawn_ahead,
     drawn_side,
     EDGE,
+    Frame,
     gated_by,
     Hinge,
     Pivot,
@@ -44,12 +47,12 @@ from .spatial import (
     rod_on_hinge,
     rod_on_slide,
     Turn,
-    Universal,
+    two_rods,
     Vector,
-    within,
+    ZERO,
 )
-from .window import HeldBy, Way, Window
-from ..formula.expression import Real, real, where
+from .window import HeldBy, Window
+from ..formula.expression import Real, real
 from ..words import listed, quoted
 
 FORMS = {
@@ -92,8 +95,8 @@ class HeldLink(NamedTuple):
     """Two hinges in a row that two rods hold: what its window is made from, as expressions."""
 
     lines: Tuple[Line, Line]
-    limits: Tuple[Optional[Tuple[Real, Real]], ...]
-    rods: Tuple[Tuple[Any, Any, Any], ...]
+    limits: Tuple[Optional[Tuple[Real, ...]], ...]
+    rods: Tuple[HeldBy, ...]
 
 
 def parse(texts: Iterable[str]) -> List[Line]:
@@ -228,11 +231,11 @@ class _Assembly:
 class _Joint:
     """A link on its joint, which is solved once it has a turn or a shift."""
 
-    def __init__(self, name: str, line: Line, numbers: List[Real]):
-        self.name, self.line, self.parent = name, line, _links(line)[0]
+    def __init__(self, line: Line, numbers: List[Real]):
+        self.line, (self.parent,) = line, _links(line)
         self.turn: Optional[Turn] = None
         self.shift: Optional[Real] = None
-        self.limits = (numbers[6], numbers[7]) if len(numbers) > 6 else None
+        self.limits = numbers[6:]
         if numbers:
             self.hinge = Hinge(Vector(*numbers[:3]), Vector(*numbers[3:6]))
 
@@ -243,6 +246,13 @@ class _Joint:
         if self.shift is not None:
             return point.plus(self.hinge.axis.times(-self.shift if back else self.shift))
         return point
+
+    def gate(self, limits: Iterable[Limit]) -> None:
+        """Have it NaN beyond limits."""
+        if self.turn:
+            self.turn = Turn(*(gated_by(x, limits) for x in self.turn))
+        elif self.shift is not None:
+            self.shift = gated_by(self.shift, limits)
 
 
 class _End(NamedTuple):
@@ -259,7 +269,7 @@ class _Drawing:
         self._assembly = _Assembly(lines, inputs)
         self._numbers = {line.names[0]: [formula(arg.text).expression(symbols) for arg in
                                          line.arguments if arg.kind != 'LINK'] for line in lines}
-        self._joints = {name: _Joint(name, self._assembly.lines[name], self._numbers[name])
+        self._joints = {name: _Joint(self._assembly.lines[name], self._numbers[name])
                         for name in self._assembly.parents}
         self._lengths: Dict[str, Real] = {}
         self._span = sum((part for numbers in self._numbers.values() for part in map(
@@ -271,20 +281,20 @@ class _Drawing:
             self._check_joint(joint)
         for name, line in self._assembly.lines.items():
             if line.word == 'rod':
-                numbers = self._numbers[name]
-                self._lengths[name] = numbers[6] if len(numbers) > 6 else self._drawn(line)
+                self._lengths[name] = [*self._numbers[name][6:], self._drawn(line)][0]
         for name in self._assembly.inputs:
-            self._drive(name, self._assembly.lines[name])
-        for group in self._assembly.order():
-            if len(group.links) == 2:
-                self._hold(group)
-            elif group.links:
-                self._fit(group.rods[0], self._joints[group.links[0]])
+            self._drive(name)
+        for rods, links in self._assembly.order():
+            if len(links) == 2:
+                self._hold(rods, *(self._joints[link] for link in links))
+            elif links:
+                self._fit(rods[0], self._joints[links[0]])
             else:
-                line, = group.rods
-                self._lengths[line.names[0]] = self._apart(line)
+                first, second = self._ends(rods[0])
+                self._lengths[rods[0].names[0]] = self._seen(second, first.link).minus(
+                    first.point).length()
         for name, line in self._assembly.lines.items():
-            self._show(name, line)
+            (self._show_rod if line.word in _RODS else self._show_joint)(name, line)
 
     def _check_joint(self, joint: _Joint) -> None:
         if joint.line.word == 'fixed':
@@ -292,27 +302,25 @@ class _Drawing:
         length = joint.hinge.direction.length()
         if length.value is None or length.value <= 0.0:
             self._demand(joint.line, length, 'its axis has no direction')
-        if joint.limits:
-            low, high = joint.limits
+        for low, high in [joint.limits] if joint.limits else []:
             self._demand(joint.line, high - low, 'within goes from a lower end to a higher one')
-            if joint.line.word == 'hinge':
-                for end in joint.limits:
-                    self._demand(joint.line, math.pi + EDGE - abs(end),
-                                 'within is from -180deg to 180deg at most')
+            for end in (low, high) if joint.line.word == 'hinge' else ():
+                self._demand(joint.line, math.pi + EDGE - abs(end),
+                             'within is from -180deg to 180deg at most')
 
     def _demand(self, line: Line, amount: Real, problem: str) -> None:
         self._builder.demands.append(Demand(line, amount, problem))
 
-    def _drive(self, name: str, line: Line) -> None:
+    def _drive(self, name: str) -> None:
         """Make an angle or a length an input."""
-        numbers, joint = self._numbers[name], self._joints.get(name)
-        if joint and line.word != 'slide':
-            value = self._builder.drive(Input(name, ANGLE), None)
-            joint.turn = Turn.by(gated_by(value, self._edges(joint, value)))
+        joint, ends = self._joints.get(name), self._numbers[name][6:]
+        if joint and joint.line.word != 'slide':
+            joint.turn = Turn.by(self._builder.drive(Input(name, ANGLE), None))
+            limits = self._edges(joint, joint.turn.angle)
+            joint.turn = Turn.by(gated_by(joint.turn.angle, limits))
             return
-        low, high = numbers[6:] if len(numbers) > 6 else (
-            real(0.0) if joint is None else -self._span, self._span)
-        value = self._builder.drive(Input(name, LENGTH, low, high), None)
+        value = self._builder.drive(Input(name, LENGTH, *(
+            ends or (real(0.0) if joint is None else -self._span, self._span))), None)
         if joint:
             joint.shift = value
         else:
@@ -327,20 +335,16 @@ class _Drawing:
         first, second = self._ends(line)
         return second.point.minus(first.point).length()
 
-    def _apart(self, line: Line) -> Real:
-        first, second = self._ends(line)
-        return self._seen(second, first.link).minus(first.point).length()
-
     def _seen(self, end: _End, link: str) -> Vector:
         """Return a point of one link in the coordinates of another."""
         up, down = self._assembly.chain(end.link), self._assembly.chain(link)
         point = end.point
         for name in up:
-            if name in down:
-                break
-            point = self._joints[name].moved(point)
-        for name in reversed([name for name in down if name not in up]):
-            point = self._joints[name].moved(point, back=True)
+            if name not in down:
+                point = self._joints[name].moved(point)
+        for name in reversed(down):
+            if name not in up:
+                point = self._joints[name].moved(point, back=True)
         return point
 
     def _pivot(self, end: _End, link: str) -> Pivot:
@@ -348,9 +352,13 @@ class _Drawing:
         moving = self._moving(end.link, link)
         joint = self._joints[moving[0]] if len(moving) == 1 else None
         if joint is None or joint.turn is None:
-            return Pivot.at(self._seen(end, link))
-        carries = joint.name in self._assembly.chain(end.link)
+            return Pivot(Circle(self._seen(end, link), ZERO, ZERO))
+        carries = moving[0] in self._assembly.chain(end.link)
         return Pivot(joint.hinge.circle(end.point), joint.turn if carries else joint.turn.back())
+
+    def _moving(self, link: str, other: str) -> List[str]:
+        return [name for name in self._assembly.between(link, other)
+                if self._joints[name].line.word != 'fixed']
 
     def _beyond(self, line: Line, link: str) -> Tuple[_End, _End]:
         """Return the end of a rod that a link carries, and the other."""
@@ -359,113 +367,97 @@ class _Drawing:
 
     def _fit(self, line: Line, joint: _Joint) -> None:
         """Turn or slide a joint so that a rod fits."""
-        end, pivot = self._beyond(line, joint.name)
-        name, length = line.names[0], self._lengths[line.names[0]]
-        base, seen = self._pivot(pivot, joint.parent), self._seen(end, joint.name)
-        sign = real(float(self._signs.get(name, 1)))
+        (link,), (name,) = joint.line.names, line.names
+        end, pivot = self._beyond(line, link)
+        length, hinge = self._lengths[name], joint.hinge
+        base, seen = self._pivot(pivot, joint.parent), self._seen(end, link)
         span = self._span + (length if not length.varies else real(0.0))
-        limits: Tuple[Limit, ...]
+        side, sided = (drawn_ahead if joint.line.word == 'slide' else drawn_side)(
+            hinge, pivot.point, end.point)
+        side *= self._signs.get(name, 1)
         if joint.line.word == 'slide':
-            ahead = joint.hinge.axis.dot(end.point.minus(pivot.point))
-            side, sided = _sign(ahead), abs(ahead) / self._drawn(line)
-            value, *limits_ = rod_on_slide(
-                joint.hinge.axis, base.place, seen, length, sign * side, span)
-            limits = tuple(limits_)
+            joint.shift, *limits = rod_on_slide(hinge.axis, base.place, seen, length, side, span)
         else:
-            side, sided = drawn_side(joint.hinge, pivot.point, end.point)
-            held = rod_on_hinge(joint.hinge, base, seen, length, sign * side, span)
-            value, limits = held.turn.angle, held.limits
-            joint.turn = held.turn
-            self._builder.transmissions[name] = held.transmission
-        self._demand(line, sided - _SIDED, f'as drawn it is at a dead point of {joint.name}: its '
+            joint.turn, *limits, self._builder.transmissions[name] = rod_on_hinge(
+                hinge, base, seen, length, side, span)
+        self._demand(line, sided - _SIDED, f'as drawn it is at a dead point of {link}: its '
                      'side cannot be seen; draw the linkage in another pose')
         self._builder.limits += limits
-        edges = self._edges(joint, value)
-        if joint.turn:
-            joint.turn = Turn(*(gated_by(x, edges) for x in joint.turn))
-        else:
-            joint.shift = gated_by(value, edges)
+        joint.gate(self._edges(joint, joint.turn.angle if joint.turn else joint.shift))
 
-    def _edges(self, joint: _Joint, value: Real) -> List[Limit]:
+    def _edges(self, joint: _Joint, value: Any) -> List[Limit]:
         """Return the limits of a joint, and have them kept."""
         if not joint.limits:
             return []
         slack = TOLERANCE * self._span if joint.line.word == 'slide' else real(EDGE)
-        found = within(value, *joint.limits, slack)
+        found = [Limit(value - joint.limits[0], slack), Limit(joint.limits[1] - value, slack)]
         self._builder.limits += found
         return found
 
-    def _hold(self, group: Group) -> None:
+    def _hold(self, lines: Tuple[Line, ...], first: _Joint, second: _Joint) -> None:
         """Solve two hinges in a row for two rods."""
-        first, second = (self._joints[name] for name in group.links)
-        home = [0.5 * (low + high) for low, high in (
-            joint.limits or (real(0.0), real(0.0)) for joint in (first, second))]
-        universal = Universal(first.hinge, second.hinge, home)
-        self._demand(second.line, universal.sine - _LEANING,
-                     f'its axis is nearly parallel to that of {first.name}')
-        ends = [self._beyond(line, second.name) for line in group.rods]
-        lengths = [self._lengths[line.names[0]] for line in group.rods]
-        pivots = [self._pivot(pivot, first.parent) for _, pivot in ends]
-        for line, (end, pivot), length, turning in zip(group.rods, ends, lengths, pivots):
-            if moving := self._moving(end.link, second.name):
-                raise line.error(f'{listed(moving)} moves between {second.name} and its end, '
+        frame, link = Frame.of(first.hinge, second.hinge), second.line.names[0]
+        self._demand(second.line, first.hinge.leaning(second.hinge) - _LEANING,
+                     f'its axis is nearly parallel to that of {first.line.names[0]}')
+        rods = []
+        for line in lines:
+            end, base = self._beyond(line, link)
+            pivot, length = self._pivot(base, first.parent), self._lengths[line.names[0]]
+            if moving := self._moving(end.link, link):
+                raise line.error(f'{listed(moving)} moves between {link} and its end, '
                                  'which must not be where two rods share two hinges')
-            anyhow = any(part.varies for part in turning.way.centre)
-            if anyhow or turning.turn and length.varies:
+            if any(part.varies for part in pivot.way.centre) or pivot.turn and length.varies:
                 what = 'be on' if length.varies else 'turn about one axis on'
-                raise line.error(f'its end on {pivot.link} must {what} {first.parent}, which '
+                raise line.error(f'its end on {base.link} must {what} {first.parent}, which '
                                  'carries the two hinges that it shares with another')
+            rods.append(Rod(pivot._replace(way=frame.seen(pivot.way)),
+                            frame.seen(second.hinge.circle(end.point)), length))
+        limits = first.limits, second.limits
         self._builder.windows.append(HeldLink(
-            (first.line, second.line), (first.limits, second.limits), tuple(
-                (universal.frame_way(pivot.way),
-                 universal.frame_way(second.hinge.circle(end.point)),
-                 None if length.varies else length)
-                for (end, _), pivot, length in zip(ends, pivots, lengths))))
-        *turns, limit = universal.solved([
-            Rod(pivot, end.point, length)
-            for (end, _), pivot, length in zip(ends, pivots, lengths)])
-        limits = [limit, *self._edges(first, turns[0].angle),
-                  *self._edges(second, turns[1].angle)]
+            (first.line, second.line), tuple(tuple(each) or None for each in limits),
+            tuple(HeldBy(rod.pivot.way, rod.end, None if rod.length.varies else rod.length)
+                  for rod in rods)))
+        first.turn, second.turn, limit = two_rods(rods, [
+            0.5 * (each[0] + each[1]) if each else real(0.0) for each in limits])
         self._builder.limits.append(limit)
-        first.turn, second.turn = (Turn(*(gated_by(x, limits) for x in turn)) for turn in turns)
+        edges = [limit, *self._edges(first, first.turn.angle),
+                 *self._edges(second, second.turn.angle)]
+        for joint in (first, second):
+            joint.gate(edges)
 
-    def _moving(self, link: str, other: str) -> List[str]:
-        return [name for name in self._assembly.between(link, other)
-                if self._joints[name].line.word != 'fixed']
-
-    def _show(self, name: str, line: Line) -> None:
-        """Add what users ask for: a joint or a length, points and lines."""
-        builder, joint = self._builder, self._joints.get(name)
-        value = self._lengths.get(name) if joint is None else \
-            joint.turn.angle if joint.turn else joint.shift
-        if value is not None and line.word != 'rod':
-            kind = 'revolute' if joint and joint.turn else 'prismatic'
-            place = f'{name}_origin' if joint else f'{name}_{_links(line)[0]}'
-            builder.links.append(Link(name, _links(line)[0], place, kind, real(0.0), place))
-            builder.joint_values[name] = value
-        if joint and line.word != 'fixed':
+    def _show_joint(self, name: str, line: Line) -> None:
+        """Add what users ask for of a joint: its angle or way, and its origin."""
+        joint = self._joints[name]
+        if line.word != 'fixed':
             self._point(f'{name}_origin', _End(name, joint.hinge.origin))
-        for end in self._ends(line) if joint is None else ():
-            self._point(f'{name}_{end.link}', end)
+            self._answer(name, 'revolute' if joint.turn else 'prismatic', f'{name}_origin',
+                         joint.turn.angle if joint.turn else joint.shift)
+
+    def _show_rod(self, name: str, line: Line) -> None:
+        """Add what users ask for of a rod: both ends, lines between them, and its length."""
+        builder, ends = self._builder, self._ends(line)
+        places = [f'{name}_{end.link}' for end in ends]
+        for place, end in zip(places, ends):
+            self._point(place, end)
             if end.link != GROUND and self._joints[end.link].line.word != 'fixed':
                 length = end.point.minus(self._joints[end.link].hinge.origin).length()
-                builder.bars.append(Bar(f'{end.link}_origin', f'{name}_{end.link}', length))
-        if line.word in _RODS:
-            first, second = (f'{name}_{link}' for link in _links(line))
-            if line.word == 'rod':
-                builder.bars.append(Bar(first, second, self._lengths[name]))
-                self._demand(line, self._lengths[name], 'it must be longer than zero')
-            else:
-                builder.cylinders.append((first, second))
+                builder.bars.append(Bar(f'{end.link}_origin', place, length))
+        if line.word == 'rod':
+            builder.bars.append(Bar(places[0], places[1], self._lengths[name]))
+            self._demand(line, self._lengths[name], 'it must be longer than zero')
+        else:
+            self._answer(name, 'prismatic', places[0], self._lengths[name])
+            builder.cylinders.append((places[0], places[1]))
+
+    def _answer(self, name: str, kind: str, place: str, value: Any) -> None:
+        parent = _links(self._assembly.lines[name])[0]
+        self._builder.links.append(Link(name, parent, place, kind, real(0.0), place))
+        self._builder.joint_values[name] = value
 
     def _point(self, name: str, end: _End) -> None:
         if name in self._builder.points:
             raise self._assembly.lines[end.link].error(f'a point of a rod is called {name}, too')
         self._builder.points[name] = Point(self._seen(end, GROUND), end.link, self._span)
-
-
-def _sign(x: Real) -> Real:
-    return where(x < 0.0, -1.0, 1.0)
 
 
 def check(lines: List[Line], linkage: Any) -> None:
@@ -481,25 +473,24 @@ def check(lines: List[Line], linkage: Any) -> None:
 def _check_window(held: HeldLink) -> None:
     """Raise ValueError, with the largest window, unless it holds one pose at most."""
     line = held.lines[1]
-    if any(np.ndim(part) for pivot, end, _ in held.rods for way in (pivot, end)
-           for vector in way for part in vector):
+    if any(np.ndim(part) for rod in held.rods for way in rod[:2] for vector in way
+           for part in vector):
         raise line.error('two rods on two hinges are shown to have one pose for one set of '
                          'dimensions, not for arrays')
-    rods = [HeldBy(Way(*map(np.array, pivot)), Way(*map(np.array, end)), length)
-            for pivot, end, length in held.rods]
-    limits = [each or (-_WIDEST, _WIDEST) for each in held.limits]
-    window = Window(rods, *zip(*limits))
+    window = Window(held.rods, *zip(*(each or (-_WIDEST, _WIDEST) for each in held.limits)))
     given = all(held.limits)
     if given and window.is_right():
         return
-    largest = window.largest()
-    low, high = np.ceil(10.0 * np.degrees(largest.low)), np.floor(10.0 * np.degrees(largest.high))
-    said = ', '.join(f'{each.names[0]} within {a / 10.0:g}deg {b / 10.0:g}deg'
-                      for each, a, b in zip(held.lines, low, high))
     problem = 'there may be a second pose in these limits' if given else 'both hinges need limits'
-    found = {each.names[0]: (a, b) for each, a, b in zip(held.lines, low, high) if a < b}
-    raise WindowError(line.error(f'{problem}; ' + (
-        f'the largest shown to have one at most: {said}' if len(found) == 2 else
-        'there are none about their middle, which is next to a singular pose')), {
-            name: (math.radians(a / 10.0), math.radians(b / 10.0))
-            for name, (a, b) in found.items()} if len(found) == 2 else {})
+    # In degrees, rounded to the inside.
+    largest = window.largest()
+    ends = np.transpose([np.ceil(10.0 * np.degrees(largest.low)),
+                         np.floor(10.0 * np.degrees(largest.high))]) / 10.0
+    if (ends[:, 0] >= ends[:, 1]).any():
+        raise WindowError(line.error(f'{problem}; there are none about their middle, which is '
+                                     'next to a singular pose'), {})
+    names = [each.names[0] for each in held.lines]
+    said = ', '.join(f'{name} within {a:g}deg {b:g}deg' for name, (a, b) in zip(names, ends))
+    raise WindowError(
+        line.error(f'{problem}; the largest shown to have one at most: {said}'),
+        {name: (a, b) for name, (a, b) in zip(names, np.radians(ends).tolist())})

@@ -21,14 +21,13 @@ Sources: Chace, "Vector analysis of linkages", J. Eng. Ind. 85 (1963); Hartenber
 
 from __future__ import annotations
 
-from typing import List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
 from .planar import Limit, TOLERANCE
 from ..formula.expression import (
     arctangent,
     cosine,
     gated,
-    Number,
     Rate,
     Real,
     real,
@@ -39,6 +38,8 @@ from ..formula.expression import (
     with_rate,
 )
 
+# An expression; in `window`, which shares the geometry, an array.
+Scalar = Any
 # Steps of Newton's method from the middle of a window: six are enough for five robots' ankles.
 STEPS = 8
 # After a last step [rad] of no more than this the rest is its square, less than rounding.
@@ -50,14 +51,9 @@ EDGE = 1e-9
 class Vector(NamedTuple):
     """A vector in space."""
 
-    x: Real
-    y: Real
-    z: Real
-
-    @staticmethod
-    def of(x: Number, y: Number, z: Number) -> Vector:
-        """Return the vector of three numbers or expressions."""
-        return Vector(real(x), real(y), real(z))
+    x: Scalar
+    y: Scalar
+    z: Scalar
 
     def plus(self, other: Vector) -> Vector:
         """Return the sum."""
@@ -67,13 +63,17 @@ class Vector(NamedTuple):
         """Return the difference."""
         return Vector(self.x - other.x, self.y - other.y, self.z - other.z)
 
-    def times(self, factor: Number) -> Vector:
+    def times(self, factor: Scalar) -> Vector:
         """Return a multiple."""
         return Vector(self.x * factor, self.y * factor, self.z * factor)
 
-    def dot(self, other: Vector) -> Real:
+    def dot(self, other: Vector) -> Scalar:
         """Return the inner product."""
         return self.x * other.x + self.y * other.y + self.z * other.z
+
+    def turned(self, cos: Scalar, sin: Scalar) -> Vector:
+        """Return it turned about z, by an angle's cosine and sine."""
+        return Vector(self.x * cos - self.y * sin, self.x * sin + self.y * cos, self.z)
 
     def cross(self, other: Vector) -> Vector:
         """Return the vector product."""
@@ -86,13 +86,16 @@ class Vector(NamedTuple):
         return abs(parts[0]) if len(parts) == 1 else square_root(
             sum(map(square, parts), real(0.0)))
 
-    def over(self, divisor: Number) -> Vector:
+    def over(self, divisor: Scalar) -> Vector:
         """Return a quotient."""
         return Vector(self.x / divisor, self.y / divisor, self.z / divisor)
 
     def unit(self) -> Vector:
         """Return the direction."""
         return self.over(self.length())
+
+
+ZERO = Vector(real(0.0), real(0.0), real(0.0))
 
 
 class Turn(NamedTuple):
@@ -119,26 +122,20 @@ class Circle(NamedTuple):
     u: Vector
     v: Vector
 
-    def at(self, cos: Real, sin: Real) -> Vector:
+    def at(self, cos: Scalar, sin: Scalar) -> Vector:
         """Return the place at an angle, by its cosine and sine."""
         return self.centre.plus(self.u.times(cos)).plus(self.v.times(sin))
 
-    def ahead(self, cos: Real, sin: Real) -> Vector:
+    def ahead(self, cos: Scalar, sin: Scalar) -> Vector:
         """Return the derivative of the place by the angle."""
         return self.v.times(cos).minus(self.u.times(sin))
 
 
 class Pivot(NamedTuple):
-    """A point on its way; without a turn it is at the centre."""
+    """A point on its way, which without a turn is the centre."""
 
     way: Circle
     turn: Optional[Turn] = None
-
-    @staticmethod
-    def at(point: Vector) -> Pivot:
-        """Return a point that may move anyhow."""
-        none = Vector.of(0.0, 0.0, 0.0)
-        return Pivot(Circle(point, none, none))
 
     @property
     def place(self) -> Vector:
@@ -165,6 +162,11 @@ class Hinge(NamedTuple):
         """The direction as a unit vector."""
         return self.direction.unit()
 
+    def leaning(self, other: Hinge) -> Real:
+        """Return the sine of the angle to another axis."""
+        return self.direction.cross(other.direction).length() / (
+            self.direction.length() * other.direction.length())
+
     def circle(self, point: Vector) -> Circle:
         """Return the way of a point that turns about the axis; it is the point at angle zero."""
         # Of the direction as given: a unit vector is rounded, and not quite of length one.
@@ -175,14 +177,6 @@ class Hinge(NamedTuple):
     def turned(self, point: Vector, turn: Turn) -> Vector:
         """Return where a turn takes a point."""
         return self.circle(point).at(turn.cosine, turn.sine)
-
-
-class Held(NamedTuple):
-    """What a rod makes of a hinge: its turn, its limits, and its transmission angle [rad]."""
-
-    turn: Turn
-    limits: Tuple[Limit, ...]
-    transmission: Real
 
 
 def rated_turn(y: Real, x: Real, cos: Real, sin: Real, rate: Rate) -> Turn:
@@ -196,9 +190,9 @@ def rated_turn(y: Real, x: Real, cos: Real, sin: Real, rate: Rate) -> Turn:
 
 
 def rod_on_hinge(hinge: Hinge, pivot: Pivot, end: Vector, length: Real, side: Real,
-                 span: Real) -> Held:
+                 span: Real) -> Tuple[Turn, Limit, Limit, Real]:
     """
-    Turn a hinge so that a rod fits.
+    Return the turn of a hinge with which a rod fits, its limits, and the transmission angle [rad].
 
     Parameters
     ----------
@@ -240,8 +234,8 @@ def rod_on_hinge(hinge: Hinge, pivot: Pivot, end: Vector, length: Real, side: Re
 
     turn = rated_turn(y, x, x / size, y / size, Rate((p, q, d, rho, length), rate))
     radial = p * turn.cosine + q * turn.sine - rho
-    return Held(turn, (near, far), arctangent(
-        0.5 * area / rho, square_root(square(radial) + square(d))))
+    return turn, near, far, arctangent(
+        0.5 * area / rho, square_root(square(radial) + square(d)))
 
 
 def rod_on_slide(axis: Vector, pivot: Vector, end: Vector, length: Real, side: Real,
@@ -261,106 +255,98 @@ def rod_on_slide(axis: Vector, pivot: Vector, end: Vector, length: Real, side: R
 
 
 class Rod(NamedTuple):
-    """A rod: its end on the base, that on the moving link at angles zero, its length [m]."""
+    """A rod in the frame of the first of two hinges: the ways of its ends, and its length [m]."""
 
     pivot: Pivot
-    end: Vector
+    end: Circle
     length: Real
 
 
-class Universal:
-    """
-    Two hinges in a row, on whose second link two rods end.
+class Frame(NamedTuple):
+    """The frame of the first of two hinges in a row: z its axis, x next to that of the second."""
 
-    Everything is seen in the frame of the first hinge: z its axis, x as near the second as it can
-    be. There an end is B = Rz(first angle) Q(second angle), Q on a circle about the second axis.
+    origin: Vector
+    axes: Tuple[Vector, Vector, Vector]
 
-    Parameters
-    ----------
-    first, second : Hinge
-        The second is carried by the first; as seen from the base at angles zero.
-    home : (Real, Real)
-        The angles [rad] from which the steps start.
-
-    """
-
-    def __init__(self, first: Hinge, second: Hinge, home: Sequence[Real]):
-        self._first = first
-        leaning = first.direction.cross(second.direction)
-        self.sine = leaning.length() / (first.direction.length() * second.direction.length())
-        x = leaning.cross(first.direction).unit()
-        self._frame = x, first.axis.cross(x), first.axis
-        self._second, self._home = second, home
+    @staticmethod
+    def of(first: Hinge, second: Hinge) -> Frame:
+        """Return the frame of two hinges."""
+        x = first.direction.cross(second.direction).cross(first.direction).unit()
+        return Frame(first.origin, (x, first.axis.cross(x), first.axis))
 
     def _seen(self, vector: Vector) -> Vector:
-        return Vector(*(vector.dot(axis) for axis in self._frame))
+        return Vector(*(vector.dot(axis) for axis in self.axes))
 
-    def seen(self, point: Vector) -> Vector:
-        """Return a point in the frame of the first hinge."""
-        return self._seen(point.minus(self._first.origin))
-
-    def frame_way(self, way: Circle) -> Circle:
-        """Return the way of a point in the frame of the first hinge."""
-        return Circle(self.seen(way.centre), self._seen(way.u), self._seen(way.v))
-
-    def bars(self, rods: Sequence[Rod]) -> List[Tuple[Vector, Circle, Real]]:
-        """Return rods in the frame of the first hinge: pivot, way of the end, length."""
-        return [(rod.pivot._replace(way=self.frame_way(rod.pivot.way)).place,
-                 self.frame_way(self._second.circle(rod.end)), rod.length) for rod in rods]
-
-    def solved(self, rods: Sequence[Rod]) -> Tuple[Turn, Turn, Limit]:
-        """Return both turns that two rods make, and what is below zero where none is found."""
-        bars = self.bars(rods)
-        c1, c2 = map(cosine, self._home)
-        s1, s2 = map(sine, self._home)
-        step = real(0.0)
-        for left in reversed(range(STEPS)):
-            if not left:  # what the steps before have added to the length of both
-                (c1, s1), (c2, s2) = _on_circle(c1, s1), _on_circle(c2, s2)
-            rows = [_row(*bar, c1, s1, c2, s2) for bar in bars]
-            d1, d2 = _solution(rows, [-_gap(row.rod, bar[2]) for row, bar in zip(rows, bars)])
-            (c1, s1), (c2, s2) = _stepped(c1, s1, d1), _stepped(c2, s2, d2)
-            step = abs(d1) + abs(d2)
-        final: List[_Row] = []
-
-        def rates(*given: Real) -> Tuple[Real, Real]:
-            if not final:
-                final.extend(_row(*bar, first.cosine, first.sine, second.cosine, second.sine)
-                             for bar in bars)
-            return _solution(final, [
-                length * rate - row.rod.dot(Vector(*moving)) for row, (_, _, length), moving, rate
-                in zip(final, bars, (given[:3], given[4:7]), (given[3], given[7]))])
-
-        of = tuple(x for pivot, _, length in bars for x in (*pivot, length))
-        first, second = (rated_turn(s, c, c, s, Rate(
-            of, lambda *given, which=which: rates(*given)[which]))
-            for which, (c, s) in enumerate(((c1, s1), (c2, s2))))
-        return first, second, Limit(with_rate(LAST_STEP - step, formula=lambda: real(0.0)),
-                                    real(0.0))
+    def seen(self, way: Circle) -> Circle:
+        """Return the way of a point in this frame."""
+        return Circle(self._seen(way.centre.minus(self.origin)), self._seen(way.u),
+                      self._seen(way.v))
 
 
-class _Row(NamedTuple):
+class Row(NamedTuple):
     """A rod from its end to its pivot, and the derivatives of half its square by both angles."""
 
     rod: Vector
-    by_first: Real
-    by_second: Real
+    by_first: Scalar
+    by_second: Scalar
 
 
-def _row(pivot: Vector, circle: Circle, _: Real, c1: Real, s1: Real, c2: Real, s2: Real) -> _Row:
-    def turned(v: Vector) -> Vector:
-        return Vector(v.x * c1 - v.y * s1, v.x * s1 + v.y * c1, v.z)
-
-    end, ahead = turned(circle.at(c2, s2)), turned(circle.ahead(c2, s2))
-    rod = pivot.minus(end)
-    return _Row(rod, pivot.x * end.y - pivot.y * end.x, -rod.dot(ahead))
+# Cosine and sine of both angles.
+Pose = Tuple[Scalar, Scalar, Scalar, Scalar]
 
 
-def _gap(rod: Vector, length: Real) -> Real:
-    return 0.5 * (rod.dot(rod) - square(length))
+def row(pivot: Vector, end: Circle, pose: Pose) -> Row:
+    """Return a rod between a place and the end that both angles turn."""
+    c1, s1, c2, s2 = pose
+    place, ahead = end.at(c2, s2).turned(c1, s1), end.ahead(c2, s2).turned(c1, s1)
+    rod = pivot.minus(place)
+    return Row(rod, pivot.x * place.y - pivot.y * place.x, -rod.dot(ahead))
 
 
-def _solution(rows: Sequence[_Row], wanted: Sequence[Real]) -> Tuple[Real, Real]:
+def gap(rod: Vector, length: Scalar) -> Scalar:
+    """Return half of what the square of a rod is too large by."""
+    return 0.5 * (rod.dot(rod) - length * length)
+
+
+def newton_step(rods: Sequence[Tuple[Vector, Circle, Scalar]],
+                pose: Pose) -> Tuple[Pose, Scalar]:
+    """Return the pose a step nearer to where two rods fit, and the step [rad]."""
+    rows = [row(pivot, end, pose) for pivot, end, _ in rods]
+    d1, d2 = _solution(rows, [-gap(each.rod, rod[2]) for each, rod in zip(rows, rods)])
+    return (*_stepped(*pose[:2], d1), *_stepped(*pose[2:], d2)), abs(d1) + abs(d2)
+
+
+def two_rods(rods: Sequence[Rod], home: Sequence[Real]) -> Tuple[Turn, Turn, Limit]:
+    """
+    Turn two hinges in a row so that two rods fit, in steps from home [rad].
+
+    In the frame of the first hinge the end of a rod is B = Rz(first angle) Q(second angle), with Q
+    on a circle. The limit is below zero where no pose is found.
+    """
+    bars = [(rod.pivot.place, rod.end, rod.length) for rod in rods]
+    pose: Pose = cosine(home[0]), sine(home[0]), cosine(home[1]), sine(home[1])
+    for _ in range(STEPS - 1):
+        pose, _step = newton_step(bars, pose)
+    # What the steps before have added to the length of both.
+    pose, step = newton_step(bars, (*_on_circle(*pose[:2]), *_on_circle(*pose[2:])))
+    final: List[Row] = []
+
+    def rates(*given: Real) -> Tuple[Real, Real]:
+        if not final:
+            pose = first.cosine, first.sine, second.cosine, second.sine
+            final.extend(row(pivot, end, pose) for pivot, end, _ in bars)
+        return _solution(final, [
+            length * rate - each.rod.dot(Vector(*moving)) for each, (_, _, length), moving, rate
+            in zip(final, bars, (given[:3], given[4:7]), (given[3], given[7]))])
+
+    of = tuple(x for pivot, _, length in bars for x in (*pivot, length))
+    first, second = (rated_turn(s, c, c, s, Rate(
+        of, lambda *given, which=which: rates(*given)[which]))
+        for which, (c, s) in enumerate((pose[:2], pose[2:])))
+    return first, second, Limit(with_rate(LAST_STEP - step, formula=lambda: real(0.0)), real(0.0))
+
+
+def _solution(rows: Sequence[Row], wanted: Sequence[Scalar]) -> Tuple[Scalar, Scalar]:
     """Return what both angles change by, to change half the squares of the rods as wanted."""
     (_, a, b), (_, c, d) = rows
     e, f = wanted
@@ -368,9 +354,9 @@ def _solution(rows: Sequence[_Row], wanted: Sequence[Real]) -> Tuple[Real, Real]
     return (e * d - b * f) / det, (a * f - e * c) / det
 
 
-def _stepped(c: Real, s: Real, step: Real) -> Tuple[Real, Real]:
+def _stepped(c: Scalar, s: Scalar, step: Scalar) -> Tuple[Scalar, Scalar]:
     """Return a cosine and a sine after a turn by 2 atan(step / 2), which is about the step."""
-    square_ = 0.25 * square(step)
+    square_ = 0.25 * (step * step)
     by = 1.0 / (1.0 + square_)
     cos, sin = (1.0 - square_) * by, step * by
     return c * cos - s * sin, s * cos + c * sin
@@ -382,12 +368,7 @@ def _on_circle(c: Real, s: Real) -> Tuple[Real, Real]:
     return c * by, s * by
 
 
-def within(value: Real, low: Real, high: Real, tolerance: Real) -> List[Limit]:
-    """Return the limits of a value that is to be between two others."""
-    return [Limit(value - low, tolerance), Limit(high - value, tolerance)]
-
-
-def gated_by(value: Real, limits: Sequence[Limit]) -> Real:
+def gated_by(value: Real, limits: Iterable[Limit]) -> Real:
     """Return a value where limits are kept, NaN elsewhere."""
     for limit in limits:
         value = gated(value, limit.margin, limit.tolerance)
@@ -404,3 +385,9 @@ def drawn_side(hinge: Hinge, pivot: Vector, end: Vector) -> Tuple[Real, Real]:
     area = hinge.axis.dot(foot.cross(arm))
     return where(area < 0.0, -1.0, 1.0), abs(area) / (foot.length() * arm.length())
 
+
+def drawn_ahead(slide: Hinge, pivot: Vector, end: Vector) -> Tuple[Real, Real]:
+    """Return what `drawn_side` does, of a rod on a slide, as `rod_on_slide` takes it."""
+    rod = end.minus(pivot)
+    ahead = slide.axis.dot(rod)
+    return where(ahead < 0.0, -1.0, 1.0), abs(ahead) / rod.length()

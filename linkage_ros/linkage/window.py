@@ -4,81 +4,152 @@
 """
 A proof that a link on two hinges and two rods has one pose at most inside its joint limits.
 
-With J the derivatives of half the squared lengths of both rods, C a constant matrix: if C J has
-positive diagonal entries and a positive determinant all over a rectangle of both angles, there is
-one pose at most in it (Gale and Nikaido, "The Jacobian matrix and global univalence of mappings",
-Math. Annalen 159 (1965)). C is J^-1 in the middle of the rectangle, one for each cell of motor
-angles that the rectangle needs. Cells are divided until the three numbers, less their change
-between the middle of a cell and its edges, are positive: all of the cell is then proved, not the
-middle alone. The change is at most each first derivative in the middle times half the cell, and a
-bound of the second derivatives times half the square of that.
+A rod from its pivot A, which a motor turns, to its end B, which both angles of the link turn, fits
+where f = (|A - B|^2 - L^2) / 2 is zero. Suppose that two poses had the same motors. On the line
+from one to the other each rod's f has a gradient that is square to the line (Rolle), somewhere in
+the convex hull of the poses that this rod allows at this motor angle. So there are no two poses,
+and none is singular, where the directions of one rod's gradients in its hull and those of the
+other's have none in common, up to sign.
+
+Rectangle and motor angles are divided into cells. In a cell, f and its gradient differ from those
+in the middle by at most their first derivatives there times half the cell, and a bound of the
+second derivatives times half the square of that: all of the cell is proved, not its middle.
 """
 
 from __future__ import annotations
 
-from functools import cached_property
 from itertools import product
-from typing import List, NamedTuple, Optional, Sequence, Tuple
+import math
+from typing import Any, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .spatial import EDGE, LAST_STEP, STEPS
+from .spatial import Circle, EDGE, gap, LAST_STEP, newton_step, row, STEPS, Vector
 
-# Cells at first, on each side of the rectangle, and how often one is divided at most.
-CELLS, DIVIDED = 6, 7
-# Pairs of cells at most: of limits that are given, which takes a third of a second, and of those
-# that are looked for.
-MOST, FEW = 400_000, 150_000
-# What three numbers that are 1 in the middle have to be above.
-LEAST = 1e-6
+# Cells on each side of the rectangle, of all motor angles, and again of each of these that is
+# needed: at first, and for limits that are given where that is too coarse.
+COARSE, FINE = (12, 36, 3), (20, 48, 4)
+# What directions [rad] have to be apart, and what rounding may do to f, as a part of its terms.
+APART, ROUNDING = 1e-6, 1e-14
 # Poses on each side of the rectangle to which the steps have to come back, one step before the
 # last, and how near [rad]: what is left is the last step, which is to be below its limit between
 # these poses, too.
 POSES, BACK = 33, 0.01 * LAST_STEP
-# Halvings on the way to the largest rectangle.
-HALVINGS = 6
+# Halvings on the way to the largest rectangle; how much smaller it becomes if steps do not do.
+HALVINGS, SMALLER = 6, 0.9
+# The hull is taken to be a polygon of 16 sides: directions in units of cells.
+SIDES = [(math.cos(angle), math.sin(angle)) for angle in np.arange(8) * math.pi / 8.0]
 
-Rectangle = Tuple[np.ndarray, np.ndarray]
+
+class Cells(NamedTuple):
+    """Cells of one size: their middles (..., n), and half of their sides."""
+
+    middle: np.ndarray
+    half: np.ndarray
 
 
-class Way(NamedTuple):
-    """The way of a point that turns: centre + cos u + sin v, arrays (3,)."""
+class Directions(NamedTuple):
+    """By cells of a motor (k,): which cells of poses each allows (k, n), directions [rad]."""
 
-    centre: np.ndarray
-    u: np.ndarray
-    v: np.ndarray
-
-    def at(self, angle: np.ndarray) -> np.ndarray:
-        """Return places (3, n)."""
-        return self.centre[:, None] + self.from_centre(angle)
-
-    def from_centre(self, angle: np.ndarray) -> np.ndarray:
-        """Return places (3, n) as seen from the centre."""
-        return np.outer(self.u, np.cos(angle)) + np.outer(self.v, np.sin(angle))
-
-    def ahead(self, angle: np.ndarray) -> np.ndarray:
-        """Return the derivatives (3, n) of places by the angle."""
-        return np.outer(self.v, np.cos(angle)) - np.outer(self.u, np.sin(angle))
-
-    @property
-    def radius(self) -> float:
-        """How far the point is from the axis."""
-        return float(np.linalg.norm(self.u))
+    allowed: np.ndarray
+    middle: np.ndarray
+    half: np.ndarray
 
 
 class HeldBy(NamedTuple):
-    """A rod in the frame of the first hinge; its length is None where it is an input."""
+    """A rod in the frame of the first hinge; its length [m] is None where it is an input."""
 
-    pivot: Way
-    end: Way
-    length: Optional[float]
+    pivot: Circle
+    end: Circle
+    length: Any
 
+    @property
+    def sides(self) -> Tuple[float, ...]:
+        """The sides of a crank on which a pose may have it; one where no crank turns."""
+        return (1.0, -1.0) if self.length is not None and any(self.pivot.u) else (0.0,)
 
-class Pivots(NamedTuple):
-    """Places of a rod's pivot (3, n), and their derivatives by the motor's angle."""
+    def pivots(self, poses: np.ndarray, side: float) -> Vector:
+        """Return where the pivot is for poses (2, n); NaN where the rod does not reach."""
+        centre, u, v = self.pivot
+        if self.length is None or not side:
+            return Vector(*(x + np.zeros(poses.shape[1]) for x in centre))
+        off = _place(self.end, poses).minus(centre)
+        x, y = off.dot(u), off.dot(v)
+        along = 0.5 * (u.dot(u) + off.dot(off) - self.length ** 2)
+        size = x * x + y * y
+        across = side * np.sqrt(size - along * along)
+        return self.pivot.at((along * x - across * y) / size, (along * y + across * x) / size)
 
-    place: np.ndarray
-    moved: np.ndarray
+    def directions(self, poses: Cells, count: int, again: int) -> Directions:
+        """Return the directions of its gradients in cells of a rectangle."""
+        motors = self._motors(poses, count)
+        if len(motors.middle) > 1:
+            needed, half = self._over(motors, poses)[0].any(axis=1), motors.half / again
+            motors = Cells((motors.middle[needed, None] + half * np.arange(
+                1 - again, again, 2)).ravel(), half)
+        allowed, gradient, spread = self._over(motors, poses)
+        needed = allowed.any(axis=1)
+        allowed, gradient, spread = allowed[needed], gradient[needed], spread[needed]
+        first = np.take_along_axis(gradient, allowed.argmax(axis=1)[:, None], 1)
+        turned, hull = np.angle(gradient * first.conj()), _hull(allowed)
+        low = np.where(hull, turned - spread, np.inf).min(axis=1, initial=np.inf)
+        high = np.where(hull, turned + spread, -np.inf).max(axis=1, initial=-np.inf)
+        return Directions(allowed, np.angle(first[:, 0]) + 0.5 * (low + high), 0.5 * (high - low))
+
+    def _motors(self, poses: Cells, count: int) -> Cells:
+        """Return cells of all motor angles, or of all lengths, that poses may need."""
+        if len(self.sides) > 1:
+            low, high = -math.pi, math.pi
+        elif self.length is None:
+            off = _place(self.end, poses.middle).minus(self.pivot.centre)
+            away, slack = np.sqrt(off.dot(off)), poses.half @ (_flat(self.end), _norm(self.end.u))
+            low, high = max(away.min() - slack, 0.0), away.max() + slack
+        else:
+            return Cells(np.zeros(1), np.zeros(()))
+        half = np.array(0.5 * (high - low) / count)
+        return Cells(low + half * np.arange(1, 2 * count, 2), half)
+
+    def _over(self, motors: Cells, poses: Cells) -> Tuple[np.ndarray, ...]:
+        """
+        Return what holds over cells of a motor and of poses, arrays (k, n).
+
+        That is whether f may be zero, the gradient in the middle as x + iy, and by how much [rad]
+        its direction may differ elsewhere.
+        """
+        at = motors.middle[:, None]
+        angle, turn, length, way = (at, motors.half, self.length, 0.0) \
+            if self.length is not None else (0.0 * at, 0.0, at, motors.half)
+        pose = tuple(f(x) for x in poses.middle for f in (np.cos, np.sin))
+        pivot, moved = (of(np.cos(angle), np.sin(angle))
+                        for of in (self.pivot.at, self.pivot.ahead))
+        rod, by_p, by_r = row(pivot, self.end, pose)
+        centre, end, ahead = (each.turned(*pose[:2]) for each in (
+            self.end.centre, self.end.at(*pose[2:]), self.end.ahead(*pose[2:])))
+        across = pivot.x * ahead.y - pivot.y * ahead.x
+        # The derivatives of the gradient by the motor, and by both angles.
+        changes = (moved.x * end.y - moved.y * end.x - 1j * moved.dot(ahead),
+                   pivot.x * end.x + pivot.y * end.y + 1j * across,
+                   across + 1j * (ahead.dot(ahead) + rod.dot(end.minus(centre))))
+        halves = turn, *poses.half
+        first, second, motor, size = self._bounds()
+        square = 0.5 * sum(halves) ** 2
+        terms = sum(abs(x) * half for x, half in zip((rod.dot(moved), by_p, by_r), halves))
+        possible = ~(abs(gap(rod, length)) > terms + square * max(first, second, motor)
+                     + way * (length + 0.5 * way) + ROUNDING * (size + length) ** 2)
+        gradient = by_p + 1j * by_r
+        steep = abs(gradient)
+        seen = [change * gradient.conj() * (half / steep) for change, half in zip(changes, halves)]
+        rest = square * math.hypot(first, second)
+        along, aside = steep - rest - sum(abs(x.real) for x in seen), rest + sum(
+            abs(x.imag) for x in seen)
+        return possible, gradient, np.where(along > 0.0, np.arctan2(aside, along), np.pi)
+
+    def _bounds(self) -> Tuple[float, float, float, float]:
+        """Return bounds of derivatives of f by the first, second angle, motor; of A and B."""
+        (pivot, rho), (end, radius) = ((_norm(way.centre), _norm(way.u))
+                                       for way in (self.pivot, self.end))
+        return (_flat(self.pivot) * _flat(self.end), (pivot + rho + end) * radius,
+                (pivot + end + radius) * rho, pivot + rho + end + radius)
 
 
 class Window:
@@ -97,228 +168,90 @@ class Window:
     def __init__(self, rods: Sequence[HeldBy], low: Sequence[float], high: Sequence[float]):
         self.rods = rods
         self.low, self.high = np.asarray(low, float), np.asarray(high, float)
-        self._turning = [rod.length is not None and rod.pivot.radius > 0.0 for rod in rods]
-        self._sides = [(1.0, -1.0) if turning else (0.0,) for turning in self._turning]
+        self.middle = 0.5 * (self.low + self.high)
 
     def scaled(self, factor: float) -> Window:
         """Return the rectangle made larger or smaller about its middle."""
-        middle, half = 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
-        return Window(self.rods, middle - factor * half, middle + factor * half)
+        half = factor * (self.high - self.middle)
+        return Window(self.rods, self.middle - half, self.middle + half)
 
     def largest(self) -> Window:
         """Return the largest rectangle of this shape, up to its size, that is right."""
         size, step = 0.0, 0.5
         for _ in range(HALVINGS):
-            if self.scaled(size + step).is_right(FEW):
-                size += step
+            size += step * self.scaled(size + step).is_single(COARSE)
             step *= 0.5
-        return self.scaled(size)
+        while size > step and not self.scaled(size).comes_back():
+            size *= SMALLER
+        return self.scaled(size if size > step else 0.0)
 
-    def is_right(self, most: int = MOST) -> bool:
+    def is_right(self) -> bool:
         """Return whether it holds one pose at most for any motor angles, and all are found."""
-        return self._comes_back() and self.is_single(most)
+        return (self.is_single(COARSE) or self.is_single(FINE)) and self.comes_back()
 
-    def is_single(self, most: int = MOST) -> bool:
+    def is_single(self, cells: Tuple[int, int, int]) -> bool:
         """Return whether it is proved that it holds one pose at most for any motor angles."""
-        cells = self._cells(CELLS)
-        if not any(self._turning):  # whatever the lengths are, the derivatives are the same
-            cells = np.array([[*0.5 * (self.low + self.high), 0.0, 0.0]])
-        chosen = np.array(list(product(*self._sides)))
-        needed = np.repeat(cells, len(chosen), axis=0), np.tile(chosen, (len(cells), 1))
-        self._left = most
-        for _ in range(DIVIDED):
-            failing = self._failing(*needed)
-            if not len(failing) or self._left < 0:
-                return self._left >= 0
-            needed = _divided(needed[0][failing]), np.repeat(needed[1][failing], 4, axis=0)
-        return False
-
-    def _cells(self, count: int) -> np.ndarray:
-        """Return cells of the rectangle, a little beyond its edges: middle and half size."""
-        low, high = self.low - 2.0 * EDGE, self.high + 2.0 * EDGE
-        half = 0.5 * (high - low) / count
-        middles = np.stack(np.meshgrid(*(
-            np.linspace(a + h, b - h, count) for a, b, h in zip(low, high, half)),
-            indexing='ij'), axis=-1).reshape(-1, 2)
-        return np.concatenate([middles, np.broadcast_to(half, middles.shape)], axis=1)
-
-    def _failing(self, cells: np.ndarray, sides: np.ndarray) -> np.ndarray:
-        """Return which cells of poses need motor angles that are not proved."""
-        arcs = [self._arcs(*each) for each in zip(self.rods, self._turning, sides.T, [cells] * 2)]
-        needed = np.flatnonzero(np.logical_and.reduce([half >= 0.0 for _, half in arcs]))
-        pivots = [self._pivots(rod, middle[needed]) for rod, (middle, _) in zip(self.rods, arcs)]
-        spread = np.array([half[needed] for _, half in arcs])
-        middle = np.outer(0.5 * (self.low + self.high), np.ones(len(needed)))
-        weights = _inverse(self._rows(pivots, middle)[0])
-        boxes = self._cells(CELLS)
-        motor = np.repeat(np.arange(len(needed)), len(boxes))
-        boxes = np.tile(boxes, (len(needed), 1))
-        failing = np.zeros(len(needed), bool)
-        for _ in range(DIVIDED):
-            self._left -= len(motor)
-            if self._left < 0:
-                break
-            kept, possible = self._proved(
-                weights[..., motor], [Pivots(*(x[:, motor] for x in each)) for each in pivots],
-                spread[:, motor], boxes)
-            # Smaller boxes are of no use where the motors' spread alone is too much.
-            failing[motor[~possible]] = True
-            left = ~kept & ~failing[motor]
-            motor, boxes = np.repeat(motor[left], 4), _divided(boxes[left])
-            if not len(motor):
-                break
-        failing[motor] = True
-        return needed[failing]
-
-    @staticmethod
-    def _arcs(rod: HeldBy, turning: bool, side: np.ndarray,
-              cells: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Return the motor angles that cells of poses need: middle and half; below 0 for none."""
-        if not turning or rod.length is None:
-            return np.zeros(len(cells)), np.zeros(len(cells))
-        end, pivot = _place(rod.end, cells[:, :2].T), rod.pivot
-        rho = pivot.radius
-        off = end - pivot.centre[:, None]
-        x, y = pivot.u @ off / rho, pivot.v @ off / rho
-        # All ends in a cell are in a ball, so the rod is as if it were shorter or longer.
-        from_axis = np.hypot(*end[:2])
-        ball = cells[:, 2] * from_axis + cells[:, 3] * rod.end.radius \
-            + 0.5 * cells[:, 2:].sum(axis=1) ** 2 * (from_axis + rod.end.radius)
-        cosines = [(rho ** 2 + _dot(off, off) - length ** 2) / (2.0 * rho * np.hypot(x, y))
-                   for length in (np.maximum(rod.length - ball, 0.0), rod.length + ball)]
-        low, high = (np.arccos(np.clip(c, -1.0, 1.0)) for c in cosines)
-        missed = (cosines[0] < -1.0) | (cosines[1] > 1.0)
-        return (np.arctan2(y, x) + side * 0.5 * (low + high),
-                np.where(missed, -1.0, 0.5 * (high - low)))
-
-    @staticmethod
-    def _pivots(rod: HeldBy, angle: np.ndarray) -> Pivots:
-        return Pivots(rod.pivot.at(angle), rod.pivot.ahead(angle))
-
-    def _rows(self, pivots: Sequence[Pivots], poses: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Return J (2, 2, n), and its derivatives by own motor and both angles (2, 2, 3, n)."""
-        values, changes = [], []
-        for rod, (pivot, moved) in zip(self.rods, pivots):
-            end = _place(rod.end, poses)
-            by_r, by_rr = (_turned(x, poses[0]) for x in (
-                rod.end.ahead(poses[1]), -rod.end.from_centre(poses[1])))
-            by_p, by_pr = _quarter(end), _quarter(by_r)
-            across = -_dot(pivot, by_pr)
-            values.append([-_dot(pivot, by_p), -_dot(pivot - end, by_r)])
-            changes.append([[-_dot(moved, by_p), _dot(pivot[:2], end[:2]), across],
-                            [-_dot(moved, by_r), across,
-                             rod.end.radius ** 2 - _dot(pivot - end, by_rr)]])
-        return np.array(values), np.array(changes)
-
-    @cached_property
-    def _bounds(self) -> np.ndarray:
-        """Bounds (2, 2) of the entries of J and of their derivatives up to the second."""
-        found = []
-        for rod in self.rods:
-            pivot, centre = (np.linalg.norm(x) for x in (rod.pivot.centre, rod.end.centre))
-            flat, end = (np.linalg.norm(way.centre[:2]) + way.radius
-                         for way in (rod.pivot, rod.end))
-            found.append([flat * end, (pivot + rod.pivot.radius + centre) * rod.end.radius])
-        return np.array(found)
-
-    def _proved(self, weights: np.ndarray, pivots: Sequence[Pivots], spread: np.ndarray,
-                boxes: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Return which pairs of cells are proved, and which could be with smaller poses."""
-        half, bounds = boxes[:, 2:].T, self._bounds
-        rows, changes = self._rows(pivots, boxes[:, :2].T)
-        (a, b), (c, d) = rows
-        (da, db), (dc, dd) = changes
-        det = _determinant(weights)
-        # Either entry: each row of J changes with its own motor, and with both angles.
-        parts = weights[:, :, None] * np.moveaxis(changes, 1, 0)
-        value = [*(weights * rows.swapaxes(0, 1)).sum(axis=1), det * (a * d - b * c)]
-        by_motors = [*(np.abs(parts[:, :, 0]) * spread).sum(axis=1), np.abs(det) * (
-            np.abs(da[0] * d - db[0] * c) * spread[0] + np.abs(a * dd[0] - b * dc[0]) * spread[1])]
-        slopes = [*parts[:, :, 1:].sum(axis=1), det * (
-            da[1:] * d + a * dd[1:] - db[1:] * c - b * dc[1:])]
-        by_poses = [(np.abs(slope) * half).sum(axis=0) for slope in slopes]
-
-        def rest(sizes: np.ndarray) -> List[np.ndarray]:
-            """Return what second derivatives add where each row changes by so much."""
-            entries = np.einsum('kin,ik,in->kn', np.abs(weights), bounds, sizes ** 2)
-            most = np.minimum(np.abs(rows) + bounds[..., None] * sizes[:, None], bounds[..., None])
-            products = [bounds[0, i] * most[1, 1 - i] * sizes[0] ** 2
-                        + 2.0 * bounds[0, i] * bounds[1, 1 - i] * sizes[0] * sizes[1]
-                        + bounds[1, 1 - i] * most[0, i] * sizes[1] ** 2 for i in range(2)]
-            return [*0.5 * entries, 0.5 * np.abs(det) * (products[0] + products[1])]
-
-        alone = np.min([x - y - z for x, y, z in zip(value, by_motors, rest(spread))], axis=0)
-        with_poses = np.min([x - y - z - w for x, y, z, w in zip(
-            value, by_motors, by_poses, rest(spread + half.sum(axis=0)))], axis=0)
-        return with_poses > LEAST, alone > LEAST
-
-    def _comes_back(self) -> bool:
-        """Return whether the steps find all poses of a grid, and none of them is singular."""
-        axes = [np.linspace(low, high, POSES) for low, high in zip(self.low, self.high)]
-        poses = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
-        cells = np.concatenate([poses, np.zeros(poses.shape)], axis=1)
-        for sides in product(*self._sides):
-            arcs = [self._arcs(rod, turning, np.full(len(cells), side), cells)
-                    for rod, turning, side in zip(self.rods, self._turning, sides)]
-            there = np.logical_and.reduce([half >= 0.0 for _, half in arcs])
-            wanted = poses[there].T
-            pivots = [self._pivots(rod, middle[there])
-                      for rod, (middle, _) in zip(self.rods, arcs)]
-            signs = np.sign(_determinant(self._rows(pivots, wanted)[0]))
-            if (signs != signs[:1]).any() or not (
-                    np.abs(self._found(wanted, pivots) - wanted) < BACK).all():
-                return False
-        return True
-
-    def _found(self, wanted: np.ndarray, pivots: Sequence[Pivots]) -> np.ndarray:
-        """Return where the steps but the last lead from the middle, for the rods of poses."""
-        def squares(poses: np.ndarray) -> np.ndarray:
-            rods = [pivot - _place(rod.end, poses) for rod, (pivot, _) in zip(self.rods, pivots)]
-            return 0.5 * np.array([_dot(rod, rod) for rod in rods])
-
-        poses = np.outer(0.5 * (self.low + self.high), np.ones(wanted.shape[1]))
-        target = squares(wanted)
+        count = cells[0]
+        # A little beyond the edges.
+        low, half = self.low - 2.0 * EDGE, (0.5 * (self.high - self.low) + 2.0 * EDGE) / count
+        poses = Cells(low[:, None] + half[:, None] * (2.0 * np.indices(
+            (count, count)).reshape(2, -1) + 1.0), half)
         with np.errstate(all='ignore'):
-            for _ in range(STEPS - 1):
-                step = (_inverse(self._rows(pivots, poses)[0])
-                        * (target - squares(poses))).sum(axis=1)
-                poses = poses + 2.0 * np.arctan(0.5 * step)
-        return poses
+            one, other = (rod.directions(poses, *cells[1:]) for rod in self.rods)
+            away = np.mod(one.middle[:, None] - other.middle, math.pi)
+            apart = np.minimum(away, math.pi - away) > one.half[:, None] + other.half + APART
+        shared = np.packbits(one.allowed, axis=1)[:, None] & np.packbits(other.allowed, axis=1)
+        return bool((apart | ~shared.any(axis=2)).all())
+
+    def comes_back(self) -> bool:
+        """Return whether the steps find all poses of a grid, whichever sides cranks are on."""
+        axes = [np.linspace(low, high, POSES) for low, high in zip(self.low, self.high)]
+        poses = np.stack(np.meshgrid(*axes)).reshape(2, -1)
+        with np.errstate(all='ignore'):
+            return all(self._steps_back(poses, sides)
+                       for sides in product(*(rod.sides for rod in self.rods)))
+
+    def _steps_back(self, poses: np.ndarray, sides: Sequence[float]) -> bool:
+        pivots = [rod.pivots(poses, side) for rod, side in zip(self.rods, sides)]
+        there = ~np.isnan([pivot.x for pivot in pivots]).any(axis=0)
+        rods = []
+        for rod, pivot in zip(self.rods, pivots):
+            pivot = Vector(*(x[there] for x in pivot))
+            off = pivot.minus(_place(rod.end, poses[:, there]))
+            rods.append((pivot, rod.end, np.sqrt(off.dot(off))))
+        first, second = self.middle
+        pose = math.cos(first), math.sin(first), math.cos(second), math.sin(second)
+        for _ in range(STEPS - 1):
+            pose, _step = newton_step(rods, pose)
+        left = [np.angle((pose[2 * i] + 1j * pose[2 * i + 1]) * np.exp(-1j * poses[i, there]))
+                for i in (0, 1)]
+        # NaN is nowhere near.
+        return bool((np.abs(left) < BACK).all())
 
 
-def _divided(cells: np.ndarray) -> np.ndarray:
-    """Return the quarters of cells, those of each one after the other."""
-    half = 0.5 * cells[:, None, 2:]
-    corners = np.array([(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)])
-    middles = cells[:, None, :2] + corners * half
-    return np.concatenate([middles, np.broadcast_to(half, middles.shape)], -1).reshape(-1, 4)
+def _hull(cells: np.ndarray) -> np.ndarray:
+    """Return which cells (k, n) of a square a polygon about some of them touches."""
+    count = round(cells.shape[1] ** 0.5)
+    hull = np.ones(cells.shape, bool)
+    for cos, sin in SIDES:
+        middles = np.add.outer(cos * np.arange(count), sin * np.arange(count)).ravel()
+        # From middle to middle of cells whose corners touch.
+        size = abs(cos) + abs(sin)
+        low = np.where(cells, middles, np.inf).min(axis=1, keepdims=True) - size
+        high = np.where(cells, middles, -np.inf).max(axis=1, keepdims=True) + size
+        hull &= (low <= middles) & (middles <= high)
+    return hull
 
 
-def _determinant(rows: np.ndarray) -> np.ndarray:
-    return rows[0, 0] * rows[1, 1] - rows[0, 1] * rows[1, 0]
+def _norm(vector: Vector) -> float:
+    return float(np.linalg.norm(vector))
 
 
-def _inverse(rows: np.ndarray) -> np.ndarray:
-    (a, b), (c, d) = rows
-    with np.errstate(all='ignore'):
-        return np.array([[d, -b], [-c, a]]) / _determinant(rows)
+def _flat(way: Circle) -> float:
+    """Return how far a point may be from the first hinge."""
+    return math.hypot(*way.centre[:2]) + _norm(way.u)
 
 
-def _dot(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    return sum(a * b for a, b in zip(x, y))
-
-
-def _turned(vector: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    cos, sin = np.cos(angle), np.sin(angle)
-    x, y, z = vector
-    return np.array([x * cos - y * sin, x * sin + y * cos, z])
-
-
-def _quarter(vector: np.ndarray) -> np.ndarray:
-    """Return the derivative of a vector by an angle about z."""
-    x, y, _ = vector
-    return np.array([-y, x, np.zeros(len(x))])
-
-
-def _place(end: Way, poses: np.ndarray) -> np.ndarray:
-    return _turned(end.at(poses[1]), poses[0])
+def _place(end: Circle, poses: np.ndarray) -> Vector:
+    first, second = poses
+    return end.at(np.cos(second), np.sin(second)).turned(np.cos(first), np.sin(first))

@@ -470,16 +470,24 @@ def determinants(ankle, motors, pitch, roll):
 
 
 def is_ambiguous(ankle, low, high, count=11):
-    """Return whether a window has a second or a singular pose for some motors that it needs."""
+    """
+    Return whether a window has a second or a singular pose for some motors that it needs.
+
+    Between poses next to each other with determinants of opposite signs one is singular. Poses
+    that are not may have such signs: a rod that does not reach all of a window may leave two parts
+    of it, each with a determinant of its own that comes nowhere near zero.
+    """
     axes = [np.linspace(*ends, count) for ends in zip(low, high)]
     pitch, roll = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2).T
     for motors in itertools.product(*(motor_values(ankle, i, pitch, roll) for i in (0, 1))):
         there = ~np.isnan(motors).any(axis=0)
         if not there.any():
             continue
-        motors = [x[there] for x in motors]
-        if len({*np.sign(determinants(ankle, motors, pitch[there], roll[there]))}) > 1:
+        signs = np.sign(determinants(ankle, motors, pitch, roll)).reshape(count, count)
+        if any((one * other < 0.0).any() for one, other in (
+                (signs[1:], signs[:-1]), (signs[:, 1:], signs[:, :-1]))):
             return True
+        motors = [x[there] for x in motors]
         all_ = np.stack(assemblies(ankle, motors), axis=-1)
         if ((all_ > low + 1e-6) & (all_ < high - 1e-6)).all(axis=-1).sum(axis=1).max() > 1:
             return True
