@@ -302,6 +302,11 @@ def test_accelerations_are_those_of_the_motion(g1):
     found = g1.joint_accelerations(at, speed, change, ['pitch', 'roll'])
     np.testing.assert_allclose(list(found.values()),
                                (moved[0] - 2.0 * moved[1] + moved[2]) / step ** 2, rtol=1e-6)
+    moved = [g1.solve([x + v * t + 0.5 * a * t * t for x, v, a in zip(at, speed, change)],
+                      ('R_roll',))['R_roll'] for t in (-step, 0.0, step)]
+    found = g1.acceleration(at, speed, change, ('R_roll',))['R_roll']
+    np.testing.assert_allclose(found, (moved[0] - 2.0 * moved[1] + moved[2]) / step ** 2,
+                               rtol=1e-5, atol=1e-6)
 
 
 def test_every_rod_keeps_its_length(g1, poses):

@@ -290,28 +290,27 @@ class Builder:
         corner = planar.triangle(base, to_first, to_second, side)
         self.triangles[name] = corner.y
         self.limits.append(planar.Limit(abs(corner.y), real(0.0)))
-        if link == GROUND:
-            self._fix(name, first, vector * corner, to_first)
-            return
-        self._place(name, first, vector * corner, link, to_first, (second,))
-        self._bar(second, name, vector * (corner - Complex(1.0, 0.0)), to_second, link)
-        self._add_to_frame(name, first, second, link, corner)
+        self._add_to_link(name, first, second, corner, to_first)
+        if link != GROUND:
+            self._bar(second, name, vector * (corner - Complex(1.0, 0.0)), to_second, link)
 
     def line(self, name: str, first: str, second: str, distance: Real) -> None:
         """Add a point on the line of a bar, a distance [m] from first, towards second."""
-        vector, base, link = self._side(first, second)
-        if link == GROUND:
-            self._fix(name, first, vector * (distance / base), abs(distance))
-            return
-        kite = self._kites.get((first, second))
-        self._place(name, first, vector * (distance / base), link, abs(distance), (second,),
-                    kite.beyond_kite(-(distance / base)) if kite else None)
-        self._add_to_frame(name, first, second, link, Complex(distance / base, 0.0))
+        part, kite = distance / self.distance(first, second), self._kites.get((first, second))
+        self._add_to_link(name, first, second, Complex(part, 0.0), abs(distance),
+                          kite.beyond_kite(-part) if kite else None)
 
-    def _fix(self, name: str, first: str, vector: Complex, length: Real) -> None:
-        """Fix a joint to the ground, a vector [m] away from another."""
-        start = self.points[first]
-        self.points[name] = Point(start.place + vector, GROUND, start.span + length)
+    def _add_to_link(self, name: str, first: str, second: str, corner: Complex, length: Real,
+                     place: Optional[Complex] = None) -> None:
+        """Add a joint to the link of two others, first + corner (second - first)."""
+        vector, _, link = self._side(first, second)
+        if link == GROUND:
+            start = self.points[first]
+            self.points[name] = Point(start.place + vector * corner, GROUND, start.span + length)
+            return
+        self._place(name, first, vector * corner, link, length, (second,), place)
+        frame = self.frames[link]
+        frame[name] = frame[first] + (frame[second] - frame[first]) * corner
 
     def mirror(self, name: str, point: str, first: str, second: str) -> None:
         """Mirror a joint in the line of two others: the far corner of a kite."""
@@ -551,12 +550,6 @@ class Builder:
             self.frames[name][tip] = Complex(length, 0.0)
             self._axes[name] = _Vector(bar, length, name)
         return name
-
-    def _add_to_frame(self, name: str, first: str, second: str, link: str,
-                      corner: Complex) -> None:
-        """Note where a point of a rigid link lies, seen from that link."""
-        frame = self.frames[link]
-        frame[name] = frame[first] + (frame[second] - frame[first]) * corner
 
     def _place(self, name: str, start: str, vector: Complex, link: str, length: Real,
                others: Tuple[str, ...], place: Optional[Complex] = None) -> None:

@@ -100,10 +100,12 @@ class Subject:
     @property
     def periodic(self):
         """Whether the joints are where they were, a period later, but for a few rounded places."""
-        now, later = (self.drawn(self.values[::40] + turn)[0].points
+        now, later = (self.drawn(self.values[::40] + turn)[0]
                       for turn in (0.0, self.inputs[0].turn))
-        return self.turns and all(np.mean(np.abs(place - later[name]) > 1e-6) < 0.1
-                                  for name, place in now.items())
+        held = np.all([gap * np.ones(self.values[::40].shape) >= 0.0
+                       for gap in now.gaps.values()] or [True], axis=0)
+        return self.turns and all(np.mean(held & (np.abs(place - later.points[name]) > 1e-6)) < 0.1
+                                  for name, place in now.points.items())
 
     def drawn(self, values):
         """Return the drawing in float64 at values of the first input, and the unit of length."""
@@ -131,7 +133,8 @@ class Subject:
 
     def away(self, value, others):
         """Return how far a value of the first input is from the nearest of others."""
-        return min((abs((value - other + math.pi) % TURN - math.pi) if self.turns
+        turn = self.inputs[0].turn
+        return min((abs((value - other + turn / 2) % turn - turn / 2) if self.turns
                     else abs(value - other) for other in others), default=math.inf)
 
     def place(self, output, drawing, unit):

@@ -24,7 +24,7 @@ NEAR = (0.0, 0.0, 0.0, 1e-16, 1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9)
 # The words, and how often they come up.
 WORDS = {
     'dyad': 6, 'rigid': 2, 'line': 2, 'mirror': 2, 'parallelogram': 1, 'antiparallelogram': 1,
-    'inversor': 1, 'slot': 2, 'slider': 3, 'yoke': 1, 'block': 2, 'image': 1, 'geared': 2,
+    'inversor': 1, 'slot': 2, 'slider': 3, 'yoke': 2, 'block': 2, 'image': 2, 'geared': 2,
 }
 # What adds an input or is geared to one, and how often.
 INPUTS = {'crank': 3, 'cylinder': 1, 'carriage': 1}
