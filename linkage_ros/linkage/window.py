@@ -27,8 +27,8 @@ import numpy as np
 from .spatial import Circle, EDGE, gap, LAST_STEP, newton_step, row, STEPS, Vector
 
 # Cells on each side of the rectangle, of all motor angles, and again of each of these that is
-# needed: at first, and for limits that are given where that is too coarse.
-COARSE, FINE = (12, 36, 3), (20, 48, 4)
+# needed: at first, and where limits that are this part as wide are proved, though they are not.
+COARSE, FINE, NEARLY = (12, 36, 3), (20, 48, 4), 0.85
 # What directions [rad] have to be apart, and what rounding may do to f, as a part of its terms.
 APART, ROUNDING = 1e-6, 1e-14
 # Poses on each side of the rectangle to which the steps have to come back, one step before the
@@ -36,7 +36,7 @@ APART, ROUNDING = 1e-6, 1e-14
 # these poses, too.
 POSES, BACK = 33, 0.01 * LAST_STEP
 # Halvings on the way to the largest rectangle; how much smaller it becomes if steps do not do.
-HALVINGS, SMALLER = 6, 0.9
+HALVINGS, SMALLER = 7, 0.9
 # The hull is taken to be a polygon of 16 sides: directions in units of cells.
 SIDES = [(math.cos(angle), math.sin(angle)) for angle in np.arange(8) * math.pi / 8.0]
 
@@ -187,7 +187,8 @@ class Window:
 
     def is_right(self) -> bool:
         """Return whether it holds one pose at most for any motor angles, and all are found."""
-        return (self.is_single(COARSE) or self.is_single(FINE)) and self.comes_back()
+        return (self.is_single(COARSE) or self.scaled(NEARLY).is_single(COARSE)
+                and self.is_single(FINE)) and self.comes_back()
 
     def is_single(self, cells: Tuple[int, int, int]) -> bool:
         """Return whether it is proved that it holds one pose at most for any motor angles."""
