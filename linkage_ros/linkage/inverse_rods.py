@@ -4,7 +4,7 @@
 """
 The inverse of a linkage of rods: the same linkage, driven by its outputs.
 
-What had been motors are then hinges that a rod tells, on either side of its crank: there is an
+What were motors are then hinges that a rod places, on either side of its crank: there is an
 assembly mode for each choice of sides, the first as drawn.
 """
 

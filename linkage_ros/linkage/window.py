@@ -158,17 +158,7 @@ class HeldBy(NamedTuple):
 
 
 class Window:
-    """
-    A rectangle of both angles of a link on two hinges in a row, held by two rods.
-
-    Parameters
-    ----------
-    rods : sequence of HeldBy
-        Both rods.
-    low, high : array-like (2,)
-        The rectangle [rad].
-
-    """
+    """A rectangle [rad] of both angles of a link on two hinges in a row, held by two rods."""
 
     def __init__(self, rods: Sequence[HeldBy], low: Sequence[float], high: Sequence[float]):
         self.rods = rods
