@@ -197,6 +197,8 @@ def check_windows(seed, count):
     rng, ambiguous = np.random.default_rng(seed), 0
     for i in range(count):
         ankle = rods.random_ankle(rng, plausible=i % 3 > 0)
+        if i % 4 == 1:  # a cylinder and a crank
+            ankle = ankle._replace(motor_axes=[None, ankle.motor_axes[1]])
         half = rng.uniform(0.2, 1.4, 2)
         middle = rng.uniform(-0.3, 0.3, 2)
         try:
