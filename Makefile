@@ -1,3 +1,6 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
 # linkage_ros without an installed ROS: ROS 2 comes as wheels from the Python package index, in a
 # virtual environment beside the sources. Where a ROS 2 is sourced, use `colcon build` instead.
 
@@ -86,20 +89,20 @@ docs: .venv-docs/.installed ## Build the documentation to docs/_build/html/ and 
 .PHONY: test
 test: build $(venv)/.tools ## Run the tests, but for the long ones, and say what they cover
 	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m slipcover --source linkage_ros \
-	  --json --out $(build)/coverage.json -m pytest -n 2 -m 'not long'
+	  --json --out $(build)/coverage.json -m pytest -n 2 --dist worksteal -m 'not long'
 	@python .ci/coverage.py $(build)/coverage.json
 
 # What starts nodes runs alike without machine code.
 .PHONY: nodes
 nodes: build $(venv)/.tools ## Run the tests of the nodes alone; with PLAIN=1 where llvmlite is not installed
 	@$(if $(PLAIN),! python -c 'import llvmlite' 2>/dev/null)
-	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 -m 'not long' \
+	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 --dist worksteal -m 'not long' \
 	  $$(grep -lE 'ros_harness|\(graph' test/test_*.py)
 
 # Hours; what is left without those that are marked exhaustive takes minutes.
 .PHONY: long
-long: build $(venv)/.tools ## Run the long tests; WHICH='long and not exhaustive': in minutes
-	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 -m '$(or $(WHICH),long)'
+long: build $(venv)/.tools ## Run the long tests; WHICH='long and not exhaustive' or WHICH=slow: in minutes
+	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 --dist worksteal -m '$(or $(WHICH),long)'
 
 .PHONY: lint
 lint: .venv-lint/.installed ## Check style and types
@@ -123,7 +126,9 @@ clean: ## Remove everything that was made
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
 $(install)/.built: $(venv)/.installed $(sources)
-	@colcon --log-base $(log) build --build-base $(build) --install-base $(install) --cmake-args \
+	@echo 'Building linkage_interfaces and linkage_ros: a minute, once.'
+	@colcon --log-base $(log) build --build-base $(build) --install-base $(install) \
+	  --event-handlers console_start_end- summary- --cmake-args \
 	  -DBUILD_TESTING=OFF -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH=$(CURDIR)/$(venv) \
 	  -DCMAKE_PROJECT_INCLUDE=$(CURDIR)/wheels/prefix.cmake -DPython3_EXECUTABLE=$(bin)/python
 	@touch $@
@@ -137,15 +142,15 @@ $(venv)/.tools: $(venv)/.installed $(tools)
 	@about='what the tests need.' wheels/install.sh '$(bin)/python' $(venv) $(requirements) $(tools)
 	@touch $@
 
-# What there is to compare with is large: some 2 GB. planegcs has a wheel for few Pythons, and is left
-# out where it cannot be built.
-.venv-bench/.installed: $(lock)/bench.txt $(lock)/planegcs.txt
+# What there is to compare with is large: some 2 GB. What comes as source is left out where it cannot
+# be built.
+.venv-bench/.installed: $(lock)/bench.txt $(lock)/bench-source.txt
 	@about='what there is to compare with: 2 GB, some minutes, once.' wheels/install.sh \
 	  --to-compile '$(PYTHON)' .venv-bench $<
 	@CMAKE_PREFIX_PATH=$$(echo $(CURDIR)/.venv-bench/lib/python*/site-packages/cmeel.prefix) \
-	  about='planegcs.' PATH=$(CURDIR)/.venv-bench/bin:$$PATH \
-	  wheels/install.sh '$(PYTHON)' .venv-bench $(lock)/planegcs.txt \
-	  || echo 'planegcs cannot be built here, and is left out.'
+	  PATH=$(CURDIR)/.venv-bench/bin:$$PATH about='what of it comes as source.' \
+	  wheels/install.sh '$(PYTHON)' .venv-bench $(lock)/bench-source.txt \
+	  || echo 'planegcs and SolveSpace cannot be built here, and are left out.'
 	@touch $@
 
 .venv-docs/.installed: $(lock)/docs.txt

@@ -58,7 +58,7 @@ if for_ros:
 
 setup(
     name=package_name,
-    version='0.1.0',
+    version='1.0.0',
     packages=find_packages(include=[f'{package_name}*']),
     package_data={package_name: ['py.typed'], f'{package_name}.c_code': ['templates/*'],
                   f'{package_name}.web': ['page/*', 'page/vendor/*']},
@@ -81,7 +81,7 @@ setup(
     zip_safe=True,
     maintainer='linkage_ros contributors',
     maintainer_email='maintainers@linkage-ros.example',
-    description='Closed planar linkages moved exactly, in closed form.',
+    description='Closed-loop kinematics of linkages, in closed form.',
     license='Apache-2.0',
     entry_points={
         'console_scripts': [f'{name} = {package_name}.{function}'

@@ -25,7 +25,6 @@ try:
     from motion import lever_error, Motion
     from nodes import DemoError, Nodes
     import numpy as np
-    from tqdm import tqdm
 except ImportError as error:
     sys.exit(f'demo: {error}; `make demo` installs and builds what is needed')
 
@@ -41,6 +40,12 @@ LEVER_ANGLES = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)
 LENGTH_TOLERANCE = 1e-12
 ANGLE_TOLERANCE = 1e-12
 
+NEXT = """
+Try next:
+  make view                               the same scene in the browser, to be moved and tuned
+  make view SCENE=config/excavator.yaml   an arm with three cylinders; config/ has more
+  docs/tutorial.md                        a gripper of your own, from paper to a servo"""
+
 
 def main() -> int:
     """Run the demo; return the exit code of the process."""
@@ -52,6 +57,7 @@ def main() -> int:
         report_motions(motions)
         report_answer(next(m for m in machines if m.linkage.type == 'slotted_lever'), answer)
         draw(motions)
+        print(NEXT)
     except (DemoError, RuntimeError) as error:
         print(f'demo: {error}', file=sys.stderr)
         return 1
@@ -114,8 +120,8 @@ def report_answer(machine, answer):
 def draw(motions):
     """Draw each mechanism to a picture, and all of them moving side by side, as they were sent."""
     OUT.mkdir(exist_ok=True)
-    print()
-    for motion in tqdm(motions, 'portraits', unit='picture'):
+    print(f'\nDrawing what they sent to {OUT} ...', flush=True)
+    for motion in motions:
         picture = Picture([motion.machine], PORTRAIT_SIZE, 'whole', USUAL, [motion])
         shown_at = motion.turns_to(PORTRAIT_ANGLE)
         picture.arrange([shown_at])
@@ -127,11 +133,8 @@ def draw(motions):
                       USUAL_IN_MOTION - {'axes'}, motions)
     times = np.arange(0.0, ANIMATED_SECONDS, 1.0 / FRAMES_PER_SECOND) / picture.period
     picture.arrange(times)
-    files.gif(picture, times, FRAMES_PER_SECOND, 0, COLOURS, OUT / 'all.gif',
-              lambda times: tqdm(times, 'animation', unit='frame'))
-    print(f'\nPictures: {OUT}')
-    for file in sorted(OUT.iterdir()):
-        print(f'  {file.name}')
+    files.gif(picture, times, FRAMES_PER_SECOND, 0, COLOURS, OUT / 'all.gif', iter)
+    print(*(f'  {file.name}' for file in sorted(OUT.iterdir())), sep='\n')
 
 
 if __name__ == '__main__':

@@ -15,8 +15,9 @@ project = 'linkage_ros'
 author = 'linkage_ros contributors'
 project_copyright = '2026, linkage_ros contributors'
 
-extensions = ['myst_parser', 'sphinx.ext.autodoc', 'sphinx.ext.napoleon']
+extensions = ['myst_parser', 'sphinx.ext.autodoc', 'sphinx.ext.autosummary', 'sphinx.ext.napoleon']
 myst_heading_anchors = 3
+autosummary_generate = False
 autodoc_member_order = 'bysource'
 autodoc_preserve_defaults = True
 autodoc_typehints = 'none'  # the docstrings name the types

@@ -3,12 +3,11 @@
 
 """The executables that run until a signal: it ends them quietly from this module's import on."""
 
+from collections.abc import Callable
 from importlib import import_module
 import os
 import signal
 import sys
-import threading
-from typing import Callable
 
 
 def _executable(module: str) -> Callable[[], None]:
@@ -17,9 +16,7 @@ def _executable(module: str) -> Callable[[], None]:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: os._exit(0))
         code = import_module(f'{__package__}.{module}').main()
-        if threading.active_count() == 1:
-            sys.exit(code)
-        # A thread that compiles would hold up the end.
+        # A thread that compiles would hold up the end, and a second signal spoil the exit code.
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)

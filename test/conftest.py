@@ -6,6 +6,7 @@
 import atexit
 from collections import defaultdict
 import gc
+import math
 import os
 
 from domains import Domain
@@ -21,7 +22,7 @@ os.environ['ROS_DOMAIN_ID'] = str(_domain.id)
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Leave what is beyond the sample of a sweep to the long tests."""
+    """Leave what is beyond the sample of a sweep to the slow tests, which are long."""
     sweeps = defaultdict(list)
     for item in items:
         if item.get_closest_marker('sample') and not item.get_closest_marker('long'):
@@ -31,7 +32,10 @@ def pytest_collection_modifyitems(items):
         chosen = {round(k * (len(cases) - 1) / max(count - 1, 1)) for k in range(count)}
         for i, case in enumerate(cases):
             if i not in chosen:
-                case.add_marker(pytest.mark.long)
+                case.add_marker(pytest.mark.slow)
+    for item in items:
+        if item.get_closest_marker('slow'):
+            item.add_marker(pytest.mark.long)
 
 
 def pytest_collection_finish():
@@ -41,10 +45,13 @@ def pytest_collection_finish():
 
 
 @pytest.fixture
-def graph():
+def graph(monkeypatch):
     """Real nodes in this process, in a context and a domain of their own."""
     pytest.importorskip('rclpy')
+    from linkage_ros.nodes import log
     from ros_harness import Graph
 
+    # However slow the machine is, what is logged now and then is logged once.
+    monkeypatch.setattr(log, 'SECONDS', math.inf)
     with Graph() as one:
         yield one

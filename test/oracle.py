@@ -499,12 +499,13 @@ class Bench:
     def _now(self):
         return self.node.get_clock().now().nanoseconds
 
-    def set(self, values):
-        """Set parameters together."""
+    def set(self, values, *listening):
+        """Set parameters together; before they act, begin or end to listen to a topic."""
         before = self._contents()
         reason, changed = self.model.change(values)
-        result = self._graph.set(self.node, **{name: Parameter(name, value=value)
-                                               for name, value in values.items()})
+        result = self._graph.set(
+            self.node, (lambda: self.listen(*listening)) if listening else lambda: None,
+            **{name: Parameter(name, value=value) for name, value in values.items()})
         if result.successful != (not reason):
             raise Mismatch(f'answer {result}, where the library says: {reason or "accepted"}')
         if not result.successful and not result.reason:
@@ -512,8 +513,8 @@ class Bench:
         # It is accepted at once, and acts when it is prepared.
         self._until_idle('linkage_ros worker')
         after = self._contents()
-        self._check_changed({topic for topic in after if after[topic] != before[topic]}
-                            if not reason else set(), changed)
+        self._check_changed({topic for topic in after if after[topic] != before.get(topic)}
+                            & before.keys() if not reason else set(), changed)
         self._check_latched()
 
     def _contents(self):
@@ -728,8 +729,10 @@ class Generator:
             if kind < 0.06:
                 steps.append(('listen', self._pick(self.topics), self._random.random() < 0.5))
             elif kind < 0.12:
-                count = self._pick([1, 1, 1, 2])
-                steps.append(('set', dict(self._change() for _ in range(count))))
+                count = self._pick([1, 1, 1, 2, 2, 5])
+                values = dict(self._change() for _ in range(count))
+                listening = (self._pick(self.topics), self._random.random() < 0.5)
+                steps.append(('set', values, *listening[:2 * self._random.integers(2)]))
             elif kind < 0.15:
                 steps.append(('compiled',))
             elif kind < 0.25:

@@ -90,14 +90,19 @@ class Graph:
                 continue
         return held
 
-    def set(self, node, atomically=True, **values):
-        """Set parameters through the node's service; __ stands for a point in a name."""
+    def set(self, node, meanwhile=lambda: None, **values):
+        """
+        Set parameters through the node's service; __ stands for a point in a name.
+
+        `meanwhile` is called once they are answered, and before what they change is waited for.
+        """
         client = AsyncParameterClient(self.node, node.get_fully_qualified_name())
         self.until(client.services_are_ready)
         parameters = [value if isinstance(value, Parameter) else
                       Parameter(name.replace('__', '.'), value=value)
                       for name, value in values.items()]
         result = self.answer(lambda: client.set_parameters_atomically(parameters)).result
+        meanwhile()
         # What is accepted acts when it has been prepared.
         self.until(lambda: getattr(node, 'is_settled', True))
         return result

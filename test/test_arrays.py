@@ -41,7 +41,7 @@ def angles(rng):
     """Return angles of every size, many of them next to multiples of a quarter turn."""
     powers = 2.0 ** np.repeat(np.arange(-1074.0, 1024.0), 5)
     multiples = np.pi / 2 * np.concatenate([np.arange(200), rng.integers(200, 2 ** 15, 2000)])
-    edge = elementary.LARGEST
+    edge = elementary.LARGEST_ANGLE
     close = [np.nextafter(multiples, sign * np.inf) for sign in (-1, 1)]
     sizes = np.concatenate([powers * rng.uniform(1.0, 2.0, powers.size), multiples, *close,
                             np.pi / 4 * np.arange(1, 400, 2), rng.uniform(0.0, 4.0, 8000),

@@ -204,6 +204,7 @@ int found(const double *value, const double *near, double *inputs)
         np.testing.assert_allclose(reached, place, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_single_precision_is_as_good_as_it_says(machines, tmp_path):
     chosen = [machines[name] for name in ('jansen', 'slotted_lever', 'boom', 'bent')]
     library = compiled(tmp_path, chosen, single=True)

@@ -52,6 +52,7 @@ def test_a_case_keeps_every_length_to_the_last_digits(name):
             assert abs(in_digits(place) - exact[joint]) <= RULE * spread[joint], (inputs, joint)
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', CASES)
 def test_its_rates_by_each_input_are_those_of_its_bars(name):
     case, linkage = CASES[name], made(name)

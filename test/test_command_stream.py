@@ -227,6 +227,7 @@ def test_a_foot_and_a_bucket_go_in_along_a_line_and_back_out(graph):
         [place for array in arrays for place in array[-1].data], actuators_at(0.0), rtol=1e-11))
 
 
+@pytest.mark.slow
 def test_of_several_inputs_what_cannot_be_had_is_held_and_said(graph, capfd):
     stream = Stream(graph, SEVERAL)
     bucket = BUCKET, LINE[2:].tolist()
@@ -329,12 +330,14 @@ def test_a_trajectory_that_cannot_be_is_refused_as_a_whole(graph, plan, capfd, n
     assert not refused()
 
 
+@pytest.mark.slow
 def test_a_trajectory_is_solved_beside_the_messages_and_a_newer_one_replaces_it(graph, plan):
     older = plan(['flap'], *(([flap(0.3)], []) for _ in range(10_000)))
     newer = plan(['flap'], ([flap(0.2)], []))
     assert graph.until(newer) and not older()
 
 
+@pytest.mark.slow
 def test_a_trajectory_of_too_many_points_is_refused(graph, plan, capfd):
     plan(['flap'], *(([flap(0.3)], []) for _ in range(10_001)))
     logged = []

@@ -88,6 +88,7 @@ def test_bytes_that_are_no_joint_states_are_passed_over_with_one_warning(graph, 
     assert len(hand.warnings('no joint states')) == 1
 
 
+@pytest.mark.slow
 def test_whatever_bytes_come_the_node_goes_on_and_publishes_finite_numbers(graph):
     hand = Hand(graph)
     random = np.random.default_rng(5)
@@ -236,7 +237,7 @@ def test_a_stream_of_new_names_is_said_within_bounds(graph, monkeypatch):
 
 
 def test_inputs_that_nobody_sends_are_said_once(graph, monkeypatch):
-    monkeypatch.setattr(kinematics, 'PATIENCE', 0.3)
+    monkeypatch.setattr(kinematics, 'MISSING_AFTER', 0.3)
     hand = Hand(graph, 'five_bar', FIVE_BAR)
     hand.send(['five_bar_crank'], [0.1])
     said = graph.until(lambda: hand.warnings('nothing was received'))
@@ -249,7 +250,7 @@ def test_inputs_that_nobody_sends_are_said_once(graph, monkeypatch):
 
 
 def test_nothing_is_missed_where_nothing_or_everything_was_heard(graph, monkeypatch):
-    monkeypatch.setattr(kinematics, 'PATIENCE', 0.2)
+    monkeypatch.setattr(kinematics, 'MISSING_AFTER', 0.2)
     hand = Hand(graph, 'five_bar', FIVE_BAR)
     with pytest.raises(AssertionError, match='in time'):
         graph.until(lambda: hand.warnings('nothing was received'), 0.5)

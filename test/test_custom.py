@@ -282,3 +282,11 @@ def test_arrays_of_dimensions_are_checked_too():
 def test_the_page_of_words_says_what_is_refused():
     failed, tried = doctest.testfile(str(PAGE), module_relative=False)
     assert tried == 3 and not failed
+
+
+def test_a_joint_of_a_carriage_stands_still_while_that_is_held():
+    linkage = mechanisms.create('custom', joints=(
+        'A ground 0 0', 'B ground 2 0', 'C ground 0 1', 'D cylinder B A 1.5 right',
+        'E carriage C along B -1 1'))
+    with pytest.raises(ValueError, match='E.x of custom does not move with the cylinder'):
+        linkage.input_for('E.x', 0.5, others=(0.3,))

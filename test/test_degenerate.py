@@ -313,6 +313,25 @@ def test_the_inverse_of_a_lever_is_that_of_the_input_its_crank_is_geared_to():
     assert found.input_for('lever', lever) == pytest.approx([0.8])
 
 
+@pytest.mark.parametrize('name, ratio', [('QB', 1.0), ('SD', math.sqrt(2.0)), ('E.x', None)])
+def test_gears_that_hardly_come_round_are_answered_in_the_turn_that_is_asked_for(name, ratio):
+    # A four-bar, another one geared to it, and a distance that depends on both.
+    found = linkage('O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'B dyad A Q 3 2 left',
+                    'R ground 10 0', 'S ground 13 0', 'C crank R 1 geared crank sqrt(2) 0.3',
+                    'D dyad C S 3 2 left', 'E dyad B D 9 9 left')
+    inverse = found.inverse(name)
+    for theta in (0.4, 0.4 + 300 * 2.0 * math.pi, -1.1 - 31 * 2.0 * math.pi):
+        value = float(found.joint_angles(theta, [name])[name])
+        (answer,), _ = inverse.nearest((value,), (theta,))
+        if ratio:
+            assert answer == pytest.approx(theta, abs=1e-9)
+            assert inverse.inputs[0].period == pytest.approx(1.0 / ratio)
+            assert found.follow(name, value, theta)[0] == pytest.approx(theta, abs=1e-9)
+        # Where nothing comes round, answers are those of one turn: still none is wrong.
+        assert math.isnan(answer) or float(found.joint_angles(answer, [name])[name]) == \
+            pytest.approx(value, abs=1e-9)
+
+
 @pytest.mark.parametrize('ratio, arcs', [('-2', 1), ('0.5', 2), ('sqrt(2)', 2)])
 def test_an_arc_goes_on_past_pi_and_comes_once_a_turn_until_all_comes_round(ratio, arcs):
     # The crank swings about pi; another one turns with it.
@@ -341,6 +360,7 @@ def test_a_block_on_a_short_bar_of_a_kite_keeps_the_digits_of_its_slide():
     assert not any(row.problem for row in rows) and max(slides) < 4.0
 
 
+@pytest.mark.slow
 def test_the_reach_of_what_hangs_on_rounding_is_found_in_so_many_calls():
     # F is where A is: the mirror line F-A has a direction of rounding, and so has all behind it.
     lines = ('A ground -0.552 0', 'B ground 0 -0.4465', 'C ground 0 0',

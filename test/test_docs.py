@@ -3,8 +3,10 @@
 
 """The pages: what they link to is there, what they say to type works, and nothing is left out."""
 
+import doctest
 import json
 from pathlib import Path
+import pkgutil
 import re
 import shlex
 import shutil
@@ -162,6 +164,33 @@ def test_the_library_in_the_readme_works_as_written():
     code = re.search(r'^    from linkage_ros .*?\n\n', (ROOT / 'README.md').read_text(),
                      re.MULTILINE | re.DOTALL)[0]
     exec(compile(textwrap.dedent(code), 'README.md', 'exec'), {})
+
+
+API = [ROOT / 'docs' / 'api.rst', *sorted((ROOT / 'docs' / 'api').glob('*.rst'))]
+
+
+@pytest.mark.parametrize('page', API, ids=lambda page: page.stem)
+def test_the_examples_of_the_reference_work_as_written(page, monkeypatch):
+    for module in ('matplotlib', 'yaml'):
+        pytest.importorskip(module)
+    monkeypatch.chdir(ROOT)
+    failed, tried = doctest.testfile(str(page), module_relative=False)
+    assert tried and not failed
+
+
+@pytest.mark.parametrize('page', API[1:], ids=lambda page: page.stem)
+def test_the_reference_has_a_summary_of_what_it_describes(page):
+    pytest.importorskip('matplotlib')
+    text, module, described = page.read_text(), None, set()
+    for kind, name in re.findall(r'^\.\. (\w+):: ([\w.]+)', text, re.MULTILINE):
+        if kind in ('automodule', 'currentmodule'):
+            module = name
+        elif kind.startswith('auto') and kind != 'autosummary':
+            full = name if name.startswith('linkage_ros.') else f'{module}.{name}'
+            assert pkgutil.resolve_name(full) is not None
+            described.add(name)
+    summary = re.search(r'autosummary::\n   :nosignatures:\n\n((?:   .*\n)+)', text)[1].split()
+    assert described <= set(summary)
 
 
 def test_the_page_of_forces_works_as_written():

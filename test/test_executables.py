@@ -29,6 +29,7 @@ def harness():
     return ros_harness
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name, stop', [
     ('crank_driver', signal.SIGINT), ('kinematics', signal.SIGTERM),
     ('servo_inverse', signal.SIGINT),
@@ -43,6 +44,7 @@ def test_a_signal_ends_a_node_quietly(harness, name, stop):
     assert process.end() == (0, '')
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize('name', EXECUTABLES)
 def test_more_signals_than_one_end_a_node_as_quietly(harness, name, stop):
@@ -136,6 +138,7 @@ def test_so_they_do_as_a_process(harness):
     assert done.returncode == 1 and one_sentence(done.stdout + done.stderr, said)
 
 
+@pytest.mark.slow
 def test_a_signal_while_a_message_is_published_is_no_failure(harness):
     # A process of its own: where the machine is busy, the signal may end it amid the callback.
     done = subprocess.run([sys.executable, '-c', textwrap.dedent("""
@@ -214,6 +217,7 @@ def test_the_library_works_where_there_is_no_ros():
     assert (done.returncode, done.stdout) == (0, 'blocked: rclpy\n'), done.stderr
 
 
+@pytest.mark.slow
 def test_without_the_interfaces_the_service_says_how_to_build_them(harness):
     done = without('linkage_interfaces', 'import linkage_ros.nodes.servo_inverse')
     assert 'run colcon build in the workspace, which builds linkage_interfaces too' in \

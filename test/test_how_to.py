@@ -144,6 +144,7 @@ def test_the_first_ten_minutes(follow):
     assert Path('walker.png').stat().st_size > 10_000
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not shutil.which('cc'), reason='there is no C compiler')
 def test_the_gripper_of_the_tutorial(follow):
     pytest.importorskip('matplotlib')
@@ -274,6 +275,7 @@ def test_a_urdf_with_pairs_of_frames(graph, follow, library):
             assert places[f'{loop}_eye'] == pytest.approx(places[f'{loop}_pin'], abs=1e-12)
 
 
+@pytest.mark.slow
 def test_the_scene_of_a_whole_robot(follow):
     follow('how-to/whole-robot')
     shown = scene.load('robot.yaml')

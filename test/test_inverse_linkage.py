@@ -8,10 +8,9 @@ import math
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
+from sweeps import EXHAUSTIVE
 from truth import random_linkages
 
-# Many more than `.ci/run` has time for.
-EXHAUSTIVE = [pytest.mark.long, pytest.mark.exhaustive]
 FIVE_BAR = """\
 # five_bar driven by P.x, P.y
 O ground 0.0 0.0
@@ -146,6 +145,7 @@ def test_two_outputs_tell_two_inputs_in_closed_form():
         assert checked(linkage, inverse, rng.uniform(-math.pi, math.pi, (40, 2)).tolist()) > 10
 
 
+@pytest.mark.slow
 def test_an_input_that_comes_round_after_two_turns_is_answered_in_both():
     linkage = custom('O ground 0 0', 'Q ground 4 0', 'A crank O 1',
                      'D crank Q 2 geared crank 1/2 0', 'B dyad A D 2.2 2 left')

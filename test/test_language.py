@@ -529,6 +529,7 @@ def test_a_line_with_slips_is_refused_or_makes_a_linkage(count, seed):
     assert 0.5 < sum(outcomes) / count < 0.98
 
 
+@pytest.mark.slow
 def test_what_passes_is_only_what_is_documented():
     number = re.compile(r'[0-9.eE]+|[+*/(),-]|max|sqrt|pi|deg|[gmbc]')
     for text in mutations(300, 4):

@@ -154,6 +154,7 @@ def test_a_traceback_shows_generated_code():
     assert 'def pose(x0):' in inspect.getsource(linkage.function())
 
 
+@pytest.mark.slow
 def test_the_text_of_code_is_gone_with_the_code():
     linkage, _ = fresh()
     file = linkage.function().__code__.co_filename

@@ -27,11 +27,10 @@ from rclpy.publisher import Publisher  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from ros_harness import Graph, Process, RETRY  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
+from sweeps import EXHAUSTIVE
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 
-# Many more than `.ci/run` has time for.
-EXHAUSTIVE = [pytest.mark.long, pytest.mark.exhaustive]
 CONFIG = Path(__file__).parents[1] / 'config'
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 LEVER = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}

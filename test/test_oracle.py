@@ -16,9 +16,7 @@ pytest.importorskip('rclpy')
 
 from oracle import Bench, everything, history, message, Mismatch, SCENES  # noqa: E402
 from ros_harness import Graph  # noqa: E402
-
-# Many more than `.ci/run` has time for.
-EXHAUSTIVE = [pytest.mark.long, pytest.mark.exhaustive]
+from sweeps import EXHAUSTIVE
 
 # Of each scene, with machine code and without: 52 histories in all, 260 and 10 000.
 SEEDS = [pytest.param(range(2), id='few'),

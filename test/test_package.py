@@ -3,6 +3,7 @@
 
 """The package as colcon, pip and a reader of the changelog see it."""
 
+import hashlib
 from importlib.metadata import EntryPoint
 import json
 import os
@@ -49,6 +50,8 @@ def test_all_files_name_one_version(arguments):
     assert manifest('linkage_interfaces').findtext('version') == version
     assert arguments['version'] == version
     assert released[0][0] == version
+    services = (ROOT / 'linkage_interfaces' / 'CHANGELOG.rst').read_text()
+    assert f'\n{version} ({released[0][1]})\n---' in services
     assert f"\nversion: {version}\ndate-released: '{released[0][1]}'\n" in citation
 
 
@@ -68,10 +71,77 @@ def test_the_workflow_runs_what_has_to_be_green():
     workflow = (ROOT / '.github/workflows/ci.yml').read_text()
     jobs = yaml.safe_load(workflow)['jobs']
     steps = [step['run'] for job in jobs.values() for step in job['steps'] if 'run' in step]
-    # The long tests take longer than what is asked of a change before it lands.
-    assert set().union(*map(made, steps)) == made((ROOT / '.ci/run').read_text()) | {'long'}
+    assert set().union(*map(made, steps)) == made((ROOT / '.ci/run').read_text())
     assert set(jobs['test']['strategy']['matrix']['distro']) == {
         file.stem for file in (ROOT / 'wheels').glob('*.txt') if 'ros-rclpy' in file.read_text()}
+
+
+def test_both_manifests_say_where_the_repository_is():
+    one, other = ({url.get('type'): url.text for url in manifest(folder).iter('url')}
+                  for folder in ('.', 'linkage_interfaces'))
+    assert one == other and set(one) == {'website', 'repository', 'bugtracker'}
+
+
+def pins(file):
+    """Return {package: {versions}} of a requirement file, and what of it has no hash."""
+    lines = file.read_text().replace('\\\n', ' ').splitlines()
+    found, bare = {}, []
+    for line in lines:
+        if line.strip() and not line.lstrip().startswith('#'):
+            name, version = re.match(r'([\w.-]+)(?:\[\w+\])?==([\w.+!]+)', line).groups()
+            found.setdefault(name.lower(), set()).add(version)
+            if not re.search(r'--hash=sha256:[0-9a-f]{64}', line):
+                bare.append(line)
+    return found, bare
+
+
+def test_all_that_make_installs_is_locked_with_hashes():
+    makefile, script = ((ROOT / name).read_text() for name in ('Makefile', 'wheels/install.sh'))
+    assert not re.search(r'pip\b.* install', makefile)
+    assert len(re.findall(r'pip install', script)) == 1 and '--require-hashes' in script
+    locked = set()
+    for file in (ROOT / 'wheels' / 'lock').glob('*.txt'):
+        found, bare = pins(file)
+        assert found and not bare
+        locked |= {(name, version) for name in found for version in found[name]}
+    asked = [*(ROOT / 'wheels').glob('*.txt'), ROOT / 'docs' / 'requirements.txt',
+             *(ROOT / 'benchmark').glob('*.txt')]
+    assert {(name, version) for file in asked for name, versions in pins(file)[0].items()
+            for version in versions} <= locked
+
+
+@pytest.mark.parametrize('slip, complaint', [
+    ('', ''), ('0', 'has another hash'), (None, 'Hashes are required')])
+def test_what_has_another_hash_or_none_is_not_installed(tmp_path, slip, complaint):
+    wheel = tmp_path / 'tiny_linkage_test-1.0-py3-none-any.whl'
+    about = 'tiny_linkage_test-1.0.dist-info/'
+    with zipfile.ZipFile(wheel, 'w') as packed:
+        packed.writestr('tiny_linkage_test.py', '')
+        packed.writestr(about + 'METADATA', 'Metadata-Version: 2.1\nName: tiny_linkage_test\n'
+                        'Version: 1.0\n')
+        packed.writestr(about + 'WHEEL', 'Wheel-Version: 1.0\nRoot-Is-Purelib: true\n'
+                        'Tag: py3-none-any\n')
+        packed.writestr(about + 'RECORD', '')
+    digest = hashlib.sha256(wheel.read_bytes()).hexdigest()
+    lock = tmp_path / 'lock.txt'
+    lock.write_text('tiny_linkage_test==1.0' + (
+        '' if slip is None else f' --hash=sha256:{slip}{digest[len(slip):]}') + '\n')
+    (tmp_path / 'bin').mkdir()
+    wrapped(tmp_path / 'bin')
+    ended = subprocess.run(
+        [ROOT / 'wheels' / 'install.sh', sys.executable, tmp_path, lock], text=True,
+        capture_output=True, timeout=120, env={
+            'PATH': os.environ['PATH'], 'PIP_CONFIG_FILE': os.devnull, 'PIP_NO_INDEX': '1',
+            'PIP_FIND_LINKS': str(tmp_path), 'PIP_TARGET': str(tmp_path / 'installed')})
+    assert (ended.returncode == 0) == (not complaint), ended.stderr
+    assert complaint in ended.stderr and len(ended.stderr.splitlines()) == bool(complaint)
+    assert (tmp_path / 'installed' / 'tiny_linkage_test.py').exists() == (not complaint)
+
+
+def test_actions_are_pinned_by_commit():
+    workflow = (ROOT / '.github/workflows/ci.yml').read_text()
+    used = re.findall(r'uses: (.*)', workflow)
+    assert used and all(re.fullmatch(r'[\w/-]+@[0-9a-f]{40}  # v[\d.]+', use) for use in used)
 
 
 def test_a_robot_without_a_screen_installs_nothing_to_look_at_it_with():
@@ -125,9 +195,12 @@ def test_a_wheel_has_the_library_and_the_page_and_no_commands(copy, tmp_path):
 
 @pytest.mark.long
 @pytest.mark.skipif(not shutil.which('colcon'), reason='colcon is not installed')
-@pytest.mark.parametrize('layout', ['', '--merge-install', '--symlink-install'])
-def test_the_ordinary_colcon_build_of_a_workspace_is_enough(copy, tmp_path, layout):
+@pytest.mark.parametrize('layout, linked', [
+    ('', False), ('--merge-install', False), ('--symlink-install', False), ('', True)])
+def test_the_ordinary_colcon_build_of_a_workspace_is_enough(copy, tmp_path, layout, linked):
     pytest.importorskip('rclpy')
+    if linked:
+        depending_on_the_interfaces(tmp_path / 'src')
     # What building against wheels needs besides.
     flags = [f'-DCMAKE_PREFIX_PATH={sys.prefix}', f'-DPython3_EXECUTABLE={sys.executable}',
              f'-DCMAKE_PROJECT_INCLUDE={ROOT}/wheels/prefix.cmake', '-DBUILD_TESTING=OFF']
@@ -144,6 +217,7 @@ print(node.__file__, node.ServoInverseType.__module__)' && echo $AMENT_PREFIX_PA
     ended = subprocess.run(['bash', '-c', script], cwd=tmp_path, env=clean, timeout=300,
                            text=True, capture_output=True)
     assert ended.returncode == 0, ended.stderr
+    assert (tmp_path / 'install' / 'asker').exists() == linked
     module, prefixes = ended.stdout.splitlines()
     assert module.startswith(str(tmp_path))
     assert module.endswith('linkage_interfaces.srv._servo_inverse')
@@ -153,6 +227,40 @@ print(node.__file__, node.ServoInverseType.__module__)' && echo $AMENT_PREFIX_PA
                            'servo_inverse', 'transmission', 'urdf', 'viewer'}
 
 
+def depending_on_the_interfaces(sources):
+    """Write a package that depends on the nested one, linked as docs/install.md says."""
+    (sources / 'linkage_interfaces').symlink_to('linkage_ros/linkage_interfaces')
+    asker = sources / 'asker'
+    asker.mkdir()
+    (asker / 'package.xml').write_text("""\
+        <package format="3">
+          <name>asker</name>
+          <version>1.0.0</version>
+          <description>Asks for inputs.</description>
+          <maintainer email="asker@example.com">asker</maintainer>
+          <license>Apache-2.0</license>
+          <buildtool_depend>ament_cmake</buildtool_depend>
+          <depend>linkage_interfaces</depend>
+          <export><build_type>ament_cmake</build_type></export>
+        </package>""")
+    (asker / 'CMakeLists.txt').write_text("""\
+        cmake_minimum_required(VERSION 3.10)
+        project(asker)
+        find_package(ament_cmake REQUIRED)
+        find_package(linkage_interfaces REQUIRED)
+        ament_package()""")
+
+
+@pytest.mark.skipif(not shutil.which('colcon'), reason='colcon is not installed')
+def test_colcon_builds_the_interfaces_before_what_depends_on_them(copy, tmp_path):
+    depending_on_the_interfaces(tmp_path / 'src')
+    order = subprocess.run(
+        ['colcon', '--log-base', '/dev/null', 'list', '--topological-order', '--names-only'],
+        cwd=tmp_path, timeout=60, check=True, capture_output=True, text=True).stdout.split()
+    assert order[0] == 'linkage_interfaces' and {*order[1:]} == {'asker', 'linkage_ros'}
+
+
+@pytest.mark.slow
 @pytest.mark.skipif(not shutil.which('colcon'), reason='colcon is not installed')
 def test_colcon_finds_both_packages_and_their_build_types():
     found = subprocess.run(['colcon', '--log-base', '/dev/null', 'list'], cwd=ROOT, timeout=60,
@@ -193,6 +301,7 @@ def only_line(command, folder, environment):
     return said
 
 
+@pytest.mark.sample(2)
 @pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
 @pytest.mark.parametrize('lines, settings, complaint', [
     ([], {'PYTHON': 'nowhere'}, 'PYTHON=nowhere is no command'),

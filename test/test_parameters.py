@@ -117,6 +117,7 @@ def refuse_all(graph, kind, names):
     return len(names) * len(hostile)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('kind', KINDS)
 def test_no_value_of_any_kind_ends_a_node_or_spoils_a_parameter(graph, kind):
     def one_of_each(fields):

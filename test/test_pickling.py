@@ -53,6 +53,7 @@ def answers(linkage):
     return b''.join(map(bits, values))
 
 
+@pytest.mark.sample(40)
 @pytest.mark.parametrize('way', WAYS)
 @pytest.mark.parametrize('name', LINKAGES)
 def test_a_copy_answers_the_same(name, way):
@@ -83,6 +84,7 @@ def test_a_copy_of_an_accelerated_one_is_accelerated():
                           quick.solve(theta)['G'])
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('file', sorted(CONFIG.glob('*.yaml')), ids=lambda file: file.stem)
 def test_scenes_and_what_is_in_them_can_be_sent(file):
     sent = scene.load(str(file))

@@ -113,6 +113,7 @@ def test_nothing_is_left_of_a_node_that_is_destroyed(graph):
     graph.until(lambda: not picture())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('stop', [
     signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_nothing_is_left_of_a_process_that_is_told_to_end(tmp_path, stop):

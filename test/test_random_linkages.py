@@ -59,7 +59,7 @@ def all_of_them(seed):
 
 
 def test_random_linkages_hold():
-    found = problems(range(15), a_few)
+    found = problems(range(10), a_few)
     assert not found, report(found)
 
 
@@ -94,19 +94,31 @@ MENDED = {
     'a yoke of a pin that has no place': ((
         'A ground 0 0', 'B ground 1 0', 'D crank A 1', 'E dyad D B 0.2 0.3 left',
         'F yoke E A along B'), (2.0,)),
+    'a slider beyond its rod, far from where coordinates begin': ((
+        'A ground 0.932167114186647 0', 'B ground -2.7064166904829103 2.1812321403010912',
+        'C crank B 0.4972591685950622 up', 'D slider C 0.35718299684870136 B along A out'),
+        (1.8321253200577161,)),
+    'a slot on an arm of nothing but rounding': ((
+        'A ground 0 0', 'C ground 0 0.4692682948918445', 'D crank A 0.3838513370796755',
+        'E antiparallelogram A C D', 'F yoke E A along D', 'H slot D F 0 out 0.37'),
+        (1.7703773345200866,)),
+    'an image of a joint of the ground': ((
+        'A ground 0 0', 'C ground 0.170347395 0', 'D ground 0.03191923 1.50131151692',
+        'E crank A 1', 'K image A D C'), (0.3,)),
 }
 
 
 @pytest.mark.parametrize('name', MENDED)
 def test_what_once_broke_the_rule_keeps_it(name):
     joints, given = MENDED[name]
-    subject = checks.Subject(random_linkages.Design(joints, {}, {}), np.random.default_rng(0))
+    subject = checks.Subject(random_linkages.Design(joints, {}, {}), np.random.default_rng(0), 400)
     motion = drawing_accuracy.Motion((1.0,), (0.3,))
     assert not drawing_accuracy.broken(subject.fitted(np.array([given]), True, motion=motion))
 
 
 # --- that the check is a check ------------------------------------------------------------------
 
+@pytest.mark.slow
 def test_every_word_comes_up_and_a_third_is_degenerate():
     words, refused, count = Counter(), 0, 150
     for seed in range(count):

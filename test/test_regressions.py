@@ -67,6 +67,7 @@ class Scene:
             self.received[topic][-1].header.stamp.sec == self._stamp))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ['kinematics', 'scene'])
 def test_without_llvmlite_and_without_subscribers_a_node_goes_on(tmp_path, name):
     (tmp_path / 'sitecustomize.py').write_text(NOT_INSTALLED)
@@ -109,6 +110,7 @@ def test_loads_beside_another_mechanism_come_with_every_message(graph, executor)
     assert all(len(state.effort) == len(state.name) for state in received)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('wrong', [math.nan, math.inf, 1e308])
 def test_a_speed_that_is_no_number_is_in_no_message(graph, executor, wrong):
     scene = Scene(graph, TWO, ['joint_states'])
@@ -134,6 +136,7 @@ def displayed(messages):
     return ids
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('times', [6, pytest.param(30, marks=pytest.mark.long)])
 def test_markers_are_gone_wherever_noise_about_the_end_of_the_reach_was(graph, executor, times):
     scene = Scene(graph, {'mechanisms': ['m', 'b'], 'm.type': 'peaucellier', 'b.type': 'jansen'},

@@ -83,6 +83,22 @@ def test_an_ankle_is_imported_with_the_limits_of_its_file(tmp_path, capsys, seed
     assert np.abs(np.array(gaps)[:, there]).max() < 1e-15
 
 
+@pytest.mark.parametrize('seed', [1, 3])
+def test_an_ankle_on_a_cross_is_imported(tmp_path, capsys, seed):
+    # As most are: both hinges of the foot cross in a point, and are no ball all the same.
+    ankle = turning(seed)
+    ankle = ankle._replace(second=ankle.first)
+    machine, _ = imported(tmp_path, ankle, ([-0.15, -0.12], [0.15, 0.12]), capsys)
+    assert {called.name for called in machine.joints.values() if called.published} == {
+        'pitch', 'roll'}
+    motors = np.random.default_rng(4).uniform(-0.1, 0.1, (2, 40))
+    found = np.stack(list(machine.linkage.joint_angles(motors, ['pitch', 'roll']).values()))
+    there = np.isfinite(found[0])
+    assert there.sum() > 10
+    assert np.abs(np.array(rods.gaps(ankle, motors, *found))[:, there]).max() < 1e-15
+
+
+@pytest.mark.slow
 def test_without_limits_the_largest_are_taken_and_said(tmp_path, capsys):
     machine, said = imported(tmp_path, turning(4), None, capsys)
     assert 'these are the largest shown to have one at most: pitch from -' in said

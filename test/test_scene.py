@@ -51,6 +51,7 @@ def test_without_parameters_the_scene_is_the_catalogue():
     assert scene.read({}).rate == 50.0
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('file', sorted(glob(os.path.join(CONFIG, '*.yaml'))))
 def test_a_scene_is_written_as_the_few_values_that_tell_it(file, tmp_path):
     before = scene.load(file)
@@ -68,6 +69,12 @@ def test_names_that_ros_takes_for_values_are_written_as_texts(tmp_path):
     again = tmp_path / 'again.yaml'
     again.write_text(writing.in_yaml(writing.without_defaults(before)))
     assert scene.load(str(again)).parameters == before.parameters
+
+
+def test_a_list_of_nothing_is_not_written_as_ros_reads_none(tmp_path):
+    text = writing.in_yaml({'mechanisms': ['jansen'], 'jansen.joint_names': [],
+                            'jansen.loads': ()})
+    assert '[]' not in text and 'joint_names' not in text and 'loads' not in text
 
 
 @pytest.mark.parametrize('name', ['my thigh', 'Hüfte', 'toe 1/2 "left" <a&b>', "o'k: #3", '大腿'])
@@ -357,6 +364,7 @@ def lengths(given):
                   if '.dimensions.' in p.name]
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize('given', [*TYPES.values(), SMALL, SIGNED, SWEPT, {'jansen.scale': 5e-324},
                                    {'jansen.scale': 1e308}],
                          ids=[*TYPES, 'small', 'signed', 'swept', 'least', 'most'])

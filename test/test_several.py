@@ -101,6 +101,7 @@ def test_whole_turns_are_kept_and_a_singular_pose_is_not_passed():
     np.testing.assert_allclose(back, near, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_outputs_of_few_inputs_are_solved_first():
     # Two levers side by side, and a bar between them that both move.
     linkage = mechanisms.create('custom', joints=(

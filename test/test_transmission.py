@@ -23,10 +23,9 @@ from linkage_ros.c_code import header, transmission
 from linkage_ros.c_code.axes import actuators, joints
 import numpy as np
 import pytest
+from sweeps import EXHAUSTIVE, few_and_many
 from truth import random_linkages
 
-# Many more than `.ci/run` has time for.
-EXHAUSTIVE = [pytest.mark.long, pytest.mark.exhaustive]
 ROOT = Path(__file__).parents[1]
 STAND_IN = ROOT / 'test' / 'ros2_control'
 STRICT = ('-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wshadow', '-Werror', '-O2')
@@ -148,6 +147,7 @@ def expected(machine, inputs):
     return position, rates, joint, signs[:, None] * turning
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
 def test_both_ways_are_those_of_the_scene(library, machines, name):
     machine = machines[name]
@@ -207,6 +207,7 @@ def test_a_singular_pose_is_said(library, machines):
     assert status == 2 and velocity == 0.0 and np.isfinite(position)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
 def test_nothing_that_comes_in_gets_out_as_no_number(library, machines, name):
     machine, rng = machines[name], np.random.default_rng(4)
@@ -239,8 +240,10 @@ def test_the_joints_are_chosen_by_their_names(machines, tmp_path):
         np.testing.assert_allclose(position, expected(leg, inputs)[0], atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('seeds', [
-    range(10), pytest.param(range(10, 100), marks=EXHAUSTIVE)])
+    range(3), pytest.param(range(3, 12), marks=pytest.mark.long),
+    pytest.param(range(12, 100), marks=EXHAUSTIVE)])
 def test_random_linkages_go_both_ways(tmp_path, seeds):
     machines = []
     for seed in seeds:
@@ -331,15 +334,15 @@ def proved(package, name, compiler, count, *flags):
     assert tried == count and good > 0.9 * count
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('compiler', COMPILERS)
 def test_a_transmission_is_proved(tmp_path, compiler):
     proved(written(tmp_path, ROOT / 'examples' / 'leg.yaml'), 'knee', compiler, 5000)
 
 
-@pytest.mark.long
-@pytest.mark.exhaustive
 @pytest.mark.parametrize('compiler', COMPILERS)
-@pytest.mark.parametrize('path', SCENES, ids=lambda path: path.stem)
+@pytest.mark.parametrize('path', few_and_many([], [(path,) for path in SCENES]),
+                         ids=lambda path: path.stem)
 def test_every_scene_is_proved_at_a_hundred_thousand_states(tmp_path, path, compiler):
     package = written(tmp_path, path)
     for name in scene.load(path).machines:
@@ -360,6 +363,7 @@ def refusals(tmp_path_factory):
     return folder / 'configure'
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('words, said', [
     (['parameter', 'a', '90'], ''),
     (['parameter', 'a', 'wide'], "must be a number [m], not 'wide'"),
@@ -390,6 +394,7 @@ def test_other_dimensions_are_those_of_another_linkage(refusals):
         assert back == pytest.approx(angle, abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
 def test_any_dimensions_are_those_of_python(tmp_path):
     given = {'mechanisms': [*mechanisms.TYPES, 'odd'],
@@ -443,6 +448,7 @@ const char *{name}_placed(const double *dimension, const double *q, double *posi
     assert tried > 200
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not shutil.which('cmake'), reason='cmake is not installed')
 def test_a_package_is_built_and_tests_itself(tmp_path):
     if not (Path(sys.prefix) / 'share' / 'ament_cmake').is_dir():

@@ -126,6 +126,7 @@ def limits(one):
             for name, end in ends.items()}
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize('name, library, count', [
     *((name, Pinocchio, 6) for name in (*MACHINES, *OWN)),
     *((name, Yourdfpy, 6) for name in ('jansen', 'slotted_lever', 'boxer engine')),
@@ -337,6 +338,7 @@ def test_a_limit_leaves_a_millionth_to_spare(kind):
         assert high - angles[name].max() == pytest.approx(spare, rel=0.01)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('arguments', [
     ['robot_model'], ['robot_model', '--format', 'mjcf'], ['c_code', ROOT / 'config/all.yaml']],
     ids=str)

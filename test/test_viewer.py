@@ -58,7 +58,6 @@ from rcl_interfaces.msg import (  # noqa: E402
     ParameterValue,
 )
 import rclpy  # noqa: E402
-from rclpy.logging import get_logger  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from ros_harness import Graph, Process  # noqa: E402
@@ -408,6 +407,7 @@ def test_a_dragged_lever_is_where_it_was_dragged_to_and_stays_there(show):
     assert running.values('lever.crank.start') == [servo]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('lengths, sign', [
     ((80.0, 150.0, 0.0), 1.0), ((80.0, 150.0, 25.0), -1.0), ((1.0, 150.0, 0.0), 1.0)])
 def test_a_lever_that_is_dragged_beyond_its_reach_goes_to_its_end(show, lengths, sign):
@@ -559,6 +559,7 @@ def test_velocity_and_acceleration_are_the_slopes_of_the_curves(name, output):
         np.testing.assert_allclose(ratio[known], effort[known], rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_node_that_is_silent_at_first_is_waited_for_and_not_guessed(show, monkeypatch):
     asked, answered = settings.RemoteNode.parameters, asyncio.Event()
 
@@ -690,6 +691,7 @@ def test_arithmetic_is_read_by_the_library(lever, text, answer):
         assert {**said, **answer} == said and said['reason'] == ''
 
 
+@pytest.mark.slow
 def test_nobody_is_listened_to_while_nobody_looks(show, monkeypatch):
     monkeypatch.setattr(scene_view, 'SECONDS_TO_LINGER', 0.2)
     running = show(LEG)
@@ -1156,8 +1158,13 @@ def unpacked(text):
         for marker in message.markers)
 
 
+def feed_of_a_leg():
+    """Return the feed of a leg's markers, which logs nothing."""
+    return Feed('/leg/markers', '/leg', MarkerArray, int, lambda text, subject: None)
+
+
 def test_what_is_read_without_unpacking_is_what_unpacking_gives():
-    topic = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    topic = feed_of_a_leg()
     looks = []
     for text in (walker(1), walker(2), walker(3), walker(4, legs=1), walker(5),
                  walker(6, width=2.0), walker(7, frame='earth'), walker(8), FILLED, FILLED):
@@ -1172,7 +1179,7 @@ def test_from_its_second_message_on_a_topic_is_not_unpacked_whatever_else_is_in_
     looked = []
     monkeypatch.setattr(feed, 'deserialized', lambda *args: (
         looked.append(args) or message_layout.deserialized(*args)))
-    topic = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    topic = feed_of_a_leg()
     for step in range(5):
         message = deserialize_message(walker(step), MarkerArray)
         message.markers.insert(1, Marker(
@@ -1185,7 +1192,7 @@ def test_from_its_second_message_on_a_topic_is_not_unpacked_whatever_else_is_in_
 
 
 def test_markers_that_are_gone_are_drawn_no_more():
-    topic = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    topic = feed_of_a_leg()
     topic.newest = walker(1)
     assert set(topic.drawn()[0]) == {0, 1}
     one = deserialize_message(walker(2), MarkerArray)
@@ -1226,7 +1233,7 @@ def swapped(message):
 
 
 def test_markers_in_the_other_byte_order_are_drawn_alike():
-    topic = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    topic = feed_of_a_leg()
     for step in (1, 2, 3):
         text = walker(step)
         topic.newest = swapped(deserialize_message(text, MarkerArray))
@@ -1259,9 +1266,10 @@ def hostile(rng, text):
         yield from (spoilt(part, number) for part in range(4))
 
 
+@pytest.mark.slow
 def test_of_what_cannot_be_drawn_nothing_stays():
     rng = np.random.default_rng(5)
-    topic = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    topic = feed_of_a_leg()
     for step, text in enumerate(hostile(rng, walker(0))):
         for topic.newest in (text, walker(step)):
             looks, records = topic.drawn()
@@ -1278,7 +1286,7 @@ def test_of_what_cannot_be_drawn_nothing_stays():
 
 
 def test_markers_with_ever_new_ids_are_not_gathered():
-    topic = Feed('/leg/markers', '/leg', MarkerArray, int, get_logger('feed'))
+    topic = feed_of_a_leg()
     for step in range(50):
         message = deserialize_message(walker(step), MarkerArray)
         for marker in message.markers:
@@ -2050,6 +2058,7 @@ def test_mechanisms_of_one_name_in_two_namespaces_are_told_apart(graph, show, lo
     looked_at(running, doing)
 
 
+@pytest.mark.slow
 @needs_browser
 def test_a_foreign_page_is_not_let_in(address, tmp_path):
     async def look():

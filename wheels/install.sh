@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
 # Makes a virtual environment of lock files, or says in one sentence what is missing. What is not in
 # them, or has another hash there, is refused; nothing else is asked for, so nothing is resolved.
 #
@@ -37,8 +40,11 @@ mkdir -p "$folder"
   || "$python" -m venv "$folder" >"$log" 2>&1 \
   || stop "The virtual environment $folder cannot be made: $(tail -n 1 "$log")"
 for file; do files+=(-r "$file"); done
-"$folder/bin/python" -m pip install -q --require-hashes \
-  --no-build-isolation "${files[@]}" >"$log" 2>&1 && exit
+install() {
+  "$folder/bin/python" -m pip install -q --require-hashes --no-build-isolation "$@" >"$log" 2>&1
+}
+[ "$to_compile" ] && install -r "${0%/*}/lock/source.txt"
+install "${files[@]}" && exit
 if grep -qiE 'connection (broken|refused|reset)|new connection|name resolution|timed out|proxy' \
     "$log"; then
   stop "The Python package index cannot be reached: is there a network? (All of it: $log)"

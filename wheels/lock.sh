@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
 # Writes wheels/lock/*.txt: what the requirement files ask for and all that this brings along, each
 # with the hashes of its files, for every Python from the one that is named.
 #
@@ -20,11 +23,12 @@ pin() {
 }
 
 pin lock 3.10 wheels/lock.txt
+pin source 3.10 wheels/source.txt
 pin fast 3.10 wheels/fast.txt
 pin lint 3.10 wheels/lint.txt
 pin docs 3.10 docs/requirements.txt
 pin bench 3.11 benchmark/requirements.txt
-pin planegcs 3.11 benchmark/planegcs.txt
+pin bench-source 3.11 benchmark/source.txt --constraint wheels/lock/bench.txt
 for distro in kilted jazzy; do
   pin $distro 3.10 wheels/{$distro,build,demo}.txt
   pin dev-$distro 3.10 wheels/dev.txt wheels/dev-$distro*.txt --constraint wheels/lock/$distro.txt

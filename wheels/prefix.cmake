@@ -1,3 +1,6 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
 # Building against the wheels: handed in with -DCMAKE_PROJECT_INCLUDE, so that the CMakeLists.txt of
 # the package stays plain ROS. CMAKE_PREFIX_PATH is the prefix of the virtual environment.
 

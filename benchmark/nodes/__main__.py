@@ -6,7 +6,7 @@ What the nodes cost, next to what any node costs, in the same run.
 
     python -m benchmark.nodes --missing          what is not measured of these sources yet
     python -m benchmark.nodes --quick            a look, within two or three minutes
-    python -m benchmark.nodes services changes   these pieces alone
+    python -m benchmark.nodes services changes   these pieces alone, in full or --quick
     python -m benchmark.nodes --tables           the tables of the last results
 
 Everything takes some 70 minutes, first with machine code, then without llvmlite. `--missing`
@@ -95,7 +95,7 @@ def run(options, result):
                   if result.get(column, {}).get(name, {}).get('sources') != sources]
     else:
         column = report.PLAIN if options.plain else report.NATIVE
-        chosen = [(column, name) for name in (QUICK if options.quick else options.pieces)]
+        chosen = [(column, name) for name in options.pieces or QUICK]
     for i, (column, name) in enumerate(chosen):
         minutes = (time.time() - started) / 60 + PIECES[name].minutes
         if i and options.missing and minutes > LONGEST:

@@ -9,6 +9,7 @@ import pickle
 import statistics
 import subprocess
 import sys
+import threading
 import time
 
 from linkage_interfaces.srv import ServoInverse
@@ -33,7 +34,7 @@ COMPARED = {'one leg': RATES, '12 legs': RATES, 'four mechanisms': RATES,
 SECONDS = {50.0: 1.2, 200.0: 1.0, 1000.0: 0.6}
 WARM_UP = 60
 # After so long all is known and made [s].
-COMPILING = 2.0
+COMPILING = 1.0
 # What else is compared in a scene, in a loop and in processes.
 BESIDE = {'one leg': ('relay',), '12 legs': ('fresh',)}
 # In a loop, in a round: topics to publish on, and ticks at least.
@@ -133,8 +134,10 @@ class Bench:
             assert self.driver.until(lambda: all(
                 _is_heard(node, scenes.topics(scene)) for node in nodes.values()))
             # Who listens is told to those that spin, and machine code is made beside first ticks.
-            for _ in range(2):
+            for _ in range(4):
                 self.driver.until(lambda: False, COMPILING, executor)
+                assert self.driver.until(lambda: 'linkage_ros compiler' not in {
+                    thread.name for thread in threading.enumerate()}, executor=executor)
                 for node in nodes.values():
                     _ticks(node, cranks, count)
             for _ in range(3 * self.rounds):

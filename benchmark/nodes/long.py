@@ -117,7 +117,7 @@ def trouble(bench, seconds):
         stalled.signal(signal.SIGSTOP)
         with changes.turning(line):
             for second in range(round(seconds)):
-                given = changes.CHANGES[kinds[second % len(kinds)]](second % 40)
+                given = changes.made(changes.CHANGES[kinds[second % len(kinds)]](second % 40))
                 took.append(1e3 * changes.change(bench.driver, client, given))
                 deaf.call_async(SetParameters.Request())
                 text = serialize_message(next(line.cranks))

@@ -59,13 +59,14 @@ PIECES = {
     'services': Piece(1.0, lambda bench, quick: bench.services(40 if quick else 200), True),
     'starts': Piece(4.0, lambda bench, _: {scene: bench.starts(scene) for scene in STARTED}, True),
     'changes': Piece(3.0, lambda bench, _: changes.measure(bench), True),
-    'hold': Piece(3.0, lambda bench, _: [long.hold(bench, scene, 1000.0, 60.0)
-                                         for scene in HELD], True),
-    'soak': Piece(9.0, lambda bench, _: long.soak(bench, 10 ** 6), True),
-    'trouble': Piece(3.0, lambda bench, _: long.trouble(bench, 120.0)),
+    'hold': Piece(3.0, lambda bench, quick: [
+        long.hold(bench, scene, 1000.0, 3.0 if quick else 60.0) for scene in HELD], True),
+    'soak': Piece(9.0, lambda bench, quick: long.soak(bench, 10 ** (4 if quick else 6)), True),
+    'trouble': Piece(3.0, lambda bench, quick: long.trouble(bench, 10.0 if quick else 120.0)),
     **{f'processes, {scene}': Piece(6.0, partial(_processes, scene)) for scene in scenes.SCENES},
-    'stream': Piece(5.0, lambda bench, _: stream.compare(bench, campaign.RATES)),
-    'growth': Piece(8.0, lambda bench, _: growth.grow(bench)),
+    'stream': Piece(5.0, lambda bench, quick: stream.compare(
+        bench, campaign.RATES[-1 if quick else 0:])),
+    'growth': Piece(8.0, lambda bench, quick: growth.grow(bench, 3 if quick else None)),
 }
 
 

@@ -366,31 +366,31 @@ static inline int lever_from_actuators(const float position[1], float q[1], leve
 static inline void lever_modes_joints(const float position[1],
     const float near[1], float start[2][1])
 {
-    const float k30 = 0.0f;
-    const float k36 = 1.0f;
+    const float k28 = 0.70710677f;
+    const float k35 = 0.70710677f;
     const float x0 = position[0];
-    const float v6 = (0.5f * (x0 + 1.5707964f));
-    const float v7 = sinf(v6);
-    const float v12 = ((1.0f - (2.0f * (v7 * v7))) * 0.081f);
-    const float v17 = (((2.0f * v7) * cosf(v6)) * 0.081f);
-    const float v20 = sqrtf(((v12 * v12) + (v17 * v17)));
-    const float v21 = (v12 / v20);
-    const float v24 = (-v6);
-    const float v25 = sinf(v24);
-    const float v32 = cosf(v24);
-    const float v38 = ((v25 * k30) + (v32 * k36));
-    const float v46 = ((v32 * k30) - (v25 * k36));
-    const float v51 = (lever_root(((-0.025f) + (0.09f * (v38 * v38))), 5.7731595e-17f) * lever_root(((-0.025f) + (0.09f * (v46 * v46))), 5.7731595e-17f));
-    const float v52 = (v21 * v51);
-    const float v54 = (v21 * 0.045f);
-    const float v55 = (v17 / v20);
-    const float v56 = (v54 * v55);
-    const float v60 = (-(v54 * v21));
-    const float v61 = (v55 * v51);
+    const float v3 = (0.5f * x0);
+    const float v4 = sinf(v3);
+    const float v9 = (((2.0f * v4) * cosf(v3)) * 0.081f);
+    const float v15 = ((1.0f - (2.0f * (v4 * v4))) * 0.081f);
+    const float v18 = sqrtf(((v9 * v9) + (v15 * v15)));
+    const float v19 = (v9 / v18);
+    const float v22 = (-v3);
+    const float v23 = sinf(v22);
+    const float v30 = cosf(v22);
+    const float v37 = ((v23 * k28) + (v30 * k35));
+    const float v45 = ((v30 * k28) - (v23 * k35));
+    const float v50 = (lever_root(((-0.025f) + (0.09f * (v37 * v37))), 5.7731595e-17f) * lever_root(((-0.025f) + (0.09f * (v45 * v45))), 5.7731595e-17f));
+    const float v51 = (v19 * v50);
+    const float v53 = (v15 / v18);
+    const float v55 = (v19 * 0.045f);
+    const float v56 = (v53 * v55);
+    const float v60 = (-(v19 * v55));
+    const float v61 = (v53 * v50);
     (void)near;
-    start[0][0] = atan2f((-(v52 + v56)), (v60 + v61));
+    start[0][0] = atan2f((-((-v51) - v56)), (v60 + v61));
     start[0][0] = start[0][0] + 6.2831855f * floorf((near[0] - start[0][0]) / 6.2831855f + 0.5f);
-    start[1][0] = atan2f((-((-v52) + v56)), (v60 - v61));
+    start[1][0] = atan2f((-(v51 - v56)), (v60 - v61));
     start[1][0] = start[1][0] + 6.2831855f * floorf((near[0] - start[1][0]) / 6.2831855f + 0.5f);
 }
 /* From positions to the inputs nearest to q. In closed form, 8 poses at most. */
@@ -429,31 +429,31 @@ static inline int lever_from_joints(const float position[1], float q[1], lever_p
 static inline void lever_modes_angle_lever(const float position[1],
     const float near[1], float start[2][1])
 {
-    const float k30 = 0.0f;
-    const float k36 = 1.0f;
+    const float k28 = 0.70710677f;
+    const float k35 = 0.70710677f;
     const float x0 = position[0];
-    const float v6 = (0.5f * (x0 + 1.5707964f));
-    const float v7 = sinf(v6);
-    const float v12 = ((1.0f - (2.0f * (v7 * v7))) * 0.081f);
-    const float v17 = (((2.0f * v7) * cosf(v6)) * 0.081f);
-    const float v20 = sqrtf(((v12 * v12) + (v17 * v17)));
-    const float v21 = (v12 / v20);
-    const float v24 = (-v6);
-    const float v25 = sinf(v24);
-    const float v32 = cosf(v24);
-    const float v38 = ((v25 * k30) + (v32 * k36));
-    const float v46 = ((v32 * k30) - (v25 * k36));
-    const float v51 = (lever_root(((-0.025f) + (0.09f * (v38 * v38))), 5.7731595e-17f) * lever_root(((-0.025f) + (0.09f * (v46 * v46))), 5.7731595e-17f));
-    const float v52 = (v21 * v51);
-    const float v54 = (v21 * 0.045f);
-    const float v55 = (v17 / v20);
-    const float v56 = (v54 * v55);
-    const float v60 = (-(v54 * v21));
-    const float v61 = (v55 * v51);
+    const float v3 = (0.5f * x0);
+    const float v4 = sinf(v3);
+    const float v9 = (((2.0f * v4) * cosf(v3)) * 0.081f);
+    const float v15 = ((1.0f - (2.0f * (v4 * v4))) * 0.081f);
+    const float v18 = sqrtf(((v9 * v9) + (v15 * v15)));
+    const float v19 = (v9 / v18);
+    const float v22 = (-v3);
+    const float v23 = sinf(v22);
+    const float v30 = cosf(v22);
+    const float v37 = ((v23 * k28) + (v30 * k35));
+    const float v45 = ((v30 * k28) - (v23 * k35));
+    const float v50 = (lever_root(((-0.025f) + (0.09f * (v37 * v37))), 5.7731595e-17f) * lever_root(((-0.025f) + (0.09f * (v45 * v45))), 5.7731595e-17f));
+    const float v51 = (v19 * v50);
+    const float v53 = (v15 / v18);
+    const float v55 = (v19 * 0.045f);
+    const float v56 = (v53 * v55);
+    const float v60 = (-(v19 * v55));
+    const float v61 = (v53 * v50);
     (void)near;
-    start[0][0] = atan2f((-(v52 + v56)), (v60 + v61));
+    start[0][0] = atan2f((-((-v51) - v56)), (v60 + v61));
     start[0][0] = start[0][0] + 6.2831855f * floorf((near[0] - start[0][0]) / 6.2831855f + 0.5f);
-    start[1][0] = atan2f((-((-v52) + v56)), (v60 - v61));
+    start[1][0] = atan2f((-(v51 - v56)), (v60 - v61));
     start[1][0] = start[1][0] + 6.2831855f * floorf((near[0] - start[1][0]) / 6.2831855f + 0.5f);
 }
 /* From positions to the inputs nearest to q. In closed form, 8 poses at most. */

@@ -233,7 +233,7 @@ class Sides:
         inputs, number = self.machine.linkage.inputs, self.code.number
         n, code = len(inputs), Code(self.name, self.machine.linkage, number == 'float')
         # Where an input comes round after some turns only, each turn has a pose of its own.
-        turns = list(product(*(range(input_.period if input_.turns else 1) for input_ in inputs)))
+        turns = list(product(*closed.turns))
         count = len(closed.modes) * len(turns)
         program = Program([value for mode in closed.modes for value in mode.inputs], len(values),
                           closed.given)
@@ -243,7 +243,7 @@ class Sides:
             for k, (mode, turned) in enumerate(product(range(len(closed.modes)), turns)):
                 for i in range(n):
                     place, value = f'start[{k}][{i}]', codes[mode * n + i]
-                    value += f' + {code.literal(math.tau * turned[i])}' if turned[i] else ''
+                    value += f' + {code.literal(turned[i])}' if turned[i] else ''
                     body += [f'    {place} = {code.times(value, 1.0 / self.sizes[i])};',
                              f'    {place} = {self._beside(i, place)};'][:1 + inputs[i].turns]
             return body

@@ -24,7 +24,7 @@ PER_QUARTER = 0.6366197723675814
 # Has no digits after the point, nor has what is added to it.
 WHOLE = 1.5 * 2.0 ** 52
 # What is larger in size is for the C library.
-LARGEST = 2.0 ** 15 * QUARTER[0]
+LARGEST_ANGLE = 2.0 ** 15 * QUARTER[0]
 SINE = (-1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
         2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10)
 COSINE = (4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05,
@@ -34,12 +34,12 @@ ARCTANGENT = (3.33333333333329318027e-01, -1.99999999998764832476e-01, 1.4285714
               6.66107313738753120669e-02, -5.83357013379057348645e-02, 4.97687799461593236017e-02,
               -3.65315727442169155270e-02, 1.62858201153657823623e-02)
 # From the first slope on, angles are counted from the second's: its angle, and the digits after.
-STARTS = ((0.4375, 0.5, 4.63647609000806093515e-01, 2.26987774529616870924e-17),
+ARCTANGENT_STARTS = ((0.4375, 0.5, 4.63647609000806093515e-01, 2.26987774529616870924e-17),
           (0.6875, 1.0, 7.85398163397448278999e-01, 3.06161699786838301793e-17))
 # What pi is more than math.pi.
 REST_OF_PI = 1.2246467991473532e-16
 # Between these, halves lose nothing and sums are finite.
-TINY, HUGE = 2.0 ** -1000, 2.0 ** 1000
+LEAST_HALVED, MOST_ADDED = 2.0 ** -1000, 2.0 ** 1000
 
 
 def sine_and_cosine(x: Real) -> Tuple[Real, Real, Real]:
@@ -52,7 +52,7 @@ def sine_and_cosine(x: Real) -> Tuple[Real, Real, Real]:
     crossed = abs(abs(quarter) - 1.0) < 0.5
     return (_signed(where(crossed, cosine, sine), abs(quarter - 0.5) < 1.0),
             _signed(where(crossed, sine, cosine), abs(quarter + 0.5) < 1.0),
-            abs(x) <= LARGEST)
+            abs(x) <= LARGEST_ANGLE)
 
 
 def _rounded(x: Real) -> Real:
@@ -101,7 +101,7 @@ def arctangent(y: Real, x: Real) -> Tuple[Real, Real]:
     steep = width < height
     low, high = where(steep, width, height), where(steep, height, width)
     numerator, denominator, start, rest = low, high, real(0.0), real(0.0)
-    for least, slope, own, after in STARTS:
+    for least, slope, own, after in ARCTANGENT_STARTS:
         beyond = least * high < low
         numerator = where(beyond, low - slope * high, numerator)
         denominator = where(beyond, high + slope * low, denominator)
@@ -112,5 +112,5 @@ def arctangent(y: Real, x: Real) -> Tuple[Real, Real]:
     angle = where(steep, math.pi / 2 - (angle - REST_OF_PI / 2), angle)
     angle = where(x < 0.0, math.pi - (angle - REST_OF_PI), angle)
     # The library knows what infinity comes to, and the signs of zeros.
-    usual = where(high > TINY, where(high < HUGE, height, 0.0), 0.0) > 0.0
+    usual = where(high > LEAST_HALVED, where(high < MOST_ADDED, height, 0.0), 0.0) > 0.0
     return _signed(angle, y > 0.0), usual

@@ -26,7 +26,7 @@ from typing import (
     Union,
 )
 
-from .operations import OPERATIONS, STEPS
+from .operations import OPERATIONS, WITHOUT_RATE
 
 
 class Real:
@@ -347,23 +347,16 @@ def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
     """
     Differentiate an expression with respect to time.
 
-    Parameters
-    ----------
-    node : Real
-        What is differentiated.
-    rates : dict
-        Rate of each argument, by its index; what is left out stands still.
-    known : dict
-        Derivatives found so far, shared between calls.
-
+    `rates` are those of the arguments, by index; what is left out stands still. `known` are the
+    derivatives found so far, shared between calls.
     """
     def needed(x: Real) -> Iterable[Real]:
-        if not x.varies or x.op in STEPS:
+        if not x.varies or x.op in WITHOUT_RATE:
             return ()
         return x.rate.of if x.rate else x.operands
 
     for x in unknown(node, needed, known):
-        if not x.varies or x.op in STEPS:
+        if not x.varies or x.op in WITHOUT_RATE:
             known[x] = real(0.0)
         elif x.op == 'argument':
             known[x] = real(rates.get(x.args[0], 0.0))

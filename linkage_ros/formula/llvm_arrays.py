@@ -32,7 +32,7 @@ VECTOR = ir.VectorType(NUMBER, LANES)
 SHARE = 3 * 2 ** 19
 # The first pose and the one after the last, all poses, then addresses: of the addresses of the
 # arguments, of the constants and of the results.
-SIGNATURE = ctypes.CFUNCTYPE(None, *3 * (ctypes.c_int64,), *3 * (ctypes.c_void_p,))
+ARRAYS_SIGNATURE = ctypes.CFUNCTYPE(None, *3 * (ctypes.c_int64,), *3 * (ctypes.c_void_p,))
 
 
 class Arrays:
@@ -40,7 +40,7 @@ class Arrays:
 
     def __init__(self, operations: Sequence, constants: Sequence[int], outputs: Sequence[int]):
         self._engine = compiled(_module(operations, constants, outputs))
-        self._run = SIGNATURE(self._engine.get_function_address('poses'))
+        self._run = ARRAYS_SIGNATURE(self._engine.get_function_address('poses'))
         self._outputs = len(outputs)
         self._share = SHARE // (1 + len(operations))
 
@@ -85,33 +85,22 @@ def _module(operations: Sequence, constants: Sequence[int],
     poses = ir.Function(module, ir.FunctionType(
         ir.VoidType(), [*3 * (COUNT,), pointer.as_pointer(), pointer, pointer]), 'poses')
     first, last, size, arguments, given, out = poses.args
-    start, body, end = (poses.append_basic_block(name) for name in ('start', 'body', 'end'))
-
-    builder = Builder(start)
+    builder = Builder(poses.append_basic_block())
     known = {number: _in_all_lanes(builder, load(builder, given, count(i)))
              for i, number in enumerate(constants)}
-    builder.branch(body)
-
-    builder.position_at_end(body)
-    pose = builder.phi(COUNT)
-    pose.add_incoming(first, start)
-    # The last eight poses of all may overlap those before.
-    latest = builder.sub(size, count(LANES))
-    at = builder.select(builder.icmp_signed('<', pose, latest), pose, latest)
 
     def lanes(array: ir.Value, offset: ir.Value) -> ir.Value:
         return builder.bitcast(builder.gep(array, [offset]), VECTOR.as_pointer())
 
-    append(operations, known, _operators(builder), VECTOR, lambda index: builder.load(
-        lanes(load(builder, arguments, count(index)), at), align=1))
-    for column, number in enumerate(outputs):
-        place = builder.add(builder.mul(count(column), size), at)
-        builder.store(known[number], lanes(out, place), align=1)
-    after = builder.add(pose, count(LANES))
-    pose.add_incoming(after, builder.block)
-    builder.cbranch(builder.icmp_signed('<', after, last), body, end)
-
-    builder.position_at_end(end)
+    with builder.each(last, first=first, step=LANES) as pose:
+        # The last eight poses of all may overlap those before.
+        latest = builder.sub(size, count(LANES))
+        at = builder.select(builder.icmp_signed('<', pose.i, latest), pose.i, latest)
+        append(operations, known, _operators(builder), VECTOR, lambda index: builder.load(
+            lanes(load(builder, arguments, count(index)), at), align=1))
+        for column, number in enumerate(outputs):
+            place = builder.add(builder.mul(count(column), size), at)
+            builder.store(known[number], lanes(out, place), align=1)
     builder.ret_void()
     return module
 

@@ -10,9 +10,11 @@ the results are the same to the last bit.
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 import ctypes
+from dataclasses import dataclass
 from functools import partial
-from typing import Callable, Dict, Sequence
+from typing import Any, Callable, Dict, Iterator, Optional, Sequence
 
 import llvmlite
 from llvmlite import binding as llvm, ir
@@ -25,8 +27,8 @@ if not hasattr(llvm, 'create_pass_builder'):
 
 NUMBER, COUNT = ir.DoubleType(), ir.IntType(64)
 # Poses, addresses of arguments, constants and results, then the strides of results in numbers.
-SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, *3 * (ctypes.c_void_p,),
-                             *2 * (ctypes.c_int64,))
+LOOP_SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, *3 * (ctypes.c_void_p,),
+                                  *2 * (ctypes.c_int64,))
 
 llvm.initialize_native_target()
 llvm.initialize_native_asmprinter()
@@ -62,26 +64,48 @@ class Builder(ir.IRBuilder):
             self.module, ir.FunctionType(kind, len(operands) * [kind]), name)
         return self.call(function, operands)
 
+    @contextmanager
+    def each(self, last: ir.Value, total: Optional[ir.Value] = None, first: Any = 0,
+             step: int = 1) -> Iterator[Turn]:
+        """Write what is done for each number below the last; a total may be carried along."""
+        before, first = self.block, count(first) if isinstance(first, int) else first
+        head, body, end = (self.function.append_basic_block() for _ in range(3))
+        self.branch(head)
+        self.position_at_end(head)
+        turn = Turn(self.phi(COUNT), total and self.phi(total.type))
+        self.cbranch(self.icmp_signed('<', turn.i, last), body, end)
+        self.position_at_end(body)
+        yield turn
+        after = self.add(turn.i, count(step))
+        for phi, start, then in ((turn.i, first, after), (turn.total, total, turn.then)):
+            if phi:
+                phi.add_incoming(start, before)
+                phi.add_incoming(then, self.block)
+        self.branch(head)
+        self.position_at_end(end)
+
+
+@dataclass
+class Turn:
+    """A turn of a loop: its number, what is carried along, and that at its end."""
+
+    i: ir.Value
+    total: Optional[ir.Value]
+    then: Optional[ir.Value] = None
+
 
 class Loop:
     """
     A loop over poses in machine code, which lives as long as this.
 
-    Parameters
-    ----------
-    operations : sequence of (int, str, tuple)
-        Number, name and operands of each operation: others' numbers, an argument's, or a value.
-    constants : sequence of int
-        The numbers of what is given with each call.
-    outputs : sequence of int
-        The numbers of what is wanted.
-
+    An operation is a number, a name and operands: others' numbers, an argument's, or a value.
+    `constants` are the numbers of what is given with each call, `outputs` of what is wanted.
     """
 
     def __init__(self, operations: Sequence, constants: Sequence[int], outputs: Sequence[int]):
         self._engine = compiled(_module(operations, constants, outputs))
         self.address = self._engine.get_function_address('loop')
-        self.run = SIGNATURE(self.address)
+        self.run = LOOP_SIGNATURE(self.address)
 
     @staticmethod
     def arguments(given: np.ndarray, constants: np.ndarray, out: np.ndarray) -> tuple:
@@ -109,25 +133,15 @@ def _module(operations: Sequence, constants: Sequence[int],
     poses, arguments, given, out, by_pose, by_output = loop.args
     for array in (arguments, given, out):
         array.add_attribute('noalias')
-    start, body, end = (loop.append_basic_block(name) for name in ('start', 'body', 'end'))
-
-    builder = Builder(start)
+    builder = Builder(loop.append_basic_block())
     known = {number: load(builder, given, count(i)) for i, number in enumerate(constants)}
-    builder.cbranch(builder.icmp_signed('>', poses, count(0)), body, end)
-
-    builder.position_at_end(body)
-    pose = builder.phi(COUNT)
-    append(operations, known, builder.operations(), NUMBER, lambda index: load(
-        builder, arguments, builder.add(builder.mul(count(index), poses), pose)))
-    for column, number in enumerate(outputs):
-        place = builder.add(builder.mul(pose, by_pose), builder.mul(count(column), by_output))
-        builder.store(known[number], builder.gep(out, [place]))
-    after = builder.add(pose, count(1))
-    pose.add_incoming(count(0), start)
-    pose.add_incoming(after, body)
-    builder.cbranch(builder.icmp_signed('<', after, poses), body, end)
-
-    builder.position_at_end(end)
+    with builder.each(poses) as pose:
+        append(operations, known, builder.operations(), NUMBER, lambda index: load(
+            builder, arguments, builder.add(builder.mul(count(index), poses), pose.i)))
+        for column, number in enumerate(outputs):
+            place = builder.add(builder.mul(pose.i, by_pose),
+                                builder.mul(count(column), by_output))
+            builder.store(known[number], builder.gep(out, [place]))
     builder.ret_void()
     return module
 

@@ -14,19 +14,18 @@ from __future__ import annotations
 from concurrent.futures import Future
 from contextlib import contextmanager
 import ctypes
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, Callable, Dict, Iterator, Optional, Sequence, Tuple
 
 from llvmlite import ir
 import numpy as np
 
-from .llvm_code import address, compiled, COUNT, count, NUMBER
+from .llvm_code import address, Builder, compiled, COUNT, count, NUMBER
 from .program import compile_in_background
 from ..cache import cached
 
 BYTE = ir.IntType(8)
-TYPES = {'i': COUNT, 'f': NUMBER}
+FIELD_TYPES = {'i': COUNT, 'f': NUMBER}
 # Every table is rows of these, whole numbers and addresses ('i8') or floats ('f8').
 # A number of the message: factor * number + plus goes to an address.
 TAKE = np.dtype([('offset', 'i8'), ('to', 'i8'), ('factor', 'f8'), ('plus', 'f8')])
@@ -48,11 +47,11 @@ ENDING = {'changes': CHANGE, 'puts': PUT}
 HEAD = ('length', 'same', 'mask', 'stamp', 'failed')
 
 # What is returned instead of the number of loops that failed.
-OTHER, UNSTAMPED = -1, -2
+OTHER_MESSAGE, UNSTAMPED = -1, -2
 # Where the stamp of a message lies, after the header that says how it is encoded.
 STAMP = 4
 # So near an end of a limit, relatively, it is for others to decide.
-NEAR = 1e-9
+LIMIT_MARGIN = 1e-9
 INFINITE = 0x7FF << 52
 
 
@@ -60,23 +59,11 @@ class Pipeline:
     """
     What is done with each message of one kind.
 
-    Parameters
-    ----------
-    same, mask : bytes
-        A message of that kind, and a mask of the bytes in which all are the same.
-    stamp : int64 array (2,)
-        Where the bytes of a message's stamp go, for an ending to copy; then what stands for the
-        stamp of a message that has none, or zero.
-    owner
-        Whatever the arrays belong to that the tables' addresses lie in.
-    takes, copies, loops, limits : structured arrays
-        What is taken from the message, copied, and run, of the types in TABLES.
-
-    Attributes
-    ----------
-    failed : int64 array
-        Which loops did not find finite numbers within their limits in the last call.
-
+    `same` is a message of that kind, `mask` has the bits in which all are the same. Into `stamp`,
+    int64 (2,), go the bytes of a message's stamp, for an ending to copy; its second number stands
+    for the stamp of a message that has none, or zero. The other arrays are of the types in TABLES;
+    the `owner` is whatever their addresses lie in. `failed` says which loops did not find finite
+    numbers within their limits in the last call.
     """
 
     def __init__(self, same: bytes, mask: bytes, stamp: np.ndarray, owner: Any, takes: Any,
@@ -94,23 +81,13 @@ class Pipeline:
         """
         Take, run and, if no loop failed, do what ends it.
 
-        It returns how many loops failed; OTHER or UNSTAMPED where nothing was done.
+        It returns how many loops failed; OTHER_MESSAGE or UNSTAMPED where nothing was done.
         """
         return self._run(message, len(message), ending.address if ending else 0)
 
 
 class Ending:
-    """
-    What becomes of the numbers that a pipeline has found.
-
-    Parameters
-    ----------
-    owner
-        Whatever the arrays belong to that the tables' addresses lie in.
-    changes, puts : structured arrays
-        What is changed in place, then copied, of the types in ENDING.
-
-    """
+    """What becomes of the numbers that a pipeline has found: tables of the types in ENDING."""
 
     def __init__(self, owner: Any, changes: Any, puts: Any):
         tables = _Tables(ENDING, (changes, puts))
@@ -153,193 +130,152 @@ def _compiled() -> Tuple[Callable[[int, bytes, int, int], int], Callable[[int], 
 
 def _module() -> ir.Module:
     module = ir.Module()
-    end = ir.Function(module, ir.FunctionType(ir.VoidType(), [COUNT]), 'end')
-    write = _Writer(end)
+    write = _Writer(module, 'end', ir.VoidType(), COUNT)
+    end = write.function
     tables = _read(write, write.place(end.args[0], COUNT), (), ENDING)[1]
     _change(write, tables['changes'])
     _copy(write, tables['puts'])
-    write.builder.ret_void()
+    write.ret_void()
 
-    run = ir.Function(module, ir.FunctionType(
-        COUNT, [COUNT.as_pointer(), BYTE.as_pointer(), COUNT, COUNT]), 'run')
-    table, text, length, ending = run.args
-    write = _Writer(run)
+    write = _Writer(module, 'run', COUNT, COUNT.as_pointer(), BYTE.as_pointer(), COUNT, COUNT)
+    table, text, length, ending = write.function.args
     known, tables = _read(write, table, HEAD, TABLES)
-    write.leave(write.builder.icmp_signed('!=', length, known['length']), OTHER)
-    write.leave(_differs(write, known, text), OTHER)
+    write.leave(write.icmp_signed('!=', length, known['length']), OTHER_MESSAGE)
+    write.leave(_differs(write, known, text), OTHER_MESSAGE)
     write.leave(_stamp(write, known, text), UNSTAMPED)
     _take(write, tables['takes'], text)
     _copy(write, tables['copies'])
     _run_loops(write, tables['loops'], known['failed'])
     _check_limits(write, tables['limits'], known['failed'])
     failed = _total(write, tables['loops'][0], known['failed'])
-    ends = write.builder.and_(write.builder.icmp_signed('==', failed, count(0)),
-                              write.builder.icmp_signed('!=', ending, count(0)))
-    with write.builder.if_then(ends):
-        write.builder.call(end, [ending])
-    write.builder.ret(failed)
+    ends = write.and_(write.icmp_signed('==', failed, count(0)),
+                      write.icmp_signed('!=', ending, count(0)))
+    with write.if_then(ends):
+        write.call(end, [ending])
+    write.ret(failed)
     return module
 
 
 def _read(write: _Writer, table: ir.Value, head: Sequence[str], kinds: Dict[str, np.dtype]
           ) -> Tuple[Dict[str, ir.Value], Dict[str, Tuple[ir.Value, ir.Value]]]:
     """Load a head: what it begins with by name, then the size and the address of each table."""
-    values = [write.load(write.step(table, i)) for i in range(len(head) + 2 * len(kinds))]
+    values = [write.read(write.step(table, i)) for i in range(len(head) + 2 * len(kinds))]
     sizes, places = values[len(head)::2], values[len(head) + 1::2]
     return dict(zip(head, values)), dict(zip(kinds, zip(sizes, places)))
 
 
-class _Writer:
-    """What appends to a function: loads and stores at any address, loops over tables."""
+class _Writer(Builder):
+    """Appends to a new function: reads and writes at any address, loops over tables."""
 
-    def __init__(self, function: ir.Function):
-        self.function = function
-        self.builder = ir.IRBuilder(function.append_basic_block())
+    def __init__(self, module: ir.Module, name: str, result: ir.Type, *arguments: ir.Type):
+        function = ir.Function(module, ir.FunctionType(result, arguments), name)
+        super().__init__(function.append_basic_block())
 
     def place(self, at: ir.Value, kind: ir.Type) -> ir.Value:
-        return self.builder.inttoptr(at, kind.as_pointer())
+        return self.inttoptr(at, kind.as_pointer())
 
     def step(self, pointer: ir.Value, i: Any) -> ir.Value:
-        return self.builder.gep(pointer, [count(i) if isinstance(i, int) else i])
+        return self.gep(pointer, [count(i) if isinstance(i, int) else i])
 
-    def load(self, pointer: ir.Value) -> ir.Value:
+    def read(self, pointer: ir.Value) -> ir.Value:
         # Numbers in a message lie at multiples of 4.
-        return self.builder.load(pointer, align=1)
+        return self.load(pointer, align=1)
 
-    def store(self, value: ir.Value, pointer: ir.Value) -> None:
-        self.builder.store(value, pointer, align=1)
-
-    def function_of(self, name: str) -> Callable[[ir.Value], ir.Value]:
-        """Return what calls a function of one number."""
-        function = self.function.module.globals.get(name) or ir.Function(
-            self.function.module, ir.FunctionType(NUMBER, [NUMBER]), name)
-        return lambda value: self.builder.call(function, [value])
+    def put(self, value: ir.Value, pointer: ir.Value) -> None:
+        self.store(value, pointer, align=1)
 
     def leave(self, condition: ir.Value, code: int) -> None:
         """Return a code where a condition holds."""
-        with self.builder.if_then(condition, likely=False):
-            self.builder.ret(count(code))
-
-    @contextmanager
-    def each(self, size: ir.Value, total: Optional[ir.Value] = None) -> Iterator[_Turn]:
-        """Write what is done for each number below a size; a total may be carried along."""
-        builder, before = self.builder, self.builder.block
-        head, body, end = (self.function.append_basic_block() for _ in range(3))
-        builder.branch(head)
-        builder.position_at_end(head)
-        turn = _Turn(builder.phi(COUNT), total and builder.phi(total.type))
-        builder.cbranch(builder.icmp_signed('<', turn.i, size), body, end)
-        builder.position_at_end(body)
-        yield turn
-        after = builder.add(turn.i, count(1))
-        for phi, first, then in ((turn.i, count(0), after), (turn.total, total, turn.then)):
-            if phi:
-                phi.add_incoming(first, before)
-                phi.add_incoming(then, builder.block)
-        builder.branch(head)
-        builder.position_at_end(end)
+        with self.if_then(condition, likely=False):
+            self.ret(count(code))
 
     @contextmanager
     def rows(self, table: Tuple[ir.Value, ir.Value], kind: np.dtype) -> Iterator[Dict]:
         """Write what is done with each row of a table, {field: value}; '' is its number."""
         size, start = table
         with self.each(size) as turn:
-            at = self.builder.add(start, self.builder.mul(turn.i, count(kind.itemsize)))
-            fields = {name: self.load(self.place(
-                self.builder.add(at, count(field[1])), TYPES[field[0].kind]))
+            at = self.add(start, self.mul(turn.i, count(kind.itemsize)))
+            fields = {name: self.read(self.place(
+                self.add(at, count(field[1])), FIELD_TYPES[field[0].kind]))
                 for name, field in (kind.fields or {}).items()}
             yield {'': turn.i, **fields}
 
 
-@dataclass
-class _Turn:
-    """A turn of a loop: its number, what is carried along, and that at its end."""
-
-    i: ir.Value
-    total: Optional[ir.Value]
-    then: Optional[ir.Value] = None
-
-
 def _differs(write: _Writer, known: Dict[str, ir.Value], text: ir.Value) -> ir.Value:
     """Return whether a message differs where all are the same."""
-    builder = write.builder
     same, mask = (write.place(known[name], BYTE) for name in ('same', 'mask'))
     with write.each(known['length'], BYTE(0)) as turn:
-        other, own, counts = (write.load(write.step(each, turn.i)) for each in (text, same, mask))
-        turn.then = builder.or_(turn.total, builder.and_(builder.xor(other, own), counts))
-    return builder.icmp_unsigned('!=', turn.total, BYTE(0))
+        other, own, counts = (write.read(write.step(each, turn.i)) for each in (text, same, mask))
+        turn.then = write.or_(turn.total, write.and_(write.xor(other, own), counts))
+    return write.icmp_unsigned('!=', turn.total, BYTE(0))
 
 
 def _stamp(write: _Writer, known: Dict[str, ir.Value], text: ir.Value) -> ir.Value:
     """Take over the stamp if the message has one; return whether there is none at all."""
-    builder, place = write.builder, write.place(known['stamp'], COUNT)
-    own = write.load(builder.bitcast(write.step(text, STAMP), COUNT.as_pointer()))
-    stamp = builder.select(builder.icmp_unsigned('==', own, count(0)),
-                           write.load(write.step(place, 1)), own)
-    write.store(stamp, place)
-    return builder.icmp_unsigned('==', stamp, count(0))
+    place = write.place(known['stamp'], COUNT)
+    own = write.read(write.bitcast(write.step(text, STAMP), COUNT.as_pointer()))
+    stamp = write.select(write.icmp_unsigned('==', own, count(0)),
+                         write.read(write.step(place, 1)), own)
+    write.put(stamp, place)
+    return write.icmp_unsigned('==', stamp, count(0))
 
 
 def _take(write: _Writer, takes: Any, text: ir.Value) -> None:
-    builder = write.builder
     with write.rows(takes, TAKE) as row:
-        number = write.load(builder.bitcast(write.step(text, row['offset']), NUMBER.as_pointer()))
-        number = builder.fadd(builder.fmul(row['factor'], number), row['plus'])
-        write.store(number, write.place(row['to'], NUMBER))
+        number = write.read(write.bitcast(write.step(text, row['offset']), NUMBER.as_pointer()))
+        number = write.fadd(write.fmul(row['factor'], number), row['plus'])
+        write.put(number, write.place(row['to'], NUMBER))
 
 
 def _copy(write: _Writer, puts: Any) -> None:
     with write.rows(puts, PUT) as row:
-        write.store(write.load(write.place(row['from'], COUNT)), write.place(row['to'], COUNT))
+        write.put(write.read(write.place(row['from'], COUNT)), write.place(row['to'], COUNT))
 
 
 def _run_loops(write: _Writer, loops: Any, failed: ir.Value) -> None:
-    builder = write.builder
     kind = ir.FunctionType(ir.VoidType(), [
         COUNT, *3 * (NUMBER.as_pointer(),), COUNT, COUNT])
     with write.rows(loops, LOOP) as row:
         pointers = [write.place(row[name], NUMBER) for name in ('given', 'constants', 'out')]
-        builder.call(write.place(row['code'], kind), [
+        write.call(write.place(row['code'], kind), [
             row['poses'], *pointers, row['by_pose'], row['by_output']])
         numbers, infinite = write.place(row['out'], COUNT), count(INFINITE)
         with write.each(row['size'], count(0)) as turn:
-            bits = builder.and_(write.load(write.step(numbers, turn.i)), infinite)
-            wrong = builder.zext(builder.icmp_unsigned('==', bits, infinite), COUNT)
-            turn.then = builder.or_(turn.total, wrong)
-        write.store(turn.total, write.step(write.place(failed, COUNT), row['']))
+            bits = write.and_(write.read(write.step(numbers, turn.i)), infinite)
+            wrong = write.zext(write.icmp_unsigned('==', bits, infinite), COUNT)
+            turn.then = write.or_(turn.total, wrong)
+        write.put(turn.total, write.step(write.place(failed, COUNT), row['']))
 
 
 def _check_limits(write: _Writer, limits: Any, failed: ir.Value) -> None:
-    builder = write.builder
-    size = write.function_of('llvm.fabs.f64')
+    size = partial(write.called, 'llvm.fabs')
     with write.rows(limits, LIMIT) as row:
-        value = builder.fadd(builder.fmul(row['factor'], write.load(
+        value = write.fadd(write.fmul(row['factor'], write.read(
             write.place(row['at'], NUMBER))), row['plus'])
-        away = size(_folded(write, builder.fsub(value, row['middle']), row['turn']))
-        slack = builder.fmul(NUMBER(NEAR), builder.fadd(size(value), row['half']))
-        near = builder.fcmp_ordered('<=', away, builder.fsub(row['half'], slack))
+        away = size(_folded(write, write.fsub(value, row['middle']), row['turn']))
+        slack = write.fmul(NUMBER(LIMIT_MARGIN), write.fadd(size(value), row['half']))
+        near = write.fcmp_ordered('<=', away, write.fsub(row['half'], slack))
         place = write.step(write.place(failed, COUNT), row['loop'])
-        write.store(builder.select(near, write.load(place), count(1)), place)
+        write.put(write.select(near, write.read(place), count(1)), place)
 
 
 def _change(write: _Writer, changes: Any) -> None:
-    builder = write.builder
     with write.rows(changes, CHANGE) as row:
         place = write.place(row['at'], NUMBER)
-        value = builder.fadd(builder.fmul(write.load(place), row['factor']), row['plus'])
-        write.store(_folded(write, value, row['turn']), place)
+        value = write.fadd(write.fmul(write.read(place), row['factor']), row['plus'])
+        write.put(_folded(write, value, row['turn']), place)
 
 
 def _folded(write: _Writer, value: ir.Value, turn: ir.Value) -> ir.Value:
     """Return a value without its whole turns, if it turns."""
-    builder, whole = write.builder, write.function_of('llvm.rint.f64')
-    turns = whole(builder.fdiv(value, turn))
-    return builder.select(builder.fcmp_ordered('>', turn, NUMBER(0.0)),
-                          builder.fsub(value, builder.fmul(turn, turns)), value)
+    whole = partial(write.called, 'llvm.rint')
+    turns = whole(write.fdiv(value, turn))
+    return write.select(write.fcmp_ordered('>', turn, NUMBER(0.0)),
+                        write.fsub(value, write.fmul(turn, turns)), value)
 
 
 def _total(write: _Writer, size: ir.Value, numbers: ir.Value) -> ir.Value:
     place = write.place(numbers, COUNT)
     with write.each(size, count(0)) as turn:
-        turn.then = write.builder.add(turn.total, write.load(write.step(place, turn.i)))
+        turn.then = write.add(turn.total, write.read(write.step(place, turn.i)))
     return turn.total

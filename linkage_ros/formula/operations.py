@@ -19,31 +19,16 @@ import numpy as np
 
 class Operation(NamedTuple):
     """
-    An operation.
+    An operation, by the name that it has in expressions and in code over arrays.
 
-    Attributes
-    ----------
-    name : str
-        What it is called in expressions; `numpy` over arrays is called by it, too.
-    python : str
-        Code on floats, with its operands in braces. It may raise where IEEE 754 has inf or nan.
-    numpy : callable
-        The same on arrays.
-    llvm : callable
-        Appends it to a function: from a `llvm_code.Builder` and its operands, numbers or vectors.
-    c : str
-        C99: {f} is how functions of its kind of number end, {name} the mechanism's. What is the
-        same in Python is an operator, of arrays too.
-    rate : callable, optional
-        What it differentiates to: from `expression.operation`, the expression and the rates of its
-        operands. None: it stands still but for steps.
-    folded : callable, optional
-        From its operands to what it comes to at once; None where it has to be done.
-    positive : tuple of int
-        The operands that make the result positive if all of them are.
-    commutes : bool
-        Whether its operands may change places.
-
+    `python` is its code on floats, with its operands in braces, which may raise where IEEE 754 has
+    inf or nan; `numpy` does the same on arrays. `llvm` appends it to a function, from a
+    `llvm_code.Builder` and its operands, numbers or vectors. `c` is C99: {f} is how functions of
+    its kind of number end, {name} the mechanism's; what is the same in Python is an operator, of
+    arrays too. `rate` is what it differentiates to, from `expression.operation`, the expression
+    and the rates of its operands; None: it stands still but for steps. `folded` returns what it
+    comes to at once, None where it has to be done. If the operands `positive` are, so is the
+    result; if it `commutes`, operands may change places.
     """
 
     name: str
@@ -172,5 +157,5 @@ OPERATIONS = {row.name: row for row in (
               '{name}_gated({}, {}, {})', lambda do, n, dx, *_: do('gated', dx, *n.args[1:])),
 )}
 # What changes in steps alone.
-STEPS = frozenset(row.name for row in OPERATIONS.values() if row.rate is None)
+WITHOUT_RATE = frozenset(row.name for row in OPERATIONS.values() if row.rate is None)
 COMMUTING = frozenset(row.name for row in OPERATIONS.values() if row.commutes)

@@ -32,9 +32,9 @@ from .operations import COMMUTING, OPERATIONS
 from ..cache import Cache
 
 # A block of this many poses stays in the second-level cache; measured in benchmark/.
-BLOCK = 4096
+BLOCK_OF_POSES = 4096
 # Below this many poses the float code in a loop beats numpy's cost per call.
-FEW = 32
+FEW_POSES = 32
 # Python's parser bounds how deep parentheses may nest.
 DEEPEST = 16
 _NUMBERS, _NAMED, _OPERANDS = count(), re.compile(r'\bv\d+'), attrgetter('operands')
@@ -266,17 +266,9 @@ class _Variant:
 
 class Program:
     """
-    Some outputs of a linkage, ready to be bound to dimensions.
+    Some outputs of a linkage, ready to be bound to dimensions; of so many arguments.
 
-    Parameters
-    ----------
-    outputs : sequence of Real
-        What is computed.
-    arguments : int
-        How many arguments are given.
-    replaced : mapping, optional
-        What stands for some arguments in the outputs.
-
+    Some arguments in the outputs may be `replaced` by expressions.
     """
 
     def __init__(self, outputs: Sequence[Real], arguments: int = 1,
@@ -389,7 +381,7 @@ class Pose:
                      self._given, self.variant.arguments, rows)
 
     def _plainly(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
-        return self._one_by_one(given, size) if size < FEW else self._blocks(given, size)
+        return self._one_by_one(given, size) if size < FEW_POSES else self._blocks(given, size)
 
     def _one_by_one(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
         poses = map(self.at, *(a.tolist() for a in given))
@@ -401,8 +393,8 @@ class Pose:
         pose = self.variant.array(*self.constants)
         out = np.empty((self.variant.outputs, size))
         with np.errstate(all='ignore'):
-            for start in range(0, size, BLOCK):
-                block = slice(start, start + BLOCK)
+            for start in range(0, size, BLOCK_OF_POSES):
+                block = slice(start, start + BLOCK_OF_POSES)
                 for row, values in zip(out, pose(*(a[block] for a in given))):
                     row[block] = values
         return out
@@ -418,13 +410,8 @@ class Batch:
     """
     Poses that are solved again and again, in arrays that stay where they are.
 
-    Attributes
-    ----------
-    given : float array (arguments, poses)
-        Where the arguments are put.
-    rows : float array (poses, outputs)
-        What `solve` makes of them.
-
+    The arguments are put into `given` (arguments, poses); `solve` puts the outputs into `rows`
+    (poses, outputs).
     """
 
     def __init__(self, plainly: Callable, loop: Optional[Future], constants: np.ndarray,

@@ -12,7 +12,7 @@ import numpy as np
 from .design import Design
 from ..words import listed, meant, quoted
 
-SHORTEST, LONGEST = 1e-300, 1e300
+SHORTEST_LENGTH, LONGEST_LENGTH = 1e-300, 1e300
 
 
 def checked_dimensions(design: Design, given: Mapping[str, Any]) -> dict:
@@ -46,8 +46,8 @@ def _checked(design: Design, name: str, value: Any) -> Any:
     if name not in design.signed and not np.all(length > 0.0):
         raise error('be positive')
     size = np.abs(length[length != 0.0])
-    if np.any((size < SHORTEST) | (size > LONGEST)):
-        raise error(f'lie between {SHORTEST:g} and {LONGEST:g}')
+    if np.any((size < SHORTEST_LENGTH) | (size > LONGEST_LENGTH)):
+        raise error(f'lie between {SHORTEST_LENGTH:g} and {LONGEST_LENGTH:g}')
     return length if length.ndim else float(length)
 
 

@@ -25,7 +25,7 @@ Step = Union[float, str]
 # The power of a length that a result is; None for zero, which is any, NaN for none.
 Degree = Optional[float]
 
-SMALLEST, LARGEST = 1e-70, 1e70
+SMALLEST_NUMBER, LARGEST_NUMBER = 1e-70, 1e70
 IN_RANGE = '0 or between 1e-70 and 1e70'
 
 _TOKEN = re.compile(r'(?P<number>(?:0|[1-9][0-9]*|(?=\.[0-9]))(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?)'
@@ -34,7 +34,7 @@ _TOKEN = re.compile(r'(?P<number>(?:0|[1-9][0-9]*|(?=\.[0-9]))(?:\.[0-9]*)?(?:[e
 _TAKES: Mapping[Step, int] = {
     '+': 2, '-': 2, '*': 2, '/': 2, 'max': 2, 'sqrt': 1, 'deg': 1, 'negative ': 1}
 _BINDS = {'+': 1, '-': 1, '*': 2, '/': 2, 'negative ': 3}
-WORDS = 'pi', 'deg', 'max', 'sqrt'
+ARITHMETIC_WORDS = 'pi', 'deg', 'max', 'sqrt'
 
 _EXPRESSIONS: Mapping[Step, Callable] = {
     '+': operator.add, '-': operator.sub, '*': operator.mul, '/': operator.truediv,
@@ -56,19 +56,16 @@ _DEGREES: Mapping[Step, Callable] = {
 
 
 def in_range(number: ArrayLike) -> Any:
-    """Return whether a number, or each of an array, is 0 or between SMALLEST and LARGEST."""
-    return (number == 0.0) | (np.abs(number) >= SMALLEST) & (np.abs(number) <= LARGEST)
+    """Return whether a number, or each of an array, is what IN_RANGE says."""
+    size = np.abs(number)
+    return (number == 0.0) | (size >= SMALLEST_NUMBER) & (size <= LARGEST_NUMBER)
 
 
 class Formula:
     """
     Arithmetic in postfix order, numbers among themselves worked out.
 
-    Raises
-    ------
-    ValueError
-        If it is none, or a number in it is neither zero nor between SMALLEST and LARGEST.
-
+    Raises ValueError if it is none, or a number in it is not what IN_RANGE says.
     """
 
     def __init__(self, text: str):
@@ -76,7 +73,7 @@ class Formula:
         self._steps: List[Step] = []
         self.words: Dict[str, bool] = {}
         self._parse()
-        self.names = tuple(word for word in self.words if word not in WORDS)
+        self.names = tuple(word for word in self.words if word not in ARITHMETIC_WORDS)
 
     @property
     def degree(self) -> Degree:
@@ -133,7 +130,7 @@ class Formula:
         if word == '-' or kind == 'opened':
             waiting.append('negative ' if word == '-' else word)
             return True
-        if kind == 'sign' or word in WORDS and word != 'pi':
+        if kind == 'sign' or word in ARITHMETIC_WORDS and word != 'pi':
             raise self._error()
         self._steps.append(math.pi if word == 'pi' else word if kind == 'name' else
                            self._number(word))
@@ -184,8 +181,8 @@ class Formula:
         if in_range(number):
             return number
         size = abs(number)
-        raise self._out_of_range(word or self.text, 'too large' if size > LARGEST else
-                                 'too small' if size < SMALLEST else 'not real')
+        raise self._out_of_range(word or self.text, 'too large' if size > LARGEST_NUMBER else
+                                 'too small' if size < SMALLEST_NUMBER else 'not real')
 
     def _out_of_range(self, word: str, wrong: str) -> ValueError:
         return ValueError(f'{quoted(word)} is {wrong}: a number is {IN_RANGE}')

@@ -421,9 +421,9 @@ class Builder:
             frame = self.frames[link]
             zero = frame[str(towards)] - frame[origin]
             return planar.TurnedRail(end.place, crank, start.place, along, zero.direction(),
-                                     frame[origin], start.span + end.span)
+                                     frame[origin])
         if end.crank and not along.x.varies and start.home == GROUND:
-            return planar.CrankRail(end.crank, start.place, along, start.span + end.span)
+            return planar.CrankRail(end.crank, start.place, along)
         return planar.Rail(end.place, start.place, along, start.span + end.span)
 
     def _on_ground(self, name: str, otherwise: str = '') -> None:

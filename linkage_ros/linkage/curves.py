@@ -16,48 +16,38 @@ from typing import Callable, Tuple
 import numpy as np
 
 # Samples of a whole turn; and how often the distance to an end of an arc is halved for more.
-SAMPLES, HALVINGS = 360, 48
+TURN_SAMPLES, END_HALVINGS = 360, 48
 # For extremes: samples of an arc, how many of the best are looked at, samples around each, zooms.
-EVEN, KEPT, AROUND, ZOOMS = 385, 4, 17, 10
+EXTREME_SAMPLES, EXTREMES_KEPT, ZOOM_SAMPLES, ZOOMS = 385, 4, 17, 10
 # Where a bracket is cut; an odd number of places, so that one is its middle.
 CUTS = np.arange(1, 16) / 16
 # Of a drawn curve: even samples to begin with, how often its pieces are halved, most samples.
-DRAWN, ROUNDS, MOST = 181, 30, 4000
+DRAWN, DRAWN_ROUNDS, MOST_DRAWN = 181, 30, 4000
 # How far a drawn curve may be from the true one, as a part of its size and of its coordinates.
 CHORD, NOISE = 1 / 600, 1e-12
 # Angles below this [rad] are zero: the rounding of any other angle is coarser.
 LEAST = 1e-18
 
 
-def sampled(lo: float, hi: float, samples: int = SAMPLES, fewest: int = 9) -> np.ndarray:
+def sampled(lo: float, hi: float, samples: int = TURN_SAMPLES, fewest: int = 9) -> np.ndarray:
     """Return angles [rad] over an arc, evenly and ever denser towards both of its ends."""
     even = np.linspace(lo, hi, max(fewest, math.ceil(samples * (hi - lo) / math.tau)))
-    steps = (hi - lo) * 0.5 ** np.arange(2, HALVINGS)
+    steps = (hi - lo) * 0.5 ** np.arange(2, END_HALVINGS)
     theta = np.concatenate([even, lo + steps, hi - steps])
     return np.unique(np.clip(theta, lo, hi))
 
 
 def drawn(curve: Callable, lo: float, hi: float) -> np.ndarray:
     """
-    Return points of a plane curve, the closer together the more it bends.
+    Return points (n, 2) of a plane curve on an arc, the closer together the more it bends.
 
-    Parameters
-    ----------
-    curve : callable
-        From values of an input, shape (n,), to points, shape (n, 2); NaN where there is none.
-    lo, hi : float
-        The ends of the arc.
-
-    Returns
-    -------
-    float array (n, 2)
-        Between neighbours no point is farther from their chord than CHORD of the curve's size.
-
+    The curve takes values of an input (m,) and returns points (m, 2), NaN where there is none.
+    Between neighbours no point is farther from their chord than CHORD of the curve's size.
     """
     at = sampled(lo, hi, 0, DRAWN)
     places = curve(at)
     parts = np.array([0.25, 0.5, 0.75])
-    for _ in range(ROUNDS):
+    for _ in range(DRAWN_ROUNDS):
         known = np.isfinite(places).all(axis=1)
         size = np.ptp(places[known], axis=0).max(initial=0.0)
         most = max(CHORD * size, NOISE * abs(places[known]).max(initial=0.0))
@@ -66,7 +56,7 @@ def drawn(curve: Callable, lo: float, hi: float) -> np.ndarray:
         between = curve(inner.ravel()).reshape(-1, 3, 2)
         bent = np.nanmax(_from_chord(places[first], places[first + 1], between), axis=1)
         halved = bent > most
-        if not halved.any() or len(at) > MOST:
+        if not halved.any() or len(at) > MOST_DRAWN:
             break
         # All that is known of a piece that bends too much.
         at = np.insert(at, first[halved].repeat(3) + 1, inner[halved].ravel())
@@ -86,18 +76,8 @@ def refined(test: Callable, lo: np.ndarray, hi: np.ndarray) -> Tuple[np.ndarray,
     """
     Return, for each bracket, the last angle that is as its start is and the first that is not.
 
-    Parameters
-    ----------
-    test : callable
-        From angles [rad], shape (brackets, n), to whether each is as its start is.
-    lo, hi : float array (brackets,)
-        Starts and ends [rad]; a bracket may run backwards.
-
-    Returns
-    -------
-    (float array, float array)
-        Neighbouring floats.
-
+    The test takes angles [rad] (brackets, n) and returns whether each is as its start is. A
+    bracket may run backwards, from lo to hi; the answers are neighbouring floats.
     """
     lo, hi = np.array(lo, float), np.array(hi, float)
     row = np.arange(len(lo))
@@ -159,24 +139,12 @@ def turns(values: np.ndarray, rates: np.ndarray, least: np.ndarray) -> np.ndarra
 
 def extremes(curve: Callable, lo: float, hi: float, angular: np.ndarray) -> np.ndarray:
     """
-    Return the least and the greatest value of outputs on an arc, and where they have it.
+    Return of outputs on an arc the least value and where, then the greatest: (outputs, 2, 2).
 
-    Parameters
-    ----------
-    curve : callable
-        From values of an input, shape (n,), to the outputs, shape (outputs, n).
-    lo, hi : float
-        The ends of the arc.
-    angular : bool array (outputs,)
-        Which outputs are angles [rad]; they are followed past -pi and pi.
-
-    Returns
-    -------
-    float array (outputs, 2, 2)
-        Of each output the least value and where, then the greatest value and where.
-
+    The curve takes values of an input (n,) and returns the outputs (outputs, n). Those that are
+    `angular` (outputs,) are angles [rad], followed past -pi and pi.
     """
-    theta = np.linspace(lo, hi, EVEN)
+    theta = np.linspace(lo, hi, EXTREME_SAMPLES)
     value = curve(theta)
     for i, known in zip(np.flatnonzero(angular), np.isfinite(value[angular])):
         value[i, known] = np.unwrap(value[i, known])
@@ -186,19 +154,19 @@ def extremes(curve: Callable, lo: float, hi: float, angular: np.ndarray) -> np.n
     height = np.where(np.isfinite(value), value, np.nan)[row] * sign
     beside = np.pad(np.nan_to_num(height, nan=-np.inf), ((0, 0), (1, 1)), constant_values=-np.inf)
     peaks = (beside[:, 1:-1] >= beside[:, :-2]) & (beside[:, 1:-1] >= beside[:, 2:])
-    best = np.argsort(np.where(peaks, -beside[:, 1:-1], np.inf), axis=1)[:, :KEPT]
+    best = np.argsort(np.where(peaks, -beside[:, 1:-1], np.inf), axis=1)[:, :EXTREMES_KEPT]
     top = np.take_along_axis(value[row], best, 1)
     at = theta[best]
-    low, high = theta[(best - 1).clip(0)], theta[(best + 1).clip(max=EVEN - 1)]
+    low, high = theta[(best - 1).clip(0)], theta[(best + 1).clip(max=EXTREME_SAMPLES - 1)]
     for _ in range(ZOOMS):
-        near = np.linspace(low, high, AROUND, axis=-1)
+        near = np.linspace(low, high, ZOOM_SAMPLES, axis=-1)
         now = curve(near.ravel()).reshape(len(value), *near.shape)[row, np.arange(len(row))]
         with np.errstate(invalid='ignore'):
             now = now + turn * np.round((top[..., None] - now) / math.tau)
         rank = np.where(np.isfinite(now), now * sign[..., None], -np.inf)
         place = rank.argmax(axis=-1)[..., None]
         top, at = (np.take_along_axis(x, place, -1)[..., 0] for x in (now, near))
-        low, high = (np.take_along_axis(near, (place + step).clip(0, AROUND - 1), -1)[..., 0]
+        low, high = (np.take_along_axis(near, (place + step).clip(0, ZOOM_SAMPLES - 1), -1)[..., 0]
                      for step in (-1, 1))
     place = np.where(np.isfinite(top), top * sign, -np.inf).argmax(axis=1)[:, None]
     found = [np.take_along_axis(x, place, 1).reshape(2, -1) for x in (top, at)]

@@ -15,28 +15,12 @@ from . import joint_lines, rod_lines
 @dataclass(frozen=True)
 class Design:
     """
-    What a type of mechanism is.
+    What a type of mechanism is: the name that users type, its defaults [m] and joint lines.
 
-    Parameters
-    ----------
-    name : str
-        The name that users type.
-    dimensions : mapping
-        Defaults [m].
-    joints : tuple of str
-        One line a joint, as `joint_lines` or `rod_lines` read them.
-    tracer : str
-        The joint whose curve is the locus.
-    signed : frozenset
-        Dimensions that may be zero or negative.
-    check : callable, optional
-        From the lines and a mechanism of this type; raises ValueError for dimensions that cannot
-        be. Default: every bar must have a length.
-    in_space : bool
-        Whether the lines are those of `rod_lines`.
-    inputs : tuple of str
-        In space, the joints that are given. Default: what is driven.
-
+    The `tracer` is the joint whose curve is the locus; `signed` dimensions may be zero or
+    negative. `check` takes the lines and a mechanism of this type and raises ValueError for
+    dimensions that cannot be; by default every bar must have a length. Lines `in_space` are those
+    of `rod_lines`, and `inputs` there the joints that are given, by default what is driven.
     """
 
     name: str

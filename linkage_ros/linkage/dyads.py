@@ -177,6 +177,10 @@ class Dyads:
         """
         raise NotImplementedError
 
+    def quarters(self, start: float) -> Optional[int]:
+        """Return the quarter turns, 0 to 3, that an angle [rad] is to be written as, if so."""
+        return None
+
     def position(self, joint: Any) -> float:
         """Return about where the motor of a joint is."""
         return 0.0
@@ -302,8 +306,12 @@ class Dyads:
                       if body in pin and abs(pin[body] - centred) > self.near),
                      centred + self.size * rail if abs(foot - centred) < self.near else foot)
         sign = -1.0 if way else 1.0
-        number, geared = self.drive('crank', hinge.joint, sign * hinge.sign, sign * hinge.zero
-                                    + phase((place - centred) / along))
+        start = sign * hinge.zero + phase((place - centred) / along)
+        quarters = self.quarters(start) if base == self.ground else None
+        if quarters is not None:
+            zero, start = quarters % 2 * ' up', 0.0
+            place = centred + (place - centred) * (1.0 if quarters < 2 else -1.0)
+        number, geared = self.drive('crank', hinge.joint, sign * hinge.sign, start)
         name = self.name(place, body, f'crank {centre} {self.said(abs(place - centred))}{zero}'
                          f'{geared}')
         self.on[body].setdefault(centre, centred)

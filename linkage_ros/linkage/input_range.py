@@ -63,7 +63,7 @@ def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Calla
 
     closed = [limit for limit in limits if limit.ends and limit.ends.theta.args[0] == 0]
     ends = [end + math.tau * turn for limit in closed for end in _crank_ends(limit, value)
-            for turn in range(input_.period)]
+            for turn in range(int(input_.period))]
     if input_.turns:
         # What follows a turn later may be another assembly: the arcs are then those of [-pi, pi].
         ends.append(input_.low)

@@ -18,38 +18,29 @@ Arc = Tuple[float, float]
 
 ANGLE, LENGTH = 'angle', 'length'
 
+# The reach of gears that come round after more turns than these is that of one turn: every turn
+# takes as long as the first.
+MOST_COUNTED = 60
 # Values beyond an end of the reach by no more than this [rad] may be that end, rounded.
-ROUNDED = 1e-12
+ROUNDED_END = 1e-12
 # Arcs below this width [rad] are the rounding of one angle.
 NARROWEST = 2e-15
 
 
 class Input(NamedTuple):
     """
-    A number that a pose follows from.
+    A number that a pose follows from: an ANGLE [rad] or a LENGTH [m], as users call it.
 
-    Attributes
-    ----------
-    name : str
-        What users call it: 'crank', 'cylinder2'.
-    kind : str
-        ANGLE [rad] or LENGTH [m].
-    low : float
-        All poses lie between this value and `high`: of an angle one turn, of a length its longest
-        stroke.
-    high : float
-        The other end.
-    period : int
-        After how many turns all comes round: more than one where it drives others by gears of
-        fractions.
-
+    All poses lie between `low` and `high`: of an angle one period, of a length its longest stroke.
+    `period` says after how many turns all comes round: more than one where it drives others by
+    gears of fractions, infinite where it never does.
     """
 
     name: str
     kind: str = ANGLE
     low: Any = -math.pi
     high: Any = math.pi
-    period: int = 1
+    period: float = 1
 
     @property
     def turn(self) -> float:
@@ -59,7 +50,7 @@ class Input(NamedTuple):
     @property
     def turns(self) -> bool:
         """Whether it is the same a turn later."""
-        return self.kind == ANGLE
+        return self.kind == ANGLE and self.period < math.inf
 
     @property
     def quantity(self) -> str:
@@ -69,12 +60,12 @@ class Input(NamedTuple):
     @property
     def unit(self) -> str:
         """What it is counted in, for messages."""
-        return 'rad' if self.turns else 'm'
+        return 'rad' if self.kind == ANGLE else 'm'
 
     @property
     def size(self) -> float:
         """The power of two [m] in which a stroke is about as long as a turn."""
-        return 1.0 if self.turns else 2.0 ** (math.frexp(self.high - self.low)[1] - 2)
+        return 1.0 if self.kind == ANGLE else 2.0 ** (math.frexp(self.high - self.low)[1] - 2)
 
     def counted(self) -> Input:
         """Return the same input counted in its size."""
@@ -108,7 +99,7 @@ class Input(NamedTuple):
 
     def on(self, arcs: Sequence[Arc], value: Any) -> Any:
         """Return whether values lie on arcs, whole turns and rounding aside."""
-        value, slack = np.asarray(value), ROUNDED * self.size
+        value, slack = np.asarray(value), ROUNDED_END * self.size
         with np.errstate(invalid='ignore'):
             ahead = [value - low + slack for low, _ in arcs]
             ahead = [gap % self.turn for gap in ahead] if self.turns else ahead

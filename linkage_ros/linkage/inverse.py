@@ -17,6 +17,8 @@ from itertools import chain, combinations, islice, product
 import math
 from typing import (
     Any,
+    cast,
+    Dict,
     Iterator,
     List,
     Mapping,
@@ -34,6 +36,7 @@ from numpy.typing import ArrayLike
 from .analysis import Analysis
 from .arguments import numbers
 from .curves import LEAST
+from .inputs import Input
 from .inverse_linkage import InverseLinkage, Mode, taken_apart
 from .inverse_rods import InverseRods, taken_apart as rods_taken_apart
 from .planar import TOLERANCE
@@ -60,8 +63,9 @@ if TYPE_CHECKING:
 ROUNDING = 32 * 2.0 ** -53
 # An answer is tried so far beside where it was found [rad, sizes], as the reach may end there.
 BESIDE = 16 * 2.0 ** -52 * math.pi
-# At an end of the reach, where rates have no bound, what that makes of an output, as a part.
-ENDED = 1e-7
+# At an end of the reach, where rates have no bound, what that makes of an output, as a part; and
+# from where on that end is near enough for both of its sides to give the same inputs.
+ENDED, STEEP = 1e-7, 10.0
 # What misses by more than this part of the output's size is the answer of another assembly.
 OTHER = 1e-2
 # What is below zero by so many tolerances, a thousandth of its size, is no end of the reach.
@@ -81,6 +85,8 @@ STEP, ALIKE = 0.3, 1e-5
 CLOSE, ULPS = 1e-7, 4 * 2.0 ** -52
 # More than any input.
 LARGE = 1e300
+# Poses in which outputs are compared with those a turn later.
+SAMPLES = 64
 # So many values of a path are looked at together.
 BLOCK = 1024
 
@@ -148,6 +154,9 @@ class Inverse:
         What is asked for, named as `Mechanism.has_output` says.
     closed : InverseLinkage or None
         Its joint lines, assembly modes and their program; None where the inverse is searched.
+    inputs : tuple of Input
+        Those of the linkage. One whose gears come round after very many turns has the period of
+        the outputs; where they have none, it is infinite, and one turn is answered alone.
 
     """
 
@@ -156,14 +165,15 @@ class Inverse:
         if linkage.checked(outputs).shape:
             raise ValueError('the inverse is for one set of dimensions, not for arrays')
         blocks(linkage, outputs)
-        self._n, self._inputs = len(outputs), linkage.inputs
+        self._n = len(outputs)
         self._angular = [linkage.is_angle(name) for name in outputs]
         self._scales = [1.0 if angular else linkage.longest for angular in self._angular]
         self._sizes = [input_.size for input_ in linkage.inputs]
+        self._check, self._choices = linkage.checked(outputs), Cache()
+        self.inputs = tuple(map(self._coming_round, range(self._n), linkage.inputs))
         # Of each input half a period, the period, and below what it is zero.
         self._turned = [(0.5 * input_.turn, input_.turn, LEAST) if input_.turns else
-                        (math.inf, math.inf, LEAST * input_.size) for input_ in linkage.inputs]
-        self._check, self._choices = linkage.checked(outputs), Cache()
+                        (math.inf, math.inf, LEAST * input_.size) for input_ in self.inputs]
         self.closed: Union[InverseLinkage, InverseRods, None] = (
             taken_apart if linkage.axes == 'xy' else rods_taken_apart)(linkage, outputs)
         if self.closed:
@@ -186,6 +196,31 @@ class Inverse:
         if not self.closed:
             return f'the inverse of {self.linkage.type} for {what} is searched'
         return f'# {self.linkage.type} driven by {what}\n{self.closed}'
+
+    def _coming_round(self, by: int, input_: Input) -> Input:
+        """Return an input with the period of the outputs, where its own has too many turns."""
+        if not input_.turns or self.linkage.period(by) == input_.period:
+            return input_
+        geared = self.linkage.geared_to(by)
+        rates = self.linkage.posed((), (), geared).at(*([0.0] * self._n))[
+            by * len(geared):][:len(geared)]
+        return input_._replace(period=next((
+            period for period in (1.0, *(1.0 / abs(rate) for rate in rates if abs(rate) > 1.0))
+            if self._repeats(by, math.tau * period)), math.inf))
+
+    def _repeats(self, by: int, turn: float) -> bool:
+        """Return whether poses are the same after an input has turned by so much [rad]."""
+        parts = np.outer(np.arange(1, SAMPLES + 1), np.sqrt([2, 3, 5, 7, 11, 13, 17, 19][
+            :self._n])) % 1.0
+        inputs = [x.low + part * (x.high - x.low) for x, part in zip(self.linkage.inputs, parts.T)]
+        first = self._check.over(*inputs)[:self._n]
+        inputs[by] = inputs[by] + turn
+        gaps = self._check.over(*inputs)[:self._n] - first
+        for gap, angular, scale in zip(gaps, self._angular, self._scales):
+            gap -= math.tau * np.round(gap / math.tau) * angular
+            gap /= scale
+        return bool(np.all(np.isnan(gaps) == np.isnan(first)) and not np.nanmax(
+            np.abs(gaps), initial=0.0) > ENDED)
 
     # All answers.
 
@@ -247,10 +282,10 @@ class Inverse:
         if not self.closed:
             return self._distinct(_columns(*self._searched(np.array(values)[:, None])))
         found, n = [], 1 + self._n
-        for row in self._at(values):
+        for mode, row in enumerate(self._at(values)):
             if row[0] == 1.0:
                 found.append((row[1:n], row[n:]))
-            elif row[0] != row[0] and (own := self._own(row[1:n], values)):
+            elif row[0] != row[0] and (own := self._own(mode, row[1:n], values)):
                 found.append(own)
         return self._distinct(found) if len(found) > 1 else found
 
@@ -280,7 +315,7 @@ class Inverse:
         """Return the inputs of a mode that need not be held to the forward formula, and rates."""
         (a, b), (c, d) = mode.rates
         det = a * d - b * c
-        return [gated(real(1.0), abs(sum(mode.inputs, real(0.0))), real(0.0)),
+        return [where(abs(sum(mode.inputs, real(0.0))) < LARGE, 1.0, 0.0),
                 *map(self._counted, range(self._n), mode.inputs),
                 d / det, -c / det, -b / det, a / det]
 
@@ -310,7 +345,7 @@ class Inverse:
                 abs(rate) * where(abs(x) < size, size, abs(x))
                 for rate, x, size in zip(rates[i::n], inputs, self._sizes)), real(0.0)))
             verdict = where(abs(gap) <= allowed, where(
-                abs(gap) <= ENDED * scale, verdict, math.nan), other)
+                allowed <= (1.0 + STEEP) * ROUNDING * scale, verdict, math.nan), other)
         polished = [self._counted(by, x - step)
                     for by, (x, step) in enumerate(zip(inputs, self._steps(gaps, rates)))]
         return [verdict, *polished, *rates]
@@ -345,7 +380,7 @@ class Inverse:
         return tuple(math.atan2(math.sin(x), math.cos(x)) if angular and abs(x) > math.tau else x
                      for x, angular in zip(values, self._angular))
 
-    def _own(self, inputs: Tuple[float, ...], values: Sequence[float],
+    def _own(self, mode: int, inputs: Tuple[float, ...], values: Sequence[float],
              within: bool = True) -> Optional[Found]:
         """Return inputs that a mode gives, and rates, if the linkage has its outputs there."""
         n, at, slack = self._n, self._check.at, ROUNDING
@@ -362,7 +397,9 @@ class Inverse:
         for _ in range(POLISHING):
             gaps, sure, away = self._missed(row, inputs, values, slack)
             if sure:
-                return self._within(inputs) if within else inputs, row[n:]
+                rates = self._rates_at_end(mode, inputs, values, row[n:])
+                return None if rates is None else (
+                    self._within(inputs) if within else inputs, rates)
             if not away <= OTHER:
                 break
             inputs = self._stepped(inputs, row[n:], gaps)
@@ -370,6 +407,36 @@ class Inverse:
                 break
             row = at(*inputs)
         return None
+
+    def _rates_at_end(self, mode: int, inputs: Tuple[float, ...], values: Sequence[float],
+                      rates: Tuple[float, ...]) -> Optional[Tuple[float, ...]]:
+        """
+        Return rates, next to an end of the reach those of the mode, None beyond it.
+
+        There rounding of the inputs moves outputs by far more than rounding. Beyond it the mode
+        has its dyads on other sides than the linkage: the inputs turn back, and their rates have
+        the other sign.
+        """
+        n, closed = self._n, cast(InverseLinkage, self.closed)
+        if np.abs(self._jacobian(rates)).max() < STEEP:
+            return rates
+        if not np.isfinite(rates).all():
+            rows = (self._check.at(*beside) for beside in self._beside(inputs))
+            rates = next((row[n:] for row in rows if np.isfinite(row).all()), rates)
+        start = mode // math.prod(map(len, closed.turns)) * n * n
+        turning = np.reshape(self._inverse_rates.at(*values)[start:start + n * n], (n, n))
+        with np.errstate(all='ignore'):
+            found = 1.0 / turning if n == 1 else np.linalg.inv(turning)
+        same = np.linalg.det(turning @ np.reshape(rates, (n, n)).T)
+        return None if same < 0.0 else tuple(found.T.ravel().tolist())
+
+    @cached_property
+    def _inverse_rates(self) -> Pose:
+        """The code for the rates of each input by each output in all modes."""
+        closed = cast(InverseLinkage, self.closed)
+        return self.linkage.bind(Program([
+            rate for mode in closed.modes for row in mode.rates for rate in row],
+            self._n, closed.given))
 
     def _beside(self, inputs: Tuple[float, ...]) -> Iterator[Tuple[float, ...]]:
         """Yield inputs that differ by rounding, one a little."""
@@ -456,7 +523,7 @@ class Inverse:
             (1, self._row, 0))
         if not (rows[:, 0] == 1.0).all():
             for mode, place in zip(*np.nonzero(np.isnan(rows[:, 0]))):
-                own = self._own(tuple(rows[mode, 1:n + 1, place].tolist()),
+                own = self._own(mode, tuple(rows[mode, 1:n + 1, place].tolist()),
                                 tuple(values[:, place].tolist()))
                 rows[mode, :, place] = (1.0, *own[0], *own[1]) if own else 0.0
             rows.swapaxes(0, 1)[:, rows[:, 0] == 0.0] = np.nan
@@ -572,7 +639,8 @@ class Inverse:
         """
         inputs, rates = self._found(np.array(values, float))
         limits, beside = tuple(ends or (None,) * self._n), near and tuple(np.ravel(near).tolist())
-        found, breaks = np.full((self._n + self._n ** 2, inputs.shape[2]), np.nan), {}
+        found = np.full((self._n + self._n ** 2, inputs.shape[2]), np.nan)
+        breaks: Dict[int, np.ndarray] = {}
         at, known = 0, np.flatnonzero(self._may_be_taken(inputs, limits))
         while (k := int(known.searchsorted(at))) < len(known):
             at = int(known[k])
@@ -755,7 +823,7 @@ class Inverse:
         if self._n > 1:
             inputs, jacobian = self._search.followed(np.array(near), np.array(values))
             return tuple(inputs.tolist()), tuple(jacobian.T.ravel().tolist())
-        first = self._inputs[0]
+        first = self.inputs[0]
         turns, size = first.turns_of(near[0]), self._sizes[0]
         found, rate = self._search.follow(self._rated.at, size, values[0], near[0] - turns)
         if self._search.is_one and first.is_whole(self.linkage.reach()):
@@ -782,7 +850,7 @@ class Inverse:
             at = {}
             for mode, last in going.items():
                 if (place := places.get(mode)) and (own := self._own(
-                        self._next_to(place, last), aim, False)):
+                        mode, self._next_to(place, last), aim, False)):
                     at[mode] = own[0]
                     found.append(own)
         return min(found, key=lambda own: math.dist(own[0], near)) if found else None
@@ -797,7 +865,7 @@ class Inverse:
 
     def _next_to(self, inputs: Sequence[float], near: Sequence[float]) -> Tuple[float, ...]:
         return tuple(x + input_.turn * round((y - x) / input_.turn) if input_.turns else x
-                     for input_, x, y in zip(self._inputs, inputs, near))
+                     for input_, x, y in zip(self.inputs, inputs, near))
 
     # The search for what does not come apart.
 
@@ -806,7 +874,7 @@ class Inverse:
         if self._n == 1:
             inputs = self._search.answers(values[0])[:, None] * self._sizes[0]
             rates = self._rated.over(inputs.ravel())[1].reshape(inputs.shape)
-            return self._inputs[0].wrapped(np.where(
+            return self.inputs[0].wrapped(np.where(
                 np.abs(inputs) < self._turned[0][2], 0.0, inputs)), rates
         found = [self._search.answers(column) for column in values.T]
         most = max((len(each) for each in found), default=0)
@@ -830,7 +898,7 @@ class Inverse:
         """Return the working mode of a pose; see `Answer.signs`."""
         linkage = self.linkage
         cranks = {link.name: link for link in linkage.links
-                  if any(input_.turns and link.name == input_.name for input_ in self._inputs)}
+                  if any(input_.turns and link.name == input_.name for input_ in linkage.inputs)}
         places, signs = linkage.solve(inputs if self._n > 1 else inputs[0]), {}
         for link in linkage.links if linkage.axes == 'xy' else ():
             crank = cranks.get(link.parent)

@@ -46,6 +46,8 @@ if TYPE_CHECKING:
 MOST_SIDES = 5
 # Of the linkage's size, what is at one place; and how often it is looked for a pose.
 NEAR, TRIES = 1e-9, 400
+# What a sum of angles of quarter turns [rad] is rounded to.
+EXACT = 4 * 2.0 ** -51
 # Assembly modes, in all turns, at most.
 MOST_MODES = 64
 
@@ -375,6 +377,11 @@ class _Sketch(Dyads):
         """Return a length as it is."""
         return repr(float(value) + 0.0)
 
+    def quarters(self, start: float) -> Optional[int]:
+        """Return quarter turns: what is added to an angle would cost it its last digits."""
+        quarters = round(start / (0.5 * math.pi))
+        return quarters % 4 if abs(start - 0.5 * math.pi * quarters) < EXACT else None
+
     def called(self, place: complex, body: str) -> str:
         """Return the linkage's own name of a joint, or a new one."""
         for name, pin in self._named.items():
@@ -399,14 +406,15 @@ class _Sketch(Dyads):
 
     def _read(self, by: int, input_: Input) -> _Read:
         """Return how an input is read, from its own link or from one that is geared to it."""
-        at_zero = [0.0] * len(self._linkage.inputs)
-        for name in (input_.name, *self._linkage.geared_to(input_.name)):
+        counted = self._linkage.period(by) == input_.period or not input_.turns
+        for name in (input_.name, *(self._linkage.geared_to(by) if counted else ())):
             try:
                 ends = self._ends(self._links[name])
             except ValueError:
                 continue
-            ratio, offset = (1.0, 0.0) if name == input_.name else map(float, np.ravel(
-                self._linkage.posed((), (name,), (name,)).searched(*at_zero))[[1 + by, 0]])
+            at_zero = self._linkage.posed((), (name,), (name,)).at(*[0.0] * len(
+                self._linkage.inputs))
+            ratio, offset = (1.0, 0.0) if name == input_.name else (at_zero[1 + by], at_zero[0])
             count = round(abs(ratio) * input_.period) if input_.turns else 1
             return _Read(name, ends, ratio, offset, tuple(
                 turn * math.tau / abs(ratio) for turn in range(count)))

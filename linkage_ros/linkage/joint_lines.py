@@ -53,7 +53,7 @@ from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tup
 
 import numpy as np
 
-from .arithmetic import Formula, IN_RANGE, in_range, WORDS
+from .arithmetic import ARITHMETIC_WORDS, Formula, IN_RANGE, in_range
 from .builder import Builder, ConstructionError, Gear
 from .planar import LEFT, RIGHT
 from ..cache import cached
@@ -94,7 +94,7 @@ FORMS = {
 INPUTS = 'crank', 'cylinder', 'carriage'
 _NAME = re.compile(r'[A-Za-z][A-Za-z0-9_]{0,63}')
 # What a dimension cannot be called: words of arithmetic, and what `mechanisms.create` takes.
-_TAKEN = (*WORDS, 'joints', 'tracer', 'branches')
+_TAKEN = (*ARITHMETIC_WORDS, 'joints', 'tracer', 'branches')
 # What an input cannot be called: other links, and groups of parameters.
 _GROUPS = 'ground', 'dimensions', 'branches'
 # Letters in a line, and in what is said about it.

@@ -22,9 +22,9 @@ from .arguments import checked_dimensions, numbers
 from .builder import in_metres, UNIT
 from .design import Design
 from .input_range import arcs
-from .inputs import Arc, Input
+from .inputs import Arc, Input, MOST_COUNTED
 from .inverse import Answer, Inverse
-from .quantities import LinkPoint, Points, Structure, structure_of
+from .quantities import LinkPoint, Points, structure_of
 from ..cache import Cache
 from ..formula.expression import derivative, Real
 from ..formula.program import Batch, evaluate, Pose, Program
@@ -32,16 +32,18 @@ from ..words import listed, meant, plain_text, quoted
 
 # Lengths beyond these are counted in a power of two of their own, which changes no bit of a
 # result and keeps squares and products of lengths inside the range of float64.
-SMALL, LARGE = 1e-30, 1e30
-# A ratio whose denominator is larger never comes round; one that takes more turns than these is
-# answered for one turn only, as every turn takes as long as the first.
-MOST_TURNS, MOST_COUNTED = 1000, 60
+SMALL_LENGTH, LARGE_LENGTH = 1e-30, 1e30
+# A ratio whose denominator is larger never comes round.
+MOST_TURNS = 1000
 # Values of expressions of dimensions that are held: some twenty times those of Jansen's leg.
 MOST_VALUES = 10000
+# Quantities of joints; all others are of links.
+OF_POINTS = 'points', 'velocities', 'point accelerations'
 
 Own = TypeVar('Own', bound='Mechanism')
 # One input, or a sequence of several; each a number or an array [rad or m].
 Inputs = Union[ArrayLike, Sequence[ArrayLike]]
+Names = Optional[Sequence[str]]
 
 
 def check_bars(linkage: Mechanism) -> None:
@@ -75,12 +77,18 @@ class Mechanism:
     A linkage whose dimensions are set; make one with `linkage_ros.mechanisms.create`.
 
     A pose depends on the inputs alone: any value, in any order, gives the same numbers. Joint
-    angles in arrays may differ by two ulps from those asked for one by one.
+    angles in arrays may differ by two ulps from those asked for one by one. In all methods `theta`
+    is the input, a crank's angle [rad] or a cylinder's length [m], a float or an array; of several
+    inputs a sequence of as many. Answers have its shape, and are NaN where the linkage cannot be
+    assembled. `points` and `joints` are names, by default all; only what they depend on is
+    computed. ValueError says which name or number is wrong, and what is allowed.
 
     Attributes
     ----------
     type : str
         The name of its type.
+    design : Design
+        What it is a mechanism of.
     dimensions : dict
         Its dimensions [m] by name.
     branches : dict
@@ -99,76 +107,52 @@ class Mechanism:
         The joints at the ends of each cylinder, its base first.
     tracer : str
         The joint whose curve is the locus.
+    is_accelerated : bool
+        Whether arrays are solved by compiled code.
+    structure : Structure
+        Its formulas, for any dimensions.
+    lengths : mapping
+        Its dimensions in its own unit, and that unit, as its programs are bound to them.
+    cache : Cache
+        What was worked out of it: reach, inverses, travels.
 
     """
 
     def __init__(self, design: Design, dimensions: Mapping, branches: Mapping[str, int],
                  accelerate: bool = False):
-        self.type = design.name
-        self.dimensions = dict(dimensions)
-        self.branches = dict(branches)
-        self.tracer = design.tracer
+        self.type, self.design, self.tracer = design.name, design, design.tracer
+        self.dimensions, self.branches = dict(dimensions), dict(branches)
+        self.is_accelerated = accelerate
         # Equal linkages share it, those that were pickled too.
-        self._structure = structure_of(design, tuple(self.branches.items()))
-        built = self._structure.built
-        self.points = tuple(built.points)
-        self.grounded = built.grounded
-        self.joints = tuple(built.joint_values)
+        self.structure = structure_of(design, tuple(self.branches.items()))
+        built = self.structure.built
+        self.points, self.joints = tuple(built.points), tuple(built.joint_values)
+        self.grounded, self.axes = built.grounded, built.axes
         self.bars = tuple((bar.first, bar.second) for bar in built.bars)
-        self.cylinders = tuple(built.cylinders)
-        self.yokes = dict(built.yokes)
-        self._design = design
-        self._accelerate = accelerate
-        self._lengths = _in_own_unit(self.dimensions, design.has_literal_lengths)
+        self.cylinders, self.yokes = tuple(built.cylinders), dict(built.yokes)
+        self.lengths = _in_own_unit(self.dimensions, design.has_literal_lengths)
         self._evaluated: dict = {}
-        self._poses, self._placers = Cache(), Cache()
-        # What was worked out of it: reach, inverses, travels.
-        self.cache = Cache()
-        self.axes = built.axes
+        self._poses, self._placers, self.cache = Cache(), Cache(), Cache()
         self.inputs = tuple(map(self._counted_input, range(len(built.inputs)), built.inputs))
-        self.geared = tuple(built.driven.keys() - {input_.name for input_ in self.inputs})
-        self.links = tuple(link._replace(zero=np.asarray(self._value(link.zero)).tolist())
+        own = {input_.name for input_ in self.inputs}
+        self.geared = tuple(name for name in built.driven if name not in own)
+        self.links = tuple(link._replace(zero=np.asarray(self.value(link.zero)).tolist())
                            for link in built.links)
 
     def __reduce__(self) -> tuple:
-        return type(self), (self._design, self.dimensions, self.branches, self._accelerate)
+        return type(self), (self.design, self.dimensions, self.branches, self.is_accelerated)
 
     def __repr__(self) -> str:
         lengths = ', '.join(f'{k}={v}' for k, v in self.dimensions.items())
         return f'<{self.type} {lengths}>'
 
+    # --- its dimensions ---
+
     @cached_property
     def bar_lengths(self) -> Mapping:
         """The length [m] of each bar."""
         return MappingProxyType({(bar.first, bar.second): self._metres(bar.length)
-                                 for bar in self._structure.built.bars})
-
-    def line_of(self, *joints: str) -> joint_lines.Line:
-        """Return the line that places one of some joints, the last that does."""
-        return [line for line in self._design.lines if set(joints) & set(line.names)][-1]
-
-    def triangles(self) -> dict:
-        """Return for each line of a rigid triangle whether the dimensions allow it."""
-        return {self.line_of(name): np.isfinite(self._value(height))
-                for name, height in self._structure.built.triangles.items()}
-
-    def constants(self, expressions: Any) -> Any:
-        """Return tuples of expressions of dimensions as tuples of their values."""
-        if isinstance(expressions, Real):
-            return self._value(expressions)
-        if not isinstance(expressions, tuple):
-            return expressions
-        values = map(self.constants, expressions)
-        make = getattr(expressions, '_make', tuple)
-        return make(values)
-
-    def demands(self) -> list:
-        """Return what dimensions have to make positive: line, amount, and the problem."""
-        return [self.constants(tuple(demand)) for demand in self._structure.built.demands]
-
-    def windows(self) -> list:
-        """Return the links on two hinges in a row that two rods hold, with their limits."""
-        return [self.constants(held) for held in self._structure.built.windows]
+                                 for bar in self.structure.built.bars})
 
     @cached_property
     def frames(self) -> Mapping:
@@ -176,16 +160,7 @@ class Mechanism:
         return MappingProxyType({
             link: {name: tuple(map(self._metres, (place.x, place.y)))
                    for name, place in frame.items()}
-            for link, frame in self._structure.built.frames.items()})
-
-    def _metres(self, length: Real) -> Any:
-        """Return the value [m] of a length of dimensions alone: a float, or an array."""
-        value = self._value(in_metres(length))
-        return value if np.ndim(value) else float(value)
-
-    def _value(self, expression: Real) -> Any:
-        with np.errstate(all='ignore'):
-            return evaluate(expression, self._lengths, self._evaluated)
+            for link, frame in self.structure.built.frames.items()})
 
     @property
     def longest(self) -> float:
@@ -193,11 +168,53 @@ class Mechanism:
         return max(self.bar_lengths.values(),
                    default=max(input_.high - input_.low for input_ in self.inputs))
 
+    def line_of(self, *joints: str) -> joint_lines.Line:
+        """Return the line that places one of some joints, the last that does."""
+        return [line for line in self.design.lines if set(joints) & set(line.names)][-1]
+
+    def triangles(self) -> dict:
+        """Return for each line of a rigid triangle whether the dimensions allow it."""
+        return {self.line_of(name): np.isfinite(self.value(height))
+                for name, height in self.structure.built.triangles.items()}
+
+    def constants(self, expressions: Any) -> Any:
+        """Return tuples of expressions of dimensions as tuples of their values."""
+        if isinstance(expressions, Real):
+            return self.value(expressions)
+        if not isinstance(expressions, tuple):
+            return expressions
+        return getattr(expressions, '_make', tuple)(map(self.constants, expressions))
+
+    def demands(self) -> list:
+        """Return what dimensions have to make positive: line, amount, and the problem."""
+        return [self.constants(tuple(demand)) for demand in self.structure.built.demands]
+
+    def windows(self) -> list:
+        """Return the links on two hinges in a row that two rods hold, with their limits."""
+        return [self.constants(held) for held in self.structure.built.windows]
+
+    def value(self, length: Real) -> Any:
+        """Return the value of an expression of dimensions alone, lengths in its own unit."""
+        with np.errstate(all='ignore'):
+            return evaluate(length, self.lengths, self._evaluated)
+
+    def _metres(self, length: Real) -> Any:
+        """Return the value [m] of a length of dimensions alone: a float, or an array."""
+        value = self.value(in_metres(length))
+        return value if np.ndim(value) else float(value)
+
+    def check(self) -> None:
+        """Raise ValueError, with the line, if its dimensions cannot be."""
+        if check := self.design.check:
+            check(self.design.lines, self)
+        else:
+            check_bars(self)
+
     def with_dimensions(self, /, **changed: ArrayLike) -> Mechanism:
         """Return the same mechanism with other dimensions [m]; raises ValueError like create."""
         made = type(self)(
-            self._design, checked_dimensions(self._design, {**self.dimensions, **changed}),
-            self.branches, self._accelerate)
+            self.design, checked_dimensions(self.design, {**self.dimensions, **changed}),
+            self.branches, self.is_accelerated)
         made.check()
         return made
 
@@ -205,22 +222,9 @@ class Mechanism:
         """
         Return a linkage in space with other inputs: what its joints are for values of others.
 
-        Parameters
-        ----------
-        *outputs : str
-            As many joints as it has inputs, those that are given instead.
-        branches : mapping, optional
-            For each rod the side of its crank, 1 as it is drawn or -1. Default: its own.
-
-        Returns
-        -------
-        Mechanism
-
-        Raises
-        ------
-        ValueError
-            If there is no such joint, or what is left cannot be solved.
-
+        `outputs` are as many joints as it has inputs, given instead of these; `branches` for each
+        rod the side of its crank, 1 as it is drawn or -1, by default its own. Raises ValueError if
+        there is no such joint, or what is left cannot be solved.
         """
         unknown = [name for name in outputs if name not in self.joints]
         if self.axes != 'xyz' or unknown or len({*outputs}) != len(self.inputs):
@@ -229,26 +233,9 @@ class Mechanism:
                              f'not by {listed(outputs)}')
         sides = {**self.branches, **(branches or {})}
         made = self.cache.get_or_make(('driven by', outputs, *sides.values()), lambda: type(self)(
-            replace(self._design, inputs=outputs), self.dimensions, sides, self._accelerate))
+            replace(self.design, inputs=outputs), self.dimensions, sides, self.is_accelerated))
         made.check()
         return made
-
-    @property
-    def design(self) -> Design:
-        """What it is a mechanism of."""
-        return self._design
-
-    @property
-    def lengths(self) -> Mapping:
-        """Its dimensions in its own unit, and that unit, as its programs are bound to them."""
-        return self._lengths
-
-    def check(self) -> None:
-        """Raise ValueError, with the line, if its dimensions cannot be."""
-        if check := self._design.check:
-            check(self._design.lines, self)
-        else:
-            check_bars(self)
 
     def accelerated(self) -> Mechanism:
         """
@@ -257,43 +244,37 @@ class Mechanism:
         The first call for a set of points compiles for about a tenth of a second. Sine, cosine and
         arctangent are not the C library's but as good as the rule for errors wants: a pose is the
         same in any array, on any number of cores, but its last digits may differ from those that
-        it has alone.
-
-        Raises
-        ------
-        ImportError
-            If llvmlite is not installed (`pip install llvmlite`).
-
+        it has alone. Raises ImportError without llvmlite.
         """
         if not find_spec('llvmlite'):
             raise ImportError('accelerated() needs llvmlite: pip install llvmlite')
         return self.cache.get_or_make('accelerated', lambda: type(self)(
-            self._design, self.dimensions, self.branches, True))
+            self.design, self.dimensions, self.branches, True))
 
-    def solve(self, theta: Inputs, points: Optional[Sequence[str]] = None) -> dict:
+    def period(self, by: int = 0) -> int:
         """
-        Place the joints.
+        Return after how many turns of an input the pose is the same.
 
-        Parameters
-        ----------
-        theta : float or array-like
-            The input: a crank's angle [rad] or a cylinder's length [m]; for a linkage with several
-            inputs a sequence of as many.
-        points : sequence of str, optional
-            The joints wanted; only what they depend on is computed. Default: all.
-
-        Returns
-        -------
-        dict
-            For each joint an array [m] of theta's shape and a last axis for x and y, NaN where it
-            cannot be assembled.
-
-        Raises
-        ------
-        ValueError
-            If a joint does not exist.
-
+        That is more than one where the input drives others by gears of fractions; a ratio that is
+        none with a denominator up to MOST_TURNS is taken for the nearest that is.
         """
+        ratios = [np.ravel(self.value(derivative(value, {by: 1.0}, {})))
+                  for _, value in self.structure.built.driven.values()]
+        return math.lcm(*(Fraction(float(ratio)).limit_denominator(MOST_TURNS).denominator
+                          for each in ratios for ratio in each if math.isfinite(ratio)))
+
+    def _counted_input(self, by: int, input_: Input) -> Input:
+        """Return an input with the values [rad or m] between which all poses lie."""
+        if not input_.turns:
+            return input_._replace(low=self._metres(input_.low), high=self._metres(input_.high))
+        period = self.period(by)
+        period = period if period <= MOST_COUNTED else 1
+        return input_._replace(low=-math.pi * period, high=math.pi * period, period=period)
+
+    # --- poses and how they change ---
+
+    def solve(self, theta: Inputs, points: Names = None) -> dict:
+        """Return the place of each joint [m]: theta's shape and a last axis for x and y."""
         if isinstance(theta, float) and len(self.inputs) == 1:
             wanted = _hashable(points)
             place = self._placers.get(wanted) or self._placer(wanted)
@@ -307,214 +288,36 @@ class Mechanism:
             return lambda theta: self._vectors('points', theta, wanted)
         return self._placers.get_or_make(_plain(wanted), lambda: pose.placer(names))
 
-    def velocity(self, theta: Inputs, points: Optional[Sequence[str]] = None, by: int = 0) -> dict:
-        """
-        Differentiate the joints' places by one of the inputs [m/rad, m/m].
-
-        Takes, returns and raises what `solve` does; infinite or NaN at a dead point.
-        """
+    def velocity(self, theta: Inputs, points: Names = None, by: int = 0) -> dict:
+        """Differentiate `solve` by an input [m/rad, m/m]; infinite or NaN at a dead point."""
         return self._vectors('velocities', theta, points, self._checked_by(by))
 
-    def joint_angles(self, theta: Inputs, joints: Optional[Sequence[str]] = None) -> dict:
+    def acceleration(self, theta: Inputs, rate: Inputs, rate_rate: Inputs,
+                     points: Names = None) -> dict:
         """
-        Return the angle of each moving link to its parent.
+        Return the acceleration of each joint [m/s^2], as `solve` returns places.
 
-        Parameters
-        ----------
-        theta : float or array-like
-            What `solve` takes.
-        joints : sequence of str, optional
-            The links wanted, by name, or other outputs; see `has_output`. Default: all links.
+        `rate` and `rate_rate` are how fast each input moves and how that changes, of shapes that
+        broadcast with theta's. Infinite or NaN at a dead point.
+        """
+        names, pose = self._ready('point accelerations', points)
+        return self._by_point(names, pose.over(*self._motion(theta, rate, rate_rate)))
 
-        Returns
-        -------
-        dict
-            For each link an array of theta's shape: rad in (-pi, pi] counted from its `zero`,
-            an input as given, a slide [m]. NaN where it cannot be assembled.
+    def joint_angles(self, theta: Inputs, joints: Names = None) -> dict:
+        """
+        Return the angle of each moving link to its parent, or other outputs; see `has_output`.
 
-        Raises
-        ------
-        ValueError
-            If a link does not exist.
-
+        Angles [rad] are in (-pi, pi] and counted from the link's `zero`; an input is as given, a
+        slide in m.
         """
         return self._scalars('angles', theta, joints)
 
-    def has_output(self, name: Any) -> bool:
-        """
-        Return whether there is an output of this name.
-
-        That is a link's name, for its joint angle [rad] or slide [m]; a joint's coordinate such as
-        'C.x' [m]; 'distance(A,C)' [m] of two joints; 'angle(A,C)' [rad] from +x to A -> C.
-        """
-        return isinstance(name, str) and self._structure.has(name)
-
-    def is_angle(self, output: str) -> bool:
-        """Return whether an output is an angle [rad], not a length [m]."""
-        return self._structure.turns(output)
-
-    def joint_rates(self, theta: Inputs, joints: Optional[Sequence[str]] = None,
-                    by: int = 0) -> dict:
+    def joint_rates(self, theta: Inputs, joints: Names = None, by: int = 0) -> dict:
         """Differentiate the joint angles by one of the inputs; see `joint_angles`."""
         return self._scalars('rates', theta, joints, self._checked_by(by))
 
-    def period(self, by: int = 0) -> int:
-        """
-        Return after how many turns of an input the pose is the same.
-
-        That is more than one where the input drives others by gears of fractions; a ratio that is
-        none with a denominator up to MOST_TURNS is taken for the nearest that is.
-        """
-        ratios = [np.ravel(self._value(derivative(value, {by: 1.0}, {})))
-                  for _, value in self._structure.built.driven.values()]
-        return math.lcm(*(Fraction(float(ratio)).limit_denominator(MOST_TURNS).denominator
-                          for each in ratios for ratio in each if math.isfinite(ratio)))
-
-    def _counted_input(self, by: int, input_: Input) -> Input:
-        """Return an input with the values [rad or m] between which all poses lie."""
-        if not input_.turns:
-            return input_._replace(low=self._metres(input_.low), high=self._metres(input_.high))
-        period = self.period(by)
-        period = period if period <= MOST_COUNTED else 1
-        return input_._replace(low=-math.pi * period, high=math.pi * period, period=period)
-
-    def reach(self, *others: float) -> list:
-        """
-        Return the values of the first input with which the linkage can be assembled.
-
-        Parameters
-        ----------
-        *others : float
-            The values [rad or m] at which further inputs are held, if there are any.
-
-        Returns
-        -------
-        list of (float, float)
-            Arcs (lo, hi) of a crank [rad] with lo in [-pi, pi) and hi > lo; a full turn is
-            [(-pi, pi)]. Strokes (lo, hi) of a cylinder [m]. [] if it never can be assembled.
-
-        Raises
-        ------
-        ValueError
-            If not every other input is given, or a dimension is an array.
-
-        """
-        return list(self.cache.get_or_make(
-            ('reach', *others), lambda: self._arcs(others)))
-
-    def _arcs(self, others: Tuple[float, ...]) -> List[Arc]:
-        _, margins = self._ready('margins', ())
-        if margins.shape:
-            raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
-                             'not for arrays')
-        if len(others) != len(self.inputs) - 1:
-            raise ValueError(f'{self.type} has {len(self.inputs)} inputs: the value of each but '
-                             f'the first is needed, got {len(others)}')
-        first = self.inputs[0]
-        return [(lo * first.size, hi * first.size) for lo, hi in arcs(
-            lambda value: margins.searched(value * first.size, *others), first.counted(),
-            self._structure.built.limits, self._value,
-            lambda theta: self._ready('points', None)[1].searched(theta, *others))]
-
-    def function(self, points: Optional[Sequence[str]] = None, joints: Sequence[str] = (),
-                 rates: Sequence[str] = ()) -> Callable:
-        """
-        Return the quickest way to one pose after the other.
-
-        Returns
-        -------
-        callable
-            From the input, a float [rad or m] (or as many as there are inputs), to a tuple of
-            floats: x, y [m] of each point wanted, then the joint angles wanted, then the joint
-            rates by each input, from one list of operations; NaN where it cannot be assembled.
-
-        Raises
-        ------
-        ValueError
-            If a joint does not exist.
-
-        """
-        return self.posed(points, joints, rates).at
-
-    def posed(self, points: Optional[Sequence[str]] = None, joints: Sequence[str] = (),
-              rates: Sequence[str] = ()) -> Pose:
-        """Return the code behind `function`."""
-        wanted = tuple(self._names(kind, _plain(_hashable(names)))
-                       for kind, names in (('points', points), ('angles', joints),
-                                           ('rates', rates)))
-        return self._bound('parts', wanted)
-
-    def legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...],
-             rows: np.ndarray) -> Batch:
-        """
-        Return legs like this one on the same inputs, to be solved again and again.
-
-        An accelerated mechanism's are solved by machine code as soon as that is there, without
-        waiting for it; the numbers are the same.
-
-        Parameters
-        ----------
-        points : tuple of str or LinkPoint
-            The joints, and points that are none, whose places are wanted.
-        joints, moving : tuple of str
-            The links whose joint angles and velocities are wanted.
-        rows : float array (legs, n)
-            Where they go: x, y [m] of each point, joint angles [rad; a slide: m], velocities.
-
-        Returns
-        -------
-        Batch
-            For each leg is given: the value of each input [rad or m], the speed of each input
-            [rad/s or m/s], and the numbers of its `Leg`.
-
-        """
-        pose = self.cache.get_or_make(('legs', points, joints, moving), lambda: self._legs(
-            points, joints, moving))
-        return pose.batch(rows)
-
-    def _legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...]) -> Pose:
-        lengths, unit = dict(self._lengths), self._lengths[UNIT.args[0]]
-        named: List[Union[str, LinkPoint]] = []
-        for i, point in enumerate(points):
-            if isinstance(point, LinkPoint):
-                names = f'[x{i}]', f'[y{i}]'
-                lengths.update(zip(names, (point.x / unit, point.y / unit)))
-                point = LinkPoint(point.link, *names)
-            named.append(point)
-        program = self._structure.legs(tuple(named), joints, moving)
-        return program.bind(lengths, dict(self._evaluated), self._accelerate)
-
-    def acceleration(self, theta: Inputs, rate: Inputs, rate_rate: Inputs,
-                     points: Optional[Sequence[str]] = None) -> dict:
-        """
-        Return the joints' accelerations, by differentiating twice.
-
-        Parameters
-        ----------
-        theta, rate, rate_rate : float or array-like
-            What `solve` takes: each input [rad or m], how fast it moves, and how that changes.
-        points : sequence of str, optional
-            The joints wanted. Default: all.
-
-        Returns
-        -------
-        dict
-            For each joint an array [m/s^2] of their broadcast shape and a last axis for x and y;
-            infinite or NaN at a dead point.
-
-        Raises
-        ------
-        ValueError
-            If a joint does not exist.
-
-        """
-        names, pose = self._ready('point accelerations', points)
-        values = pose.over(*self._motion(theta, rate, rate_rate))
-        pairs = np.moveaxis(values.reshape(len(names), 2, *values.shape[1:]), 1, -1)
-        return dict(zip(names, pairs))
-
     def joint_accelerations(self, theta: Inputs, rate: Inputs, rate_rate: Inputs,
-                            joints: Optional[Sequence[str]] = None) -> dict:
+                            joints: Names = None) -> dict:
         """Return how the joint rates change [rad/s^2 or m/s^2]; see `acceleration`."""
         names, pose = self._ready('joint accelerations', joints)
         return dict(zip(names, pose.over(*self._motion(theta, rate, rate_rate))))
@@ -523,81 +326,134 @@ class Mechanism:
         return [values for name, inputs in zip(('theta', 'rate', 'rate_rate'), each)
                 for values in self.each_input(inputs, name)]
 
+    def transmission_angles(self, theta: Inputs, joints: Names = None) -> dict:
+        """
+        Return the angle in [0, pi] at which each joint passes on its force, best at pi/2.
+
+        The joints are those that a dyad, cylinder, mirror, inversor, slot or slider line places
+        first; 0 and pi are dead points. For a dyad it is the angle between its bars, a cylinder
+        being one; for a slider between its rod and the normal of its line; for a slot between its
+        line and the normal of the radius from pivot to pin. Sources: Norton, "Design of
+        Machinery", sec. 3.3; Balli and Chand, "Transmission angle in mechanisms", Mechanism and
+        Machine Theory 37 (2002).
+        """
+        return self._scalars('transmissions', theta, joints)
+
+    def function(self, points: Names = None, joints: Sequence[str] = (),
+                 rates: Sequence[str] = ()) -> Callable:
+        """
+        Return the quickest way to one pose after the other.
+
+        It takes the input, a float (or as many as there are inputs), and returns a tuple of
+        floats from one list of operations: x, y of each point, then the joint angles, then the
+        joint rates by each input.
+        """
+        return self.posed(points, joints, rates).at
+
+    def posed(self, points: Names = None, joints: Sequence[str] = (),
+              rates: Sequence[str] = ()) -> Pose:
+        """Return the code behind `function`."""
+        wanted = tuple(self._names(kind, _plain(_hashable(names)))
+                       for kind, names in (('points', points), ('angles', joints),
+                                           ('rates', rates)))
+        return self.bound('parts', wanted)
+
+    def legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...],
+             rows: np.ndarray) -> Batch:
+        """
+        Return legs like this one on the same inputs, to be solved again and again.
+
+        An accelerated mechanism's are solved by machine code as soon as that is there, without
+        waiting for it; the numbers are the same. For each leg is given: the value of each input
+        [rad or m], its speed [rad/s or m/s], and the numbers of its `Leg`. Into the leg's row go
+        x, y of each point (a joint, or a `LinkPoint` on a link), the angles of `joints` [rad; a
+        slide: m], and the velocities of the links in `moving`.
+        """
+        pose = self.cache.get_or_make(('legs', points, joints, moving), lambda: self._legs(
+            points, joints, moving))
+        return pose.batch(rows)
+
+    def _legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...]) -> Pose:
+        lengths, unit = dict(self.lengths), self.lengths[UNIT.args[0]]
+        named: List[Union[str, LinkPoint]] = []
+        for i, point in enumerate(points):
+            if isinstance(point, LinkPoint):
+                names = f'[x{i}]', f'[y{i}]'
+                lengths.update(zip(names, (point.x / unit, point.y / unit)))
+                point = LinkPoint(point.link, *names)
+            named.append(point)
+        program = self.structure.legs(tuple(named), joints, moving)
+        return program.bind(lengths, dict(self._evaluated), self.is_accelerated)
+
+    # --- forces ---
+
     def effort(self, theta: Inputs, loads: Mapping[str, ArrayLike]) -> np.ndarray:
         """
         Return what holds the linkage at rest against loads.
 
-        Parameters
-        ----------
-        theta : float or array-like
-            What `solve` takes.
-        loads : mapping
-            By name: for a joint a force (x, y) [N], for a link a moment [N m], counterclockwise
-            positive; each may have axes of its own in front, in theta's shape.
-
-        Returns
-        -------
-        array
-            Of theta's shape and a last axis for the inputs: the torque of a crank [N m], the force
-            of a cylinder [N], positive where it acts the way the input grows. It grows without
-            bound next to a dead point, and is infinite or NaN there.
-
-        Raises
-        ------
-        ValueError
-            If there is no such joint or link, or a load has another shape.
-
+        `loads` are by name: for a joint a force (x, y) [N], for a link a moment [N m],
+        counterclockwise positive; each may have axes of its own in front, in theta's shape.
+        Returned is an array of theta's shape and a last axis for the inputs: the torque of a crank
+        [N m], the force of a cylinder [N], positive where it acts the way the input grows. It
+        grows without bound next to a dead point, and is infinite or NaN there.
         """
         return statics.effort(self, theta, loads)
 
     def output_effort(self, output: str, theta: Inputs, effort: ArrayLike) -> Any:
         """
-        Return the force or torque that an output exerts where the input gives an effort.
+        Return what an output [N m of an angle, else N] exerts where the only input gives `effort`.
 
-        Parameters
-        ----------
-        output : str
-            What `input_for` takes, of a linkage with one input.
-        theta : float or array-like
-            What `solve` takes.
-        effort : float or array-like
-            Of the input [N m or N].
-
-        Returns
-        -------
-        float or array
-            [N m] of an angle, [N] of a length or a coordinate; infinite where the output turns
-            back, 0 at a dead point.
-
-        Raises
-        ------
-        ValueError
-            If there is no such output, or there are several inputs.
-
+        Infinite where the output turns back, 0 at a dead point.
         """
         return statics.output_effort(self, output, theta, effort)
 
+    # --- outputs ---
+
+    def has_output(self, name: Any) -> bool:
+        """
+        Return whether there is an output of this name.
+
+        That is a link's name, for its joint angle [rad] or slide [m]; a joint's coordinate such as
+        'C.x' [m]; 'distance(A,C)' [m] of two joints; 'angle(A,C)' [rad] from +x to A -> C.
+        """
+        return isinstance(name, str) and self.structure.has(name)
+
+    def is_angle(self, output: str) -> bool:
+        """Return whether an output is an angle [rad], not a length [m]."""
+        return self.structure.turns(output)
+
+    def moves(self, output: str, by: int = 0) -> bool:
+        """Return whether an output depends on one of the inputs."""
+        return self.structure.moves(output, by)
+
+    def check_output(self, output: str) -> None:
+        """Raise ValueError if there is no such output, or it stands still."""
+        self.check_there(output)
+        if not self.moves(output):
+            raise ValueError(f'{plain_text(output)} of {self.type} does not move with the '
+                             f'{self.inputs[0].name}')
+
+    def check_there(self, output: str) -> None:
+        """Raise ValueError if there is no such output."""
+        if not self.has_output(output):
+            named = (*self.joints, *(f'{name}.{axis}' for name in self.points for axis in 'xy'))
+            raise ValueError(
+                f'{self.type} has no output {quoted(output)}; allowed: distance(A,B) and '
+                f'angle(A,B) of two joints, {listed(named)}{meant(output, named)}')
+
+    def geared_to(self, by: int) -> List[str]:
+        """Return the links that one of the inputs drives by gears."""
+        return [name for name in self.geared if self.moves(name, by)]
+
+    # --- the inverse ---
+
     def inverse(self, outputs: Union[str, Sequence[str]]) -> Inverse:
         """
-        Return the inverse of as many outputs as there are inputs.
+        Return the inverse of as many outputs as there are inputs; see `has_output`.
 
-        Parameters
-        ----------
-        outputs : str or sequence of str
-            Outputs as `has_output` says.
-
-        Returns
-        -------
-        Inverse
-            All answers, the nearest, or the one that goes on from the last; `print` shows the
-            joint lines of its linkage.
-
-        Raises
-        ------
-        ValueError
-            If there is no such output, there are not as many as inputs, they do not tell all
-            inputs, or a dimension is an array.
-
+        It has all answers, the nearest, or the one that goes on from the last; `print` shows the
+        joint lines of its linkage. Raises ValueError if there is no such output, there are not as
+        many as inputs, they do not tell all inputs, or a dimension is an array.
         """
         names = (outputs,) if isinstance(outputs, str) and len(self.inputs) == 1 else outputs
         if not isinstance(names, (list, tuple)) or not all(isinstance(x, str) for x in names):
@@ -620,38 +476,15 @@ class Mechanism:
         """
         Return the values of the first input that give an output the value that is wanted.
 
-        Parameters
-        ----------
-        output : str
-            A link's name: its joint angle [rad], whole turns aside, or its slide [m]; a joint's
-            coordinate such as 'C.x' [m]; 'distance(A,C)' [m]; 'angle(A,C)' [rad] from +x.
-        value : float or array-like
-            What the output is to be.
-        near : float or array-like, optional
-            The answer nearest to this is taken, a crank's with whole turns included.
-        others : sequence of float
-            The values [rad or m] at which further inputs are held, if there are any.
-
-        Returns
-        -------
-        float or array
-            Without `near` all answers, crank angles in [-pi, pi), ascending, on a last axis that
-            is filled up with NaN and at least one long; with `near` the one chosen, in the shape
-            of value and near broadcast. NaN where the output cannot be had, or never changes.
-
-        Raises
-        ------
-        ValueError
-            If there is no such output, it stands still, a dimension is an array, or not every
-            other input is given.
-
-        Notes
-        -----
-        A value beyond an extreme by no more than rounding counts as the extreme. See `inverse`.
+        `output` is as for `inverse`, an angle with whole turns aside; `others` are the values at
+        which further inputs are held. Without `near` all answers, crank angles in [-pi, pi),
+        ascending, on a last axis that is filled up with NaN and at least one long; with `near` the
+        nearest, whole turns included, in the shape of value and near broadcast. NaN where the
+        output cannot be had, or never changes; a value beyond an extreme by no more than rounding
+        counts as the extreme.
 
         A linkage with one change point in a turn is the same only after two turns: for it the
         answers are those of the turn [-pi, pi), and `near` should lie there.
-
         """
         value, (inverse, held) = numbers('value', value), self._held(output, others)
         if near is None:
@@ -678,23 +511,11 @@ class Mechanism:
         """
         Return one value of the input that gives an output a value, and d output / d input there.
 
-        Parameters
-        ----------
-        output, value
-            As for `input_for`.
-        near : float or array-like, optional
-            The answer nearest to this is taken, a crank's with whole turns included. Default: the
-            least on the working branch, where the output grows with the input, as lever and crank
-            turn the same way; if there is none, the least.
-        ends : (float, float), optional
-            The lowest and the highest value [rad or m] that may be taken. Default: any; of a
-            crank without near, those of one turn from -pi.
-
-        Returns
-        -------
-        (float or array, float or array)
-            In the shape of value and near broadcast; NaN where there is none.
-
+        That is the answer nearest to `near`, a crank's with whole turns included; by default the
+        least on the working branch, where the output grows with the input, as lever and crank turn
+        the same way; if there is none, the least. `ends` are the lowest and the highest value that
+        may be taken; by default any, of a crank without near those of one turn from -pi. Both have
+        the shape of value and near broadcast; NaN where there is none.
         """
         inverse, _ = self._held(output, ())
         given = [x if type(x) is float else numbers(name, x)
@@ -704,23 +525,10 @@ class Mechanism:
 
     def follow(self, output: str, value: float, near: float) -> Tuple[float, float]:
         """
-        Return the input that gives an output a value, going on from another without a jump.
+        Return the input that gives an output a value, and d output / d input, without a jump.
 
-        Parameters
-        ----------
-        output : str
-            What `input_for` takes, of a linkage with one input.
-        value : float
-            What the output is [rad or m].
-        near : float
-            Where the input was [rad or m]; whole turns of a crank are kept.
-
-        Returns
-        -------
-        (float, float)
-            The input [rad or m], between the dead points and extremes of the output that `near` is
-            between, and d output / d input there; NaN if the output has no such value there.
-
+        The input [rad or m], whole turns of a crank kept, is between the dead points and extremes
+        of the output that `near` is between, where it was; NaN if there is no such value there.
         """
         (found,), (rate,) = self._held(output, ())[0].follow(value, near)
         return found, rate
@@ -728,20 +536,10 @@ class Mechanism:
     def inputs_for(self, outputs: Sequence[str], values: ArrayLike,
                    near: Optional[ArrayLike] = None) -> List[Answer]:
         """
-        Return all values of the inputs that give as many outputs the values that are wanted.
+        Return all values of the inputs that give as many outputs values; see `Inverse.all`.
 
-        Parameters
-        ----------
-        outputs, values
-            As for `inverse` and `Inverse.all`.
-        near : array-like (inputs,), optional
-            Values of the inputs [rad or m] to which the answers are brought by whole turns, the
-            nearest first, a length being counted in parts of about its stroke.
-
-        Returns
-        -------
-        list of Answer
-
+        With `near` (inputs,) they are brought by whole turns next to these, the nearest first, a
+        length being counted in parts of about its stroke.
         """
         return self.inverse(outputs).all(values, near)
 
@@ -751,189 +549,97 @@ class Mechanism:
         inputs, rates = self.inverse(outputs).follow(values, near)
         return np.array(inputs), np.reshape(rates, (len(inputs), -1)).T
 
-    def extremes(self, output: str, arcs: Optional[Sequence[Arc]] = None) -> list:
+    # --- all of its motion; further inputs are held at the values `others` ---
+
+    def reach(self, *others: float) -> list:
         """
-        Return how far an output goes.
+        Return the values of the first input with which the linkage can be assembled.
 
-        Parameters
-        ----------
-        output : str
-            What `input_for` takes, of a linkage with one input.
-        arcs : sequence of (float, float), optional
-            Where the input may be [rad or m]. Default: its reach.
-
-        Returns
-        -------
-        list of ((float, float), (float, float))
-            For each arc the least value and the input there, then the greatest; an angle is
-            followed past -pi and pi. By default an arc in which the output jumps, as an angle does
-            where its ends meet, counts as several.
-
+        Arcs (lo, hi) of a crank [rad] have lo in [-pi, pi) and hi > lo, and a full turn is
+        [(-pi, pi)]; strokes (lo, hi) of a cylinder are in m; [] if it never can be. Raises
+        ValueError if not every other input is given, or a dimension is an array.
         """
-        return Analysis(self).extremes(output, arcs)
+        return list(self.cache.get_or_make(('reach', *others), lambda: self._arcs(others)))
 
-    def transmission_angles(self, theta: Inputs, joints: Optional[Sequence[str]] = None) -> dict:
-        """
-        Return the angle at which each joint passes on its force.
-
-        Parameters
-        ----------
-        theta : float or array-like
-            What `solve` takes.
-        joints : sequence of str, optional
-            The joints wanted: those that a dyad, cylinder, mirror, inversor, slot or slider line
-            places first. Default: all.
-
-        Returns
-        -------
-        dict
-            For each joint an array of theta's shape, rad in [0, pi], best at pi/2; 0 and pi are
-            dead points. For a dyad the angle between its bars, a cylinder being one; for a slider
-            between its rod and the normal of its line; for a slot between its line and the normal
-            of the radius from pivot to pin. NaN where it cannot be assembled.
-
-        Raises
-        ------
-        ValueError
-            If a joint has no transmission angle.
-
-        Notes
-        -----
-        Sources: Norton, "Design of Machinery", sec. 3.3; Balli and Chand, "Transmission angle in
-        mechanisms", Mechanism and Machine Theory 37 (2002).
-
-        """
-        return self._scalars('transmissions', theta, joints)
+    def _arcs(self, others: Tuple[float, ...]) -> List[Arc]:
+        margins, points = self.bound('margins', ()), self._ready('points', None)[1]
+        if margins.shape:
+            raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
+                             'not for arrays')
+        if len(others) != len(self.inputs) - 1:
+            raise ValueError(f'{self.type} has {len(self.inputs)} inputs: the value of each but '
+                             f'the first is needed, got {len(others)}')
+        first = self.inputs[0]
+        return [(lo * first.size, hi * first.size) for lo, hi in arcs(
+            lambda value: margins.searched(value * first.size, *others), first.counted(),
+            self.structure.built.limits, self.value,
+            lambda theta: points.searched(theta, *others))]
 
     def dead_points(self, *others: float) -> list:
         """
-        Return the values of the first input at which a dyad stretches or folds.
+        Return the values of the first input at which a dyad stretches or folds, ascending.
 
         These are the ends of the reach and the change points: there a transmission angle is 0
-        or pi, and the input alone cannot tell how the linkage goes on.
-
-        Parameters
-        ----------
-        *others : float
-            The values [rad or m] at which further inputs are held, if there are any.
-
-        Returns
-        -------
-        list of float
-            Values [rad or m], ascending; crank angles in [-pi, pi).
-
-        Raises
-        ------
-        ValueError
-            If not every other input is given, or a dimension is an array.
-
+        or pi, and the input alone cannot tell how the linkage goes on. Crank angles are in
+        [-pi, pi). Raises what `reach` does.
         """
         return [dead * self.inputs[0].size for dead in Analysis(self, others).dead_points()]
 
     def distance_to_dead_point(self, theta: ArrayLike, *others: float) -> Any:
-        """
-        Return how far the first input is from the nearest dead point.
-
-        Parameters
-        ----------
-        theta : float or array-like
-            Value of the first input [rad or m].
-        *others : float
-            The values [rad or m] at which further inputs are held, if there are any.
-
-        Returns
-        -------
-        float or array
-            Distance [rad or m] in the shape of theta, of a crank at most pi; infinite without
-            dead points.
-
-        """
+        """Return how far values of the first input are from the nearest dead point, or inf."""
         theta = numbers('theta', theta)
         away = [self.inputs[0].apart(theta, dead) for dead in self.dead_points(*others)]
         return np.min([np.full(np.shape(theta), np.inf), *away], axis=0)[()]
 
+    def extremes(self, output: str, arcs: Optional[Sequence[Arc]] = None) -> list:
+        """
+        Return how far an output goes on arcs of the only input, by default its reach.
+
+        For each arc the least value and the input there, then the greatest; an angle is followed
+        past -pi and pi. By default an arc in which the output jumps, as an angle does where its
+        ends meet, counts as several.
+        """
+        return Analysis(self).extremes(output, arcs)
+
     def monotone(self, output: str, most: float) -> Tuple[List[Tuple[float, ...]], Pose]:
         """
-        Return what an inverse of one's own starts from, of a linkage with one input.
+        Return pieces of the reach of the only input on which an output rises or falls all along.
 
-        Parameters
-        ----------
-        output : str
-            What `input_for` takes.
-        most : float
-            By how much the output changes in one piece at most [rad or m].
-
-        Returns
-        -------
-        (list of (float, float, float, float), Pose)
-            Pieces of the reach on which the output rises or falls all along: the input [rad or m]
-            at both ends, and the output there; the code for the output and its rate.
-
+        Each has the input [rad or m] at both ends, and the output there, which changes by `most`
+        at most; and the code for the output and its rate.
         """
         size = self.inputs[0].size
         self.check_output(output)
         return [(low * size, high * size, *values) for low, high, *values
-                in Analysis(self).branches(output).pieces(most)], self._bound('output', output)
+                in Analysis(self).branches(output).pieces(most)], self.bound('output', output)
 
-    def check_output(self, output: str) -> None:
-        """Raise ValueError if there is no such output, or it stands still."""
-        self.check_there(output)
-        if not self._structure.moves(output):
-            raise ValueError(f'{plain_text(output)} of {self.type} does not move with the '
-                             f'{self.inputs[0].name}')
-
-    def check_there(self, output: str) -> None:
-        """Raise ValueError if there is no such output."""
-        if not self.has_output(output):
-            named = (*self.joints, *(f'{name}.{axis}' for name in self.points for axis in 'xy'))
-            raise ValueError(
-                f'{self.type} has no output {quoted(output)}; allowed: distance(A,B) and '
-                f'angle(A,B) of two joints, {listed(named)}{meant(output, named)}')
-
-    # What inverses and studies of the motion are made from.
-
-    @property
-    def is_accelerated(self) -> bool:
-        """Whether arrays are solved by compiled code."""
-        return self._accelerate
-
-    @property
-    def structure(self) -> Structure:
-        """Its formulas, for any dimensions."""
-        return self._structure
-
-    def geared_to(self, input_: str) -> List[str]:
-        """Return the links that an input drives by gears."""
-        driven = self._structure.built.driven
-        return [name for name in self.geared if driven[name][0].name == input_]
-
-    def moves(self, output: str, by: int = 0) -> bool:
-        """Return whether an output depends on one of the inputs."""
-        return self._structure.moves(output, by)
+    # --- its code ---
 
     def bind(self, program: Program) -> Pose:
         """Return a program of its formulas as a function of its arguments."""
-        return program.bind(self._lengths, self._evaluated, self._accelerate)
-
-    def checked(self, outputs: Tuple[str, ...]) -> Pose:
-        """Return the code for outputs, NaN where anything cannot be assembled, and their rates."""
-        return self._bound('checked', outputs)
-
-    def margins(self, *inputs: np.ndarray) -> np.ndarray:
-        """Return each limit's margin, not negative where it is kept: (limits, n)."""
-        return self._bound('margins', ()).searched(*inputs)
-
-    def value(self, length: Real) -> Any:
-        """Return the value of an expression of dimensions alone, lengths in its own unit."""
-        return self._value(length)
+        if len(self._evaluated) > MOST_VALUES:
+            # Another dictionary: a thread may be reading this one.
+            self._evaluated = {}
+        return program.bind(self.lengths, self._evaluated, self.is_accelerated)
 
     def bound(self, kind: str, names: Any, *by: int) -> Pose:
         """Return the code for quantities of one kind; see `Structure.program`."""
-        return self._bound(kind, names, *by)
+        return self.bind(self.structure.program(kind, names, *by))
+
+    def checked(self, outputs: Tuple[str, ...]) -> Pose:
+        """Return the code for outputs, NaN where anything cannot be assembled, and their rates."""
+        return self.bound('checked', outputs)
+
+    def margins(self, *inputs: np.ndarray) -> np.ndarray:
+        """Return each limit's margin, not negative where it is kept: (limits, n)."""
+        return self.bound('margins', ()).searched(*inputs)
 
     def _vectors(self, kind: str, theta: Inputs, points: Any, *by: int) -> dict:
         names, pose = self._ready(kind, points, *by)
-        values = pose.over(*self.each_input(theta))
+        return self._by_point(names, pose.over(*self.each_input(theta)))
+
+    def _by_point(self, names: Sequence[str], values: np.ndarray) -> dict:
+        """Return coordinates (coordinates of all names, *shape) as {name: (*shape, axes)}."""
         places = values.reshape(len(names), len(self.axes), *values.shape[1:])
         return dict(zip(names, np.moveaxis(places, 1, -1)))
 
@@ -942,6 +648,7 @@ class Mechanism:
         return dict(zip(names, pose.over(*self.each_input(theta))))
 
     def each_input(self, theta: Any, name: str = 'theta') -> Sequence[np.ndarray]:
+        """Return each input's values as an array; raise ValueError for what are none."""
         if len(self.inputs) == 1:
             return (numbers(name, theta),)
         if not hasattr(theta, '__len__') or len(theta) != len(self.inputs):
@@ -965,22 +672,12 @@ class Mechanism:
     def _pose(self, kind: str, wanted: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
         names = self._names(kind, wanted)
         return self._poses.get_or_make(
-            (kind, wanted, *by), lambda: (names, self._bound(kind, names, *by)))
-
-    def _bound(self, kind: str, names: Any, *by: int) -> Pose:
-        program = self._structure.program(kind, names, *by)
-        if len(self._evaluated) > MOST_VALUES:
-            # Another dictionary: a thread may be reading this one.
-            self._evaluated = {}
-        return program.bind(self._lengths, self._evaluated, self._accelerate)
+            (kind, wanted, *by), lambda: (names, self.bound(kind, names, *by)))
 
     def _names(self, kind: str, wanted: Any) -> Tuple[str, ...]:
-        what, allowed = {
-            'points': ('point', self.points), 'velocities': ('point', self.points),
-            'point accelerations': ('point', self.points),
-            'transmissions': ('transmission angle at', tuple(
-                self._structure.built.transmissions)),
-        }.get(kind, ('joint', self.joints))
+        what, allowed = ('point', self.points) if kind in OF_POINTS else ('joint', self.joints)
+        if kind == 'transmissions':
+            what, allowed = 'transmission angle at', tuple(self.structure.built.transmissions)
         if wanted is None:
             return allowed
         names = (wanted,) if isinstance(wanted, str) else wanted
@@ -994,7 +691,7 @@ class Mechanism:
 def _in_own_unit(dimensions: Mapping, fixed: bool) -> dict:
     """Return dimensions counted in a unit that is a power of two, and that unit in metres."""
     longest = max((np.max(np.abs(length)) for length in dimensions.values()), default=1.0)
-    if fixed or SMALL < longest < LARGE:
+    if fixed or SMALL_LENGTH < longest < LARGE_LENGTH:
         return {**dimensions, UNIT.args[0]: 1.0}
     unit = 2.0 ** np.frexp(longest)[1]
     return {UNIT.args[0]: unit, **{name: length / unit for name, length in dimensions.items()}}

@@ -12,40 +12,20 @@ import numpy as np
 from .inputs import Arc
 from .mechanism import Mechanism
 
-SAMPLES = 721
+DRAG_SAMPLES = 721
 # A path that crosses itself is not left: all the way of the input counts as a part of its width.
 LEASH = 0.1
-STEPS, HALVINGS = 60, 12
+GAUSS_NEWTON_STEPS, STEP_HALVINGS = 60, 12
 
 
 def nearest_inputs(linkage: Mechanism, joint: str, place: Sequence[float],
                    present: Sequence[float], arcs: Sequence[Sequence[Arc]]) -> np.ndarray:
     """
-    Return the inputs that bring a joint nearest to a place.
+    Return the inputs (inputs,) [rad or m] that bring a joint nearest to a place (x, y) [m].
 
-    Parameters
-    ----------
-    linkage : Mechanism
-        What moves.
-    joint : str
-        One of its joints.
-    place : (float, float)
-        Where that is wanted [m].
-    present : sequence of float
-        The inputs as they are [rad or m]; of poses that serve, one near them is taken.
-    arcs : sequence of sequence of (float, float)
-        For each input where it may be.
-
-    Returns
-    -------
-    float array (inputs,)
-        The inputs [rad or m], each on one of its arcs.
-
-    Raises
-    ------
-    ValueError
-        If there is no such joint, or the linkage cannot be assembled on these arcs.
-
+    Of poses that serve, one near the inputs that are `present` is taken. Each input is on one of
+    its `arcs`, a sequence of (low, high). Raises ValueError if there is no such joint, or the
+    linkage cannot be assembled on these arcs.
     """
     goal = np.asarray(place, float)
     if len(linkage.inputs) > 1:
@@ -59,14 +39,14 @@ def nearest_inputs(linkage: Mechanism, joint: str, place: Sequence[float],
 def _nearest_sample(linkage: Mechanism, joint: str, goal: np.ndarray, present: float,
                     arcs: Sequence[Arc]) -> Sequence[np.ndarray]:
     """Return the best of many values of the only input, and the ends of its arc."""
-    samples = np.array([np.linspace(*arc, SAMPLES) for arc in arcs])
+    samples = np.array([np.linspace(*arc, DRAG_SAMPLES) for arc in arcs])
     path = linkage.solve(samples, (joint,))[joint]
     if not np.isfinite(path).any():
         raise ValueError(f'{linkage.type} cannot be assembled here')
     width = np.nanmax(np.nanmax(path, axis=(0, 1)) - np.nanmin(path, axis=(0, 1)))
     away = np.hypot(*np.moveaxis(path - goal, -1, 0)) + LEASH * width * linkage.inputs[0].apart(
         samples, present) / np.ptp(samples)
-    row, column = divmod(int(np.nanargmin(away)), SAMPLES)
+    row, column = divmod(int(np.nanargmin(away)), DRAG_SAMPLES)
     return [np.array([value]) for value in (samples[row, column], *arcs[row])]
 
 
@@ -80,7 +60,7 @@ def _descended(linkage: Mechanism, joint: str, goal: np.ndarray, value: np.ndarr
         return goal - linkage.solve(inputs[0] if single else inputs, (joint,))[joint]
 
     gap = seen(value)
-    for _ in range(STEPS):
+    for _ in range(GAUSS_NEWTON_STEPS):
         rates = np.stack([linkage.velocity(value[0] if single else value, (joint,), i)[joint]
                           for i in range(len(value))], axis=1) * sizes
         if not np.isfinite(rates).all() or not np.isfinite(gap).all():
@@ -91,7 +71,7 @@ def _descended(linkage: Mechanism, joint: str, goal: np.ndarray, value: np.ndarr
             step[free] = np.linalg.lstsq(rates[:, free], gap, rcond=None)[0]
             free &= ~((value <= low) & (step < 0.0) | (value >= high) & (step > 0.0))
         step[~free] = 0.0
-        for part in 0.5 ** np.arange(HALVINGS):
+        for part in 0.5 ** np.arange(STEP_HALVINGS):
             tried = np.clip(value + part * step * sizes, low, high)
             if np.hypot(*seen(tried)) < np.hypot(*gap):
                 break

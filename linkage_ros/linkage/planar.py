@@ -534,7 +534,9 @@ class CrankRail(Rail):
     cosine of (psi + pi/2)/2.
     """
 
-    def __init__(self, crank: Crank, origin: Complex, along: Complex, span: Real):
+    def __init__(self, crank: Crank, origin: Complex, along: Complex):
+        # Where the ground is does not matter: only how far the crank is from the line.
+        span = (crank.centre - origin).length() + crank.length
         super().__init__(crank.centre + crank.bar(), origin, along, span)
         self._crank = crank
         self._centre = cross(along, crank.centre - origin)
@@ -569,9 +571,9 @@ class TurnedRail(CrankRail):
     """
 
     def __init__(self, pin: Complex, crank: Crank, place: Complex, along: Complex, zero: Complex,
-                 origin: Complex, span: Real):
-        Rail.__init__(self, pin, place, along, span)
+                 origin: Complex):
         arm = pin - crank.centre
+        Rail.__init__(self, pin, place, along, arm.length() + origin.length())
         self._crank = Crank(crank.centre, arm.length(), arm.direction(), -crank.angle)
         self._centre = -cross(zero, origin)
         self._turn = (arm.direction() * (crank.zero * zero).conjugate()).turned()

@@ -31,6 +31,7 @@ from ..formula.expression import (
     real,
     spin,
     square_root,
+    unknown,
 )
 from ..formula.program import Program
 
@@ -261,8 +262,22 @@ class Structure:
     def moves(self, output: str, by: int = 0) -> bool:
         """Return whether an output depends on one of the inputs."""
         rate, = self._rates((output,), by)
-        bare: Real = rate.args[0] if rate.op == 'gated' else rate
-        return bare.value != 0.0
+        return not _vanishes(rate)
+
+
+def _vanishes(rate: Real) -> bool:
+    """Return whether an expression is zero wherever it has a value."""
+    zero: Dict[Real, bool] = {}
+    some = {'multiply': any, 'add': all, 'subtract': all}
+    for x in unknown(rate, lambda x: x.operands, zero):
+        parts = [zero[part] for part in x.operands]
+        if x.op in some:
+            zero[x] = some[x.op](parts)
+        elif x.op == 'where':
+            zero[x] = parts[1] and parts[2]
+        else:
+            zero[x] = x.value == 0.0 or x.op in ('gated', 'negative', 'divide') and parts[0]
+    return zero[rate]
 
 
 @cached(32, shared=True)

@@ -65,17 +65,9 @@ class Layout(NamedTuple):
 
 class Solution:
     """
-    The numbers of one layout, in an array that stays where it is.
+    The numbers of one `Layout`, in an array of values that stays where it is.
 
-    Parameters
-    ----------
-    layout : Layout
-        What is where.
-    values : float array
-        Where they go.
-    batch : Batch
-        Solves the legs into the rows of the values; see `Mechanism.legs`.
-
+    The batch solves the legs into the rows of the values; see `Mechanism.legs`.
     """
 
     def __init__(self, layout: Layout, values: np.ndarray, batch: Batch):
@@ -107,26 +99,10 @@ class Assembly:
     """
     The legs of one mechanism.
 
-    Parameters
-    ----------
-    linkage : Mechanism
-        One leg; more need a single crank.
-    leg_pairs : int
-        Left legs, evenly spread over a turn of the crank.
-    mirrored : bool
-        Whether each left leg has a right one.
-    scale : float
-        Factor of every length.
-    reach : sequence of (float, float), optional
-        What linkage.reach() returns, where that is known.
-
-    Attributes
-    ----------
-    legs : dict
-        The legs, by what their joints' names begin with.
-    joints : tuple of str
-        The moving links that follow from the inputs.
-
+    So many pairs, their left legs evenly spread over a turn of the crank; each has a right leg if
+    `mirrored`. More than one leg needs a single crank. `scale` is a factor of every length,
+    `reach` what `linkage.reach()` returns, where that is known. `legs` are by what their joints'
+    names begin with, `joints` the moving links that follow from the inputs.
     """
 
     def __init__(self, linkage: Mechanism, leg_pairs: int = 1, mirrored: bool = False,

@@ -17,7 +17,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from . import joint_state_reader
 from .log import Once, Throttle
-from .message_layout import NEVER, pack_time, unpack, Unreadable
+from .message_layout import NEVER, pack_time, unpack
 from .messages import joint_states
 from .publishers import PatchedPublisher, TrackedPublisher
 from .worker import Worker
@@ -107,8 +107,7 @@ class CommandStream:
         self._last: dict[str, Command] = {}
         self._searches: dict[str, float] = {}
         self._worker = Worker(node, node.report)
-        node.create_subscription(JointState, 'wanted_states', node.guarded(
-            'wanted_states', self._receive), joint_state_reader.ANY, raw=True)
+        joint_state_reader.subscribe(node, 'wanted_states', self._receive)
         node.create_subscription(JointTrajectory, 'wanted_trajectory', node.guarded(
             'wanted_trajectory', self._receive_trajectory), 10)
 
@@ -173,15 +172,8 @@ class CommandStream:
         if not self._commands.has_subscribers and not any(
                 one.has_subscribers for one in self._arrays.values()):
             return
-        try:
-            source = self._reader.source(text)
-        except Unreadable as error:
-            reason = str(error)
-            self._throttle.warn('unreadable', lambda: (
-                f'wanted_states: {len(text)} bytes that are no joint states are ignored: '
-                f'{reason}'))
-            return
-        (targets, known), (stamp, positions, speeds) = source.meaning, source.take(text)
+        source = self._reader.source(text)
+        (targets, known), (stamp, positions, speeds) = source.meaning, source.read(text)
         commands = [self._command(target, positions, speeds if known else None)
                     for target in targets]
         if found := [command for command in commands if command]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from typing import AbstractSet, Any, Callable, Iterator, Optional, Tuple
+from typing import AbstractSet, Any, Callable, Iterator, Optional, Sequence, Tuple
 
 import numpy as np
 from rclpy.duration import Duration
@@ -72,15 +72,20 @@ class DrivenMechanism:
     @property
     def has_subscribers(self) -> bool:
         """Whether its joint states or its markers have subscribers."""
-        return self._joint_states.has_subscribers or self._markers.has_subscribers
+        return any(self._subscribed())
 
     def solution(self, in_scene: bool) -> Solution:
         """Return the solver for its subscribers, and for those to the scene's joint states."""
-        return self._solution(self.model, in_scene)
+        return self._solution(self.model, in_scene, self._subscribed())
 
-    def _solution(self, model: MechanismModel, in_scene: bool) -> Solution:
-        return model.solution(self._joint_states.has_subscribers or in_scene,
-                              self._markers.has_subscribers, bool(self.known[1].all()))
+    def _solution(self, model: MechanismModel, in_scene: bool, subscribed: Sequence[bool]
+                  ) -> Solution:
+        joints, markers = subscribed
+        return model.solution(joints or in_scene, markers, bool(self.known[1].all()))
+
+    def _subscribed(self) -> Tuple[bool, bool]:
+        """Return whether its joint states and its markers have subscribers."""
+        return self._joint_states.has_subscribers, self._markers.has_subscribers
 
     def conversion(self, i: int) -> Tuple[float, float]:
         """Return the factor of a source's position, and what is added: the input."""
@@ -148,12 +153,14 @@ class DrivenMechanism:
     def publishers(self) -> Iterator[PatchedPublisher]:
         """Yield what publishes the pose to the subscribers of the mechanism's own topics."""
         if self.pose and self.pose.exists:
-            yield from self._publishers(self.model, self.pose)
+            yield from self._publishers(self.model, self.pose, self._subscribed())
 
-    def _publishers(self, model: MechanismModel, pose: Pose) -> Iterator[PatchedPublisher]:
-        for topic, build in ((self._joint_states, model.joint_message),
-                             (self._markers, model.marker_message)):
-            if topic.has_subscribers:
+    def _publishers(self, model: MechanismModel, pose: Pose, subscribed: Sequence[bool]
+                    ) -> Iterator[PatchedPublisher]:
+        for is_subscribed, topic, build in zip(
+                subscribed, (self._joint_states, self._markers),
+                (model.joint_message, model.marker_message)):
+            if is_subscribed:
                 yield model.publisher(topic.publisher, build, pose, self._logger)
 
     def prepared(self, machine: scene.SceneMechanism, frame_id: str, prefix: str,
@@ -163,11 +170,13 @@ class DrivenMechanism:
         if before and before.made_of == (machine, frame_id, prefix):
             return before
         model = MechanismModel(machine, frame_id, prefix)
-        if before and self.is_complete and (in_scene or self.has_subscribers):
-            solution = self._solution(model, in_scene)
+        # In the worker's thread: subscribers may come and go meanwhile.
+        subscribed = self._subscribed()
+        if before and self.is_complete and (in_scene or any(subscribed)):
+            solution = self._solution(model, in_scene, subscribed)
             solution.finish()
             solution.solve(*self.inputs.tolist())
-            list(self._publishers(model, model.regular(solution)))
+            list(self._publishers(model, model.regular(solution), subscribed))
         return model
 
     def adopt(self, model: MechanismModel) -> None:
@@ -188,7 +197,7 @@ class DrivenMechanism:
         self._delete(self._displayed)
         self._set_locus(None)
 
-    def let_arrive(self, deadline: float) -> None:
+    def wait_for_deletions(self, deadline: float) -> None:
         """Wait until the deletions have arrived, or until a time on the steady clock [s]."""
         for publisher in (self._markers.publisher, self._locus):
             publisher.wait_for_all_acked(Duration(seconds=max(0.0, deadline - time.monotonic())))

@@ -19,7 +19,8 @@ from typing import Any, Callable, Dict, NamedTuple, Optional, Set, Tuple
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
-from .message_layout import deserialized, HEADER, MessageLayout, NoLayout, pack
+from .log import Throttle
+from .message_layout import deserialized, HEADER, MessageLayout, NoLayout, pack, Unreadable
 
 # Best effort matches every publisher; 100 messages are what comes in 100 ms at 1000 Hz.
 ANY = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -35,6 +36,30 @@ class Numbers(NamedTuple):
     stamp: bytes
     positions: Tuple[float, ...]
     velocities: Tuple[float, ...]
+
+
+def subscribe(node: Any, topic: str, receive: Callable[[bytes], None],
+              failed: Callable[[], None] = lambda: None) -> None:
+    """
+    Subscribe a SceneNode to joint states as bytes.
+
+    Where `receive` raises Unreadable, they are ignored, which is logged now and then. After any
+    other exception, which is reported, `failed` is called.
+    """
+    throttle = Throttle(node.get_logger())
+
+    def receive_or_ignore(text: bytes) -> None:
+        try:
+            receive(text)
+        except Unreadable as error:
+            reason = str(error)
+            throttle.warn(topic, lambda: (f'{topic}: {len(text)} bytes that are no joint states '
+                                          f'are ignored: {reason}'))
+        except Exception as error:
+            node.report(topic, error)
+            failed()
+
+    node.create_subscription(JointState, topic, receive_or_ignore, ANY, raw=True)
 
 
 class Reader:
@@ -120,7 +145,7 @@ class Source:
             return text is self._only[0]
         return len(text) == self.size and int.from_bytes(text, 'little') & self.mask == self.same
 
-    def take(self, text: bytes) -> Numbers:
+    def read(self, text: bytes) -> Numbers:
         """Return what a message of this source says."""
         return self._only[1] or self._unpacked(text)
 

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 import sys
@@ -17,9 +16,9 @@ from sensor_msgs.msg import JointState
 
 from . import joint_state_reader, scene_node
 from .driven_mechanism import DrivenMechanism
-from .log import InvalidHandle, Once, RCLError, Throttle
+from .log import Once
 from .mechanism_model import MechanismModel
-from .message_layout import pack_time, Unreadable
+from .message_layout import pack_time
 from .plan import Planner, Route
 from .scene_joint_states import SceneJointStates
 from .. import scene
@@ -28,9 +27,9 @@ from ..words import listed
 
 # After how long inputs that nobody sends are named [s], and how many unknown joint names are
 # warned about.
-PATIENCE, UNKNOWN_NAMES = 5.0, 1000
+MISSING_AFTER, UNKNOWN_NAMES = 5.0, 1000
 # How long the end of the node waits for its deletions of markers to arrive [s].
-FAREWELL = 0.1
+DELETION_TIMEOUT = 0.1
 
 
 class Kinematics(scene_node.SceneNode):
@@ -51,19 +50,16 @@ class Kinematics(scene_node.SceneNode):
                                 joint_state_reader.Reader(self._interpret), self._now)
         self._own: frozenset = frozenset()
         self._missing, self._unknown = set(self._inputs), Once(UNKNOWN_NAMES)
-        self._throttle = Throttle(self.get_logger())
-        self._patience = self.create_timer(
-            PATIENCE, self.guarded('the inputs that nobody sends', self._name_missing),
+        self._missing_timer = self.create_timer(
+            MISSING_AFTER, self.guarded('the inputs that nobody sends', self._name_missing),
             clock=Clock(clock_type=ClockType.STEADY_TIME), autostart=False)
         self.begin()
         try:
             next(iter(self.scene.machines.values())).linkage.accelerated()
         except ImportError as error:
             self.get_logger().info(f'{error}; plain Python moves the legs, to the same places')
-        self.create_subscription(
-            JointState, 'crank_states', self.guarded('crank_states', self._receive,
-                                                     self._planner.discard),
-            joint_state_reader.ANY, raw=True)
+        joint_state_reader.subscribe(
+            self, 'crank_states', self._planner.process, self._planner.discard)
 
     def serves(self) -> str:
         """Say which mechanisms it moves."""
@@ -122,34 +118,20 @@ class Kinematics(scene_node.SceneNode):
             self.get_logger().info(f'no robot_description of the whole scene: {error}', once=True)
         return lambda: self._scene_joint_states.describe(text) if models is self._models else None
 
-    def destroy_node(self) -> None:
-        """Delete what is displayed, then end."""
-        with suppress(RCLError, InvalidHandle):
-            self.say_goodbye()
-        super().destroy_node()
-
-    def say_goodbye(self) -> None:
+    def delete_displayed(self) -> None:
         """Delete what is displayed."""
         for one in self._mechanisms.values():
             one.clear()
         # What has not arrived when a process ends is lost.
-        deadline = time.monotonic() + FAREWELL
+        deadline = time.monotonic() + DELETION_TIMEOUT
         for one in self._mechanisms.values():
-            one.let_arrive(deadline)
+            one.wait_for_deletions(deadline)
 
     def _invalidate(self) -> None:
         self._planner.invalidate()
 
     def _now(self) -> bytes:
         return pack_time(self.get_clock().now().nanoseconds)
-
-    def _receive(self, text: bytes) -> None:
-        try:
-            self._planner.process(text)
-        except Unreadable as error:
-            reason = str(error)
-            self._throttle.warn('unreadable', lambda: (
-                f'crank_states: {len(text)} bytes that are no joint states are ignored: {reason}'))
 
     def _interpret(self, message: JointState) -> Tuple[Tuple[Route, ...], bool]:
         """Return the inputs that a source sets, and whether it says how fast they move."""
@@ -163,7 +145,7 @@ class Kinematics(scene_node.SceneNode):
     def _note(self, names: Iterable[str], sent: Iterable[str]) -> None:
         """Note which inputs are sent; name those that there are not, each once."""
         if len(self._missing) == len(self._inputs) and not self._missing.isdisjoint(sent):
-            self._patience.reset()
+            self._missing_timer.reset()
         self._missing.difference_update(sent)
         unknown = self._unknown.new(name for name in names if name not in self._inputs
                                     and name not in self._own)
@@ -174,7 +156,7 @@ class Kinematics(scene_node.SceneNode):
 
     def _name_missing(self) -> None:
         """Say once which inputs nobody sends."""
-        self._patience.cancel()
+        self._missing_timer.cancel()
         if self._missing:
             waiting = [name for name in self._inputs if name in self._missing]
             stuck = dict.fromkeys(mechanism for name in waiting

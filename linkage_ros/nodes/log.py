@@ -10,7 +10,7 @@ from functools import wraps
 import math
 import time
 import traceback
-from typing import Any, Callable, Hashable, Iterable, List, Optional, Set
+from typing import Any, Callable, Hashable, Iterable, List, Set
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -76,17 +76,14 @@ class Incidents:
             self._logger.error(f'internal error in {what}, which is dropped: {error!r} '
                                f'({frame.filename}:{frame.lineno}); logged once')
 
-    def guarded(self, what: str, callback: Callable,
-                failed: Optional[Callable[[], None]] = None) -> Callable:
-        """Return a callback that reports what is raised, and calls `failed` then."""
+    def guarded(self, what: str, callback: Callable) -> Callable:
+        """Return a callback that reports what is raised."""
         @wraps(callback)
         def guarded(*args: Any) -> Any:
             try:
                 return callback(*args)
             except Exception as error:
                 self.report(what, error)
-                if failed:
-                    failed()
                 return None
 
         return guarded

@@ -34,15 +34,15 @@ class Announcer:
         self._node = node
         self._publisher = node.create_publisher(ParameterEvent, TOPIC, LATCHED)
         # How many announcements the topic holds for late subscribers.
-        self._held = 0
+        self._announced = 0
 
     def first(self) -> Callable[[], None]:
         """Return what publishes all values for the first time, if nothing else has till then."""
         of, values = self._node.scene, _messages(self._node.scene.parameters)
 
         def publish() -> None:
-            if not self._held:
-                self._held = 1
+            if not self._announced:
+                self._announced = 1
                 self._publish(new_parameters=values if of is self._node.scene else _messages(
                     self._node.scene.parameters))
         return publish
@@ -50,10 +50,10 @@ class Announcer:
     def announce(self, changed: Iterable[scene.Parameter]) -> None:
         """Publish the values that several nodes act on of those that have changed."""
         values = _messages(changed)
-        if self._held and values:
+        if self._announced and values:
             # What has all values must not be the one that the next one pushes out.
-            self._held = 1 if self._held == DEPTH else self._held + 1
-            self._publish(changed_parameters=values if self._held > 1 else _messages(
+            self._announced = 1 if self._announced == DEPTH else self._announced + 1
+            self._publish(changed_parameters=values if self._announced > 1 else _messages(
                 self._node.scene.parameters))
 
     def _publish(self, **values: Any) -> None:
@@ -83,19 +83,19 @@ class Follower:
         fields = self._parameters.fields
         values, wrong = _read((*event.new_parameters, *event.changed_parameters), fields)
         if 'mechanisms' in values or event.node != self._owner:
-            self._meet(event, values)
+            self._compare(event, values)
         # What could not be may be now.
-        wanted = {name: value for name, value in {**self._refused, **values}.items()
+        changed = {name: value for name, value in {**self._refused, **values}.items()
                   if name in self._owned and not fields[name].read_only
                   and value != self._present(name)}
-        refused = self._parameters.follow(dict(sorted(wanted.items())))
-        self._refused = {name: wanted[name] for name in refused}
+        refused = self._parameters.follow(dict(sorted(changed.items())))
+        self._refused = {name: changed[name] for name in refused}
         self._warn('refused', wrong + [*refused.values()], 'values that cannot be followed')
 
     def _present(self, name: str) -> Any:
         return scene.plain(self._node.get_parameter_or(name).value)
 
-    def _meet(self, event: ParameterEvent, values: Mapping[str, Any]) -> None:
+    def _compare(self, event: ParameterEvent, values: Mapping[str, Any]) -> None:
         """Find out what is followed of an owner that says all."""
         fields, machines = self._parameters.fields, self._parameters.scene.machines
         started = event.node != self._owner or event.new_parameters

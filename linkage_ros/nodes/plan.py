@@ -216,6 +216,6 @@ class Planner:
     def _measure(self, source: Source, routes: Sequence[Route], moving: bool,
                  text: bytes) -> frozenset:
         """Set the inputs that sensors measure; return those that cannot be where they say."""
-        _, positions, velocities = source.take(text)
+        _, positions, velocities = source.read(text)
         return frozenset(route for route in routes if not route.mechanism.measure(
             route.input, positions[route.place], velocities[route.place] if moving else None))

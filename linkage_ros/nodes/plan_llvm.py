@@ -46,7 +46,7 @@ class LlvmExecutor:
 
     def run(self, text: bytes, output: Any) -> Union[None, bool, AbstractSet]:
         """See `PythonExecutor.run`."""
-        ending = self._ending(output) if output else None
+        ending = output and (output.compiled or self._ending(output))
         failed = self._pipeline.run(text, ending)
         if failed == native.UNSTAMPED:
             self._stamp[1:] = np.frombuffer(self._plan.now(), np.int64)
@@ -62,13 +62,12 @@ class LlvmExecutor:
 
     def publish(self, output: Any) -> None:
         """See `PythonExecutor.publish`."""
-        ending = self._ending(output)
+        ending = output.compiled or self._ending(output)
         ending.run()
         ending.publish()
 
     def _ending(self, output: Any) -> _Ending:
-        if output.compiled is None:
-            output.compiled = _Ending(self._plan, output, self._stamps, self._changes)
+        output.compiled = _Ending(self._plan, output, self._stamps, self._changes)
         return output.compiled
 
 

@@ -38,7 +38,7 @@ class PythonExecutor:
         return self._solved
 
     def _read(self, text: bytes) -> None:
-        stamp, positions, velocities = self._plan.source.take(text)
+        stamp, positions, velocities = self._plan.source.read(text)
         stamp = np.frombuffer(self._plan.now() if stamp == NEVER else stamp, np.int64)
         self._plan.stamp[:] = stamp
         for mechanism in self._plan.mechanisms:

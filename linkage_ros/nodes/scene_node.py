@@ -23,7 +23,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
-from .log import Incidents, refused
+from .log import Incidents, InvalidHandle, RCLError, refused
 from .ownership import Announcer, Follower
 from .parameters import SceneParameters
 from .shutdown import ShutdownHandler
@@ -150,8 +150,13 @@ class SceneNode(Node):
         return super().create_service(
             srv_type, srv_name, partial(self._respond, callback), **kwargs)
 
+    def delete_displayed(self) -> None:
+        """Delete what others display of the node; it is about to end."""
+
     def destroy_node(self) -> None:
-        """End the worker too."""
+        """Delete what is displayed, and end the worker too."""
+        with suppress(RCLError, InvalidHandle):
+            self.delete_displayed()
         self._worker.end()
         super().destroy_node()
 
@@ -265,7 +270,7 @@ def _spin(executor: Any, nodes: List[Node], shutdown: ShutdownHandler,
     try:
         # `wake` wakes not every executor.
         shutdown.wake = lambda: executor.create_task(lambda: None)
-        shutdown.last_words = partial(_say_goodbye, nodes)
+        shutdown.before_exit = partial(_delete_displayed, nodes)
         for node in nodes:
             executor.add_node(node)
         while rclpy.ok() and not shutdown.is_over:
@@ -280,10 +285,11 @@ def _spin(executor: Any, nodes: List[Node], shutdown: ShutdownHandler,
         executor.shutdown()
 
 
-def _say_goodbye(nodes: Iterable[Node]) -> None:
+def _delete_displayed(nodes: Iterable[Node]) -> None:
     for node in nodes:
         with suppress(Exception):
-            node.say_goodbye() if hasattr(node, 'say_goodbye') else None
+            if isinstance(node, SceneNode):
+                node.delete_displayed()
 
 
 def _refuse_namesake(node: Node, others: Iterable[Node]) -> None:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from array import array
+from contextlib import suppress
 import math
 import sys
 from typing import Any, Callable, Dict, List, Mapping, Sequence, Tuple
@@ -48,8 +49,7 @@ class ServoInverse(scene_node.SceneNode):
         self._sources: frozenset = frozenset()
         self._positions: Dict[str, float] = {}
         self._reader = joint_state_reader.Reader(self._interpret)
-        self.create_subscription(JointState, 'crank_states', self.guarded(
-            'crank_states', self._receive), joint_state_reader.ANY, raw=True)
+        joint_state_reader.subscribe(self, 'crank_states', self._receive)
         self.create_service(ServoInverseType, 'servo_inverse', self.answer)
         self.create_service(InputsFor, 'inputs_for', self.answer_together)
         self._stream = CommandStream(self, self.scene.machines, lambda machine: present(
@@ -109,13 +109,11 @@ class ServoInverse(scene_node.SceneNode):
                 if name in self._sources]
 
     def _receive(self, text: bytes) -> None:
-        try:
+        # `kinematics` says what is unreadable.
+        with suppress(Unreadable):
             source = self._reader.source(text)
-        except Unreadable:
-            # `kinematics` says so.
-            return
-        positions = source.take(text).positions
-        self._positions.update((name, positions[place]) for name, place in source.meaning)
+            positions = source.read(text).positions
+            self._positions.update((name, positions[place]) for name, place in source.meaning)
 
 
 def solve(inverse: InverseRequest, request: Any, response: Any) -> None:

@@ -10,10 +10,10 @@ import signal
 import socket
 import sys
 from threading import Event, Thread
-from typing import Any, Callable, Optional
+from typing import Any, Callable
 
 # How long what is being done may go on after a signal, until the process ends all the same [s].
-PATIENCE = 0.6
+TIMEOUT = 0.6
 
 
 class ShutdownHandler:
@@ -21,12 +21,12 @@ class ShutdownHandler:
     Catches SIGINT and SIGTERM in a thread, so that none interrupts a callback.
 
     The first one sets `is_over` and calls `wake`; whoever spins then stops. Where that takes
-    longer than PATIENCE, `last_words` are said, and the process ends with exit code 0.
+    longer than TIMEOUT, `before_exit` is called, and the process ends with exit code 0.
     """
 
     def __init__(self) -> None:
-        self.wake: Optional[Callable[[], Any]] = None
-        self.last_words: Optional[Callable[[], Any]] = None
+        self.wake: Callable[[], Any] = lambda: None
+        self.before_exit: Callable[[], Any] = lambda: None
         self.is_over = False
         self._left = Event()
 
@@ -34,10 +34,10 @@ class ShutdownHandler:
         self._received, self._sent = socket.socketpair()
         self._sent.setblocking(False)
         Thread(target=self._wait, name='linkage_ros signals', daemon=True).start()
+        signal.set_wakeup_fd(self._sent.fileno(), warn_on_full_buffer=False)
         # Python's own handler would raise KeyboardInterrupt amid a callback.
         self._before = {number: signal.signal(number, lambda *_: None)
                         for number in (signal.SIGINT, signal.SIGTERM)}
-        signal.set_wakeup_fd(self._sent.fileno(), warn_on_full_buffer=False)
         return self
 
     def __exit__(self, *_: Any) -> None:
@@ -53,11 +53,9 @@ class ShutdownHandler:
             if not self._received.recv(1):
                 return
             self.is_over = True
-            if self.wake:
-                self.wake()
-            if not self._left.wait(PATIENCE):
-                if self.last_words:
-                    self.last_words()
+            self.wake()
+            if not self._left.wait(TIMEOUT):
+                self.before_exit()
                 sys.stdout.flush()
                 sys.stderr.flush()
                 os._exit(0)

@@ -11,7 +11,7 @@ import threading
 from typing import Any, Callable, Deque, Dict, Iterable, Optional, Tuple
 
 # How long the end of a node waits for its worker [s].
-PATIENCE = 0.1
+TIMEOUT = 0.1
 
 # What other jobs make.
 OTHER = 'what is published once'
@@ -58,7 +58,7 @@ class Worker:
             self._ended.set()
             thread = self._thread
         if thread is not None and thread is not threading.current_thread():
-            thread.join(PATIENCE)
+            thread.join(TIMEOUT)
 
     def _start(self) -> None:
         if self._thread is None and not self._ended.is_set():
@@ -92,7 +92,7 @@ class Worker:
         executor, done = self._node.executor, threading.Event()
         if executor is not None:
             executor.create_task(partial(self._act, kind, act, done))
-            while not done.wait(PATIENCE) and not self._ended.is_set():
+            while not done.wait(TIMEOUT) and not self._ended.is_set():
                 pass
 
     def _act(self, kind: str, act: Callable[[], None], done: threading.Event) -> None:

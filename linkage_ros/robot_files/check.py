@@ -55,6 +55,14 @@ class Found(NamedTuple):
     wrong: str
     beyond: str
 
+    def said(self, name: str) -> str:
+        """Return what is said of a mechanism that is right."""
+        moved = ', '.join(f'{source} from {low:.4g} to {high:.4g}'
+                          for source, low, high in self.ranges)
+        beyond = f'; not beyond {self.beyond}' if self.beyond else ''
+        return (f'Checked: {name}: in {self.poses} poses of the robot, its loops closed in space, '
+                f'{moved}, the worst difference is {self.worst:.0e}, of {self.joint}{beyond}.')
+
 
 class Track(NamedTuple):
     """Poses along paths: where motors and joints are, which are closed, how stiff they are."""

@@ -16,8 +16,9 @@ from .spatial import Component, components, displaced, Poses, trees, turned
 from ..command import RequestError
 from ..words import listed
 
-# What is open by less, of the size of its loops, is closed by the steps from where it is.
-NEAR = 1e-6
+# What is open by less, of the size of its loops, is rounding, and closed from where it is: files
+# have angles such as 1.5708.
+NEAR = 1e-4
 # Other poses are looked for from so many starts; what is open by less is closed [of the size].
 STARTS, CLOSED = 24, 1e-10
 # A pose that is farther by less than this factor, and this [rad], is as near.
@@ -157,21 +158,24 @@ def _check_unfolded(component: Component, poses: Poses, motors: List[str], least
 
 
 def _refuse_fold(component: Component, poses: Poses, motors: List[str], aside: np.ndarray) -> None:
-    """Raise ValueError with both poses next to one in which bars lie in line."""
-    still = component.held(motors)
+    """Raise ValueError with both poses next to one in which bars lie in line, if two there are."""
+    still, ends = component.held(motors), True
     for ahead in (ASIDE, -ASIDE):
         step = component.towards_limits(motors, ahead)
         both = Poses(*map(np.concatenate, zip(*(component.closed(
             component.stepped(poses, step + side), still, 40) for side in (aside, -aside)))))
         name, first, second = component.farthest_apart(both, 1.0)
-        if np.max(component.gap(both)) < CLOSED and abs(first - second) > DISTINCT:
+        is_closed = np.max(component.gap(both)) < CLOSED
+        ends = ends and not is_closed
+        if is_closed and abs(first - second) > DISTINCT:
             where = ' '.join(f'{motor}={float(component.read(both)[motor][0]):.3g}'
                              for motor in motors)
             raise ValueError(f'bars lie in line where the file has them, and with {where} {name} '
                              f'is at {first:.3g} as well as at {second:.3g}: choose by --pose '
                              f'{where} {name}=...')
-    raise ValueError(f'its loops end where the file has {listed(motors)}: choose another pose '
-                     f'by --pose {motors[0]}=...')
+    if ends:
+        raise ValueError(f'its loops end where the file has {listed(motors)}: choose another '
+                         f'pose by --pose {motors[0]}=...')
 
 
 def nearest(component: Component, names: List[str], followers: List[str]) -> Tuple[Poses, str]:
@@ -183,8 +187,9 @@ def nearest(component: Component, names: List[str], followers: List[str]) -> Tup
     """
     start, still = component.at_start(), component.held(names)
     gap = float(component.gap(start)[0])
-    poses = component.closed(start, still)
-    if gap < NEAR and component.gap(poses)[0] < max(CLOSED, 1e-3 * gap) \
+    # Axes that lean a little are no reason to go far where nothing drives.
+    poses = component.closed(start, still, soft=1e-7)
+    if gap < NEAR and component.gap(poses)[0] <= max(CLOSED, gap) \
             and np.linalg.norm(component.away(poses.positions)) < 1e3 * max(gap, CLOSED):
         _check_unfolded(component, poses, names, max(FOLDED, 3.0 * math.sqrt(gap)))
         return poses, ''
@@ -204,11 +209,15 @@ def nearest(component: Component, names: List[str], followers: List[str]) -> Tup
     away = np.linalg.norm(component.away(found.positions) * determined, axis=1)
     nearest_one = int(np.argmin(away))
     for i in np.flatnonzero(away < ALIKE * away[nearest_one] + ALIKE_LENGTH):
-        name, first, second = component.farthest_apart(
-            found.some(np.array([nearest_one, i])), determined)
+        two = found.some(np.array([nearest_one, i]))
+        name, first, second = component.farthest_apart(two, determined)
         if abs(first - second) > DISTINCT:
-            raise ValueError(f'the file has them open, and they close as well with {name} at '
-                             f'{first:.3g} as at {second:.3g}: choose by --pose {name}=...')
+            # Where motors had to move, they are part of the choice.
+            chosen = [name, *(motor for motor in names if not held_now and motor != name)]
+            ends = [' '.join(f'{each}={component.read(two)[each][k]:.3g}' for each in chosen)
+                    for k in (0, 1)]
+            raise ValueError(f'the file has them open, and they close as well with {ends[0]} as '
+                             f'with {ends[1]}: choose by --pose {name}=...')
     return found.some(np.array([nearest_one])), said
 
 

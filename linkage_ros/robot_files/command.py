@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from itertools import combinations
 import math
-import re
 import shlex
 import sys
 from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
@@ -16,7 +15,7 @@ import numpy as np
 
 from . import check, closing, loops, model, readers, rods
 from .dyads import Drawing, Drive, short
-from .robot import FARTHEST, Joint, Robot
+from .robot import FARTHEST, Joint, plain, Robot
 from .. import command, mechanisms, scene
 from ..linkage.mechanism import Mechanism
 from ..scene.joint_names import quoted_name
@@ -87,49 +86,42 @@ class _NotPlaced(ValueError):
 def described(robot: Robot) -> Tuple[Dict[str, Any], List[str]]:
     """Return the parameters of a robot's scene, and what is left out and what was checked."""
     given: Dict[str, Any] = {'mechanisms': []}
-    robot, said, open_ones, stiff, faults = closing.closed(robot)
-    for group in loops.groups(robot, stiff):
-        fault = next((faults[joint.name] for joint in group.joints if joint.name in faults), '')
+    closed = closing.closed(robot)
+    robot, said = closed.robot, closed.said
+
+    def add(name: str, parameters: Mapping[str, Any], more: Sequence[str]) -> None:
+        given['mechanisms'].append(name)
+        given.update(parameters)
+        said.extend(more)
+
+    for group in loops.groups(robot, closed.stiff):
+        open_one, fault = (_first(reasons, group.joints) for reasons in (
+            closed.open_ones, closed.faults))
         left = group.joints
-        for part in group.parts if group.why else [group]:
+        for part in (group.parts if group.why else [group]) if not open_one else ():
             try:
-                if why := next((open_ones[joint.name] for joint in part.joints
-                                if joint.name in open_ones), ''):
-                    raise ValueError(why)
-                name, parameters, checked = _checked(
-                    robot, _drawn(robot, part), given['mechanisms'])
+                add(*_checked(robot, _drawn(robot, part), given['mechanisms']))
             except (ArithmeticError, ValueError) as error:
-                if not group.why:
-                    bodies = error.bodies if isinstance(error, _NotPlaced) else _bodies(left)
-                    reason = error if WRONG in str(error) else fault or error
-                    said.append(f'Left out: {", ".join(bodies)}: {reason}.')
-                continue
-            given['mechanisms'].append(name)
-            given.update(parameters)
-            said += checked
+                if group.why:
+                    continue
+                reason = error if WRONG in str(error) else fault or error
+                bodies = error.bodies if isinstance(error, _NotPlaced) else _bodies(left)
+                said.append(f'Left out: {", ".join(bodies)}: {reason}.')
             done = {joint.name for joint in part.joints}
             left = [joint for joint in left if joint.name not in done]
-        if group.why and left:
-            said += _in_space(robot, group._replace(joints=left), open_ones, fault, given)
+        if not left:
+            continue
+        try:
+            if open_one:
+                raise ValueError(open_one)
+            add(*rods.described(robot, group._replace(joints=left), given['mechanisms']))
+        except (ArithmeticError, ValueError) as error:
+            why = fault or (f'as rods in space: {error}' if group.why else error)
+            said.append(f'Left out: {", ".join(_bodies(left))}: '
+                        + f'{group.why}; ' * bool(group.why) + f'{why}.')
     if not given['mechanisms']:
         raise command.RequestError(' '.join(said) or 'no joint of this robot closes a loop')
     return given, said
-
-
-def _in_space(robot: Robot, group: loops.Group, open_ones: Mapping[str, str], fault: str,
-              given: Dict[str, Any]) -> List[str]:
-    """Add the mechanism of loops that are not planar; return what is said of it."""
-    try:
-        if why := next((open_ones[joint.name] for joint in group.joints
-                        if joint.name in open_ones), ''):
-            raise ValueError(why)
-        name, parameters, said = rods.described(robot, group, given['mechanisms'])
-    except (ArithmeticError, ValueError) as error:
-        return [f'Left out: {", ".join(_bodies(group.joints))}: {group.why}; '
-                + (fault or f'as rods in space: {error}') + '.']
-    given['mechanisms'].append(name)
-    given.update(parameters)
-    return said
 
 
 def _values(said: Sequence[str]) -> Dict[str, float]:
@@ -144,6 +136,10 @@ def _values(said: Sequence[str]) -> Dict[str, float]:
         if not name or not abs(found[name]) < FARTHEST:
             raise command.RequestError(f'{each!r} must be JOINT=VALUE, its value in rad or m')
     return found
+
+
+def _first(reasons: Mapping[str, str], joints: Sequence[Joint]) -> str:
+    return next((reasons[joint.name] for joint in joints if joint.name in reasons), '')
 
 
 def _bodies(joints: Sequence[Joint]) -> List[str]:
@@ -210,8 +206,7 @@ def _why(drawing: Drawing) -> str:
 def _checked(robot: Robot, drawing: Drawing, taken: Sequence[str]
              ) -> Tuple[str, Dict[str, Any], List[str]]:
     """Return a mechanism's name and parameters, and what is to be said, once it has its pose."""
-    name = re.sub('[^A-Za-z0-9]+', '_', drawing.moved_by[0].name).strip('_')[:60]
-    name = name if name[:1].isalpha() else f'joint_{name}'.rstrip('_')
+    name = plain(drawing.moved_by[0].name, 60)
     name = f'{name}_{len(taken)}' if name in taken else name
     loop, given = drawing.loop, {
         f'{name}.{key}': value for key, value in _parameters(drawing)}
@@ -231,18 +226,14 @@ def _checked(robot: Robot, drawing: Drawing, taken: Sequence[str]
     if found.wrong:
         raise ValueError(f'{WRONG}: {found.wrong}')
     said = [f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.'] if drawing.left else []
-    moved = ', '.join(f'{source} from {low:.4g} to {high:.4g}'
-                      for source, low, high in found.ranges)
-    said.append(f'Checked: {name}: in {found.poses} poses of the robot, its loops closed in '
-                f'space, {moved}, the worst difference is {found.worst:.0e}, of {found.joint}'
-                + (f'; not beyond {found.beyond}' if found.beyond else '') + '.')
+    said.append(found.said(name))
     said += [f'{joint} has its ends {gap:.2g} m apart along its axis, on which no angle depends.'
              for joint, gap in loop.across.items()]
     told = {called.name for called in machine.joints.values() if called.published}
     told |= {joint.name for joint in drawing.moved_by}
-    own = [part for joint in loop.joints for part in joint.name.split('+')
-           if drawing.parts.keys() >= {*joint.bodies}]
-    if lost := [joint for joint in robot.positions if joint in own and joint not in told]:
+    own = {one.name for joint in loop.joints if drawing.parts.keys() >= {*joint.bodies}
+           for one in joint.hinges}
+    if lost := [joint for joint in robot.positions if joint in own - told]:
         said.append(f'Not published: {", ".join(lost)}, which no angle in the plane tells.')
     return name, given, said
 

@@ -10,11 +10,11 @@ from typing import Collection, Dict, List, Mapping, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .robot import BALL, FIXED, HINGE, Joint, Robot, SLIDE, UNIVERSAL
+from .robot import BALL, FIXED, HINGE, Joint, Robot, SLIDE
 from .spatial import blocks, trees
 
 # What joints of a planar loop may be.
-FLAT = (HINGE, SLIDE, BALL, UNIVERSAL)
+FLAT = (HINGE, SLIDE, BALL)
 # Axes that differ by more [rad] are not parallel: files have angles such as 1.5708.
 ASKEW = 1e-4
 # Hinges nearer to each other [m] cross in a point; the ends of a loop [m] are in one plane.
@@ -101,7 +101,7 @@ def _blocks(robot: Robot, home: Mapping[str, str], joints: Sequence[Joint]) -> L
         every = {found[body][1] for body in block} | {*own}
         chosen = [joint for joint in joints if joint in every]
         ground = min((body for joint in chosen for body in joint.bodies), key=ranks.__getitem__)
-        names = {name for joint in chosen for name in joint.name.split('+')}
+        names = {one.name for joint in chosen for one in joint.hinges}
         frame_id = next((body for joint in robot.joints for body in joint.bodies
                          if joint.name in names and home[body] == ground), ground)
         try:
@@ -155,7 +155,8 @@ def _with_balls(robot: Robot, joints: List[Joint]) -> List[Joint]:
         if bodies[0] != bodies[1] and np.linalg.norm(places[0] - places[1]) < TOGETHER \
                 and (BALL in (own[0].kind, own[1].kind)
                      or np.linalg.norm(np.cross(*axes)) > ASKEW):
-            ball = Joint(f'{own[0].name}+{own[1].name}', BALL, bodies, places, axes[0])
+            ball = Joint(f'{own[0].name}+{own[1].name}', BALL, bodies, places, axes[0],
+                         parts=tuple(own))
             joints, on[body] = [*(joint for joint in joints if joint not in own), ball], []
             for end in bodies:
                 on[end] = [ball if joint in own else joint for joint in on[end]]
@@ -235,7 +236,7 @@ def _check_rods(ground: str, joints: Sequence[Joint]) -> None:
     """Raise ValueError if a body can leave the plane: only rods may be on balls alone."""
     held = {ground}
     while more := {end for joint in joints for end in joint.bodies
-                   if joint.kind not in (BALL, UNIVERSAL)
+                   if joint.kind != BALL
                    and held & {*joint.bodies}} - held:
         held |= more
     for body in dict.fromkeys(end for joint in joints for end in joint.bodies):

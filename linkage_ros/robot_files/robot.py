@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+import re
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
@@ -34,9 +35,11 @@ class Joint:
     turns : pair of array
         Rotation matrices of its frame on each body.
     second : array
-        The axis on its second body, where that is another, as of a universal joint.
+        The axis on its second body, where that is another.
     is_cut : bool
         Whether it closes a loop of a tree, so that its two frames may be apart.
+    parts : tuple of Joint
+        The hinges that a ball is made of, if it is.
 
     """
 
@@ -50,12 +53,24 @@ class Joint:
     turns: Any = (np.eye(3), np.eye(3))
     second: Any = None
     is_cut: bool = False
+    parts: Tuple['Joint', ...] = ()
+
+    @property
+    def hinges(self) -> List['Joint']:
+        """The hinges that it is made of, or itself."""
+        return [one for part in self.parts for one in part.hinges] or [self]
 
     @property
     def axes(self) -> Tuple[np.ndarray, np.ndarray]:
         """Its axis as each body has it."""
         other = self.turns[1] @ self.turns[0].T @ self.axis if self.second is None else self.second
         return self.axis, other
+
+
+def plain(name: str, most: int) -> str:
+    """Return a name of letters, digits and single underscores, of no more than so many."""
+    found = re.sub('[^A-Za-z0-9]+', '_', name).strip('_')[:most]
+    return found if found[:1].isalpha() else f'joint_{found}'.rstrip('_')
 
 
 @dataclass
@@ -89,6 +104,14 @@ class Robot:
         if kind in (HINGE, SLIDE, UNIVERSAL) and not size > 0.0:
             raise RequestError(f'the axis of joint {name} has no length')
         low, high = (float(str(limit) or 'nan') for limit in limits)
+        if kind == UNIVERSAL:
+            # Two hinges with a cross between them.
+            cross = f'{name}/cross'
+            self.frames[cross] = frame
+            self.join(name, HINGE, (bodies[0], cross), frame, axis)
+            self.join(f'{name}/second', HINGE, (cross, bodies[1]), frame,
+                      frame[:3, :3].T @ second, other)
+            return
         if kind not in (HINGE, SLIDE):
             position = None
         self.joints.append(Joint(

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from itertools import product
 import math
-import re
 from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
 
 import numpy as np
@@ -21,13 +20,12 @@ import numpy as np
 from . import check
 from .dyads import short
 from .loops import Group
-from .robot import BALL, HINGE, Joint, Robot, SLIDE, UNIVERSAL
+from .robot import BALL, HINGE, Joint, plain, Robot, SLIDE
 from .. import mechanisms, scene
 from ..linkage.rod_lines import FORMS, WindowError
 from ..scene.joint_names import quoted_name
 from ..words import listed
 
-_BALLS = BALL, UNIVERSAL
 # Limits of a hinge that say nothing [rad].
 _ANY = 0.999 * math.pi
 # Poses on each side of the motors' ranges that a check moves them in.
@@ -56,7 +54,7 @@ class Rods:
     """
 
     def __init__(self, robot: Robot, group: Group):
-        ground, self.frame_id, joints = group.ground, group.frame_id, group.joints
+        ground, self.frame_id = group.ground, group.frame_id
         self._seen = np.linalg.inv(robot.frames[self.frame_id])
         self._driven = {*robot.driven}
         self.links: Dict[str, Link] = {}
@@ -64,11 +62,11 @@ class Rods:
         # The joint that drives an input, by the input's name.
         self.inputs: Dict[str, Joint] = {}
         self._names: Set[str] = {*FORMS, 'ground', 'at', 'axis', 'within', 'length'}
-        own = {body: [joint for joint in joints if body in joint.bodies]
-               for joint in joints for body in joint.bodies}
-        rods = {body: tuple(held) for body, held in own.items() if body != ground
-                and len(held) == 2 and all(joint.kind in _BALLS for joint in held)
-                and BALL in {joint.kind for joint in held}}
+        rods = {body: tuple(held) for body, held in _on_bodies(group.joints).items()
+                if body != ground and [joint.kind for joint in held] == [BALL, BALL]}
+        joints = [one for joint in group.joints for one in (
+            [joint] if {*joint.bodies} & rods.keys() else joint.hinges)]
+        own = _on_bodies(joints)
         halves = [joint for joint in joints if joint.kind == SLIDE and joint.name in self._driven
                   and all(len(own[body]) == 2 and body != ground for body in joint.bodies)]
         self._bodies = {ground: 'ground'}
@@ -89,8 +87,7 @@ class Rods:
                                   for body in half.bodies])
 
     def _named(self, joint: Joint) -> str:
-        name = re.sub('[^A-Za-z0-9]+', '_', joint.name).strip('_')[:50]
-        name = name if name[:1].isalpha() else f'joint_{name}'.rstrip('_')
+        name = plain(joint.name, 50)
         while name in self._names:
             name += '_'
         self._names.add(name)
@@ -104,20 +101,15 @@ class Rods:
         """Add a link on a joint with one that is there."""
         backwards = joint.bodies[0] not in self._bodies
         base, body = joint.bodies[::-1] if backwards else joint.bodies
-        if joint.kind not in (HINGE, SLIDE, UNIVERSAL):
+        if joint.kind not in (HINGE, SLIDE):
             raise ValueError(f'{joint.name} is a joint of type {joint.kind} and no end of a rod')
-        axes = [joint.axis] if joint.kind != UNIVERSAL else [joint.axis, joint.second]
-        parent = self._bodies[base]
-        for axis in axes[::-1] if backwards else axes:
-            name = self._named(joint)
-            self.links[name] = Link(name, parent, joint, -axis if backwards else axis,
-                                    joint.places[backwards])
-            parent = name
-        self._bodies[body] = parent
+        name = self._bodies[body] = self._named(joint)
+        self.links[name] = Link(name, self._bodies[base], joint,
+                                -joint.axis if backwards else joint.axis, joint.places[backwards])
         if joint.name in self._driven:
             if joint.kind != HINGE:
                 raise ValueError(f'{joint.name} drives, and is no hinge and no cylinder')
-            self.inputs[parent] = joint
+            self.inputs[name] = joint
 
     def _end(self, joint: Joint, body: str) -> str:
         """Return the other end of a ball of a rod: its link and place."""
@@ -148,7 +140,6 @@ class Rods:
         found = []
         for name, link in self.links.items():
             word = 'motor' if name in self.inputs else link.joint.kind
-            word = HINGE if word == UNIVERSAL else word
             ends = None if word == 'motor' else limits.get(name, self._limits(link))
             found.append(f'{name} {word} {link.parent} at {self._text(link.place)} axis '
                          f'{self._text(link.axis, False)}' + (
@@ -189,6 +180,11 @@ class Rods:
         return math.dist(map(float, words[3:6]), map(float, words[7:10]))
 
 
+def _on_bodies(joints: Sequence[Joint]) -> Dict[str, List[Joint]]:
+    return {body: [joint for joint in joints if body in joint.bodies]
+            for joint in joints for body in joint.bodies}
+
+
 def described(robot: Robot, group: Group, taken: Sequence[str]
               ) -> Tuple[str, Dict[str, Any], List[str]]:
     """
@@ -209,11 +205,7 @@ def described(robot: Robot, group: Group, taken: Sequence[str]
                               ends, 0.0)
     if compared.wrong:
         raise ValueError(compared.wrong)
-    moved = ', '.join(f'{source} from {low:.4g} to {high:.4g}'
-                      for source, low, high in compared.ranges)
-    said.append(f'Checked: {name}: in {compared.poses} poses of the robot, its loops closed in '
-                f'space, {moved}, the worst difference is {compared.worst:.0e}, of '
-                f'{compared.joint}.')
+    said.append(compared.said(name))
     return name, given, said + [*_corners(machine, found)]
 
 

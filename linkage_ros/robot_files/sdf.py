@@ -9,6 +9,7 @@ from functools import lru_cache
 import math
 from pathlib import Path
 from typing import Dict, Iterator, List, Optional, Tuple
+from xml.etree.ElementTree import SubElement
 
 import numpy as np
 
@@ -19,11 +20,20 @@ from ..command import RequestError
 
 def read(path: str, root: Element) -> Robot:
     """Return the robot that the first model with joints is."""
+    _say_frames(root)
     for model in (*root.findall('model'), *root.findall('world/model')):
         parts = [*_parts(model, '', path)]
         if any(part.tag == 'joint' for _, part in parts):
-            return _Model(once(parts), root.get('version', '1.12')).robot()
+            return _Model(once(parts)).robot()
     raise RequestError('the SDF has no model with joints')
+
+
+def _say_frames(root: Element) -> None:
+    """Write what is without saying up to version 1.4 of a file: axes are in the model's frame."""
+    if tuple(map(int, root.get('version', '1.12').split('.'))) <= (1, 4):
+        for axis in (*root.iter('axis'), *root.iter('axis2')):
+            if not text(axis, 'use_parent_model_frame'):
+                SubElement(axis, 'use_parent_model_frame').text = '1'
 
 
 def _parts(model: Element, name: str, path: str) -> Iterator[Tuple[str, Element]]:
@@ -45,7 +55,9 @@ def _included(part: Element, name: str, path: str) -> Iterator[Tuple[str, Elemen
     file = file / 'model.sdf' if file.is_dir() else file
     if not file.is_file() or part.get('merge') in ('1', 'true'):
         raise RequestError(f'the model includes {uri!r}, which is not read: write it in its place')
-    model = parse(str(file)).find('model')
+    root = parse(str(file))
+    _say_frames(root)
+    model = root.find('model')
     if model is None:
         raise RequestError(f'{file} has no model')
     for tag in ('pose', 'placement_frame'):
@@ -60,9 +72,8 @@ def _included(part: Element, name: str, path: str) -> Iterator[Tuple[str, Elemen
 class _Model:
     """Frames of a model's parts; names in it count from the model that they are said in."""
 
-    def __init__(self, parts: Dict[str, Element], version: str):
+    def __init__(self, parts: Dict[str, Element]):
         self._parts = parts
-        self._version = tuple(int(part) for part in version.split('.'))
         self.frame = lru_cache(None)(self._frame)
 
     def robot(self) -> Robot:
@@ -152,9 +163,7 @@ class _Model:
         way, turned = numbers(text(axis, 'xyz', '0 0 1')), self.frame(name)[:3, :3]
         if seen := attribute(axis, 'xyz', 'expressed_in'):
             return turned.T @ self.frame(self.named(name, seen))[:3, :3] @ way
-        # As all axes were up to version 1.4.
-        is_model_s = text(axis, 'use_parent_model_frame')
-        if is_model_s in ('1', 'true') or not is_model_s and self._version <= (1, 4):
+        if text(axis, 'use_parent_model_frame') in ('1', 'true'):
             return turned.T @ self.frame(name.rpartition('::')[0])[:3, :3] @ way
         return way
 

@@ -16,7 +16,7 @@ from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Seq
 
 import numpy as np
 
-from .robot import BALL, FIXED, FREE, HINGE, Joint, Robot, SLIDE, UNIVERSAL
+from .robot import BALL, FIXED, FREE, HINGE, Joint, Robot, SLIDE
 from ..command import RequestError
 
 # A pose moves by no more than this in a step [rad, or parts of the size].
@@ -28,7 +28,7 @@ MOST = 100
 # Hinges nearer to each other [m] cross in a point.
 TOGETHER = 1e-6
 # In which order joints are taken into the tree, so that hinges and balls are left to close it.
-_TREE = {FIXED: 0, SLIDE: 1, FREE: 2, UNIVERSAL: 3, BALL: 4, HINGE: 5}
+_TREE = {FIXED: 0, SLIDE: 1, FREE: 2, BALL: 3, HINGE: 4}
 
 
 class Element(NamedTuple):
@@ -180,8 +180,7 @@ class Component:
         zero = np.zeros_like(x)
         self._skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
         self.unit = np.where(self._slides[self._column], self.size, 1.0)
-        self._ends = np.array([[self._end(found, body) for body in cut.bodies]
-                               for cut in self._cuts], int).reshape(-1, 2)
+        self._cut_ends = [[self._end(found, body) for body in cut.bodies] for cut in self._cuts]
         self._equations()
 
     def _end(self, found: Dict[str, Tuple[str, Joint]], body: str) -> int:
@@ -204,8 +203,7 @@ class Component:
         sign = 1.0 if forward else -1.0
         place, axis = joint.places[not forward], joint.axes[not forward]
         parts = {HINGE: [(HINGE, axis)], SLIDE: [(SLIDE, axis)], BALL: [(BALL, axis)],
-                 FREE: [*((SLIDE, each) for each in np.eye(3)), (BALL, axis)],
-                 UNIVERSAL: [(HINGE, axis), (HINGE, joint.second)][::1 if forward else -1]}
+                 FREE: [*((SLIDE, each) for each in np.eye(3)), (BALL, axis)]}
         for kind, way in parts.get(joint.kind, []):
             self._elements.append(Element(joint, kind, sign, place, np.asarray(way), parent,
                                           body))
@@ -213,20 +211,20 @@ class Component:
         self._on[body] = parent
 
     def _equations(self) -> None:
-        """Note places and directions on both ends of each cut that have to be the same."""
-        self._places = np.array([cut.places for cut in self._cuts]).reshape(-1, 2, 3)
-        pairs: List[Tuple[int, np.ndarray, np.ndarray]] = []
-        self._dots = []
-        for i, cut in enumerate(self._cuts):
+        """Note points on both ends of each cut that have to be the same."""
+        ends, points = [], []
+        for end, cut in zip(self._cut_ends, self._cuts):
+            ways = [np.zeros((2, 3))]
             if cut.kind == HINGE:
                 one, other = cut.axes
-                pairs.append((i, one, other if one @ other > 0.0 else -other))
+                ways.append(np.array([one, other if one @ other > 0.0 else -other]))
             if cut.kind == FIXED:
-                pairs += [(i, cut.turns[0][:, k], cut.turns[1][:, k]) for k in range(3)]
-            if cut.kind == UNIVERSAL:
-                self._dots.append((i, cut.axes[0], cut.second))
-        self._pair_ends = self._ends[[i for i, _, _ in pairs]].reshape(-1, 2)
-        self._pairs = np.array([(one, other) for _, one, other in pairs]).reshape(-1, 2, 3)
+                ways += [np.array([turn[:, k] for turn in cut.turns]) for k in range(3)]
+            points += [np.array(cut.places) + self.size * way for way in ways]
+            ends += [end] * len(ways)
+        self._ends, self._points = np.array(ends, int).reshape(-1, 2), np.array(points)
+        above = self._above[self._ends][..., self._column]
+        self._signed = above * np.array([[1.0], [-1.0]])
 
     @property
     def positions(self) -> Dict[str, float]:
@@ -329,47 +327,25 @@ class Component:
     def errors(self, poses: Poses, slopes: bool = False) -> Tuple[np.ndarray, np.ndarray]:
         """Return what is open in each pose [m], and its derivatives by the columns."""
         frames = self._frames(poses)
-        count = len(frames)
-        turns, moves = self._twists(frames) if slopes else (frames[:, :0], frames[:, :0])
-        rows, slope = [], []
-        for ends, vectors, size, are_places in (
-                (self._ends, self._places, 1.0, True), (self._pair_ends, self._pairs, self.size,
-                                                        False)):
-            both = []
-            for side in (0, 1):
-                own = frames[:, ends[:, side]]
-                seen = np.einsum('pcij,cj->pci', own[..., :3, :3], vectors[:, side])
-                seen = seen + own[..., :3, 3] if are_places else seen
-                both.append(seen)
-                if slopes:
-                    above = self._above[ends[:, side]][:, self._column]
-                    rate = _cross(turns[:, None], seen[:, :, None])
-                    rate = rate + moves[:, None] if are_places else rate
-                    rate = rate * (above * size * (1.0, -1.0)[side])[None, :, :, None]
-                    slope.append(rate.swapaxes(2, 3).reshape(count, -1, len(self._column)))
-            rows.append((size * (both[0] - both[1])).reshape(count, -1))
-            if slopes:
-                slope[-2:] = [slope[-2] + slope[-1]]
-        for i, one, other in self._dots:
-            ends = self._ends[i]
-            first, second = (np.einsum('pij,j->pi', frames[:, end, :3, :3], way)
-                             for end, way in zip(ends, (one, other)))
-            rows.append(self.size * (np.einsum('pi,pi->p', first, second) - one @ other)[:, None])
-            if slopes:
-                above = self._above[ends][:, self._column].astype(float)
-                across = _cross(first, second)
-                slope.append(self.size * np.einsum('pci,pi->pc', turns, across)[:, None]
-                             * (above[0] - above[1]))
-        return np.concatenate(rows, axis=1), (np.concatenate(slope, axis=1) * self.unit
-                                              if slopes else np.zeros(0))
+        own, count = frames[:, self._ends], len(frames)
+        seen = np.einsum('prsij,rsj->prsi', own[..., :3, :3], self._points) + own[..., :3, 3]
+        error = (seen[:, :, 0] - seen[:, :, 1]).reshape(count, -1)
+        if not slopes:
+            return error, np.zeros(0)
+        turns, moves = self._twists(frames)
+        rates = _cross(turns[:, None, None], seen[:, :, :, None]) + moves[:, None, None]
+        slope = np.einsum('prsci,rsc->pric', rates, self._signed)
+        return error, slope.reshape(count, -1, len(self._column)) * self.unit
 
     def closed(self, poses: Poses, still: np.ndarray, count: int = 12,
-               home: Optional[np.ndarray] = None, firm: float = 0.0) -> Poses:
+               home: Optional[np.ndarray] = None, firm: float = 0.0, soft: float = 1e-14
+               ) -> Poses:
         """
         Return poses that Newton's method has closed, as far as it can in so many steps.
 
         The columns that are `still` do not move. `home` [columns] pulls poses back, at first
-        as firmly as loops pull, then less and less.
+        as firmly as loops pull, then less and less. Ways to move that loops hold no more firmly
+        than `soft` are hardly gone.
         """
         free = ~still
         for i in range(count):
@@ -378,7 +354,7 @@ class Component:
             down = slope.swapaxes(1, 2)
             square, pull = down @ slope, (down @ error[:, :, None])[..., 0]
             most = np.einsum('pii->p', square)[:, None]
-            weight = 1e-14 * most
+            weight = soft * most
             if home is not None:
                 weight = weight + most * max(firm * 0.5 ** i, 1e-13)
                 pull = pull + weight * ((poses.positions[:, self._column] - home) / self.unit)[
@@ -469,7 +445,7 @@ class Component:
         found = {each.joint.name: each.sign * poses.positions[:, i] + each.joint.position
                  for i, each in enumerate(self._elements) if each.joint.position is not None}
         frames = self._frames(poses)
-        for cut, (first, second) in zip(self._cuts, self._ends):
+        for cut, (first, second) in zip(self._cuts, self._cut_ends):
             if cut.position is not None and cut.kind == HINGE:
                 turned = frames[:, first, :3, :3].swapaxes(1, 2) @ frames[:, second, :3, :3]
                 skew = np.stack([turned[:, 2, 1] - turned[:, 1, 2], turned[:, 0, 2] - turned[

@@ -194,8 +194,9 @@ class Reader:
                             (cut['parent'], cut['child']), own, axis)
         for name, kind in zip(loops.get('joint_name', ()), loops.get('joint_type', ())):
             self._change(name, str(kind).upper())
-        self.robot.driven = [*loops.get('independent', ()), *loops.get('name_mot', ()),
-                             *self.robot.driven]
+        # What it says of motors is of the closed robot, transmissions are of the open tree.
+        self.robot.driven = [*loops.get('independent', ()), *loops.get('name_mot', ())] \
+            or self.robot.driven
 
     def _change(self, name: str, kind: str) -> None:
         """Make a joint of the tree one of another type, about axes of its frame."""
@@ -203,10 +204,13 @@ class Reader:
             if joint.name == name:
                 joint.position, joint.limits = None, None
                 if kind.startswith('UJOINT'):
-                    joint.kind, (first, second) = UNIVERSAL, ('XYZ'.index(x) for x in kind[-2:])
-                    joint.axis, joint.second = (joint.turns[0][:, i] for i in (first, second))
-                else:
-                    joint.kind = {'SPHERICAL': BALL, 'FIXED': FIXED}.get(kind, kind)
+                    self.robot.joints.remove(joint)
+                    first, second = ('XYZ'.index(x) for x in kind[-2:])
+                    self.robot.join(name, UNIVERSAL, joint.bodies, at(
+                        joint.places[0], joint.turns[0]), np.eye(3)[first],
+                        second=joint.turns[0][:, second])
+                    return
+                joint.kind = {'SPHERICAL': BALL, 'FIXED': FIXED}.get(kind, kind)
 
 
 def _vector(said: Any) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 from .input_settings import in_words, InputSettings
 from .scene_mechanism import SceneMechanism
 from ..formula.program import compile_in_background
-from ..linkage.inputs import Arc
+from ..linkage.inputs import Arc, Input
 from ..linkage.inverse import CLOSE
 from ..words import listed
 
@@ -206,8 +206,8 @@ class InverseRequest:
         found = []
         for answer in self._inverse.all(np.divide(values, self._units),
                                         np.divide(near, self._scales)):
-            inputs = [_inside(drive, value * scale) for drive, value, scale in zip(
-                self._drives, answer.inputs, self._scales)]
+            inputs = [_inside(drive, input_, value * scale) for drive, input_, value, scale in zip(
+                self._drives, self._inverse.inputs, answer.inputs, self._scales)]
             if not any(map(math.isnan, inputs)):
                 found.append(SceneAnswer(tuple(inputs), answer.mode, answer.is_singular))
         sizes = [drive.input.size for drive in self._drives]
@@ -245,7 +245,7 @@ class InverseRequest:
 
     def _beyond(self, end: float, input_: float, name: str) -> Tuple[float, float, str]:
         """Return how far beyond an end an input is, where that is, and the end's name."""
-        sign, own = 1.0 if name == 'upper' else -1.0, self._drives[0].input
+        sign, own = 1.0 if name == 'upper' else -1.0, self._inverse.inputs[0]
         gap = sign * (input_ - end)
         gap = gap % own.turn if own.turns else gap if gap > 0.0 else math.inf
         return gap, end + sign * gap, name
@@ -289,11 +289,11 @@ class InverseRequest:
         return [[(value * self._units[0], at * scale) for value, at in span] for span in found]
 
 
-def _inside(drive: InputSettings, value: float) -> float:
+def _inside(drive: InputSettings, input_: Input, value: float) -> float:
     """Return an input between its ends, where a crank's whole periods are one; else NaN."""
     low, high = drive.ends or (value, value)
-    if drive.input.turns and not low <= value <= high:
-        turn = drive.input.turn
+    if input_.turns and not low <= value <= high:
+        turn = input_.turn
         value += turn * (math.ceil((low - value) / turn) if value < low else
                          math.floor((high - value) / turn))
     return value if low <= value <= high else math.nan

@@ -25,6 +25,9 @@ def in_yaml(given: Mapping[str, Any]) -> str:
     texts = ['/**:', '  ros__parameters:']
     for name, value in given.items():
         shown = list(value) if isinstance(value, tuple) else value
+        if shown == []:
+            # ROS reads no empty list, and it is what is there without.
+            continue
         numbers = isinstance(shown, list) and not any(isinstance(one, str) for one in shown)
         text = yaml.dump({name: shown}, Dumper=Dumper, width=1000,
                          default_flow_style=numbers and None)

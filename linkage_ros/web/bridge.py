@@ -8,9 +8,10 @@ from typing import Any, Callable, Optional
 
 from rclpy.node import Node
 
+from ..nodes.log import Throttle
+
 SECONDS_TO_ANSWER = 3.0
 SECONDS_BETWEEN_TRIES = 0.02
-SECONDS_BETWEEN_WARNINGS = 5.0
 
 
 class NoAnswer(Exception):
@@ -35,6 +36,7 @@ class Bridge:
 
     def __init__(self, node: Node) -> None:
         self.node = node
+        self._throttle = Throttle(node.get_logger())
         self.loop: asyncio.AbstractEventLoop
 
     def ask(self, function: Callable[..., Any], *args: Any) -> asyncio.Future[Any]:
@@ -74,9 +76,9 @@ class Bridge:
         except asyncio.TimeoutError:
             raise NoAnswer(f'{client.srv_name} does not answer') from None
 
-    def warn(self, text: str) -> None:
-        """Say what went wrong, not too often."""
-        self.node.get_logger().warning(text, throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
+    def warn(self, text: str, subject: str = '') -> None:
+        """Log what went wrong with a subject, not too often."""
+        self._throttle.warn(subject, lambda: text)
 
     def hand_over(self, function: Callable[..., Any], *args: Any) -> None:
         """Let a function run in the web's thread, if that is still there."""

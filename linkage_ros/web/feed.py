@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from visualization_msgs.msg import Marker
 
-from .bridge import SECONDS_BETWEEN_WARNINGS
 from ..nodes.message_layout import deserialized, MessageLayout, NoLayout
 
 KINDS = {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'strip', Marker.SPHERE_LIST: 'joints',
@@ -35,19 +34,19 @@ class Feed:
         Marker or MarkerArray.
     number : callable
         Returns a number for the first marker of a message, the second and so on; always the same.
-    logger : rclpy logger
-        Told of messages that are dropped.
+    warn : callable
+        Logs a text about a subject: a message that is dropped, and its topic.
 
     """
 
     def __init__(self, topic: str, mechanism: str, type_: type, number: Callable[[int], int],
-                 logger: Any) -> None:
+                 warn: Callable[[str, str], None]) -> None:
         self.newest: Optional[bytes] = None
         self.topic = topic
         self._mechanism = mechanism
         self._type = type_
         self._number = number
-        self._logger = logger
+        self._warn = warn
         self._drawn: Optional[bytes] = None
         self._layout: Optional[MessageLayout] = None
         # By the markers' numbers; the places are those of the markers in the message.
@@ -74,8 +73,7 @@ class Feed:
                 self._draw(self.newest)
             except Exception as error:
                 # What the middleware raises is its own affair, and the bytes are anybody's.
-                self._logger.warning(f'a message on {self.topic} is dropped: {error}',
-                                     throttle_duration_sec=SECONDS_BETWEEN_WARNINGS)
+                self._warn(f'a message on {self.topic} is dropped: {error}', self.topic)
         return self._looks, self._records
 
     @np.errstate(over='ignore')

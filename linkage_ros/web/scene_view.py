@@ -441,9 +441,7 @@ class SceneView:
         def number(i: int) -> int:
             return self._numbers.setdefault((name, i), len(self._numbers))
 
-        # A logger of its own: what is throttled is the warnings of this topic alone.
-        logger = self._bridge.node.get_logger().get_child(name.strip('/'))
-        feed = Feed(name, key, type_, number, logger)
+        feed = Feed(name, key, type_, number, self._bridge.warn)
         return feed, self._bridge.node.create_subscription(
             type_, name, lambda raw: self._receive(feed, raw), qos, raw=True)
 

@@ -7,11 +7,11 @@ How far an answer about any linkage may be from its drawing, where joints hang o
 A result is measured in units of its *sensitivity*: what moving each thing that is rounded by half
 ulp does to the true result. Rounded are the inputs (angles, lengths, dimensions, numbers in the
 lines, what is calculated from them, what gears make of them), and each joint on the way but those
-of the ground: half an ulp of the largest coordinate on its line; a gap so small that it counts as
-a change point may be closed. The pin of a crank on the ground is charged only to lines that are
-not drawn on an arm from the ground to that pin: for such an arm half angles keep all digits, and
-the rule holds them to it. For velocities and rates also the velocity of each of those joints is
-rounded, for accelerations their acceleration too, and how the inputs move. The rule is
+that are written down: half an ulp of the largest coordinate on its line; a gap so small that it
+counts as a change point may be closed. The pin of a crank on the ground is charged only to lines
+that are not drawn on an arm from the ground to that pin: for such an arm half angles keep all
+digits, and the rule holds them to it. For velocities and rates also the velocity of each of those
+joints is rounded, for accelerations their acceleration too, and how the inputs move. The rule is
 
     error <= 4 x sensitivity + 1 ulp of the result,
 
@@ -255,9 +255,11 @@ class Measure:
             if self._lines[name].word in ('carriage', 'cylinder'):
                 slack[name] = LOOSER * (slack[name] + half_ulp(self.linkage.longest))
         states = {name: _state(gap, slack[name]) for name, gap in closures.items()}
-        states.update((name, 'adrift' if arm <= RULES[0] * bent[name] else 'undirected')
-                      for name, arm in arms.items()
+        states.update((name, 'undirected') for name, arm in arms.items()
                       if states.get(name, 'meets') == 'meets' and arm <= GRAZE * bent[name])
+        states.update((name, 'adrift') for name, arm in arms.items()
+                      if states.get(name) in ('undirected', 'grazes')
+                      and arm <= RULES[0] * bent[name])
         states.update((name, 'grazes') for name in grazed if states.get(name) != 'fails')
         states.update((name, 'slips') for name in self._undirected(now))
         return Truth(values, [float(x) for x in spread], states, closures, slack)
@@ -293,7 +295,7 @@ class Measure:
         for i, slack in self.linkage.geared(rows, given):
             moved = [*rows[:i], (*rows[i][:-1], rows[i][-1] + side * slack), *rows[i + 1:]]
             yield still._replace(numbers=self._nominal._replace(rows=moved))
-        hung = [name for name in self.linkage.placed if name not in self.linkage.fixed]
+        hung = [name for name in self.linkage.placed if self._lines[name].word != 'ground']
         for moved in self._displaced(now.points, hung, side):
             yield still._replace(joints=moved)
         for i, (way, motion) in enumerate(zip(ways, speeds)):

@@ -99,8 +99,9 @@ class Subject:
 
     @property
     def periodic(self):
-        """Whether the joints are where they were, a turn later, but for a few rounded places."""
-        now, later = (self.drawn(self.values[::40] + turn)[0].points for turn in (0.0, TURN))
+        """Whether the joints are where they were, a period later, but for a few rounded places."""
+        now, later = (self.drawn(self.values[::40] + turn)[0].points
+                      for turn in (0.0, self.inputs[0].turn))
         return self.turns and all(np.mean(np.abs(place - later[name]) > 1e-6) < 0.1
                                   for name, place in now.items())
 
@@ -304,7 +305,7 @@ def reach(subject):
     arcs = subject.mechanism.reach(*subject.held)
     drawing, _ = subject.drawn(subject.values)
     held = subject.reachable(drawing)
-    inside = _inside(arcs, subject.values, TURN if subject.periodic else 0.0)
+    inside = _inside(arcs, subject.values, subject.inputs[0].turn if subject.periodic else 0.0)
     for i in _some(np.flatnonzero(held != inside)):
         value = float(subject.values[i])
         states = subject.states(value)

@@ -45,9 +45,10 @@ class Design(NamedTuple):
         return f'C({lines}{given}{sides})'
 
 
-def design(rng):
-    """Return a random `Design`."""
-    return _Writer(rng).written()
+def design(rng, without=()):
+    """Return a random `Design`, in which some words may not come up."""
+    return _Writer(rng, {word: often for word, often in WORDS.items()
+                         if word not in without}).written()
 
 
 def given(rng, count, spots, inputs):
@@ -86,8 +87,10 @@ def _log_uniform(rng, low, high):
 class _Writer:
     """A linkage that is being written."""
 
-    def __init__(self, rng):
+    def __init__(self, rng, words):
         self._rng = rng
+        self._words, self._often = list(words), np.array(list(words.values())) / sum(
+            words.values())
         self._lines, self._dimensions = [], {}
         self._names = iter('ABCDEFGHJKLMNPQRSTUVWXYZ')
         self._place, self._kind = {}, {}
@@ -118,8 +121,7 @@ class _Writer:
         for _ in range(10 * moving):
             if len(self._place) - len(self._fixed) >= moving + inputs:
                 break
-            word = rng.choice(list(WORDS), p=np.array(list(WORDS.values())) / sum(WORDS.values()))
-            getattr(self, f'_{word}')()
+            getattr(self, f'_{rng.choice(self._words, p=self._often)}')()
         branches = {}
         for line in self._lines:
             parts = line.split()

@@ -1,0 +1,262 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Random robots in SDF: their frames and axes are known before they are written in one of many ways.
+
+Source of what each way means: the SDFormat specification (sdformat.org/spec) and its proposals on
+pose frame semantics, nested models, `expressed_in`, `degrees` and `mimic`.
+"""
+
+from itertools import count
+import math
+from xml.sax.saxutils import quoteattr
+
+from linkage_ros.robot_files import closing, readers
+import numpy as np
+import pytest
+
+VERSIONS = '1.4', '1.5', '1.6', '1.7', '1.9', '1.11'
+
+
+def rotation(rng):
+    """Return a random rotation matrix."""
+    q, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    return q * np.linalg.det(q)
+
+
+def frame(rng):
+    """Return a random pose."""
+    made = np.eye(4)
+    made[:3, :3], made[:3, 3] = rotation(rng), rng.normal(size=3)
+    return made
+
+
+def words(numbers):
+    return ' '.join(repr(float(number)) for number in numbers)
+
+
+def euler(turned):
+    """Return roll, pitch, yaw about fixed axes."""
+    return (math.atan2(turned[2, 1], turned[2, 2]), -math.asin(turned[2, 0]),
+            math.atan2(turned[1, 0], turned[0, 0]))
+
+
+def quaternion(turned):
+    """Return x, y, z, w: the axis that a matrix leaves as it is, and half its angle."""
+    values, ways = np.linalg.eig(turned)
+    axis = ways[:, np.argmin(np.abs(values - 1.0))].real
+    across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    angle = math.atan2(axis @ np.cross(across, turned @ across), across @ (turned @ across))
+    return *(axis * math.sin(0.5 * angle)), math.cos(0.5 * angle)
+
+
+class Writer:
+    """
+    Writes a model of links whose poses are known.
+
+    Attributes
+    ----------
+    links : dict
+        Where each link is, by its whole name.
+    axes, places : dict
+        Of each joint its axis and its place.
+    follows : dict
+        Of joints that follow another: that, the multiplier, the offset and the reference.
+
+    """
+
+    def __init__(self, rng, version, folder):
+        self.rng, self.folder = rng, folder
+        self.numbers = count()
+        self.links, self.axes, self.places, self.bodies, self.follows = {}, {}, {}, {}, {}
+        text = self.model('', 'robot', frame(rng), version, 2, np.eye(4))
+        self.text = f'<?xml version="1.0"?><sdf version="{version}">{text}</sdf>'
+
+    def pose(self, at, base, version, known=(), relative=True):
+        """Return a pose in one of the ways of a version; the frames in `known` may be said."""
+        said = ''
+        if known and relative and version >= (1, 7) and self.rng.random() < 0.6:
+            name = list(known)[self.rng.integers(len(known))]
+            base, said = known[name], f' relative_to={quoteattr(name)}'
+        seen = np.linalg.inv(base) @ at
+        way = self.rng.integers(3) if version >= (1, 9) else 0
+        if way == 1:
+            return (f'<pose{said} rotation_format="quat_xyzw">'
+                    f'{words([*seen[:3, 3], *quaternion(seen[:3, :3])])}</pose>')
+        angles = np.degrees(euler(seen[:3, :3])) if way else euler(seen[:3, :3])
+        said += ' degrees="true"' * bool(way)
+        return f'<pose{said}>{words([*seen[:3, 3], *angles])}</pose>'
+
+    def model(self, scope, name, at, version, depth, base, known=()):
+        """Return a model and note what is in it."""
+        number = tuple(map(int, version.split('.')))
+        rng, inner = self.rng, f'{scope}::{name}'.lstrip(':') if depth < 2 else ''
+
+        def whole(one):
+            return f'{inner}::{one}'.lstrip(':')
+
+        here = {'__model__': at}
+        parts = [self.pose(at, base, number, known)]
+        for _ in range(rng.integers(2, 5)):
+            link = f'link {next(self.numbers)}'
+            there = frame(rng)
+            parts.append(f'<link name="{link}">{self.pose(there, at, number, here)}</link>')
+            here[link] = self.links[whole(link)] = there
+        links = [link for link in here if link != '__model__']
+        for _ in range(rng.integers(3) if number >= (1, 7) else 0):
+            own, there = f'frame-{next(self.numbers)}', frame(rng)
+            on = [*here][rng.integers(len(here))] if rng.random() < 0.5 else ''
+            said = f' attached_to="{on}"' if on else ''
+            parts.append(f'<frame name="{own}"{said}>'
+                         f'{self.pose(there, here[on] if on else at, number, here)}</frame>')
+            here[own] = there
+        if depth and number >= (1, 7):
+            child = f'inner {next(self.numbers)}'
+            there = frame(rng)
+            if rng.random() < 0.5:
+                parts.append(self.included(inner, child, there, at, here, number))
+            else:
+                parts.append(self.model(inner, child, there, version, depth - 1, at, here))
+            links += [link[len(whole('')):] for link in self.links
+                      if link.startswith(whole(child))]
+            here.update({link: self.links[whole(link)] for link in links})
+        rng.shuffle(links)
+        for parent, child in zip(['world', *links] if depth == 2 else links,
+                                 links if depth == 2 else links[1:]):
+            parts.append(self.joint(whole, parent, child, at, here, number))
+        return f'<model name="{name}">{"".join(parts)}</model>'
+
+    def included(self, scope, name, at, base, here, number):
+        """Return an include of a model in a file of another version."""
+        other = VERSIONS[self.rng.integers(len(VERSIONS))]
+        folder = self.folder / f'model_{name.split()[1]}'
+        folder.mkdir()
+        # What the file says of its own pose is what the include says instead.
+        text = self.model(scope, name, at, other, 0, frame(self.rng))
+        uri = ['model://', '', 'file://'][self.rng.integers(3)] + folder.name
+        (folder / 'model.sdf').write_text(f'<sdf version="{other}">{text}</sdf>')
+        return (f'<include><uri>{uri}</uri><name>{name}</name>'
+                f'{self.pose(at, base, number, here)}</include>')
+
+    def joint(self, whole, parent, child, at, here, number):
+        """Return a joint of any pose, axis and way to say it."""
+        rng, name, there = self.rng, f'joint {next(self.numbers)}', frame(self.rng)
+        axis = rng.normal(size=3)
+        axis /= np.linalg.norm(axis)
+        seen, said = there, ''
+        if number <= (1, 4):
+            seen = at
+        elif number <= (1, 6) and rng.random() < 0.5:
+            seen, said = at, '<use_parent_model_frame>true</use_parent_model_frame>'
+        elif number >= (1, 7) and rng.random() < 0.5:
+            other = [*here][rng.integers(len(here))]
+            seen, said = here[other], quoteattr(other)
+        xyz = f'<xyz{" expressed_in=" + said if said[:1] == chr(34) else ""}>' \
+              f'{words(seen[:3, :3].T @ axis * rng.uniform(0.5, 2.0))}</xyz>'
+        more = said if said[:1] == '<' else ''
+        before = [one for one in self.axes if one.startswith(whole('')) and '::' not in one[
+            len(whole('')):]]
+        if number >= (1, 11) and before and rng.random() < 0.5:
+            leader = before[rng.integers(len(before))]
+            numbers = rng.normal(size=3).tolist()
+            more += (f'<mimic joint="{leader[len(whole("")):]}"><multiplier>{numbers[0]!r}'
+                     f'</multiplier><offset>{numbers[1]!r}</offset><reference>{numbers[2]!r}'
+                     '</reference></mimic>')
+            self.follows[whole(name)] = leader, *numbers
+        self.axes[whole(name)], self.places[whole(name)] = axis, there[:3, 3]
+        self.bodies[whole(name)] = tuple(
+            one if one == 'world' else whole(one) for one in (parent, child))
+        kind = 'prismatic' if rng.random() < 0.3 else 'revolute'
+        return (f'<joint name="{name}" type="{kind}"><parent>{parent}</parent>'
+                f'<child>{child}</child>{self.pose(there, here[child], number, here)}'
+                f'<axis>{xyz}{more}</axis></joint>')
+
+
+def check_is_read(folder, seed):
+    """Check that a robot is read as it was before it was written."""
+    rng = np.random.default_rng(seed)
+    made = Writer(rng, VERSIONS[seed % len(VERSIONS)], folder)
+    file = folder / 'robot.sdf'
+    file.write_text(made.text)
+    robot = readers.read(str(file))
+    assert {*robot.frames} - {'world'} == {*made.links}
+    for name, there in made.links.items():
+        assert robot.frames[name] == pytest.approx(there, abs=1e-12), name
+    assert {joint.name for joint in robot.joints} == {*made.axes}
+    for joint in robot.joints:
+        assert joint.bodies == made.bodies[joint.name]
+        assert joint.axis == pytest.approx(made.axes[joint.name], abs=1e-12), joint.name
+        assert joint.places[0] == pytest.approx(made.places[joint.name], abs=1e-12)
+    assert robot.follows.keys() == made.follows.keys()
+    for name, (leader, ratio, offset, reference) in made.follows.items():
+        assert robot.follows[name][0] == leader
+        for position in (-1.0, 0.0, 2.0):
+            found = robot.follows[name][1] * position + robot.follows[name][2]
+            assert found == pytest.approx(ratio * (position - reference) + offset)
+
+
+@pytest.mark.parametrize('seed', range(30))
+def test_links_are_where_they_were_before_they_were_written(tmp_path, seed):
+    check_is_read(tmp_path, seed)
+
+
+@pytest.mark.long
+def test_many_robots_are_read_as_they_were(tmp_path):
+    for seed in range(30, 1500):
+        (tmp_path / str(seed)).mkdir()
+        check_is_read(tmp_path / str(seed), seed)
+
+
+def turn(robot, name, body, base):
+    """Return how a body is turned as seen from another, from where the file has both."""
+    here = closing.posed(robot, name).frames
+    was = np.linalg.inv(robot.frames[base]) @ robot.frames[body]
+    return (np.linalg.inv(here[base]) @ here[body])[:3, :3] @ was[:3, :3].T
+
+
+def angle_about(axis, turned):
+    """Return by how much a matrix turns about an axis."""
+    skew = np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0],
+                     turned[1, 0] - turned[0, 1]])
+    return math.atan2(0.5 * axis @ skew, 0.5 * (np.trace(turned) - 1.0))
+
+
+@pytest.mark.parametrize('seed', range(8))
+def test_a_gearbox_turns_its_bodies_as_the_specification_says(tmp_path, seed):
+    # theta_2 = -gearbox_ratio theta_1, both from the reference body, about axis and axis2.
+    rng, file = np.random.default_rng(seed), tmp_path / 'gear.sdf'
+    signs, ratio = rng.choice([-1, 1], 4), rng.uniform(0.2, 3.0)
+    ends = [('carrier', 'sun'), ('carrier', 'planet')]
+    joints = ''.join(
+        f'<joint name="{name}" type="revolute"><parent>{pair[0]}</parent><child>{pair[1]}</child>'
+        f'<axis><xyz>0 0 {sign}</xyz></axis></joint>'
+        for name, pair, sign in zip('ab', (pair[::rng.choice([-1, 1])] for pair in ends), signs))
+    file.write_text(
+        '<sdf version="1.9"><model name="m"><link name="carrier"/><link name="sun"/>'
+        f'<link name="planet"><pose>1 0 0 0 0 0</pose></link>{joints}'
+        '<joint name="g" type="gearbox"><parent>sun</parent><child>planet</child>'
+        f'<gearbox_ratio>{ratio}</gearbox_ratio><gearbox_reference_body>carrier'
+        f'</gearbox_reference_body><axis><xyz>0 0 {signs[2]}</xyz></axis>'
+        f'<axis2><xyz>0 0 {signs[3]}</xyz></axis2></joint></model></sdf>')
+    robot = readers.read(str(file))
+    (follower, (leader, factor, offset)), = robot.follows.items()
+    positions = {leader: 0.4, follower: factor * 0.4 + offset}
+    one, two = (angle_about(np.array([0.0, 0.0, sign]), turn(robot, positions, body, 'carrier'))
+                for sign, body in zip(signs[2:], ('sun', 'planet')))
+    assert math.remainder(two + ratio * one, math.tau) == pytest.approx(0.0, abs=1e-12)
+    assert len(robot.joints) == 2
+
+
+def test_a_merged_include_and_a_placement_frame_are_refused(tmp_path):
+    text = ('<sdf version="1.9"><model name="m"><link name="a"/><joint name="j" type="revolute">'
+            '<parent>world</parent><child>a</child></joint>{}</model></sdf>')
+    file = tmp_path / 'robot.sdf'
+    for part, why in (
+            ('<include merge="true"><uri>other</uri></include>', 'write it in its place'),
+            ('<include><uri>nowhere</uri></include>', "includes 'nowhere', which is not"),
+            ('<model name="n" placement_frame="b"><link name="b"/></model>',
+             'has a placement_frame, which is not read')):
+        file.write_text(text.format(part))
+        with pytest.raises(readers.RequestError, match=why):
+            readers.read(str(file))
