@@ -320,7 +320,7 @@ class Inverse:
         """Return the inputs of a mode that need not be held to the forward formula, and rates."""
         (a, b), (c, d) = mode.rates
         det = a * d - b * c
-        return [gated(real(1.0), abs(sum(mode.inputs, real(0.0))), real(0.0)),
+        return [where(abs(sum(mode.inputs, real(0.0))) < LARGE, 1.0, 0.0),
                 *map(self._counted, range(self._n), mode.inputs),
                 d / det, -c / det, -b / det, a / det]
 

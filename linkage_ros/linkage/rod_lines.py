@@ -83,14 +83,6 @@ class WindowError(ValueError):
         self.limits = limits
 
 
-class Demand(NamedTuple):
-    """What dimensions have to make positive, and the problem where they do not."""
-
-    line: Line
-    amount: Real
-    problem: str
-
-
 class HeldLink(NamedTuple):
     """Two hinges in a row that two rods hold: what its window is made from, as expressions."""
 
@@ -149,19 +141,16 @@ def draw(builder: Builder, lines: Iterable[Line], symbols: Mapping[str, Real],
 
 def turning_rods(lines: List[Line], inputs: Collection[str]) -> List[str]:
     """Return the rods that turn a hinge, which has two sides, where others are given."""
-    return [group.rods[0].names[0] for group in _Assembly(lines, inputs).order()
-            if len(group.rods) == 1 and group.links]
+    return [rods[0].names[0] for rods, links in _Assembly(lines, inputs).order()
+            if len(rods) == 1 and links]
 
 
-class Group(NamedTuple):
-    """What is solved together: rods, and the hinges or slide that they tell."""
-
-    rods: Tuple[Line, ...]
-    links: Tuple[str, ...]
+# What is solved together: rods, and the hinges or slide that they place.
+Group = Tuple[Tuple[Line, ...], Tuple[str, ...]]
 
 
 class _Assembly:
-    """The tree of links, and the order in which rods tell what is not an input."""
+    """The tree of links, and the order in which rods place what is not an input."""
 
     def __init__(self, lines: List[Line], inputs: Collection[str] = ()):
         self.lines = {line.names[0]: line for line in lines}
@@ -192,12 +181,12 @@ class _Assembly:
         while left:
             open_ = [(line, tuple(x for x in self.between(*_links(line)) if x in unknown))
                      for line in left]
-            group = self._next(open_)
-            found.append(group)
-            unknown -= {*group.links}
-            left = [line for line in left if line not in group.rods]
+            rods, links = self._next(open_)
+            found.append((rods, links))
+            unknown -= {*links}
+            left = [line for line in left if line not in rods]
         for name in unknown:
-            raise self.lines[name].error(f'no rod tells where {name} is')
+            raise self.lines[name].error(f'no rod places {name}')
         return found
 
     def _next(self, left: List[Tuple[Line, Tuple[str, ...]]]) -> Group:
@@ -209,11 +198,11 @@ class _Assembly:
                 raise line.error('nothing is left to move between its ends: one rod too many, or '
                                  'one hinge too few')
             if len(links) == (line not in free):
-                return Group((line,), links)
+                return (line,), links
         for (one, links), (other, same) in combinations(left, 2):
             if links == same and len(links) == 2 and not {one, other} & set(free) \
                     and self._in_a_row(links):
-                return Group((one, other), links[::-1])
+                return (one, other), links[::-1]
         line, links = min(left, key=lambda each: len(each[1]))
         others = [other.names[0] for other, also in left
                   if other is not line and set(also) & set(links)]
@@ -309,7 +298,8 @@ class _Drawing:
                              'within is from -180deg to 180deg at most')
 
     def _demand(self, line: Line, amount: Real, problem: str) -> None:
-        self._builder.demands.append(Demand(line, amount, problem))
+        """Have a line refused for dimensions that make an amount zero or negative."""
+        self._builder.demands.append((line, amount, problem))
 
     def _drive(self, name: str) -> None:
         """Make an angle or a length an input."""
@@ -386,7 +376,7 @@ class _Drawing:
         joint.gate(self._edges(joint, joint.turn.angle if joint.turn else joint.shift))
 
     def _edges(self, joint: _Joint, value: Any) -> List[Limit]:
-        """Return the limits of a joint, and have them kept."""
+        """Return the limits of a joint, which the linkage has from now on."""
         if not joint.limits:
             return []
         slack = TOLERANCE * self._span if joint.line.word == 'slide' else real(EDGE)

@@ -194,19 +194,9 @@ def rod_on_hinge(hinge: Hinge, pivot: Pivot, end: Vector, length: Real, side: Re
     """
     Return the turn of a hinge with which a rod fits, its limits, and the transmission angle [rad].
 
-    Parameters
-    ----------
-    hinge : Hinge
-        What is turned.
-    pivot, end : Pivot, Vector
-        The rod's ends as seen from the hinge's parent, and from its child at angle zero.
-    length : Real
-        Of the rod [m].
-    side : Real
-        1 or -1: from the direction of the pivot the end turns off to the left or right.
-    span : Real
-        The size of the numbers that all this is made from [m].
-
+    The rod's ends are as seen from the hinge's parent, and from its child at angle zero. Seen from
+    the axis the end turns off to the left of the pivot, where the side is 1, or right, where it is
+    -1. The span is the size of the numbers that all this is made from [m].
     """
     across = hinge.axis.cross(end.minus(hinge.origin))
     # Of an end next to the axis this is square to the axis no more than to rounding, so once more.
@@ -369,7 +359,7 @@ def _on_circle(c: Real, s: Real) -> Tuple[Real, Real]:
 
 
 def gated_by(value: Real, limits: Iterable[Limit]) -> Real:
-    """Return a value where limits are kept, NaN elsewhere."""
+    """Return a value inside limits, NaN elsewhere."""
     for limit in limits:
         value = gated(value, limit.margin, limit.tolerance)
     return value

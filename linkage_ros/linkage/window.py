@@ -24,11 +24,11 @@ from typing import Any, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .spatial import Circle, EDGE, gap, LAST_STEP, newton_step, row, STEPS, Vector
+from .spatial import Circle, EDGE, gap, LAST_STEP, newton_step, Pose, row, STEPS, Vector
 
 # Cells on each side of the rectangle, of all motor angles, and again of each of these that is
-# needed: at first, and for limits that are given where that is too coarse.
-COARSE, FINE = (12, 36, 3), (20, 48, 4)
+# needed: at first, and where limits that are this part as wide are proved, though they are not.
+COARSE, FINE, NEARLY = (10, 36, 2), (20, 48, 4), 0.8
 # What directions [rad] have to be apart, and what rounding may do to f, as a part of its terms.
 APART, ROUNDING = 1e-6, 1e-14
 # Poses on each side of the rectangle to which the steps have to come back, one step before the
@@ -36,7 +36,7 @@ APART, ROUNDING = 1e-6, 1e-14
 # these poses, too.
 POSES, BACK = 33, 0.01 * LAST_STEP
 # Halvings on the way to the largest rectangle; how much smaller it becomes if steps do not do.
-HALVINGS, SMALLER = 6, 0.9
+HALVINGS, SMALLER = 7, 0.9
 # The hull is taken to be a polygon of 16 sides: directions in units of cells.
 SIDES = [(math.cos(angle), math.sin(angle)) for angle in np.arange(8) * math.pi / 8.0]
 
@@ -84,12 +84,13 @@ class HeldBy(NamedTuple):
         """Return the directions of its gradients in cells of a rectangle."""
         motors = self._motors(poses, count)
         if len(motors.middle) > 1:
-            needed, half = self._over(motors, poses)[0].any(axis=1), motors.half / again
-            motors = Cells((motors.middle[needed, None] + half * np.arange(
+            coarse, half = self._allowed(motors, poses).any(axis=1), motors.half / again
+            motors = Cells((motors.middle[coarse, None] + half * np.arange(
                 1 - again, again, 2)).ravel(), half)
-        allowed, gradient, spread = self._over(motors, poses)
+        allowed = self._allowed(motors, poses)
         needed = allowed.any(axis=1)
-        allowed, gradient, spread = allowed[needed], gradient[needed], spread[needed]
+        allowed = allowed[needed]
+        gradient, spread = self._gradients(Cells(motors.middle[needed], motors.half), poses)
         first = np.take_along_axis(gradient, allowed.argmax(axis=1)[:, None], 1)
         turned, hull = np.angle(gradient * first.conj()), _hull(allowed)
         low = np.where(hull, turned - spread, np.inf).min(axis=1, initial=np.inf)
@@ -109,19 +110,28 @@ class HeldBy(NamedTuple):
         half = np.array(0.5 * (high - low) / count)
         return Cells(low + half * np.arange(1, 2 * count, 2), half)
 
-    def _over(self, motors: Cells, poses: Cells) -> Tuple[np.ndarray, ...]:
-        """
-        Return what holds over cells of a motor and of poses, arrays (k, n).
+    def _pivots(self, motors: Cells) -> Tuple[Vector, Vector, float]:
+        """Return where the pivot is, its derivative by the motor's angle, and half of a cell."""
+        turn = 0.0 if self.length is None else float(motors.half)
+        angle = motors.middle[:, None] * (turn > 0.0)
+        return (self.pivot.at(np.cos(angle), np.sin(angle)),
+                self.pivot.ahead(np.cos(angle), np.sin(angle)), turn)
 
-        That is whether f may be zero, the gradient in the middle as x + iy, and by how much [rad]
-        its direction may differ elsewhere.
-        """
-        at = motors.middle[:, None]
-        angle, turn, length, way = (at, motors.half, self.length, 0.0) \
-            if self.length is not None else (0.0 * at, 0.0, at, motors.half)
-        pose = tuple(f(x) for x in poses.middle for f in (np.cos, np.sin))
-        pivot, moved = (of(np.cos(angle), np.sin(angle))
-                        for of in (self.pivot.at, self.pivot.ahead))
+    def _allowed(self, motors: Cells, poses: Cells) -> np.ndarray:
+        """Return whether f may be zero somewhere in cells of a motor and of poses (k, n)."""
+        pivot, moved, turn = self._pivots(motors)
+        length, way = (self.length, 0.0) if self.length is not None else (
+            motors.middle[:, None], motors.half)
+        rod, by_p, by_r = row(pivot, self.end, _pose(poses.middle))
+        *bounds, size = self._bounds()
+        halves = turn, *poses.half
+        terms = sum(abs(x) * half for x, half in zip((rod.dot(moved), by_p, by_r), halves))
+        slack = 0.5 * max(bounds) * sum(halves) ** 2 + way * (length + 0.5 * way)
+        return ~(abs(gap(rod, length)) > terms + slack + ROUNDING * (size + length) ** 2)
+
+    def _gradients(self, motors: Cells, poses: Cells) -> Tuple[np.ndarray, np.ndarray]:
+        """Return gradients in the middle of cells as x + iy, and by how much [rad] they turn."""
+        pose, (pivot, moved, turn) = _pose(poses.middle), self._pivots(motors)
         rod, by_p, by_r = row(pivot, self.end, pose)
         centre, end, ahead = (each.turned(*pose[:2]) for each in (
             self.end.centre, self.end.at(*pose[2:]), self.end.ahead(*pose[2:])))
@@ -131,18 +141,13 @@ class HeldBy(NamedTuple):
                    pivot.x * end.x + pivot.y * end.y + 1j * across,
                    across + 1j * (ahead.dot(ahead) + rod.dot(end.minus(centre))))
         halves = turn, *poses.half
-        first, second, motor, size = self._bounds()
-        square = 0.5 * sum(halves) ** 2
-        terms = sum(abs(x) * half for x, half in zip((rod.dot(moved), by_p, by_r), halves))
-        possible = ~(abs(gap(rod, length)) > terms + square * max(first, second, motor)
-                     + way * (length + 0.5 * way) + ROUNDING * (size + length) ** 2)
         gradient = by_p + 1j * by_r
         steep = abs(gradient)
         seen = [change * gradient.conj() * (half / steep) for change, half in zip(changes, halves)]
-        rest = square * math.hypot(first, second)
+        rest = 0.5 * math.hypot(*self._bounds()[:2]) * sum(halves) ** 2
         along, aside = steep - rest - sum(abs(x.real) for x in seen), rest + sum(
             abs(x.imag) for x in seen)
-        return possible, gradient, np.where(along > 0.0, np.arctan2(aside, along), np.pi)
+        return gradient, np.where(along > 0.0, np.arctan2(aside, along), np.pi)
 
     def _bounds(self) -> Tuple[float, float, float, float]:
         """Return bounds of derivatives of f by the first, second angle, motor; of A and B."""
@@ -153,17 +158,7 @@ class HeldBy(NamedTuple):
 
 
 class Window:
-    """
-    A rectangle of both angles of a link on two hinges in a row, held by two rods.
-
-    Parameters
-    ----------
-    rods : sequence of HeldBy
-        Both rods.
-    low, high : array-like (2,)
-        The rectangle [rad].
-
-    """
+    """A rectangle [rad] of both angles of a link on two hinges in a row, held by two rods."""
 
     def __init__(self, rods: Sequence[HeldBy], low: Sequence[float], high: Sequence[float]):
         self.rods = rods
@@ -187,7 +182,8 @@ class Window:
 
     def is_right(self) -> bool:
         """Return whether it holds one pose at most for any motor angles, and all are found."""
-        return (self.is_single(COARSE) or self.is_single(FINE)) and self.comes_back()
+        return (self.is_single(COARSE) or self.scaled(NEARLY).is_single(COARSE)
+                and self.is_single(FINE)) and self.comes_back()
 
     def is_single(self, cells: Tuple[int, int, int]) -> bool:
         """Return whether it is proved that it holds one pose at most for any motor angles."""
@@ -219,8 +215,7 @@ class Window:
             pivot = Vector(*(x[there] for x in pivot))
             off = pivot.minus(_place(rod.end, poses[:, there]))
             rods.append((pivot, rod.end, np.sqrt(off.dot(off))))
-        first, second = self.middle
-        pose = math.cos(first), math.sin(first), math.cos(second), math.sin(second)
+        pose = _pose(self.middle)
         for _ in range(STEPS - 1):
             pose, _step = newton_step(rods, pose)
         left = [np.angle((pose[2 * i] + 1j * pose[2 * i + 1]) * np.exp(-1j * poses[i, there]))
@@ -252,6 +247,12 @@ def _flat(way: Circle) -> float:
     return math.hypot(*way.centre[:2]) + _norm(way.u)
 
 
-def _place(end: Circle, poses: np.ndarray) -> Vector:
+def _pose(poses: np.ndarray) -> Pose:
+    """Return the cosine and sine of the first and of the second angle."""
     first, second = poses
-    return end.at(np.cos(second), np.sin(second)).turned(np.cos(first), np.sin(first))
+    return np.cos(first), np.sin(first), np.cos(second), np.sin(second)
+
+
+def _place(end: Circle, poses: np.ndarray) -> Vector:
+    cos, sin, *second = _pose(poses)
+    return end.at(*second).turned(cos, sin)
