@@ -81,7 +81,7 @@ def joints(machine: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
     machine.linkage.inverse(tuple(outputs))
     named = [machine.joints.get(_key(machine, output)) or JointName(f'{machine.name}_{output}')
              for output in outputs]
-    return [axis(machine, output, called.name, called.sign, called.offset, called.taken)
+    return [axis(machine, output, called.name, called.sign, called.offset, called.wraps)
             for output, called in zip(outputs, named)]
 
 

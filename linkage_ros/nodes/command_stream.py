@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Commands for actuators from values of outputs, message by message or ahead of time."""
+"""Actuator commands for requested outputs, from single messages or trajectories."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ from ..scene.joint_names import JointName
 from ..scene.scene_mechanism import SceneMechanism
 from ..words import elided, listed
 
-# Between two searches for a first command, which may be anywhere [s].
+# Shortest time between two searches for a first command [s].
 SECONDS_BETWEEN_SEARCHES = 0.5
-# Arrangements of commands that are cached, unknown names that are warned about, and points of a
-# trajectory: that many take the worker some seconds.
+# Cached arrangements of commands, reported unknown names, and points of a trajectory, which take
+# the worker some seconds.
 ARRANGEMENTS, UNKNOWN_NAMES, MOST_POINTS = 100, 1000, 10_000
 
 
 class Target(NamedTuple):
-    """Outputs of a mechanism as a message names them, and what solves them for its actuators."""
+    """Requested outputs of a mechanism, with their names in messages and their solver."""
 
     named: str
     machine: SceneMechanism
@@ -45,20 +45,20 @@ class Target(NamedTuple):
 
     @property
     def actuators(self) -> list[str]:
-        """Return what moves the inputs: of one that is measured elsewhere, the input itself."""
+        """Return the actuators' names: each input's source, or the input if it is derived."""
         return [f'{self.machine.name}_{drive.input.name}' if drive.measures else drive.source
                 for drive in self.machine.inputs.values()]
 
     def command(self, positions: Sequence[float], speeds: Optional[Sequence[float]],
                 near: Sequence[float], jumps: bool) -> Any:
-        """Return what `InverseRequest.command` does, for what a message says [rad or m]."""
+        """Solve a message's positions and speeds [rad or m]; see `InverseRequest.command`."""
         return self.request.command(
             self._values(positions),
             speeds and [name.sign * speeds[place] for name, place in zip(self.names, self.places)],
             near, jumps)
 
     def reason(self, positions: Sequence[float]) -> str:
-        """Return in words why positions cannot be had."""
+        """Explain why positions have no solution."""
         values = ', '.join(f'{positions[place]:.6g}' for place in self.places)
         return f'{self.named} cannot be {values}: {self.request.reason(*self._values(positions))}'
 
@@ -68,7 +68,7 @@ class Target(NamedTuple):
 
 
 class Command(NamedTuple):
-    """What a mechanism's actuators are to do, and its inputs there [rad or m]; speeds if known."""
+    """Actuator positions, speeds if known, and the corresponding inputs [rad or m]."""
 
     target: Target
     inputs: Sequence[float]
@@ -77,7 +77,7 @@ class Command(NamedTuple):
 
     @property
     def efforts(self) -> list[float]:
-        """Return what actuators give at rest against the loads [N m or N], else 0."""
+        """Return the actuators' static efforts against the loads [N m or N], 0 without loads."""
         machine = self.target.machine
         if not machine.loads:
             return [0.0] * len(self.inputs)
@@ -89,10 +89,10 @@ class CommandStream:
     """
     Publishes `servo_commands`, `<mechanism>/commands` and `servo_trajectory`.
 
-    The outputs come on `wanted_states` and `wanted_trajectory`. Every answer is the one that goes
-    on from the last; an output out of reach leaves its actuator at the last good command. A
-    trajectory is computed in a worker's thread; a newer one replaces it.
-    `present` tells of a SceneMechanism where its inputs are; infinite where that is not known.
+    Requests arrive on `wanted_states` and `wanted_trajectory`. Each solution continues the last
+    one; if an output is out of reach, its actuator holds the last valid command. A trajectory is
+    computed in a worker thread; a newer one replaces it.
+    `present` returns the inputs of a SceneMechanism; infinite where unknown.
     """
 
     def __init__(self, node: Any, mechanisms: Iterable[str],
@@ -112,19 +112,19 @@ class CommandStream:
             'wanted_trajectory', self._receive_trajectory), 10)
 
     def adopt(self, machines: Mapping[str, SceneMechanism]) -> None:
-        """Act on these mechanisms from now on."""
+        """Replace the mechanisms."""
         self._machines, self._publishers = machines, Cache(self._publisher, ARRANGEMENTS)
-        # The last pose of several inputs may be none of another geometry.
+        # With several inputs, the last pose may not exist in the new geometry.
         self._last = {name: last for name, last in self._last.items() if len(last.inputs) == 1
                       or last.target.machine is machines.get(name)}
         self._reader = joint_state_reader.Reader(self._interpret)
 
     def end(self) -> None:
-        """End the trajectory that is being computed."""
+        """Cancel the trajectory in progress."""
         self._worker.end()
 
     def _output(self, named: str) -> Optional[tuple[SceneMechanism, str, JointName]]:
-        """Return whose output others call so, its own name and how that differs."""
+        """Return the mechanism, output and published name that match a name in messages."""
         for machine in self._machines.values():
             own = {name.name: (joint, name) for joint, name in machine.joints.items()}
             joint, name = own.get(named) or (
@@ -134,7 +134,7 @@ class CommandStream:
         return None
 
     def _targets(self, names: Sequence[str]) -> tuple[list[Target], list[str], list[str]]:
-        """Return the targets of names, those that are none, and reasons for what is left out."""
+        """Return the targets of names, the unknown names, and reasons for omitted mechanisms."""
         found: dict[str, list[tuple]] = {}
         targets, unknown, reasons = [], [], []
         for place, named in enumerate(names):
@@ -160,7 +160,7 @@ class CommandStream:
         return targets, unknown, reasons
 
     def _interpret(self, message: JointState) -> tuple[list[Target], bool]:
-        """Return the targets that a message has positions for, and whether it has speeds."""
+        """Return the targets of a message, and whether it has speeds."""
         targets, unknown, reasons = self._targets(message.name[:len(message.position)])
         for reason in reasons:
             self._logger.warning(f'wanted_states: {reason}')
@@ -181,7 +181,7 @@ class CommandStream:
             self._send(now or stamp, found)
 
     def _near(self, target: Target) -> Sequence[float]:
-        """Return where inputs were last, or are; else where they start."""
+        """Return the inputs of the last command, else the present ones, else their starts."""
         if last := self._last.get(target.machine.name):
             return last.inputs
         return [position if math.isfinite(position) else drive.start for position, drive in zip(
@@ -189,10 +189,10 @@ class CommandStream:
 
     def _command(self, target: Target, positions: Sequence[float],
                  speeds: Optional[Sequence[float]]) -> Optional[Command]:
-        """Return the command for outputs, or the last good one, to be held; None without any."""
+        """Return the command for outputs, else the last valid one, else None."""
         name, now = target.machine.name, time.monotonic()
         last = self._last.get(name)
-        # The first command may be anywhere: that takes a search, so now and then.
+        # The first command has no predecessor and needs a search, whose rate is limited.
         jumps = not last and now > self._searches.get(name, -math.inf)
         command = Command(target, *target.command(positions, speeds, self._near(target), jumps))
         if jumps:
@@ -251,7 +251,7 @@ class CommandStream:
 
     def _solve(self, message: JointTrajectory, targets: Sequence[Target],
                near: list[Sequence[float]], jumps: list[bool]) -> Optional[Callable[[], None]]:
-        """Return what publishes the actuators' trajectory; None if a newer one has come."""
+        """Solve a trajectory; return its publisher, or None if a newer one has arrived."""
         solved = JointTrajectory(header=message.header, joint_names=[
             name for target in targets for name in target.actuators])
         try:
@@ -269,7 +269,7 @@ class CommandStream:
 
 def _solved_point(i: int, point: JointTrajectoryPoint, n: int, targets: Sequence[Target],
                   near: list[Sequence[float]], jumps: Sequence[bool]) -> JointTrajectoryPoint:
-    """Return the actuators' point of a trajectory, and put where inputs are then into near."""
+    """Return the actuators' trajectory point, and update `near` with its inputs."""
     if len(point.positions) != n or len(point.velocities) not in (0, n):
         raise ValueError(f'point {i} must have {n} positions, and as many velocities or '
                          f'none, not {len(point.positions)} and {len(point.velocities)}')

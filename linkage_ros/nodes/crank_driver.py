@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Node that moves the inputs of a scene: turns its cranks, pushes and pulls its cylinders."""
+"""Node that moves the inputs of a scene: cranks, cylinders and carriages."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from .. import scene
 from ..scene.motion import Motion
 from ..words import listed
 
-# By how much the clock may run ahead of steady time between two messages [ns]: a clock is slewed.
+# Largest advance of the clock over steady time between two messages that counts as slewing [ns].
 JUMP = 10 ** 8
 
-# In thirty years [ns] nobody waits for the next message.
+# Longest timer period [ns], thirty years, instead of an overflow.
 LONGEST_PERIOD = 1e18
 
 
@@ -32,10 +32,10 @@ class CrankDriver(scene_node.SceneNode):
     """
     Publishes every input as a function of the node's time, on `crank_states`.
 
-    Nodes `in_process` get the messages without the middleware if nobody else subscribes.
+    Nodes `in_process` receive the messages directly unless there are other subscribers.
     """
 
-    # What time it is [ns], where no other is simulated.
+    # The time [ns], unless it is simulated.
     system_time = staticmethod(time_ns)
 
     def __init__(self, in_process: Sequence[Any] = (), **kwargs: Any):
@@ -50,13 +50,13 @@ class CrankDriver(scene_node.SceneNode):
         self._message: PatchedPublisher
         self._publisher = InProcessPublisher(self, 'crank_states', in_process)
         self._timer = self.create_timer(1.0, self.guarded('a crank message', self._tick))
-        # On system time a timer sleeps until an old time comes round again, if that is set back.
+        # After system time is set back, a timer would sleep until the old time returns.
         self.create_timer(1.0, self.guarded('a look at the clock', self._wake),
                           clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.begin()
 
     def adopt(self, new: scene.Scene) -> None:
-        """Let every input go on as the scene says: from where it is, or from a new start."""
+        """Continue every input by the new scene, from its present value or from a new start."""
         now = 0 if self._now is None else self._settled()
         drives = {(name, input_): drive for name, machine in new.machines.items()
                   for input_, drive in machine.inputs.items()}
@@ -67,14 +67,14 @@ class CrankDriver(scene_node.SceneNode):
             elif (old.speed, old.sweep) != (drive.speed, drive.sweep):
                 self._motions[key] = self._motions[key].changed(drive.speed, drive.sweep, now)
         self._drives, self._machines = drives, new.machines
-        # Of inputs with one source the last is sent.
+        # If several inputs have one source, the last one is published.
         sent = {drive.source: (key, drive) for key, drive in drives.items()}
         self._sent = list(sent.values())
         self._name(list(sent))
         self._pace(new.rate)
 
     def _name(self, sources: List[str]) -> None:
-        """Send these joints from now on."""
+        """Replace the published joints."""
         if sources == self._names:
             return
         n = len(sources)
@@ -93,18 +93,18 @@ class CrankDriver(scene_node.SceneNode):
             self._timer.reset()
 
     def _time(self) -> Tuple[int, bool]:
-        """Return the time [ns], and whether it is simulated."""
+        """Return the time [ns] and whether it is simulated."""
         clock = self.get_clock()
         simulated = clock.ros_time_is_active
         return clock.now().nanoseconds if simulated else self.system_time(), simulated
 
     def _settled(self) -> int:
-        """Return the time [ns]; where it jumps, every input goes on from where it is."""
+        """Return the time [ns]; after a jump of the clock, inputs continue from their values."""
         (now, simulated), steady = self._time(), monotonic_ns()
         reached = 0
         if self._now is not None:
             reached = self._now if simulated else self._now + steady - self._steady
-        # A simulation may leap ahead as it likes: its time is the only one that there is.
+        # Simulated time may advance by any amount.
         leapt = now - reached > JUMP and not simulated
         if self._now is None or now < self._now or leapt:
             self._motions = {n: m.moved(reached, now) for n, m in self._motions.items()}
@@ -119,14 +119,14 @@ class CrankDriver(scene_node.SceneNode):
 
     def _position(self, key: Tuple[str, str], drive: scene.InputSettings,
                   now: int) -> Tuple[float, float]:
-        """Return the position and the speed of an input's source [rad or m, per second]."""
+        """Return the position [rad or m] and speed [per second] of an input's source."""
         value, speed = self._motions[key].at(now)
         if drive.is_plain:
             return value, speed
         return self._machines[key[0]].to_source(drive, value, speed)
 
     def serves(self) -> str:
-        """Say which inputs it moves, how often."""
+        """Describe the inputs and their rate."""
         sources = [drive.source for drive in self._drives.values()]
         return f'moves {listed(sources, 200)} on crank_states at {self.scene.rate:g} Hz'
 
@@ -138,9 +138,9 @@ class CrankDriver(scene_node.SceneNode):
 
 class InProcessPublisher:
     """
-    Publishes joint states; `nodes` of this process get them without the middleware.
+    Publishes joint states; `nodes` of this process receive them without the middleware.
 
-    While there are other subscribers these nodes get them as the others do: each message once.
+    While there are other subscribers, all use the middleware, so each message arrives once.
     """
 
     def __init__(self, node: Any, name: str, nodes: Sequence[Any]):
@@ -151,11 +151,11 @@ class InProcessPublisher:
 
     @property
     def has_subscribers(self) -> bool:
-        """Whether there are subscribers, here or elsewhere."""
+        """Whether there are subscribers, in this process or elsewhere."""
         return self._others.has_subscribers or bool(self._subscriptions)
 
     def publish(self, message: Any) -> None:
-        """Publish a message: bytes, or one that is not serialised yet."""
+        """Publish a message, serialised or not."""
         if self._others.has_subscribers:
             self._others.publish(message)
             return

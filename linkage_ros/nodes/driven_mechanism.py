@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One mechanism of `kinematics`: the state of its inputs, its pose, and its topics."""
+"""A mechanism of `kinematics`: the state of its inputs, its pose and its topics."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from ..linkage.walker import Solution
 
 class DrivenMechanism:
     """
-    The state and the topics of one mechanism; `changed` is called when subscribers come or go.
+    State and topics of a mechanism; `changed` is called when subscribers come or go.
 
     Attributes
     ----------
     inputs : float array (2, inputs)
-        The last value of each input [rad or m], and its speed [per second].
+        Last value [rad or m] and speed [per second] of each input.
     known : bool array (2, inputs)
         Which of them have been received.
     stamp : int64 array (1,)
-        The stamp of the last message that named an input, as it is in a message.
+        Stamp of the last message that set an input, as serialised.
     pose : Pose, optional
-        What the numbers of the last solution are good for; None: nothing is solved.
+        Validity of the last solution; None: not solved yet.
 
     """
 
@@ -60,7 +60,7 @@ class DrivenMechanism:
 
     @property
     def model(self) -> MechanismModel:
-        """Return what it is made of; it is adopted before the first message comes."""
+        """The adopted model; there is one before the first message."""
         assert self._model
         return self._model
 
@@ -75,7 +75,7 @@ class DrivenMechanism:
         return any(self._subscribed())
 
     def solution(self, in_scene: bool) -> Solution:
-        """Return the solver for its subscribers, and for those to the scene's joint states."""
+        """Return the solver that its subscribers need, and those of the scene's joint states."""
         return self._solution(self.model, in_scene, self._subscribed())
 
     def _solution(self, model: MechanismModel, in_scene: bool, subscribed: Sequence[bool]
@@ -88,17 +88,17 @@ class DrivenMechanism:
         return self._joint_states.has_subscribers, self._markers.has_subscribers
 
     def conversion(self, i: int) -> Tuple[float, float]:
-        """Return the factor of a source's position, and what is added: the input."""
+        """Return the factor and the offset from a source's position to the input."""
         source = self.model.inputs[i]
-        # Of all numbers only -0.0 leaves every other as it is.
+        # Adding -0.0 changes no number; adding 0.0 would change -0.0.
         return source.ratio, -0.0 if source.is_plain else source.offset
 
     def receive(self, i: int, value: float, speed: Optional[float]) -> None:
-        """Set an input [rad or m], and its speed [per second] if it is known."""
+        """Set an input [rad or m] and, if known, its speed [per second]."""
         self.inputs[:, i] = value, 0.0 if speed is None else speed
 
     def measure(self, i: int, position: float, speed: Optional[float]) -> bool:
-        """Set an input by what a sensor reads [rad or m]; return False if that cannot be."""
+        """Set an input from a sensor's value [rad or m]; return False if it has no solution."""
         source = self.model.inputs[i]
         near = float(self.inputs[0, i]) if self.known[0, i] else None
         value, speed = self.model.machine.from_source(source, position, speed, near)
@@ -115,7 +115,7 @@ class DrivenMechanism:
         solution.solve(*self.inputs.tolist())
 
     def assess(self, solution: Solution, is_regular: bool) -> bool:
-        """Set the pose that was solved, before its conversion; return whether it is another."""
+        """Determine the pose from unconverted numbers; return whether it has changed."""
         layout, before = solution.layout, self.pose
         if layout.efforts:
             layout.effort(solution.values)[:] = self.model.machine.efforts(self.inputs[0].tolist())
@@ -128,14 +128,14 @@ class DrivenMechanism:
         return self.pose != before
 
     def _display(self, pose: Pose) -> None:
-        """Take note of the markers that a pose displays, or delete them where it has none."""
+        """Record the markers that a pose displays; delete those of a mechanism without a pose."""
         if not pose.exists:
             self._delete(self._displayed)
         elif self._markers.has_subscribers:
             self._displayed = self.model.marker_array.ids
 
     def convert(self, solution: Solution) -> None:
-        """Convert what was solved to the robot's joints: their signs, offsets and turns."""
+        """Convert joint values to the robot's signs, offsets and turns."""
         if conversion := self.model.conversion(solution.layout):
             factors, offsets, wrapped = conversion
             values = solution.values
@@ -144,14 +144,14 @@ class DrivenMechanism:
             values[wrapped] -= math.tau * np.round(values[wrapped] / math.tau)
 
     def refresh(self, solution: Solution) -> None:
-        """Solve for other subscribers than before, at the inputs as they were."""
+        """Solve again for changed subscribers, at the present inputs."""
         if self.pose is None or self.pose.solution is not solution:
             self.solve(solution)
             self.assess(solution, False)
             self.convert(solution)
 
     def publishers(self) -> Iterator[PatchedPublisher]:
-        """Yield what publishes the pose to the subscribers of the mechanism's own topics."""
+        """Yield the publishers of the pose whose topics have subscribers."""
         if self.pose and self.pose.exists:
             yield from self._publishers(self.model, self.pose, self._subscribed())
 
@@ -165,12 +165,12 @@ class DrivenMechanism:
 
     def prepared(self, machine: scene.SceneMechanism, frame_id: str, prefix: str,
                  in_scene: bool) -> MechanismModel:
-        """Return the model of a mechanism, with what its subscribers need; the same if it is."""
+        """Return the model of a mechanism, compiled for its subscribers; reuse an equal one."""
         before = self._model
         if before and before.made_of == (machine, frame_id, prefix):
             return before
         model = MechanismModel(machine, frame_id, prefix)
-        # In the worker's thread: subscribers may come and go meanwhile.
+        # This runs in the worker's thread: subscribers may change meanwhile.
         subscribed = self._subscribed()
         if before and self.is_complete and (in_scene or any(subscribed)):
             solution = self._solution(model, in_scene, subscribed)
@@ -180,12 +180,12 @@ class DrivenMechanism:
         return model
 
     def adopt(self, model: MechanismModel) -> None:
-        """Be another model from now on; what is displayed of the old one is deleted."""
+        """Replace the model, and delete the old one's markers."""
         self._model, self.pose = model, None
         self._delete(self._displayed - model.marker_array.ids)
 
     def publish_latched(self, latched: Tuple[str, Optional[Marker]]) -> None:
-        """Publish the robot model, if it is another, and the locus, or delete it."""
+        """Publish a changed robot model, and publish or delete the locus."""
         description, locus = latched
         if description != self._described:
             self._described = description
@@ -198,7 +198,7 @@ class DrivenMechanism:
         self._set_locus(None)
 
     def wait_for_deletions(self, deadline: float) -> None:
-        """Wait until the deletions have arrived, or until a time on the steady clock [s]."""
+        """Wait until subscribers have acknowledged the deletions, at most until `deadline` [s]."""
         for publisher in (self._markers.publisher, self._locus):
             publisher.wait_for_all_acked(Duration(seconds=max(0.0, deadline - time.monotonic())))
 

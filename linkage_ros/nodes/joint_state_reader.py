@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Joint states read from their bytes, which costs a tenth of deserialising them.
+Read joint states from their bytes, at a tenth of the cost of deserialising them.
 
-Of each source, whose messages differ in numbers alone, the first message is deserialised; the
-numbers of the others are read from where the layout of that one says that they lie.
+The messages of a source differ only in numbers. Its first message is deserialised, and the layout
+of that message gives the positions of the numbers in all others.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from sensor_msgs.msg import JointState
 from .log import Throttle
 from .message_layout import deserialized, HEADER, MessageLayout, NoLayout, pack, Unreadable
 
-# Best effort matches every publisher; 100 messages are what comes in 100 ms at 1000 Hz.
+# Best effort matches every publisher; 100 messages arrive in 100 ms at 1000 Hz.
 ANY = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 
-# Sources that are cached, of messages up to so many bytes; arrangements of names among those of
-# one length. Where there are more, one message in so many is laid out.
+# Cached sources; longest message of a cached source [bytes]; arrangements of names per length.
+# Beyond that, one message in SAMPLED is analysed.
 SOURCES, LONGEST, ARRANGEMENTS, SAMPLED = 256, 1 << 16, 4, 256
 
 
 class Numbers(NamedTuple):
-    """What a message says: its stamp, packed, its positions and its velocities."""
+    """Content of a message: packed stamp, positions and velocities."""
 
     stamp: bytes
     positions: Tuple[float, ...]
@@ -43,8 +43,8 @@ def subscribe(node: Any, topic: str, receive: Callable[[bytes], None],
     """
     Subscribe a SceneNode to joint states as bytes.
 
-    Where `receive` raises Unreadable, they are ignored, which is logged now and then. After any
-    other exception, which is reported, `failed` is called.
+    If `receive` raises Unreadable, the message is ignored with a throttled warning. Any other
+    exception is reported, then `failed` is called.
     """
     throttle = Throttle(node.get_logger())
 
@@ -64,15 +64,15 @@ def subscribe(node: Any, topic: str, receive: Callable[[bytes], None],
 
 class Reader:
     """
-    Tells the sources of serialised joint states.
+    Identifies the sources of serialised joint states.
 
-    `interpret` makes of a message what all of its source share, their `meaning`.
+    `interpret` returns the `meaning` of a message, which all messages of its source share.
     """
 
     def __init__(self, interpret: Callable[[JointState], Any]):
         self._interpret = interpret
-        # By the length of messages masks of the bytes that count; by those the sources, of which
-        # the latest used is the last.
+        # Masks of the significant bytes by message length; sources by masked bytes, least recently
+        # used first.
         self._masks: Dict[int, Set[int]] = {}
         self._sources: OrderedDict[Tuple[int, int, int], Source] = OrderedDict()
         self._missed = 0
@@ -107,15 +107,15 @@ class Reader:
 
 class Source:
     """
-    How messages of a source are told from others, and how their numbers are read.
+    Identification of a source's messages, and the places of their numbers.
 
     Attributes
     ----------
     size, same, mask : int
-        How long its messages are, 0 if they are read one by one; which bytes they have, as a
-        number, where a mask has ones.
+        Length of its messages, 0 if each is deserialised; the bytes that they share and the mask
+        of these bytes, as integers.
     positions, velocities : int
-        Where in a message these begin.
+        Offsets in a message.
 
     """
 
@@ -133,7 +133,7 @@ class Source:
         end = self.positions + 8 * self._first
         self._unpack = Struct(f'<{HEADER}x8s{self.positions - HEADER - 8}x{self._first}d'
                               f'{self.velocities - end}x{count}d').unpack_from
-        # As numbers: with messages as short as these that is the quickest to compare and look up.
+        # Integers are the fastest to compare and look up for messages this short.
         self.mask = int.from_bytes(layout.fixed, 'little')
         self.same = int.from_bytes(text, 'little') & self.mask
         if _bits(self._unpacked(text)) == _bits(numbers):
@@ -146,7 +146,7 @@ class Source:
         return len(text) == self.size and int.from_bytes(text, 'little') & self.mask == self.same
 
     def read(self, text: bytes) -> Numbers:
-        """Return what a message of this source says."""
+        """Read a message of this source."""
         return self._only[1] or self._unpacked(text)
 
     def _unpacked(self, text: bytes) -> Numbers:

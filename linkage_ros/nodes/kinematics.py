@@ -25,10 +25,9 @@ from .. import scene
 from ..robot_model import bodies, urdf
 from ..words import listed
 
-# After how long inputs that nobody sends are named [s], and how many unknown joint names are
-# warned about.
+# Time until missing inputs are reported [s], and number of unknown joint names that are.
 MISSING_AFTER, UNKNOWN_NAMES = 5.0, 1000
-# How long the end of the node waits for its deletions of markers to arrive [s].
+# Longest wait for the deletion of markers when the node ends [s].
 DELETION_TIMEOUT = 0.1
 
 
@@ -62,32 +61,32 @@ class Kinematics(scene_node.SceneNode):
             self, 'crank_states', self._planner.process, self._planner.discard)
 
     def serves(self) -> str:
-        """Say which mechanisms it moves."""
+        """Describe the mechanisms."""
         return f'moves {listed(self.scene.machines, 200)} by crank_states'
 
     def check(self, new: scene.Scene) -> None:
-        """Refuse what has no robot model; SceneError says why."""
+        """Raise SceneError for a mechanism without a robot model."""
         for name, machine in new.machines.items():
             before = self.scene.machines[name]
             if machine.in_space:
                 continue
             if machine is not before:
                 bodies.size(machine)
-            # Of dimensions and sweeps nothing else is refused, and their travels take long.
+            # Dimensions and sweeps cannot make a robot model invalid; their travels are slow.
             alike = replace(machine, linkage=before.linkage, reach=before.reach,
                             inputs=before.inputs)
             if alike != before or new.frame_id != self.scene.frame_id:
                 bodies.robot([alike], new.frame_id)
 
     def prepare(self, new: scene.Scene) -> Any:
-        """Return the model of each mechanism, another for each that has changed, and its robot."""
+        """Return the model of each mechanism; those of unchanged mechanisms are reused."""
         in_scene = self._scene_joint_states.has_subscribers
         return {name: self._mechanisms[name].prepared(
             machine, machine.frame_id or new.frame_id, new.frame_prefix, in_scene)
             for name, machine in new.machines.items()}
 
     def adopt(self, models: Dict[str, MechanismModel]) -> None:
-        """Publish the mechanisms so from now on."""
+        """Replace the models of the mechanisms."""
         changed = [self._mechanisms[name] for name, model in models.items()
                    if model is not self._models.get(name)]
         is_first, self._models = not self._models, models
@@ -102,13 +101,13 @@ class Kinematics(scene_node.SceneNode):
                     partial(self._robot, models)])
 
     def _latched(self, one: DrivenMechanism, model: MechanismModel) -> Callable[[], None]:
-        """Make what is published once of a mechanism; return what publishes it."""
+        """Build a mechanism's latched messages; return a function that publishes them."""
         latched = model.latched()
         return lambda: one.publish_latched(latched) if one.model is model else None
 
     def _robot(self, models: Dict[str, MechanismModel]) -> Callable[[], None]:
-        """Make the robot model of the scene; return what publishes it."""
-        # Where only named joints are published, they are in a robot model of somebody else's.
+        """Build the scene's robot model; return a function that publishes it."""
+        # With `only_named`, the joints belong to a robot model that is published elsewhere.
         robots = [model.robot for model in models.values()
                   if model.robot and not model.machine.only_named]
         text = ''
@@ -119,10 +118,10 @@ class Kinematics(scene_node.SceneNode):
         return lambda: self._scene_joint_states.describe(text) if models is self._models else None
 
     def delete_displayed(self) -> None:
-        """Delete what is displayed."""
+        """Delete all markers and loci."""
         for one in self._mechanisms.values():
             one.clear()
-        # What has not arrived when a process ends is lost.
+        # Messages still in transit when a process ends are lost.
         deadline = time.monotonic() + DELETION_TIMEOUT
         for one in self._mechanisms.values():
             one.wait_for_deletions(deadline)
@@ -134,7 +133,7 @@ class Kinematics(scene_node.SceneNode):
         return pack_time(self.get_clock().now().nanoseconds)
 
     def _interpret(self, message: JointState) -> Tuple[Tuple[Route, ...], bool]:
-        """Return the inputs that a source sets, and whether it says how fast they move."""
+        """Return the inputs that a source sets, and whether its messages have velocities."""
         places = dict(zip(message.name, range(len(message.position))))
         routes = tuple(Route(self._mechanisms[mechanism], i, place)
                        for name, place in places.items()
@@ -143,7 +142,7 @@ class Kinematics(scene_node.SceneNode):
         return routes, len(message.velocity) == len(message.name)
 
     def _note(self, names: Iterable[str], sent: Iterable[str]) -> None:
-        """Note which inputs are sent; name those that there are not, each once."""
+        """Record which inputs are sent; warn once about each unknown name."""
         if len(self._missing) == len(self._inputs) and not self._missing.isdisjoint(sent):
             self._missing_timer.reset()
         self._missing.difference_update(sent)
@@ -155,7 +154,7 @@ class Kinematics(scene_node.SceneNode):
                 f'{listed(self._inputs, 150)}{self._unknown.ending}')
 
     def _name_missing(self) -> None:
-        """Say once which inputs nobody sends."""
+        """Warn once about inputs that have not been received."""
         self._missing_timer.cancel()
         if self._missing:
             waiting = [name for name in self._inputs if name in self._missing]

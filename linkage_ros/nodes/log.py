@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is logged of what comes again and again: now and then, once, and how much at most."""
+"""Logging of repeated events: throttled, once, and up to a limit."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 
 RCLError = rclpy_implementation.RCLError
 InvalidHandle = rclpy_implementation.InvalidHandle
-# Between two warnings about one subject [s], how many subjects are cached, and how many different
-# errors are logged.
+# Time between two warnings about one subject [s], cached subjects, and logged errors.
 SECONDS, SUBJECTS, ERRORS = 5.0, 1000, 100
 
 
@@ -30,7 +29,7 @@ class Throttle:
         self._logged: OrderedDict[Any, float] = OrderedDict()
 
     def warn(self, subject: Any, text: Callable[[], str]) -> None:
-        """Log what `text` returns, which is called only if it is logged."""
+        """Log the result of `text`, which is called only if needed."""
         now = time.monotonic()
         if now < self._logged.get(subject, -math.inf) + SECONDS:
             return
@@ -42,7 +41,7 @@ class Throttle:
 
 
 class Once:
-    """Subjects that are logged once each, up to a number of them."""
+    """Subjects that are logged once each, up to a limit."""
 
     def __init__(self, most: int):
         self._most = most
@@ -50,7 +49,7 @@ class Once:
         self._seen: Set[int] = set()
 
     def new(self, subjects: Iterable[Hashable]) -> List[Any]:
-        """Return the subjects that come for the first time, as long as there is room."""
+        """Return the new subjects, up to the limit."""
         room = self._most - len(self._seen)
         new = [one for one in dict.fromkeys(subjects) if hash(one) not in self._seen][:room]
         self._seen.update(map(hash, new))
@@ -58,7 +57,7 @@ class Once:
 
     @property
     def ending(self) -> str:
-        """Return what the last warning ends with."""
+        """The ending of the last warning."""
         return '; no more will be named' if len(self._seen) == self._most else ''
 
 
@@ -69,7 +68,7 @@ class Incidents:
         self._logger, self._is_ending, self._once = logger, is_ending, Once(ERRORS)
 
     def report(self, what: str, error: Exception) -> None:
-        """Log what was being handled when an exception was raised, and where that was."""
+        """Log an exception, what was being handled, and where it was raised."""
         frame = traceback.extract_tb(error.__traceback__)[-1]
         if not self._is_ending() and self._once.new([
                 (what, type(error), frame.filename, frame.lineno)]):
@@ -77,7 +76,7 @@ class Incidents:
                                f'({frame.filename}:{frame.lineno}); logged once')
 
     def guarded(self, what: str, callback: Callable) -> Callable:
-        """Return a callback that reports what is raised."""
+        """Return a callback whose exceptions are reported."""
         @wraps(callback)
         def guarded(*args: Any) -> Any:
             try:
@@ -90,7 +89,7 @@ class Incidents:
 
 
 def refused(response: Any, reason: str) -> Any:
-    """Return the response of a service whose request could not be handled."""
+    """Return a service's response to a request that failed."""
     result = SetParametersResult(successful=False, reason=reason)
     if hasattr(response, 'results'):
         response.results.append(result)

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A mechanism ready to be published: its solutions, its messages, its locus and robot model."""
+"""The solvers, messages, locus and robot model of a mechanism."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from ..linkage.quantities import LinkPoint
 from ..linkage.walker import Layout, Solution
 from ..robot_model import bodies, shapes, urdf
 
-# Arrangements of messages that are cached: a walker may lose its legs one by one.
+# Cached arrangements of messages: the legs of a walker may leave their reach one by one.
 ARRANGEMENTS = 128
 
 
 class Pose(NamedTuple):
-    """What the numbers of a solution are good for; it selects the messages made of them."""
+    """Validity of a solution's numbers, which selects its messages."""
 
     solution: Solution
-    # A byte for each leg; None where all are assembled.
+    # A byte for each leg; None if all are assembled.
     assembled: Optional[bytes]
     # Whether all velocities are finite, and all efforts.
     moving: bool
@@ -43,7 +43,7 @@ class Pose(NamedTuple):
         return self.assembled is None or 1 in self.assembled
 
     def legs(self) -> np.ndarray:
-        """Return the numbers of the assembled legs."""
+        """Return the indices of the assembled legs."""
         count = self.solution.layout.legs
         return np.arange(count) if self.assembled is None else np.flatnonzero(
             np.frombuffer(self.assembled, bool))
@@ -51,10 +51,10 @@ class Pose(NamedTuple):
 
 class MechanismModel:
     """
-    What a mechanism needs to be published; immutable but for its caches.
+    Everything needed to publish a mechanism; immutable but for its caches.
 
-    `frame_id` is the frame of its pose, and what `prefix` is put before in markers. Raises
-    SceneError if it has no robot model.
+    `frame_id` is the frame of its pose; `prefix` precedes it in markers. Raises SceneError if the
+    mechanism has no robot model.
     """
 
     def __init__(self, machine: scene.SceneMechanism, frame_id: str, prefix: str):
@@ -73,19 +73,19 @@ class MechanismModel:
 
     @cached_property
     def marker_array(self) -> messages.Markers:
-        """Return the markers' message."""
+        """The builder of marker messages."""
         return messages.Markers(*self._drawn)
 
     def latched(self) -> Tuple[str, Optional[Any]]:
-        """Return the messages that are published once: the robot model and, if any, the locus."""
+        """Return the latched messages: the robot model and, if any, the locus."""
         drawn, size = self._drawn[:3], self._drawn[3]
         curve = self.assembly.locus(self.machine.tracer)
         return (urdf.write(self.robot) if self.robot else '',
                 messages.locus(*drawn, curve, size) if len(curve) > 1 else None)
 
     def solution(self, joints: bool, markers: bool, moving: bool) -> Solution:
-        """Return the solver of all legs for the topics that have subscribers."""
-        # Only a pose tells how far several inputs reach, so all its angles are needed to know.
+        """Return the solver of all legs for the subscribed topics."""
+        # The reach of several inputs shows only in the solved angles.
         joints = joints or len(self.inputs) > 1
         names = self.assembly.joints if joints else ()
         return self._solutions.get_or_make((joints, markers, moving), lambda: (
@@ -94,17 +94,17 @@ class MechanismModel:
                 len(self.inputs) if self.machine.loads else 0)))
 
     def regular(self, solution: Solution) -> Pose:
-        """Return the pose of a solution in which every number is finite and within reach."""
+        """Return the pose of a solution whose numbers are finite and within reach."""
         return Pose(solution, None, solution.layout.speeds > 0, solution.layout.efforts > 0)
 
     def pose(self, solution: Solution, inputs: np.ndarray) -> Pose:
-        """Return what a solution is good for, at inputs and speeds (2, inputs)."""
+        """Assess a solution at inputs and speeds of shape (2, inputs)."""
         layout, values, pose = solution.layout, solution.values, self.regular(solution)
         assembled = None
         if self.assembly.is_limited:
             assembled = self.assembly.within_reach(inputs[0, 0])
-        # The sum of squares tells at once whether all are finite; unlike `dot`, `vdot` may
-        # overflow without a warning.
+        # One sum of squares tests whether all are finite; `vdot` overflows without the warning of
+        # `dot`.
         if not math.isfinite(np.vdot(values, values)):
             finite = np.isfinite(solution.rows[:, :layout.posed]).all(axis=1)
             finite &= bool(np.isfinite(inputs[0]).all())
@@ -119,7 +119,7 @@ class MechanismModel:
         return pose._replace(assembled=assembled.tobytes())
 
     def conversion(self, layout: Layout) -> Optional[Tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Return factors, offsets and what is wrapped for the robot's joints; None if plain."""
+        """Return factors, offsets and wrapped joints of the robot's joints; None if trivial."""
         return None if self._is_plain else self._conversions[layout]
 
     def _conversion(self, layout: Layout) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -130,20 +130,20 @@ class MechanismModel:
 
     def publisher(self, publisher: Any, build: Callable, pose: Pose, logger: Any
                   ) -> PatchedPublisher:
-        """Return what publishes the message that `build` makes of the values of a pose."""
+        """Return the publisher of the message that `build` makes from a pose's values."""
         return self._publishers.get_or_make((publisher, pose), lambda: PatchedPublisher(
             publisher, lambda stamp, values: build(pose, values, stamp),
             pose.solution.layout.size, logger))
 
     def joint_message(self, pose: Pose, values: np.ndarray, stamp: Any) -> JointState:
-        """Return the joint states of the assembled legs."""
+        """Build the joint states of the assembled legs."""
         names, positions, velocities, efforts = self.joints(pose, values)
         return messages.joint_states(
             stamp, names.tolist(), positions, velocities if pose.moving else (),
             efforts if pose.loaded else ())
 
     def joints(self, pose: Pose, values: np.ndarray) -> List[np.ndarray]:
-        """Return names, positions, velocities, if solved, and efforts of published joints."""
+        """Return names, positions and, if solved, velocities and efforts of published joints."""
         layout, n, legs = pose.solution.layout, len(self.inputs), pose.legs()
         chosen = self._published.copy()
         chosen[n:].reshape(layout.legs, -1)[np.isin(np.arange(layout.legs), legs, invert=True)] = 0
@@ -155,22 +155,22 @@ class MechanismModel:
                 velocities[chosen] if layout.speeds else velocities[:0], efforts[chosen]]
 
     def marker_message(self, pose: Pose, values: np.ndarray, stamp: Any) -> MarkerArray:
-        """Return the markers of the assembled legs."""
+        """Build the markers of the assembled legs."""
         layout, legs = pose.solution.layout, pose.legs()
         places = layout.rows(values)[legs, :layout.coordinates].reshape(
             len(legs), -1, len(self.machine.linkage.axes))
-        # Legs on the left and on the right follow each other; each side has ground of its own.
+        # Left and right legs alternate; each side has its own ground.
         _, grounded = np.unique(legs % (1 + self.machine.mirrored), return_index=True)
         return self.marker_array.message(stamp, places, sorted(grounded))
 
 
 def _shown(machine: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
-    """Return the points of the markers, joints and others, and which of them each marker shows."""
+    """Return the points of the markers, and the indices of each marker's points."""
     linkage, wanted = machine.linkage, machine.points
     if machine.in_space:
         return _in_space(linkage, wanted)
     cranks, plates = shapes.cranks(linkage), shapes.plates(linkage, wanted)
-    # A plate is drawn instead of its bars: the message is the smaller for it.
+    # A plate replaces its bars, which makes the message smaller.
     edges = {frozenset(edge) for plate in plates for edge in combinations(plate, 2)}
     bars = [bar for bar in linkage.bars if bar not in cranks and frozenset(bar) not in edges]
     pieces: Dict[int, list] = {
@@ -192,7 +192,7 @@ def _shown(machine: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
 
 
 def _in_space(linkage: Mechanism, wanted: Sequence[str]) -> Tuple[Sequence, Dict[int, list]]:
-    """Return what `_shown` does for a linkage of rods: lines between points."""
+    """Return the same as `_shown` for a linkage of rods, drawn as lines."""
     place = {point: i for i, point in enumerate(wanted)}
     return wanted, {messages.LINKS_ID: [
         [place[end] for end in line] for line in (*linkage.bars, *linkage.cylinders)
@@ -200,7 +200,7 @@ def _in_space(linkage: Mechanism, wanted: Sequence[str]) -> Tuple[Sequence, Dict
 
 
 def _arranged(layout: Layout, rest: float, joints: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Return numbers for joints, inputs first, for their velocities and efforts, and the rest."""
+    """Arrange values: joints with inputs first, then velocities, efforts and the rest."""
     values, n = np.full(layout.size, rest), layout.inputs
     rows, driven = layout.rows(values), layout.driven(values)
     driven[:n] = joints[:n]

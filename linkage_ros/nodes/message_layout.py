@@ -2,12 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Where the numbers lie in the bytes of a message, to read and write them without the rest.
+Positions of numbers in serialised messages, to read and write them in place.
 
-From one message of a publisher to its next only numbers change: its stamps, and the float64 in its
-sequences. Where they lie follows from the lengths that stand between them (CDR, as it is on the
-wire). Whoever uses a layout tries it first: what it reads or writes has to be what an ordinary
-message says.
+Consecutive messages of a publisher differ only in stamps and in the float64 of sequences. Their
+positions follow from the lengths of strings and sequences (CDR encoding). A layout is verified
+before use: its numbers must equal those of an ordinary message.
 """
 
 from __future__ import annotations
@@ -19,73 +18,73 @@ from builtin_interfaces.msg import Time
 import numpy as np
 from rclpy.serialization import deserialize_message, serialize_message
 
-# The bytes that say how a message is encoded; what follows is aligned from its end.
+# Length of the encapsulation header; alignment counts from its end.
 HEADER = 4
 LEAD = bytes(8 - HEADER)
 LITTLE_ENDIAN = b'\0\1'
-# Of fewer bytes no message is made. A middleware that takes the sender's word for how many of them
-# are padding looks beyond the end, and may end the process.
+# Shorter texts are refused. A middleware that trusts the padding length in the header reads beyond
+# their end, and may crash.
 SHORTEST = 8
-# The stamp of a message that has none.
+# The stamp of a message without one.
 NEVER = bytes(8)
 
 _STAMP, _COUNT = struct.Struct('<iI'), struct.Struct('<I')
 _SIZES = {'boolean': 1, 'octet': 1, 'uint8': 1, 'int8': 1, 'uint16': 2, 'int16': 2, 'uint32': 4,
           'int32': 4, 'float': 4, 'uint64': 8, 'int64': 8, 'double': 8}
-# What is made of float64 alone, and of how many.
+# Types made of float64 alone, with their number.
 _DOUBLES = {'double': 1, 'geometry_msgs/Point': 3}
 
 
 def pack(stamp: Time) -> bytes:
-    """Return a stamp as it is in a message."""
+    """Serialise a stamp."""
     return _STAMP.pack(stamp.sec, stamp.nanosec)
 
 
 def pack_time(nanoseconds: int) -> bytes:
-    """Return a time [ns] as the stamp of a message has it."""
+    """Serialise a time [ns] as a stamp."""
     return _STAMP.pack(*divmod(nanoseconds, 10 ** 9))
 
 
 def unpack(stamp: bytes) -> Time:
-    """Return the stamp that some bytes of a message are."""
+    """Deserialise a stamp."""
     sec, nanosec = _STAMP.unpack(stamp)
     return Time(sec=sec, nanosec=nanosec)
 
 
 class Unreadable(ValueError):
-    """A message that cannot be deserialised; the text says why."""
+    """A message that cannot be deserialised; the text has the reason."""
 
 
 def deserialized(text: bytes, kind: type) -> Any:
-    """Return a message from its bytes; raise Unreadable if they are none of its kind."""
+    """Deserialise a message; raise Unreadable if the bytes are not of its type."""
     if len(text) < SHORTEST:
         raise Unreadable(f'there must be {SHORTEST} at least')
     try:
         return deserialize_message(text, kind)
     except Exception as error:
-        # Each middleware has errors of its own.
+        # Each middleware has its own error types.
         raise Unreadable(' '.join(str(error).split())[:200]) from None
 
 
 class NoLayout(Exception):
-    """A message whose numbers cannot be read or written in place; the text says why."""
+    """A message whose numbers cannot be accessed in place; the text has the reason."""
 
 
 class MessageLayout:
     """
-    Where the numbers lie in a message, and which other bytes count.
+    Positions of the numbers in a message, and a mask of its constant bytes.
 
-    The message is given serialised and as it is; it is of a type without arrays of fixed size and
-    without wide strings. Raises NoLayout if it is encoded otherwise.
+    Its arguments are the message, serialised and not. Its type has no fixed-size arrays and no
+    wide strings. Raises NoLayout for another encoding.
 
     Attributes
     ----------
     stamps : list of int
-        Where the stamps are.
+        Offsets of the stamps.
     numbers : list of (int, int)
-        For each sequence of float64 or points where its numbers begin, and how many they are.
+        Offset and count of the numbers of each sequence of float64 or points.
     fixed : uint8 array
-        A mask of the bytes that are neither number nor padding.
+        Mask of the bytes that are neither numbers nor padding.
 
     """
 
@@ -100,19 +99,19 @@ class MessageLayout:
         self._bytes, self.fixed = (np.frombuffer(each, np.uint8) for each in (text, self._fixed))
 
     def fits(self, text: bytes) -> bool:
-        """Return whether a message differs in nothing but stamps, numbers and padding."""
+        """Return whether a message differs only in stamps, numbers and padding."""
         return len(text) == len(self._text) and not (
             (np.frombuffer(text, np.uint8) ^ self._bytes) & self.fixed).any()
 
     def is_same(self, text: bytes, other: bytes) -> bool:
-        """Return whether two messages fit and differ in nothing but padding."""
+        """Return whether two messages fit and differ only in padding."""
         places = [(place, _STAMP.size) for place in self.stamps] + [
             (place, 8 * count) for place, count in self.numbers]
         return self.fits(text) and self.fits(other) and all(
             text[place:place + size] == other[place:place + size] for place, size in places)
 
     def read(self, text: bytes) -> List[np.ndarray]:
-        """Return the numbers of a message that fits, an array for each sequence."""
+        """Read the numbers of a message that fits, one array per sequence."""
         return [np.frombuffer(text, '<f8', count, place) for place, count in self.numbers]
 
     def _walk(self, message: Any) -> None:
@@ -148,7 +147,7 @@ class MessageLayout:
         return _COUNT.unpack_from(self._text, self._pass(4, 4))[0]
 
     def _pass(self, alignment: int, size: int, mask: bytes = b'\xff') -> int:
-        """Go on by some bytes; return where they begin, at a multiple after the header."""
+        """Advance by some aligned bytes; return their offset."""
         place = self._place + (HEADER - self._place) % alignment
         self._place = end = place + size
         if end > len(self._text):
@@ -159,25 +158,24 @@ class MessageLayout:
 
 class Template:
     """
-    The bytes of a message whose stamp and float64 values change; `message` as last patched.
+    A serialised message whose stamp and float64 values are patched in place.
 
-    `build` makes, from a stamp and an array of `count` floats, a message that shows some of them,
-    and else no numbers in its sequences but zero. Raises NoLayout if a patched message reads
-    differently from one that is built.
+    `build` makes a message from a stamp and an array of `count` floats. Numbers in its sequences
+    are these values or zero. Raises NoLayout if a patched message differs from a built one.
     """
 
     def __init__(self, build: Callable, count: int):
-        # Made of 1, 2, 3 and so on, a message says itself which of its numbers is which value.
+        # In a message built from 1, 2, 3, ... each number is the index of its value.
         message = build(Time(sec=1), np.arange(1.0, count + 1.0))
         text = serialize_message(message)
         layout = MessageLayout(text, message)
-        # Numbers lie at multiples of 8 after the header; in memory too they are quicker there.
+        # Numbers are aligned to 8 bytes after the header; LEAD aligns them in memory, too.
         self._bytes = bytearray(LEAD + text + bytes(-(len(text) - HEADER) % 8))
         self.message = memoryview(self._bytes)[len(LEAD):len(LEAD) + len(text)]
         self._stamps = [slice(len(LEAD) + place, len(LEAD) + place + _STAMP.size)
                         for place in layout.stamps if any(text[place:place + _STAMP.size])]
         self._numbers = np.frombuffer(self._bytes, float, offset=len(LEAD) + HEADER)
-        # Every number comes from one table: zero, the values, then what the message says besides.
+        # All numbers come from one table: zero, the values, then the message's constants.
         self._table = np.concatenate([np.zeros(count + 1), self._numbers])
         self._values = self._table[1:count + 1]
         self._sources = np.arange(count + 1, len(self._table))
@@ -187,7 +185,7 @@ class Template:
         self._check(build, layout, count)
 
     def patched(self, stamp: bytes, values: Any) -> bytes:
-        """Return the message with this stamp, packed, and these values, serialised."""
+        """Return the serialised message with a packed stamp and values."""
         self._values[:] = values
         self._table.take(self._sources, out=self._numbers, mode='clip')
         for place in self._stamps:
@@ -195,7 +193,7 @@ class Template:
         return bytes(self.message)
 
     def places(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return where in `message` values lie, which value each is, and where the stamps lie."""
+        """Return the offsets of values in `message`, their indices, and the stamps' offsets."""
         own = np.flatnonzero((self._sources > 0) & (self._sources <= len(self._values)))
         return HEADER + 8 * own, self._sources[own] - 1, np.array(
             [place.start - len(LEAD) for place in self._stamps], int)

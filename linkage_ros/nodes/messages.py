@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Joint states and markers of a mechanism as messages, from the numbers that were solved."""
+"""Build joint states and markers from solved numbers."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from .. import palette
 
 (LINKS_ID, JOINTS_ID, LOCUS_ID, GUIDES_ID, BODIES_ID, CRANKS_ID, DRIVEN_ID, PLATES_ID,
  GROUND_ID) = range(9)
-# How each marker is drawn, by its id: type, colour, width as a part of the longest bar, and its
-# layer. Layers lie one above the other, so that what is in one plane does not flicker.
+# Type, colour, width as a fraction of the longest bar, and layer of each marker, by id. Layers
+# have different heights, so that coplanar markers do not flicker.
 LOOKS = (
     (Marker.LINE_LIST, palette.BAR, 1 / 40, 0),
     (Marker.SPHERE_LIST, palette.JOINT, 1 / 20, 0),
@@ -31,7 +31,7 @@ LOOKS = (
     (Marker.LINE_LIST, palette.DRIVEN, 1 / 22, 4),
     (Marker.TRIANGLE_LIST, palette.BAR, None, -1),
     (Marker.TRIANGLE_LIST, palette.EARTH, None, -2))
-# From a layer to the next, as a part of the longest bar.
+# Distance between layers, as a fraction of the longest bar.
 STEP = 1 / 250
 
 
@@ -39,13 +39,13 @@ def _rgba(colour: str) -> ColorRGBA:
     return ColorRGBA(**dict(zip('rgb', palette.rgb(colour))), a=1.0)
 
 
-# Of a plate; its marker's own colour is that of the bars around it.
+# Colour of a plate; its marker's own colour is that of its edges.
 FACE = _rgba(palette.PLATE)
 
 
 def joint_states(stamp: Any, names: Sequence[str], positions: Any, velocities: Any = (),
                  efforts: Any = ()) -> JointState:
-    """Return joints [rad or m], their velocities and efforts, where they are known."""
+    """Build a message of joints [rad or m] with velocities and efforts, if known."""
     message = JointState(name=names, position=array('d', positions),
                          velocity=array('d', velocities), effort=array('d', efforts))
     message.header.stamp = stamp
@@ -54,17 +54,16 @@ def joint_states(stamp: Any, names: Sequence[str], positions: Any, velocities: A
 
 class Markers:
     """
-    The links, joints, guides and so on of one mechanism, a marker each.
+    The markers of a mechanism: links, joints, guides and so on.
 
     Parameters
     ----------
     name : str
-        The mechanism: the markers' namespace.
+        Name of the mechanism, the markers' namespace.
     frame_id, pose, size
-        The frame of the linkage's plane, x, y, z [m], roll, pitch, yaw [rad]; the longest bar [m].
+        Frame of the pose; x, y, z [m], roll, pitch, yaw [rad]; longest bar [m].
     shown : mapping
-        What each marker shows, by its id: joints, ends of lines or corners, by their place among
-        the points.
+        Indices of each marker's points, by its id: joints, ends of lines or corners.
 
     """
 
@@ -77,10 +76,10 @@ class Markers:
     def message(self, stamp: Any, places: np.ndarray, grounded: Sequence[int] = (0,)
                 ) -> MarkerArray:
         """
-        Return the markers of some legs.
+        Build the markers of legs.
 
-        `places` (legs, points, 2 or 3) is where the points are [m], `grounded` the legs whose
-        ground is shown, one for each ground that there is.
+        `places` (legs, points, 2 or 3) are the points' coordinates [m], `grounded` the legs whose
+        ground is drawn.
         """
         for marker, points in self._shown:
             marker.header.stamp = stamp
@@ -88,7 +87,7 @@ class Markers:
             marker.points = [Point(**dict(zip('xyz', place))) for place in legs[:, points].reshape(
                 -1, places.shape[-1]).tolist()]
             if marker.type == Marker.TRIANGLE_LIST:
-                # With colours of their own RViz shows both sides of faces so, lit or not.
+                # RViz draws both sides of faces alike only with per-vertex colours.
                 face = FACE if marker.id == PLATES_ID else marker.color
                 marker.colors = [face] * (len(marker.points) // 3)
         return MarkerArray(markers=[marker for marker, _ in self._shown])
@@ -96,14 +95,14 @@ class Markers:
 
 def locus(name: str, frame_id: str, pose: Sequence[float], places: np.ndarray,
           size: float) -> Marker:
-    """Return the curve through places [m], shape (n, 2); without a stamp it holds at any time."""
+    """Build the curve through places [m], shape (n, 2); a zero stamp is valid at any time."""
     marker = _marker(name, LOCUS_ID, frame_id, pose, size)
     marker.points = [Point(**dict(zip('xyz', place))) for place in places.tolist()]
     return marker
 
 
 def deleted(name: str, id_: int) -> Marker:
-    """Return the marker that takes another out of the picture."""
+    """Build the marker that deletes another."""
     return Marker(ns=name, id=id_, action=Marker.DELETE)
 
 

@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-One owner of what several nodes act on: types, dimensions, branches, scale and sweep.
+One owner of the parameters that several nodes use: types, dimensions, branches, scale and sweep.
 
-`kinematics` announces its values on `scene_parameters`; the other nodes follow them while it is
-there. Without it, or after it, each goes by its own. An announcement with the names of the
-mechanisms has all values, any other those that have changed since the one before. Whoever comes
-late gets the last with all, and those after it.
+`kinematics` announces its values on `scene_parameters`; the other nodes follow while it runs.
+Without it, each node uses its own values. An announcement with the names of the mechanisms has all
+values; the others have only changed ones. A late subscriber receives the last full announcement
+and all after it.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ LATCHED = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Announcer:
-    """Publishes the values of all parameters that several nodes act on."""
+    """Publishes the parameters that several nodes use."""
 
     def __init__(self, node: Any):
         self._node = node
         self._publisher = node.create_publisher(ParameterEvent, TOPIC, LATCHED)
-        # How many announcements the topic holds for late subscribers.
+        # Number of announcements that the topic holds for late subscribers.
         self._announced = 0
 
     def first(self) -> Callable[[], None]:
-        """Return what publishes all values for the first time, if nothing else has till then."""
+        """Return a function that publishes all values, unless they have been published before."""
         of, values = self._node.scene, _messages(self._node.scene.parameters)
 
         def publish() -> None:
@@ -48,10 +48,10 @@ class Announcer:
         return publish
 
     def announce(self, changed: Iterable[scene.Parameter]) -> None:
-        """Publish the values that several nodes act on of those that have changed."""
+        """Publish the changed values that several nodes use."""
         values = _messages(changed)
         if self._announced and values:
-            # What has all values must not be the one that the next one pushes out.
+            # The full announcement must stay within the depth of the topic.
             self._announced = 1 if self._announced == DEPTH else self._announced + 1
             self._publish(changed_parameters=values if self._announced > 1 else _messages(
                 self._node.scene.parameters))
@@ -75,7 +75,7 @@ class Follower:
             ParameterEvent, TOPIC, node.guarded(TOPIC, self._receive), LATCHED)
 
     def owner_of(self, name: str) -> Optional[str]:
-        """Return the full name of the node that a parameter belongs to, while it is there."""
+        """Return the full name of the node that owns a parameter, while it runs."""
         there = name in self._owned and self._node.count_publishers(self._subscription.topic_name)
         return self._owner if there else None
 
@@ -84,7 +84,7 @@ class Follower:
         values, wrong = _read((*event.new_parameters, *event.changed_parameters), fields)
         if 'mechanisms' in values or event.node != self._owner:
             self._compare(event, values)
-        # What could not be may be now.
+        # Values that were refused before may be valid now.
         changed = {name: value for name, value in {**self._refused, **values}.items()
                    if name in self._owned and not fields[name].read_only
                    and value != self._present(name)}
@@ -96,7 +96,7 @@ class Follower:
         return scene.plain(self._node.get_parameter_or(name).value)
 
     def _compare(self, event: ParameterEvent, values: Mapping[str, Any]) -> None:
-        """Find out what is followed of an owner that says all."""
+        """Decide which mechanisms to follow, from a full announcement."""
         fields, machines = self._parameters.fields, self._parameters.scene.machines
         started = event.node != self._owner or event.new_parameters
         self._owner, self._refused = event.node, {}
@@ -118,7 +118,7 @@ class Follower:
                 'other values, which are followed')
 
     def _warn(self, kind: str, particulars: Sequence[str], what: str) -> None:
-        """Warn of something once, and again when it is another thing."""
+        """Warn once, and again if the particulars change."""
         if particulars and particulars != self._warned.get(kind):
             self._node.get_logger().warning(
                 f'{elided(self._owner)} has {what}: {listed(particulars, 1000)}')
@@ -131,7 +131,7 @@ def _messages(parameters: Iterable[scene.Parameter]) -> List:
 
 
 def _read(messages: Iterable, fields: Mapping[str, Any]) -> Tuple[Dict[str, Any], List[str]]:
-    """Return the values of the fields that there are, and what is wrong with the others."""
+    """Return the values of known fields, and errors for the others."""
     values: Dict[str, Any] = {}
     wrong: List[str] = []
     for message in messages:

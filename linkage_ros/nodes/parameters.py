@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of a node that acts on a scene, by the public hooks of the client library."""
+"""Scene parameters of a node, declared and validated by rclpy's public hooks."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ from ..words import elided, quoted
 
 
 class Undeclared(ParameterNotDeclaredException):
-    """A name that no parameter has; the text says so."""
+    """An unknown parameter name."""
 
     __init__ = Exception.__init__
 
 
 class SceneParameters:
     """
-    Declares what a node acts on, and turns every change into a scene or a refusal.
+    Declares the parameters that a node uses, and validates every change.
 
-    The node is made with `automatically_declare_parameters_from_overrides`. `role`, one of
-    scenes.ALL, tells which parameters it acts on. `check` raises SceneError for a scene that it
-    cannot act on; `changed` is called with the parameters that have changed, after `scene` has.
-    Raises SceneError if the values that the node was started with make no scene.
+    The node is created with `automatically_declare_parameters_from_overrides`. `role`, one of
+    scenes.ALL, selects its parameters. `check` raises SceneError for a scene that the node does
+    not support; `changed` is called with the changed parameters, after `scene` is replaced.
+    Raises SceneError if the node's initial values are invalid.
 
     Attributes
     ----------
     scene : Scene
-        What the parameters say now.
+        The scene of the present values.
     fields : dict
         The Field of each parameter.
     is_given : bool
@@ -54,10 +54,10 @@ class SceneParameters:
     def __init__(self, node: Any, role: str, check: Callable[[scenes.Scene], None],
                  changed: Callable[[list[scenes.Parameter]], None]):
         self._node, self._role, self._check, self._changed = node, role, check, changed
-        # Whose value counts instead of an own one, and whether that is being followed.
+        # The node that owns a parameter, and whether its values are being followed.
         self.owner_of: Callable[[str], Optional[str]] = lambda name: None
         self._is_followed = self._is_derived = False
-        # A parameter file's empty list has no type and no value.
+        # An empty list in a parameter file has neither type nor value.
         given = {name: () if one.value is None else scenes.plain(one.value)
                  for name, one in node.get_parameters_by_prefix('').items()}
         self.scene = scenes.read(given)
@@ -65,19 +65,19 @@ class SceneParameters:
         self.fields = {one.name: one.field for one in own}
         of_scene = given.keys() & {one.name for one in self.scene.parameters}
         self.is_given = bool(of_scene)
-        # Those that other nodes act on are not this one's.
+        # Parameters of other nodes only are not declared here.
         for name in of_scene:
             node.undeclare_parameter(name)
         self._declare(own)
         self._candidate = self.scene
-        # By name: the mechanism and the value that a range was found for.
+        # By name: mechanism, value and the range computed for them.
         self._ends: dict[str, tuple[Any, Any, Any]] = {}
         node.add_pre_set_parameters_callback(self._typed_alike)
         node.add_on_set_parameters_callback(self._validate)
         node.add_post_set_parameters_callback(self._adopt)
 
     def set_readable(self, messages: Sequence[ParameterMessage]) -> dict[int, SetParametersResult]:
-        """Set what can be read of a request; return the results by their place in it."""
+        """Set the readable parameters of a request; return results by index."""
         readable = {}
         for i, one in enumerate(messages):
             with suppress(scenes.SceneError, KeyError, ValueError):
@@ -88,7 +88,7 @@ class SceneParameters:
         return dict(zip(readable, self._set_together([*readable.values()])))
 
     def follow(self, values: Mapping[str, Any]) -> dict[str, str]:
-        """Set values that another node owns; return why not, by name."""
+        """Set values that another node owns; return the errors by name."""
         self._is_followed = True
         try:
             results = self._set_together([
@@ -102,8 +102,8 @@ class SceneParameters:
         """
         Set parameters, all at once or else half by half; return a result for each.
 
-        One by one the values of another scene cannot be: a leg of mixed sizes cannot be assembled.
-        Of a name that comes several times only the last value is validated and set.
+        Setting them one by one would fail: a leg with some old and some new sizes may not be
+        assembled. If a name is repeated, only its last value is validated and set.
         """
         if not parameters:
             return []
@@ -115,22 +115,22 @@ class SceneParameters:
         return self._set_together(parameters[:half]) + self._set_together(parameters[half:])
 
     def ranged(self, name: str, descriptor: ParameterDescriptor) -> ParameterDescriptor:
-        """Return a parameter's descriptor with the range of its slider about its value."""
+        """Return a parameter's descriptor with a slider range around its value."""
         if name not in self.fields:
             return descriptor
         descriptor, ends = copy(descriptor), self._slider_ends(name)
-        # The client library notes the type of a refused value.
+        # rclpy changes the descriptor's type to that of a refused value.
         descriptor.type = _kind(self.fields[name]).value
         if ends and self.fields[name].kind == 'integer':
             descriptor.integer_range = [IntegerRange(from_value=ends[0], to_value=ends[1], step=1)]
         elif ends:
-            # A step other than 0 refuses values that are stops up to rounding.
+            # With a step other than 0, rclpy would refuse rounded values.
             descriptor.floating_point_range = [
                 FloatingPointRange(from_value=ends[0], to_value=ends[1], step=0.0)]
         return descriptor
 
     def renew_ranges(self) -> None:
-        """Find again the ranges that somebody has asked for; it may run in another thread."""
+        """Compute the requested ranges again; it may run in another thread."""
         for name in list(self._ends):
             self._slider_ends(name)
 
@@ -146,7 +146,7 @@ class SceneParameters:
     def _declare(self, own: Sequence[scenes.Parameter]) -> None:
         descriptors = {field: _descriptor(field, field.read_only)
                        for field in {one.field for one in own}}
-        # The type of an empty list does not follow from its value.
+        # The value of an empty list does not imply its type.
         empty = [one for one in own if one.value == ()]
         self._node.declare_parameters('', [
             (one.name, one.value, copy(descriptors[one.field])) if one.value != () else
@@ -158,7 +158,7 @@ class SceneParameters:
                 self._node.set_descriptor(one.name, descriptors[one.field])
 
     def _typed_alike(self, parameters: list[Parameter]) -> list[Parameter]:
-        """Return parameters in their own types: 3 for 3.0, and lists that are empty."""
+        """Convert parameters to their declared types, such as 3 to 3.0, and empty lists."""
         for one in parameters:
             if not self._node.has_parameter(one.name):
                 raise Undeclared(f'{elided(one.name)} is not a parameter of '
@@ -172,7 +172,7 @@ class SceneParameters:
                 Parameter(parameter.name, _kind(field), field.checked(
                     parameter.name, parameter.value)))
         except scenes.SceneError:
-            # It is refused in words by what comes next.
+            # Validation refuses it with an explanation.
             return parameter
 
     def _validate(self, parameters: list[Parameter]) -> SetParametersResult:
@@ -213,7 +213,7 @@ class SceneParameters:
             return
         self.scene = self._candidate
         given = {one.name for one in parameters}
-        # Values that nobody set may follow from others.
+        # Defaults may depend on other parameters.
         derived = [_parameter(one) for one in changed if one.name in self.fields
                    and one.name not in given and not one.field.read_only]
         if derived:
@@ -230,13 +230,13 @@ def _kind(field: Any) -> Parameter.Type:
 
 
 def _parameter(parameter: scenes.Parameter) -> Parameter:
-    """Return a parameter whose type does not depend on its value."""
+    """Return a ROS parameter with the type of its field."""
     return Parameter(parameter.name, _kind(parameter.field), parameter.value)
 
 
 def _descriptor(field: Any, read_only: bool) -> ParameterDescriptor:
-    """Return how a kind of parameter is described, whatever its name."""
-    # A wrong type is refused by the sentence of its field, not by the client library's.
+    """Return the descriptor of a field, without its name."""
+    # Dynamic typing lets the field refuse a wrong type with its own message.
     return ParameterDescriptor(
         description=field.meaning, read_only=read_only, type=_kind(field).value,
         additional_constraints=field.allowed, dynamic_typing=True)

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What a crank message sets off: one plan, made once for its source, the scene and its subscribers.
+Processing of crank messages by plans, each made once for a source, a scene and its subscribers.
 
-The steps of a plan are always the same: read the inputs, solve, assess which legs are assembled,
-convert to the robot's joints, write the numbers into the messages, publish them. One of two
-executors takes them on the same arrays: `plan_python`, or `plan_llvm` once its code is compiled.
+All plans have the same steps: read the inputs, solve, assess which legs are assembled, convert
+to the robot's joints, write the numbers into the messages, publish. Two executors run them on the
+same arrays: `plan_python`, and `plan_llvm` once its code is compiled.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ except ImportError:
 
 # Plans that are cached.
 PLANS = 64
-# After how many runs a plan looks for its machine code; then each time that many more are done.
+# Runs after which a plan looks for its machine code; later it looks every TRIED[-1] runs.
 TRIED = 2, 4, 8, 16, 32, 64
 
 
 class Route(NamedTuple):
-    """An input of a mechanism that a source sets, and its place in the source's messages."""
+    """An input of a mechanism, and its index in a source's messages."""
 
     mechanism: DrivenMechanism
     input: int
@@ -45,12 +45,12 @@ class Route(NamedTuple):
 
     @property
     def is_measured(self) -> bool:
-        """Whether the source measures something from which the input follows."""
+        """Whether the source measures an output instead of the input."""
         return bool(self.mechanism.model.inputs[self.input].measures)
 
 
 class Message(NamedTuple):
-    """A message of a plan: its publisher, where its values are, and its stamp."""
+    """A message of a plan: its publisher, the arrays of its values, and its stamp."""
 
     publisher: PatchedPublisher
     values: List[np.ndarray]
@@ -59,28 +59,28 @@ class Message(NamedTuple):
 
 @dataclass(eq=False)
 class Output:
-    """What poses are published as; `is_regular` tells whether all that a plan solves are."""
+    """Messages for the present poses; `is_regular`: every solved pose is regular."""
 
     messages: List[Message]
     is_regular: bool
-    # What the executor in machine code makes of it.
+    # The machine-code executor's form of it.
     compiled: Any = None
 
 
 class Plan:
     """
-    What the messages of one source set off.
+    The processing of one source's messages.
 
-    Without a source nothing is read, and the mechanisms are published as they are.
+    Without a source, it publishes the mechanisms at their present inputs.
 
     Attributes
     ----------
     is_moving : bool
-        Whether the source says how fast its inputs move.
+        Whether the source's messages have velocities.
     readings : list of Route
-        The inputs that are read; measured ones are set before a plan runs.
+        Inputs to read; measured inputs are set before a plan runs.
     solved : list of (DrivenMechanism, Solution)
-        What is solved, and how.
+        Mechanisms to solve, with their solvers.
 
     """
 
@@ -106,7 +106,7 @@ class Plan:
         self._executor: Any = PythonExecutor(self)
 
     def run(self, text: bytes) -> bool:
-        """Do all that a message sets off; return False if it is of another source."""
+        """Process a message; return False if it is from another source."""
         is_settled = self._version == self._planner.version
         output = self._output if is_settled else None
         irregular = self._executor.run(text, output if output and output.is_regular else None)
@@ -117,7 +117,7 @@ class Plan:
         return True
 
     def _conclude(self, irregular: AbstractSet[DrivenMechanism]) -> None:
-        """Assess what was solved, of which some may be irregular, and publish it."""
+        """Assess and publish the solutions, of which some may be irregular."""
         changed = [one.assess(solution, one not in irregular) for one, solution in self.solved]
         if True in changed:
             self._planner.version += 1
@@ -126,7 +126,7 @@ class Plan:
         self._executor.publish(self._output)
         if self._is_interpreted and plan_llvm:
             self._runs += 1
-            # Tried now and then: while subscribers come one by one no plan lasts.
+            # Not at once: while subscribers come one by one, plans are short-lived.
             if self._runs in TRIED or self._runs % TRIED[-1] == 0:
                 executor = plan_llvm.executor(self)
                 self._executor, self._is_interpreted = executor or self._executor, not executor
@@ -136,7 +136,7 @@ class Plan:
         return self._outputs.get_or_make(poses, self._made_output)
 
     def _made_output(self) -> Output:
-        """Return what publishes the present poses."""
+        """Return the output for the present poses."""
         messages = [Message(publisher, [solution.values], one.stamp)
                     for one, solution in self.solved for publisher in one.publishers()]
         if found := self._planner.scene_joint_states.message(self._members):
@@ -148,16 +148,16 @@ class Plan:
 
 class Planner:
     """
-    The plans of a scene, by what selects them, and the state that they share.
+    The cached plans of a scene, and their common state.
 
     Attributes
     ----------
     now : callable
-        Returns the time, packed, for messages that have no stamp.
+        Returns the packed time, for messages without a stamp.
     stamp : int64 array (1,)
-        The stamp of the last message that set an input.
+        Stamp of the last message that set an input.
     version : int
-        Counts the changes of poses in anything but numbers.
+        Number of changes of poses other than in numbers.
 
     """
 
@@ -167,11 +167,11 @@ class Planner:
         self.now, self._reader = now, reader
         self.stamp, self.version = np.zeros(1, np.int64), 0
         self._plans = Cache(size=PLANS)
-        # The last plan, if the next message of its source selects it again.
+        # The last plan, if the next message of its source uses it again.
         self._last: Optional[Plan] = None
 
     def process(self, text: bytes) -> None:
-        """Do all that a message sets off; raise Unreadable if the bytes are none."""
+        """Process a serialised message; raise Unreadable if it is not a joint state."""
         if self._last is None or not self._last.run(text):
             source = self._reader.source(text)
             plan = self._plan(source, text)
@@ -179,22 +179,22 @@ class Planner:
                 plan.run(text)
 
     def invalidate(self) -> None:
-        """Make new plans from the next message on: the scene or its subscribers are others."""
+        """Drop all plans: the scene or its subscribers have changed."""
         self._plans.clear()
         self._last = None
 
     def discard(self) -> None:
-        """Drop all poses: what was being done has failed half way."""
+        """Drop all poses after a failure in the middle of a message."""
         self.invalidate()
         for one in self.mechanisms:
             one.pose = None
 
     def publish(self, mechanisms: Sequence[DrivenMechanism]) -> None:
-        """Publish mechanisms as they are, and the joints of the scene."""
+        """Publish mechanisms at their present inputs, and the joints of the scene."""
         Plan(None, (), mechanisms, self).run(b'')
 
     def _plan(self, source: Source, text: bytes) -> Optional[Plan]:
-        """Return the plan for a message of a source, in which its inputs are known."""
+        """Return the plan for a message, after its inputs are marked as known."""
         routes, moving = source.meaning
         measured = [route for route in routes if route.is_measured]
         failed = self._measure(source, measured, moving, text) if measured else frozenset()
@@ -215,7 +215,7 @@ class Planner:
 
     def _measure(self, source: Source, routes: Sequence[Route], moving: bool,
                  text: bytes) -> frozenset:
-        """Set the inputs that sensors measure; return those that cannot be where they say."""
+        """Set the inputs that sensors measure; return those whose values have no solution."""
         _, positions, velocities = source.read(text)
         return frozenset(route for route in routes if not route.mechanism.measure(
             route.input, positions[route.place], velocities[route.place] if moving else None))

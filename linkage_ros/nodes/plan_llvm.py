@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Plans in machine code: one call from the bytes of a message to the bytes of all others."""
+"""Plans in machine code: one call reads a message, solves, and patches all other messages."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from ..linkage.walker import Solution
 
 
 def executor(plan: Any) -> Any:
-    """Return the executor of a plan in machine code; None while that is not compiled."""
+    """Return the machine-code executor of a plan; None until it is compiled."""
     ready = plan.source and plan.source.size and native.code().done() and all(
         solution.batch.code for _, solution in plan.solved)
     return LlvmExecutor(plan) if ready else None
 
 
 class LlvmExecutor:
-    """Takes the steps of a plan in one call, from tables of addresses."""
+    """Runs a plan in one native call, with precomputed tables of addresses."""
 
     def __init__(self, plan: Any):
         self._plan = plan
@@ -72,7 +72,7 @@ class LlvmExecutor:
 
 
 class _Ending(native.Ending):
-    """What publishes the messages of one output."""
+    """The messages of one output, with their address tables."""
 
     def __init__(self, plan: Any, output: Any, stamps: np.ndarray, changes: np.ndarray):
         puts = [_puts(message) for message in output.messages if message.publisher.template]
@@ -82,7 +82,7 @@ class _Ending(native.Ending):
         self._built = [one for one in output.messages if not one.publisher.template]
 
     def publish(self) -> None:
-        """Publish the messages as they have been patched."""
+        """Publish the patched messages."""
         for publish, message in self._patched:
             publish(message.tobytes())
         for publisher, values, stamp in self._built:
@@ -90,7 +90,7 @@ class _Ending(native.Ending):
 
 
 def _readings(plan: Any) -> Iterator[tuple]:
-    """Yield what is taken of a message: where it lies, where it goes, factor and what is added."""
+    """Yield the numbers to read: offset in the message, destination, factor and offset."""
     for mechanism, i, place in plan.readings:
         state, (factor, plus) = native.addresses(mechanism.inputs), mechanism.conversion(i)
         yield plan.source.positions + 8 * place, state[0, i], factor, plus
@@ -99,7 +99,7 @@ def _readings(plan: Any) -> Iterator[tuple]:
 
 
 def _copies(mechanism: Any, solution: Solution) -> Iterator[tuple]:
-    """Yield from where to where inputs and speeds are copied: to every leg that is solved."""
+    """Yield source and destination of inputs and speeds, copied to every solved leg."""
     driven = native.addresses(solution.layout.driven(solution.values))
     state = native.addresses(mechanism.inputs).ravel()
     for start, given, own in zip(state, native.addresses(solution.batch.given), driven):
@@ -108,7 +108,7 @@ def _copies(mechanism: Any, solution: Solution) -> Iterator[tuple]:
 
 
 def _limits(loop: int, mechanism: Any, solution: Solution) -> Iterator[tuple]:
-    """Yield for each leg between what it can be assembled, well within its widest reach."""
+    """Yield, for each leg, limits well inside its widest reach."""
     assembly = mechanism.model.assembly
     if not assembly.is_limited:
         return
@@ -131,7 +131,7 @@ def _conversion(mechanism: Any, solution: Solution) -> np.ndarray:
 
 
 def _puts(message: Any) -> np.ndarray:
-    """Return what is put into the bytes of a message."""
+    """Return the table of values to write into a message."""
     template = message.publisher.template
     numbers, sources, stamps = template.places()
     start = native.address(np.frombuffer(template.message, np.uint8))

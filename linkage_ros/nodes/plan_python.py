@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Plans in plain Python and numpy: the executor that is always there."""
+"""Plans in plain Python and numpy: the executor without optional packages."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .message_layout import NEVER
 
 
 class PythonExecutor:
-    """Takes the steps of a plan one by one."""
+    """Runs the steps of a plan one by one."""
 
     def __init__(self, plan: Any):
         self._plan, self._solved = plan, frozenset(mechanism for mechanism, _ in plan.solved)
@@ -25,8 +25,8 @@ class PythonExecutor:
         """
         Read a message and solve.
 
-        It returns the mechanisms whose numbers may be irregular, or None if the message is of
-        another source. An executor that has published the given output as well returns True.
+        Return the mechanisms whose numbers may be irregular; None if the message is from another
+        source; True if the executor has published the output, too.
         """
         plan = self._plan
         if plan.source:
@@ -48,7 +48,7 @@ class PythonExecutor:
                               factor * velocities[place] if self._plan.is_moving else None)
 
     def publish(self, output: Any) -> None:
-        """Convert what was solved and publish the messages."""
+        """Convert the solutions and publish the messages."""
         for mechanism, solution in self._plan.solved:
             mechanism.convert(solution)
         for publisher, values, stamp in output.messages:

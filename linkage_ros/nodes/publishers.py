@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Publishers that track their subscriber count, and those that patch a message of theirs."""
+"""Publishers that track their subscriber count, and publishers that patch one message."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from .message_layout import NoLayout, Template, unpack
 
-# For what is published once, for every later subscriber.
+# For messages published once, which later subscribers receive, too.
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class TrackedPublisher:
     """
-    A publisher whose `has_subscribers` is of the middleware's last event: no message asks for it.
+    A publisher that updates `has_subscribers` on events, without a query for each message.
 
-    Of the subscriptions `own` of this process do not count. `changed` is called on the executor's
-    thread when the first subscriber comes and when the last leaves.
+    `own` is the number of this process's subscriptions, which do not count. `changed` is called on
+    the executor's thread when the first subscriber comes and when the last one leaves.
     """
 
     def __init__(self, node: Node, type_: Any, name: str, qos: Any,
@@ -42,10 +42,10 @@ class TrackedPublisher:
 
 class PatchedPublisher:
     """
-    Publishes one message again and again with other values, `build` and `count` as for Template.
+    Publishes one message repeatedly with new values; `build` and `count` as for Template.
 
-    Its `template` has the bytes that are patched, or is None where that cannot be done: then
-    ordinary messages are built, which is logged once.
+    If the message cannot be patched, `template` is None, and ordinary messages are built, which is
+    logged once.
     """
 
     def __init__(self, publisher: Any, build: Callable, count: int, logger: Any):
@@ -59,7 +59,7 @@ class PatchedPublisher:
                            once=True)
 
     def publish(self, stamp: bytes, values: Sequence[Any]) -> None:
-        """Publish the message with this stamp, packed, and values, one array after the other."""
+        """Publish the message with a packed stamp and values, given as consecutive arrays."""
         joined: Any = np.concatenate(values) if len(values) > 1 else values[0]
         if self.template:
             self.publisher.publish(self.template.patched(stamp, joined))

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Topics of the whole scene, for one robot_state_publisher: all joints, and a robot model."""
+"""Topics of the whole scene for robot_state_publisher: all joints, and a robot model."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .messages import joint_states
 from .publishers import LATCHED, PatchedPublisher, TrackedPublisher
 from ..cache import Cache
 
-# Arrangements of the message that are cached.
+# Cached arrangements of the message.
 ARRANGEMENTS = 16
 
 
@@ -24,8 +24,8 @@ class SceneJointStates:
     """
     Publishes `joint_states` and `robot_description`.
 
-    `sources` are the joints on `crank_states`: where that is the same topic, they are not
-    published again. `changed` is called when subscribers come or go.
+    `sources` are the joints on `crank_states`, which are omitted if that is the same topic.
+    `changed` is called when subscribers come or go.
     """
 
     def __init__(self, node: Any, sources: Iterable[str], changed: Callable[[], None]):
@@ -41,17 +41,17 @@ class SceneJointStates:
 
     @property
     def has_subscribers(self) -> bool:
-        """Whether anybody but the node itself subscribes to the joints."""
+        """Whether the joints have subscribers other than the node itself."""
         return self._joint_states.has_subscribers
 
     def describe(self, text: str) -> None:
-        """Publish a robot model, if there is one and it is another."""
+        """Publish a robot model, unless it is empty or unchanged."""
         if text not in ('', self._description):
             self._description = text
             self._descriptions.publish(String(data=text))
 
     def message(self, members: Iterable[Any]) -> Optional[Tuple[PatchedPublisher, List]]:
-        """Return what publishes the joints of mechanisms, and the arrays of their values."""
+        """Return the publisher of mechanisms' joints, and the arrays of their values."""
         poses = tuple((member.model, member.pose) for member in members
                       if member.pose and member.pose.exists)
         if not poses:

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the three nodes share: a scene as parameters that can be changed, and `main`."""
+"""Base of the three nodes: a scene as changeable parameters, and functions to run nodes."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ try:
 except ImportError:
     Executor = SingleThreadedExecutor
 
-# Some builds of the EventsExecutor wait well for a while, but busily and deaf to signals for ever.
+# With an endless wait, some builds of the EventsExecutor spin busily and ignore signals [s].
 LONGEST_WAIT = 1.0
 
-# How long a thread that prepares a change may keep a message waiting [s]. Where it is less, that
-# thread also takes turns amid a message, and more messages are late.
+# Longest delay of a message by the worker thread [s]. With a shorter interval, the worker also
+# interrupts messages, and more of them are late.
 SWITCH_INTERVAL = 0.0005
 
 SECONDS_BETWEEN_LOOKS = 2.0
@@ -48,16 +48,16 @@ SECONDS_BETWEEN_LOOKS = 2.0
 
 class SceneNode(Node):
     """
-    A node that acts on a scene.
+    Base class of the nodes of a scene.
 
-    A subclass overrides `check`, `prepare` and `adopt`, and ends its constructor with `begin`. A
-    change is validated and answered at once, prepared in a worker thread, then adopted; of several
-    changes only the newest is prepared.
+    A subclass overrides `check`, `prepare` and `adopt`, and calls `begin` last in its constructor.
+    A change is validated and answered at once, prepared in a worker thread, then adopted. If
+    changes queue up, only the newest is prepared.
 
     Raises
     ------
     SceneError
-        If the parameters that the node is started with make no scene.
+        If the initial parameters are invalid.
 
     """
 
@@ -78,7 +78,7 @@ class SceneNode(Node):
 
     @property
     def scene(self) -> scenes.Scene:
-        """Return what the parameters say."""
+        """The scene of the present parameters."""
         return self._parameters_of_scene.scene
 
     @property
@@ -88,7 +88,7 @@ class SceneNode(Node):
 
     @property
     def fields(self) -> Mapping[str, scenes.Field]:
-        """Return the parameters that it acts on."""
+        """The parameters that the node uses."""
         return self._parameters_of_scene.fields
 
     @property
@@ -97,7 +97,7 @@ class SceneNode(Node):
         return self._adopted is self.scene
 
     def begin(self) -> None:
-        """Adopt the first scene, and follow or announce what several nodes act on."""
+        """Adopt the first scene; follow or announce common parameters."""
         with self._or_destroyed():
             self.check(self.scene)
             prepared = self.prepare(self.scene)
@@ -113,48 +113,48 @@ class SceneNode(Node):
             clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def check(self, new: scenes.Scene) -> None:
-        """Raise SceneError for a scene that the node cannot act on; quick."""
+        """Raise SceneError for a scene that the node does not support; must be fast."""
 
     def prepare(self, new: scenes.Scene) -> Any:
-        """Return all that a scene needs, changing nothing in the node; on the worker's thread."""
+        """Return all objects of a scene, without changes to the node; on the worker's thread."""
         return new
 
     def adopt(self, prepared: Any) -> None:
-        """Swap in what was prepared; quick, on the executor's thread."""
+        """Swap in the prepared objects, on the executor's thread; must be fast."""
 
     def later(self, jobs: Iterable[Job]) -> None:
-        """Do jobs in the worker's thread, once the node spins."""
+        """Run jobs in the worker's thread, once the node spins."""
         if self._first_spin.is_canceled():
             self._worker.add(jobs)
         else:
             self._later.extend(jobs)
 
     def serves(self) -> str:
-        """Return in words what the node does, for its first message."""
+        """Describe what the node does, for its first log message."""
         return listed(self.scene.machines, 200)
 
     def declare_parameters(self, namespace: str, parameters: Any, ignore_override: bool = False
                            ) -> List[Parameter]:
-        """Declare parameters; an empty list of a parameter file has no type of its own."""
+        """Declare parameters; an empty list in a parameter file has the default's type."""
         for _, *value, descriptor in (one for one in parameters if len(one) > 2):
             descriptor.dynamic_typing = descriptor.dynamic_typing or value == [None]
         return super().declare_parameters(namespace, parameters, ignore_override)
 
     def describe_parameter(self, name: str) -> ParameterDescriptor:
-        """Describe a parameter, with the range of its slider around the present value."""
+        """Describe a parameter, with a slider range around its present value."""
         return self._parameters_of_scene.ranged(name, super().describe_parameter(name))
 
     def create_service(self, srv_type: Any, srv_name: str, callback: Callable, **kwargs: Any
                        ) -> Any:
-        """Create a service that answers with the reason if its callback raises."""
+        """Create a service that responds with the reason if its callback raises."""
         return super().create_service(
             srv_type, srv_name, partial(self._respond, callback), **kwargs)
 
     def delete_displayed(self) -> None:
-        """Delete what others display of the node; it is about to end."""
+        """Delete the node's markers before it ends."""
 
     def destroy_node(self) -> None:
-        """Delete what is displayed, and end the worker too."""
+        """Delete displayed markers, end the worker, and destroy the node."""
         with suppress(RCLError, InvalidHandle):
             self.delete_displayed()
         self._worker.end()
@@ -175,7 +175,7 @@ class SceneNode(Node):
             return refused(response, elided(f'internal error: {error!r}', 299))
 
     def _changed(self, changed: List[scenes.Parameter]) -> None:
-        """Prepare the newest scene, and tell the nodes that follow."""
+        """Prepare the newest scene, and announce the changes."""
         if type(self).prepare is SceneNode.prepare:
             self._adopt(self.scene, self.scene)
         else:
@@ -185,7 +185,7 @@ class SceneNode(Node):
             self._announcer.announce(changed)
 
     def _prepared(self, new: scenes.Scene) -> Callable[[], None]:
-        """Return what adopts a scene."""
+        """Prepare a scene; return a function that adopts it."""
         return partial(self._adopt, new, self.prepare(new))
 
     def _adopt(self, new: scenes.Scene, prepared: Any) -> None:
@@ -221,7 +221,7 @@ def run(node_class: Callable[[], Node], name: str, args: Any = None,
 
 def run_together(make: Callable[[], Iterable[Node]], name: str, args: Any = None,
                  executor_class: Any = Executor) -> int:
-    """Run the nodes that are made, in one executor, until they are interrupted; as `run`."""
+    """Run several nodes in one executor until interrupted; see `run`."""
     with ShutdownHandler() as shutdown:
         return _run(make, name, args, executor_class, shutdown)
 
@@ -233,7 +233,7 @@ def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_clas
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         _refuse_arguments(args)
     except (RuntimeError, scenes.SceneError) as error:
-        # What the client library makes of an argument may be as long as that.
+        # rclpy's message may quote a long argument.
         rclpy.try_shutdown()
         unknown = isinstance(error, rclpy_implementation.UnknownROSArgsError)
         what = 'nothing after --ros-args is called ' if unknown else ''
@@ -241,14 +241,14 @@ def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_clas
         return _failed(name, elided(f'bad arguments: {what}{error}', 240) + hint)
     nodes: List[Node] = []
     try:
-        # Nothing of what is made is dropped: there is nothing to collect.
+        # Nothing becomes garbage while nodes are created.
         gc.disable()
         for node in make():
             _refuse_namesake(node, nodes)
             nodes.append(node)
             if isinstance(node, SceneNode):
                 node.get_logger().info(f'ready: {node.serves()}')
-        # What has been made so far stays: the collector need not look through it again and again.
+        # All objects so far are permanent: exclude them from garbage collection.
         gc.freeze()
         gc.enable()
         _spin(executor_class(), nodes, shutdown, Incidents(
@@ -268,7 +268,7 @@ def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_clas
 def _spin(executor: Any, nodes: List[Node], shutdown: ShutdownHandler,
           incidents: Incidents) -> None:
     try:
-        # `wake` wakes not every executor.
+        # `Executor.wake` does not wake every kind of executor.
         shutdown.wake = lambda: executor.create_task(lambda: None)
         shutdown.before_exit = partial(_delete_displayed, nodes)
         for node in nodes:
@@ -279,7 +279,7 @@ def _spin(executor: Any, nodes: List[Node], shutdown: ShutdownHandler,
             except ExternalShutdownException:
                 raise
             except Exception as error:
-                # A callback of the client library's own, such as a parameter service.
+                # A callback of rclpy, such as a parameter service.
                 incidents.report('a request', error)
     finally:
         executor.shutdown()

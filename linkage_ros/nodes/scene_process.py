@@ -16,7 +16,7 @@ NAME = 'scene'
 
 
 def nodes() -> Iterator[SceneNode]:
-    """Make the nodes, the owner of the geometry first, who turns the cranks last."""
+    """Create the nodes: the owner of the geometry first, crank_driver last."""
     kinematics = Kinematics()
     yield kinematics
     inverse = ServoInverse()

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How the executables end: at SIGINT or SIGTERM within a second, whatever they are doing."""
+"""Shutdown of the executables: they end within a second after SIGINT or SIGTERM."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ import sys
 from threading import Event, Thread
 from typing import Any, Callable
 
-# How long what is being done may go on after a signal, until the process ends all the same [s].
+# Time after a signal until the process is ended by force [s].
 TIMEOUT = 0.6
 
 
 class ShutdownHandler:
     """
-    Catches SIGINT and SIGTERM in a thread, so that none interrupts a callback.
+    Handles SIGINT and SIGTERM in a thread, so that callbacks are not interrupted.
 
-    The first one sets `is_over` and calls `wake`; whoever spins then stops. Where that takes
-    longer than TIMEOUT, `before_exit` is called, and the process ends with exit code 0.
+    The first signal sets `is_over` and calls `wake`, so that spinning stops. If that takes longer
+    than TIMEOUT, `before_exit` is called, and the process ends with exit code 0.
     """
 
     def __init__(self) -> None:
@@ -35,7 +35,7 @@ class ShutdownHandler:
         self._sent.setblocking(False)
         Thread(target=self._wait, name='linkage_ros signals', daemon=True).start()
         signal.set_wakeup_fd(self._sent.fileno(), warn_on_full_buffer=False)
-        # Python's own handler would raise KeyboardInterrupt amid a callback.
+        # Python's default handler would raise KeyboardInterrupt in a callback.
         self._before = {number: signal.signal(number, lambda *_: None)
                         for number in (signal.SIGINT, signal.SIGTERM)}
         return self
@@ -48,7 +48,7 @@ class ShutdownHandler:
         self._sent.close()
 
     def _wait(self) -> None:
-        # Open to the end: another signal would not find where to write, and print that.
+        # Stays open: without it, another signal would print an error.
         with self._received:
             if not self._received.recv(1):
                 return

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Command that prints a robot model, of a scene that comes as a node's parameters too."""
+"""Command that prints a robot model; the scene may come as ROS parameters, too."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ def _show(args: List[str]) -> None:
 
 
 def _without_ros(args: List[str]) -> List[str]:
-    """Return the arguments that are not for ROS; raise RequestError if others are wrong."""
+    """Return the arguments that are not for ROS; raise RequestError if ROS's are invalid."""
     try:
         return remove_ros_args([NAME, *args])[1:]
     except RuntimeError as error:
-        # Not where in its own source the client library found out.
+        # Remove the source location from rcl's message.
         why = re.sub(r'Failed to parse ROS arguments: |, at /\S+:\d+', '', str(error))
         raise command.RequestError(f'the arguments for ROS are wrong: {why}') from None
 
 
 def _scene(args: List[str]) -> scene.Scene:
-    """Return the scene in the parameters that come with ROS arguments."""
+    """Read the scene from the parameters in ROS arguments."""
     rclpy.init(args=args)
     try:
         reader = _Reader('--params-file' in args)
@@ -49,7 +49,7 @@ def _scene(args: List[str]) -> scene.Scene:
 
 
 class _Reader(scene_node.SceneNode):
-    """A node that is given a scene; RequestError if it is not."""
+    """A node that reads a scene; RequestError if it has no scene parameters."""
 
     def __init__(self, promised: bool):
         super().__init__(NAME)

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A thread beside a node's executor: it makes what takes longer than a message may wait."""
+"""A thread for jobs that would delay messages on a node's executor."""
 
 from __future__ import annotations
 
@@ -10,50 +10,50 @@ from functools import partial
 import threading
 from typing import Any, Callable, Deque, Dict, Iterable, Optional, Tuple
 
-# How long the end of a node waits for its worker [s].
+# Longest wait for the worker when a node ends [s].
 TIMEOUT = 0.1
 
 # What other jobs make.
 OTHER = 'what is published once'
-# A job makes something in the worker's thread; what it returns acts on the executor's thread.
+# A job runs in the worker's thread; the function that it returns runs on the executor's thread.
 Job = Callable[[], Optional[Callable[[], None]]]
 
 
 class Worker:
     """
-    A thread that does one job after the other, while there are any.
+    A thread that runs jobs one after the other, and ends when none is left.
 
-    What a job returns is called on the thread of the node's executor. `failed` is called on the
-    worker's thread with what was being done, and the exception that ended it.
+    A job's result is called on the thread of the node's executor. `failed` is called on the
+    worker's thread with the kind of job and its exception.
     """
 
     def __init__(self, node: Any, failed: Callable[[str, Exception], None]):
         self._node, self._failed = node, failed
         self._lock = threading.Lock()
-        # Of each kind only the newest job counts; they come before the others.
+        # The newest job of each kind; these run before the others.
         self._newest: Dict[str, Job] = {}
         self._others: Deque[Job] = deque()
         self._thread: Optional[threading.Thread] = None
         self._ended = threading.Event()
 
     def replace(self, kind: str, job: Job) -> None:
-        """Do a job soon, instead of one of its kind that has not begun."""
+        """Queue a job in place of one of its kind that has not begun."""
         with self._lock:
             self._newest[kind] = job
             self._start()
 
     def add(self, jobs: Iterable[Job]) -> None:
-        """Do jobs when there is nothing to be done soon."""
+        """Queue jobs behind those of `replace`."""
         with self._lock:
             self._others.extend(jobs)
             self._start()
 
     def is_newest(self, kind: str) -> bool:
-        """Return whether no other job of a kind waits; long jobs end where there is one."""
+        """Return whether no newer job of a kind waits; otherwise long jobs should end."""
         return kind not in self._newest and not self._ended.is_set()
 
     def end(self) -> None:
-        """Begin no other job, and wait for the present one, but not for long."""
+        """Cancel queued jobs, and wait up to TIMEOUT for the present one."""
         with self._lock:
             self._ended.set()
             thread = self._thread
@@ -88,7 +88,7 @@ class Worker:
             return OTHER, self._others.popleft()
 
     def _hand_over(self, kind: str, act: Callable[[], None]) -> None:
-        """Let the executor act, and wait until it has: one act at a time holds up messages."""
+        """Call `act` on the executor's thread and wait: only one at a time delays messages."""
         executor, done = self._node.executor, threading.Event()
         if executor is not None:
             executor.create_task(partial(self._act, kind, act, done))

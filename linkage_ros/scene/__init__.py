@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Scenes: which mechanisms there are, how large, where, and how their inputs move.
+Scenes: a set of mechanisms with their sizes, poses and input motions.
 
-The only place that knows the names of parameters. `read` turns given values into a Scene, or says
-in one sentence which parameter is wrong and what it may be; the scene's `parameters` are what a
-node declares. No ROS is needed.
+This room alone defines the parameters' names. `read` turns values into a Scene, or raises an error
+that names the wrong parameter and its allowed values. Nodes declare the scene's `parameters`. No
+ROS is needed.
 """
 
 from __future__ import annotations
@@ -46,18 +46,18 @@ MECHANISMS = Field(
     'string_array', 'Names of the mechanisms in the scene.', readers=ALL, read_only=True,
     rule='at least one, each once, of up to 64 letters, digits and single underscores, '
          'a letter first', pattern=_NAME)
-FRAME_ID = Field('string', 'Frame that the poses are in.', readers=(KINEMATICS,),
+FRAME_ID = Field('string', 'Frame of the poses.', readers=(KINEMATICS,),
                  rule='1 to 100 characters that can be seen, the first a letter, digit or _',
                  pattern=re.compile(FRAME_NAME))
 FRAME_PREFIX = Field(
-    'string', 'Put before the frames of markers and loci, as robot_state_publisher does.',
+    'string', 'Prefix of the frames of markers and loci, as in robot_state_publisher.',
     readers=(KINEMATICS,), rule=FRAME_RULE, pattern=FRAME)
-RATE = Field('double', 'Crank messages in a second [Hz]; 0: none.', 0.0, 1000.0, readers=(DRIVER,))
+RATE = Field('double', 'Rate of crank messages [Hz]; 0: none.', 0.0, 1000.0, readers=(DRIVER,))
 
 
 @dataclass(frozen=True)
 class Scene:
-    """Machines by name, the frame they are in, and the rate of the crank messages [Hz]."""
+    """Mechanisms by name, their common frame, and the rate of the crank messages [Hz]."""
 
     machines: Mapping[str, SceneMechanism]
     frame_id: str
@@ -73,7 +73,7 @@ class Scene:
                                  for parameter in machine.parameters))
 
     def changed_from(self, old: 'Scene') -> List[Parameter]:
-        """Return the parameters that have not the value that they have in a scene before."""
+        """Return the parameters whose values differ from those of an older scene."""
         parts = [(self.general, old.general), *(
             (machine.parameters, old.machines[name].parameters)
             for name, machine in self.machines.items() if machine is not old.machines[name])]
@@ -83,7 +83,7 @@ class Scene:
 
 
 def load(path: str) -> Scene:
-    """Read a scene from a parameter file, as its nodes in no namespace do; needs PyYAML."""
+    """Read a scene from a parameter file, as nodes without a namespace do; needs PyYAML."""
     found = {node: overrides(path, f'/{node}') for node in ALL}
     if not any(own is not None for own in found.values()):
         raise SceneError(f"{path} must be YAML with '/**:' and below it 'ros__parameters:'")
@@ -92,7 +92,7 @@ def load(path: str) -> Scene:
     scene = read(merged)
     if all(own == merged for own in given.values()):
         return scene
-    # What is for one node alone counts where that node's value does.
+    # Each parameter has the value that the file gives to the parameter's owner.
     owners = {parameter.name: OWNER if OWNER in parameter.field.readers
               else parameter.field.readers[0] for parameter in scene.parameters}
     return read({name: given[owner][name] for name, owner in owners.items()
@@ -101,22 +101,22 @@ def load(path: str) -> Scene:
 
 def read(given: Mapping[str, Any], before: Optional[Scene] = None, strict: bool = True) -> Scene:
     """
-    Read a scene from the values that are given, by full parameter name.
+    Read a scene from parameter values.
 
     Parameters
     ----------
     given : mapping
         Values by full parameter name.
     before : Scene, optional
-        The scene that this one follows: what is given for a mechanism as before is not read again.
+        The previous scene: mechanisms whose values are unchanged are reused from it.
     strict : bool
-        Whether a start must be where its input moves. Where others change the sweep or the reach
-        of an input that has long left its start, it need not.
+        Whether an input's start must lie in its sweep or reach. False while a scene runs: an
+        input that has left its start does not constrain a change of its sweep or reach.
 
     Raises
     ------
     SceneError
-        If a parameter is unknown or cannot be what it is.
+        If a parameter is unknown or its value is not allowed.
 
     """
     parts = _parted(given)
@@ -128,9 +128,9 @@ def read(given: Mapping[str, Any], before: Optional[Scene] = None, strict: bool 
 
 def changed(before: Scene, values: Mapping[str, Any], strict: bool = True) -> Scene:
     """
-    Read again what these values, by full parameter name, are about; the rest stays as it is.
+    Return a scene with some values changed, by full parameter name.
 
-    Raises what `read` does.
+    Only the mechanisms concerned are read again. Raises SceneError as `read` does.
     """
     parts = dict(before.given)
     for name, part in _parted(values).items():
@@ -160,7 +160,7 @@ def _read(parts: Mapping[str, Mapping[str, Any]], before: Optional[Scene], stric
 
 
 def _parted(given: Any) -> Dict[str, Dict[str, Any]]:
-    """Return the values by mechanism, those of none under an empty name."""
+    """Group values by mechanism; general parameters have an empty name."""
     if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in given):
         raise SceneError(f'a scene is values by the names of parameters, not {quoted(given)}')
     parts: Dict[str, Dict[str, Any]] = {}

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How an input of a scene moves and who tells of it: speed, start, sweep, source, and the rest."""
+"""Settings of an input: its motion (speed, start, sweep) and its source in messages."""
 
 from __future__ import annotations
 
@@ -15,55 +15,55 @@ from ..linkage.inputs import Arc, Input
 from ..linkage.mechanism import Mechanism
 from ..words import quoted
 
-# What an input that swings by default leaves of its reach at each end, as a part of its width.
+# Margin at each end of the reach of a default sweep, as a fraction of the reach.
 MARGIN = 0.01
-# The narrowest sweep, of a length as a part of its size.
+# Narrowest sweep [rad]; for a length, as a fraction of its size.
 NARROWEST_SWEEP = 1e-6
-# Angles beyond this [rad] have lost digits that a crank needs.
+# Largest angle [rad] whose rounding error is negligible for a crank.
 FARTHEST = 1e6
 FASTEST = 100.0
 
 SPEED = Field('double', 'Speed of the {0} [{1}/s].', -FASTEST, FASTEST, readers=(DRIVER,))
 TURNS = {'low': -4.0 * math.pi, 'high': 4.0 * math.pi}
-START = Field('double', 'Where the {0} starts [{1}]; a new value moves it there.',
+START = Field('double', 'Initial value of the {0} [{1}]; a new value moves it there.',
               readers=(DRIVER,))
-SOURCE = Field('string', 'Joint in messages that tells of the {0}; empty: its name, or that of '
-               'what is measured, after <mechanism>_.', readers=ALL, read_only=True)
-MEASURES = Field('string', 'Output that the source measures, from which the {0} follows; empty: '
-                 'the {0} itself.', readers=ALL, read_only=True)
-RATIO = Field('double', 'How far the {0} moves for each unit of its source [1].', readers=ALL,
+SOURCE = Field('string', 'Joint in messages that carries the {0}; empty: <mechanism>_ and the '
+               'name of the {0} or of the measured output.', readers=ALL, read_only=True)
+MEASURES = Field('string', 'Output that the source measures; empty: the {0} itself.',
+                 readers=ALL, read_only=True)
+RATIO = Field('double', 'Motion of the {0} per unit of its source [1].', readers=ALL,
               rule='not zero')
-OFFSET = Field('double', 'Where the {0} is when its source is at zero [{1}].', readers=ALL)
-SWEEP = Field('double_array', 'Between which values [{1}] the {0} moves to and fro; '
-              'empty: through its reach, or all round.', readers=ALL,
+OFFSET = Field('double', 'Value of the {0} when its source is at zero [{1}].', readers=ALL)
+SWEEP = Field('double_array', "Ends of the {0}'s oscillation [{1}]; empty: its reach, or full "
+              'rotation.', readers=ALL,
               rule=f'the lower end and the higher end, within {FARTHEST:g} of zero, or none')
 
 
 @dataclass(frozen=True)
 class InputSettings:
     """
-    How an input moves, an angle [rad] or a length [m], the scale included.
+    Motion and source of an input, an angle [rad] or a length [m]; lengths include the scale.
 
     Attributes
     ----------
     input : Input
-        What moves.
+        The input of the linkage.
     reach : tuple of (float, float)
-        Where it can be.
+        Intervals in which the linkage can be assembled.
     speed, start : float
-        How fast, and from where.
+        Speed [rad/s or m/s] and initial value.
     sweep : (float, float), optional
-        Between which ends it moves to and fro; None: it turns all round.
+        Ends of the oscillation; None: full rotation.
     ends : (float, float), optional
-        The ends that were set, beyond which no answer lies either; None: all its reach.
+        Sweep set by the user, which also limits the inverse; None: the whole reach.
     source : str
-        The joint in messages that tells of it.
+        Name of the joint in messages that carries the input.
     ratio, offset : float
-        It is ratio * position + offset; so is what is measured instead.
+        The input, or the measured output, is ratio * position + offset.
     measures : str
-        The output that is measured instead; empty: the input itself.
+        Output that the source measures; empty: the input itself.
     period : int
-        After how many turns the pose is the same, as `Mechanism.period` has it.
+        Turns after which the pose repeats, as `Mechanism.period`.
 
     """
 
@@ -81,25 +81,25 @@ class InputSettings:
 
     @cached_property
     def is_plain(self) -> bool:
-        """Whether its source tells the input as it is."""
+        """Whether the source's position is the input, without conversion."""
         return (self.ratio, self.offset, self.measures) == (1.0, 0.0, '')
 
     @property
     def actuator(self) -> Tuple[float, float]:
-        """Ratio and offset of what moves it: the input itself where something else is measured."""
+        """Ratio and offset of the actuator: the source's, or (1, 0) if an output is measured."""
         return (1.0, 0.0) if self.measures else (self.ratio, self.offset)
 
 
 def in_words(arcs: Iterable[Arc]) -> str:
-    """Return arcs as text, for messages."""
+    """Format intervals for messages."""
     return ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in arcs)
 
 
 def _scaled(input_: Input, linkage: Mechanism, reach: Tuple[Arc, ...],
             scale: float) -> Tuple[Input, Tuple[Arc, ...]]:
-    """Return an input and its reach, a length times the scale."""
+    """Return an input and its reach; lengths are scaled."""
     if len(linkage.inputs) > 1:
-        # How far one of several reaches depends on the others.
+        # The reach of one of several inputs depends on the others.
         reach = ((input_.low, input_.high),)
     if input_.turns:
         return input_, reach
@@ -110,7 +110,7 @@ def _scaled(input_: Input, linkage: Mechanism, reach: Tuple[Arc, ...],
 def read_settings(name: str, linkage: Mechanism, input_: Input, reach: Tuple[Arc, ...],
                   scale: float, values: Values, old: Optional[InputSettings],
                   strict: bool) -> InputSettings:
-    """Return how an input of a mechanism moves; `old` is how it did before, if it was there."""
+    """Read the settings of an input; `old` are its previous settings, if any."""
     drive = _read(name, *_scaled(input_, linkage, reach, scale), values, old, strict)
     _check_measures(name, linkage, drive)
     return replace(drive, period=linkage.period(linkage.inputs.index(input_)))
@@ -145,7 +145,7 @@ def _read(name: str, input_: Input, reach: Tuple[Arc, ...], values: Values,
 
 
 def _source(name: str, input_: Input, values: Values) -> Tuple[str, float, float, str]:
-    """Return how messages tell of an input: source, ratio, offset, and what is measured."""
+    """Read the source, ratio, offset and measured output of an input."""
     source, measures, ratio, offset = (
         values.take(f'{name}.{key}', field.about(input_.name, input_.unit), default)
         for key, field, default in (('source', SOURCE, ''), ('measures', MEASURES, ''),
@@ -170,7 +170,7 @@ def _check_measures(name: str, linkage: Mechanism, drive: InputSettings) -> None
 
 
 def _usual_speed(input_: Input, reach: Tuple[Arc, ...]) -> float:
-    """Return the speed where none is given: a stroke takes about three seconds."""
+    """Return the default speed: 1 rad/s, or about three seconds for a stroke."""
     if input_.turns:
         return 1.0
     return float(f'{min(max(high - low for low, high in reach) / 3.0, FASTEST):.2g}')

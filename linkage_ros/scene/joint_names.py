@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What joints are called where they are published: a robot's own names, signs and zeros."""
+"""Published names of joints, with a robot's signs and zero offsets."""
 
 from __future__ import annotations
 
@@ -15,35 +15,35 @@ import numpy as np
 from .parameters import SceneError
 from ..words import elided, listed
 
-# A sign and a figure after a name are an offset; before a letter a hyphen is part of the name.
+# A sign and a digit after a name begin an offset; a hyphen before a letter belongs to the name.
 _PLAIN = r'[A-Za-z_][\w./:]*(?:-[A-Za-z_][\w./:]*)*'
-# Any other name is in quotes, as JSON writes it.
+# Other names are quoted as in JSON.
 _LINE = re.compile(rf'(\w+)=(-?)({_PLAIN}|"(?:[^"\\]|\\.)+")'
                    r'([+-](?:\d{1,99}\.?\d{0,99}|\.\d{1,99})(?:[eE][+-]?\d\d?)?)?', re.ASCII)
 
 
 class JointName(NamedTuple):
     """
-    What a joint is called; published is sign * position + offset [rad or m], or nothing.
+    Published name of a joint, whose value is sign * position + offset [rad or m].
 
-    Of an angle that has a zero of its own whole turns are `taken` off: it is within half a turn.
+    An angle with its own zero is wrapped to [-pi, pi].
     """
 
     name: str
     sign: float = 1.0
     offset: float = 0.0
     published: bool = True
-    taken: bool = False
+    wraps: bool = False
 
     def of(self, position: Any) -> Any:
-        """Return what is published for a position, a number or an array."""
+        """Convert a position, a number or an array, to the published value."""
         value = self.sign * position + self.offset
-        return value - math.tau * np.round(value / math.tau) if self.taken else value
+        return value - math.tau * np.round(value / math.tau) if self.wraps else value
 
     def travel(self, ends: Tuple[float, float]) -> Optional[Tuple[float, float]]:
-        """Return between which ends it is published; None for an angle that passes half a turn."""
-        low, high = sorted(self._replace(taken=False).of(end) for end in ends)
-        if not self.taken:
+        """Convert limits to published ones; None for an angle that wraps between them."""
+        low, high = sorted(self._replace(wraps=False).of(end) for end in ends)
+        if not self.wraps:
             return low, high
         turns = math.tau * round(0.5 * (low + high) / math.tau)
         low, high = low - turns, high - turns
@@ -53,9 +53,9 @@ class JointName(NamedTuple):
 def read_joint_names(mechanism: str, joints: Mapping[str, bool], lines: Iterable[str],
                      only_named: bool) -> Dict[str, JointName]:
     """
-    Return the names of all joints of a mechanism; raise SceneError if a line fits none.
+    Return the published names of all joints; raise SceneError if a line matches none.
 
-    `joints` tells of each whether it is an angle that comes without whole turns.
+    `joints` maps each joint to whether it is an angle published without whole turns.
     """
     usual = {joint: JointName(f'{mechanism}_{joint}', published=not only_named)
              for joint in joints}
@@ -70,12 +70,12 @@ def read_joint_names(mechanism: str, joints: Mapping[str, bool], lines: Iterable
                 f'{elided(line)!r}')
         offset = float(match[4] or 0.0)
         own[match[1]] = JointName(name, -1.0 if match[2] else 1.0, offset,
-                                  taken=joints[match[1]] and offset != 0.0)
+                                  wraps=joints[match[1]] and offset != 0.0)
     return {**usual, **own}
 
 
 def quoted_name(name: str) -> str:
-    """Return a name as `joint_names` has it: in quotes, unless it is plain."""
+    """Return a name as written in `joint_names`: quoted unless plain."""
     plain = re.fullmatch(_PLAIN, name, re.ASCII)
     return name if plain else json.dumps(name, ensure_ascii=False)
 
@@ -88,7 +88,7 @@ def _unquoted(text: str) -> str:
 
 
 def check_distinct(names: Mapping[str, Mapping[str, JointName]]) -> None:
-    """Raise SceneError if two joints of a scene, by mechanism, are published under one name."""
+    """Raise SceneError if two joints of the scene have one published name."""
     owners: Dict[str, str] = {}
     for mechanism, joints in names.items():
         for joint, called in joints.items():

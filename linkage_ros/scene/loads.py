@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What pulls at a mechanism: forces at its joints, moments on its links."""
+"""Loads on a mechanism: forces at joints, moments on links."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LINE = re.compile(rf'(\w+)=({_FIGURE})(?: +({_FIGURE}))?(?: +({_FIGURE}))?', re
 
 
 def read_loads(mechanism: str, linkage: Mechanism, lines: Iterable[str]) -> Dict[str, Load]:
-    """Return the loads on joints and links, by name; raise SceneError for what is none."""
+    """Return loads by joint or link; raise SceneError for a line that is not a load."""
     loads: Dict[str, Load] = {}
     for line in lines:
         match = _LINE.fullmatch(line)

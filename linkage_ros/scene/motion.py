@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-An input as a function of the clock.
+An input as a function of time.
 
-Angles are counted in whole steps of 2^-160 rad, lengths of 2^-160 m, and time in whole
-nanoseconds, so nothing is lost however long an input moves: the only rounding is of the answer.
+Angles are integers in units of 2^-160 rad, lengths of 2^-160 m, and time in nanoseconds, so errors
+never accumulate: only the result is rounded.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ def _steps(value: float, per: int = 1) -> int:
 
 class Motion:
     """
-    An input that turns, or moves to and fro as a triangle wave, at a constant speed.
+    An input that rotates, or oscillates as a triangle wave, at a constant speed.
 
-    Its phase runs through one turn, or from the low end of the sweep to the high end and back.
+    Its phase covers one period, or the sweep from its low end to its high end and back.
 
     Parameters
     ----------
     speed : float
-        Speed [rad/s or m/s]; to and fro, its sign is the direction from the start.
+        Speed [rad/s or m/s]; for a sweep, its sign is the initial direction.
     sweep : (float, float), optional
-        Ends between which it moves to and fro [rad or m]; None: it turns all round.
+        Ends of the oscillation [rad or m]; None: full rotation.
     start : float
-        Where it is at the time `since` [rad or m]; outside the sweep it is at the nearer end.
+        Value at the time `since` [rad or m], clipped to the sweep.
     since : int
         Time [ns].
     turns : bool
-        Whether it is the same a turn later.
+        Whether the input is an angle, the same after a turn.
     period : int
-        After how many turns it begins again, where it turns all round.
+        Turns after which a full rotation returns to 0.
 
     """
 
@@ -60,35 +60,35 @@ class Motion:
         self._since = since
 
     def at(self, now: int) -> Tuple[float, float]:
-        """Return the value, an angle from 0 to its period or in the sweep, and its speed."""
+        """Return the value, in [0, period) or in the sweep, and the speed at a time [ns]."""
         travelled, ahead = self._fold((self._phase + self._rate * (now - self._since))
                                       % self._period)
-        # To multiply by a power of two rounds nothing.
+        # Multiplication by a power of two is exact.
         angle = float(self._low + travelled) * STEP
         if self._sweep is None and angle >= self._end:
-            # What is just below the period may round up to it.
+            # A value just below the period may round up to it.
             angle = 0.0
         return angle, self._speed if ahead else -self._speed or 0.0
 
     @classmethod
     def of(cls, drive: InputSettings, since: int = 0) -> Motion:
-        """Return how an input moves from its start."""
+        """Return the motion of an input from its start at the time `since` [ns]."""
         return cls(drive.speed, drive.sweep, drive.start, since, drive.input.turns, drive.period)
 
     def changed(self, speed: float, sweep: Optional[Arc], now: int) -> Motion:
-        """Return the motion that takes over from this one at a time [ns], without a jump."""
-        taken = Motion(speed, sweep, since=now, turns=self._turns, period=self._round // TURN)
+        """Return the motion that continues this one without a jump from `now` [ns]."""
+        motion = Motion(speed, sweep, since=now, turns=self._turns, period=self._round // TURN)
         phase = self._phase_at(now)
         if sweep == self._sweep:
-            taken._phase = phase
-            return taken
+            motion._phase = phase
+            return motion
         travelled, ahead = self._fold(phase)
-        place = taken._place(self._low + travelled)
-        taken._phase = place if ahead or sweep is None else -place
-        return taken
+        place = motion._place(self._low + travelled)
+        motion._phase = place if ahead or sweep is None else -place
+        return motion
 
     def moved(self, before: int, now: int) -> Motion:
-        """Return the motion that is at `now` [ns] where this one is at `before` [ns]."""
+        """Return this motion, delayed so that its value at `before` [ns] is reached at `now`."""
         motion = self.changed(self._speed, self._sweep, before)
         motion._since = now
         return motion
@@ -97,12 +97,12 @@ class Motion:
         return (self._phase + self._rate * (now - self._since)) % self._period
 
     def _fold(self, phase: int) -> Tuple[int, bool]:
-        """Return how far from the low end a phase is, and whether it is on the way up."""
+        """Return the distance of a phase from the low end, and whether it is rising."""
         ahead = phase < self._width
         return (phase, ahead) if ahead else (2 * self._width - phase, ahead)
 
     def _place(self, angle: int) -> int:
-        """Return the phase of an angle, on the way up."""
+        """Return the rising phase of an angle."""
         if self._sweep is None:
             return angle % self._round
         half = self._width // 2

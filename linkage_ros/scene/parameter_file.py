@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Parameter files, read as the nodes' client library reads them, without ROS. Needs PyYAML.
+Read parameter files as rclpy does, without ROS. Needs PyYAML.
 
-What is a number, which sections a node takes and in which order, and what is refused follow
-rcl_yaml_param_parser (https://github.com/ros2/rcl), down to its sentences.
+Numbers, sections, their order and error messages follow rcl_yaml_param_parser
+(https://github.com/ros2/rcl).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .parameters import SceneError
 from ..words import quoted
 
 KEY = 'ros__parameters'
-# Of several values of one parameter the first of these kinds counts.
+# If a parameter has values of several kinds, the first kind in this order wins.
 KINDS = {bool: 'bool', int: 'integer', float: 'double', str: 'string'}
 TRUE = {'Y', 'y', *(word for low in ('yes', 'true', 'on')
                     for word in (low, low.title(), low.upper()))}
@@ -38,12 +38,12 @@ _TOKEN = re.compile(r'\*\*?|[A-Za-z_]\w*', re.ASCII)
 
 def overrides(path: str, node: str) -> Optional[Dict[str, Any]]:
     """
-    Return what a file gives a node, by parameter; None if no section is for it.
+    Return a node's parameter values from a file; None if no section matches the node.
 
     Raises
     ------
     SceneError
-        If ROS could not read the file; with its reason.
+        If rcl would refuse the file; the text has rcl's reason.
 
     """
     import yaml
@@ -62,7 +62,7 @@ def overrides(path: str, node: str) -> Optional[Dict[str, Any]]:
 
 
 class _Reader:
-    """The state of reading: nodes with parameters, and where in the nested names it is."""
+    """Parser state: the nodes' parameters, and the position in the nested names."""
 
     def __init__(self) -> None:
         # Each parameter is its name and its values by kind.
@@ -77,7 +77,7 @@ class _Reader:
         self._place = 0
 
     def values_of(self, node: str) -> Optional[Dict[str, Any]]:
-        """Return the parameters of all sections for a node, in the order of the file."""
+        """Merge the parameters of all sections that match a node, in file order."""
         found = [own for name, own in self.nodes.items() if _pattern(name).fullmatch(node)]
         if not found:
             return None
@@ -86,12 +86,12 @@ class _Reader:
                 for own in found for name, values in own}
 
     def read(self, events: Iterable[Any]) -> None:
-        """Take all events; raise ValueError for what ROS refuses."""
+        """Process all YAML events; raise ValueError where rcl would refuse one."""
         for event in events:
             self.line = event.start_mark.line + 1
-            taken = getattr(self, f'_{type(event).__name__[:-5]}', None)
-            if taken:
-                taken(event)
+            handler = getattr(self, f'_{type(event).__name__[:-5]}', None)
+            if handler:
+                handler(event)
 
     def _Scalar(self, event: Any) -> None:
         if self._at_key:
@@ -149,7 +149,7 @@ class _Reader:
             self._in_parameters = True
 
     def _parameter(self, key: str) -> None:
-        """Go to a parameter; one whose value is a mapping becomes the first one in that."""
+        """Enter a parameter; if its value is a mapping, it becomes the mapping's first one."""
         if self._is_new:
             self._space, self._is_new = self._own[self._place][0], False
             self._spaces += 1
@@ -179,7 +179,7 @@ def _list_of(kind: type) -> str:
 
 
 def _read(event: Any, line: int) -> Any:
-    """Return what a scalar is; raise ValueError if it is nothing."""
+    """Return the value of a scalar; raise ValueError if it is empty."""
     text = event.value
     is_quoted = event.style in ('"', "'")
     if not text and not is_quoted:
@@ -188,7 +188,7 @@ def _read(event: Any, line: int) -> Any:
 
 
 def plain(text: str) -> Any:
-    """Return what a text without quotes is: a truth value, a number or the text."""
+    """Return the value of unquoted text: a bool, an int, a float or the text."""
     if text in TRUE or text in FALSE:
         return text in TRUE
     if _WHOLE.fullmatch(text):
@@ -201,7 +201,7 @@ def plain(text: str) -> Any:
 
 
 def _number(text: str) -> Optional[float]:
-    """Return the number that a text is in C; None if it is none, or too large or too small."""
+    """Parse a number as C's strtod does; None if invalid, or out of range."""
     if _DOTTED.fullmatch(text):
         return float(text.replace('.', ''))
     if _SPECIAL.fullmatch(text):
@@ -221,7 +221,7 @@ def _number(text: str) -> Optional[float]:
 
 
 def _checked(name: str) -> str:
-    """Return the name of a section; raise ValueError if no node can be called so."""
+    """Return a section's name; raise ValueError if it is not a valid node name."""
     if not all(map(_TOKEN.fullmatch, name.removeprefix('/').split('/'))):
         raise ValueError("node name must not contain characters other than alphanumerics or '_', "
                          f'got {quoted(name)}')
@@ -229,7 +229,7 @@ def _checked(name: str) -> str:
 
 
 def _pattern(name: str) -> 're.Pattern[str]':
-    """Return what the names of nodes match that a section is for."""
+    """Return the pattern that matches the full names of a section's nodes."""
     parts = name.removeprefix('/').split('/')
     return re.compile(''.join(r'(/\w+)*' if part == '**' else '/' + part.replace('*', r'\w+')
                               for part in parts))

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Parameters: what each may be, checked one by one, in words that name it. No ROS is needed."""
+"""Parameters: descriptions and validation, with errors that name the parameter; without ROS."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from typing import Any, Iterable, List, Optional, Tuple, Type
 from ..cache import cached
 from ..words import elided, listed, meant, MESSAGE, quoted
 
-# Which nodes act on a parameter, and whose value counts where several do.
+# The nodes that use parameters; OWNER's value counts for parameters that several nodes use.
 DRIVER, KINEMATICS, INVERSE = ALL = 'crank_driver', 'kinematics', 'servo_inverse'
 OWNER = KINEMATICS
 
-# What the client library declares for itself.
+# Parameters that rclpy declares.
 _ROS = re.compile(r'(use_sim_time|start_type_description_service)$')
 
 KINDS = {
@@ -31,7 +31,7 @@ KINDS = {
     'string_array': (str, 'a list of texts of up to 1000 letters'),
 }
 
-# How far, relatively, a value may be beyond an end of its range; the client library allows it.
+# Relative tolerance at the ends of a range, as in rclpy.
 ROUNDED = 1e-6
 
 TEXT = re.compile(r'.{0,1000}', re.DOTALL)
@@ -39,7 +39,7 @@ LONGEST_LIST = 10000
 
 
 class SceneError(ValueError):
-    """A parameter that cannot be; the text names it and says what is allowed."""
+    """An invalid parameter; the text names it and says what is allowed."""
 
     def __init__(self, text: str):
         super().__init__(elided(text, MESSAGE))
@@ -48,24 +48,24 @@ class SceneError(ValueError):
 @dataclass(frozen=True)
 class Field:
     """
-    What a parameter means and what it may be.
+    Description and allowed values of a parameter.
 
     Attributes
     ----------
     kind : str
         One of KINDS.
     meaning : str
-        In words, with the unit.
+        Description with the unit.
     low, high : float, optional
-        The ends of its range.
+        Ends of the range.
     positive : bool
         Whether it must be above zero.
     rule : str
-        What else is asked of it.
+        Further requirement, in words.
     pattern : re.Pattern
-        What a text must match.
+        Pattern that a text must match.
     readers : tuple of str
-        The nodes that act on it.
+        Nodes that use it.
     read_only : bool
         Whether a change needs a restart.
 
@@ -82,17 +82,17 @@ class Field:
     read_only: bool = False
 
     def about(self, *words: str, **other: Any) -> Field:
-        """Return the same with these words in its meaning, and what else is other."""
+        """Return a copy with words put into its meaning, and other attributes replaced."""
         return _with(self, ('meaning', self.meaning.format(*words)), *other.items())
 
     @property
     def shared(self) -> bool:
-        """Whether more than one node acts on it."""
+        """Whether several nodes use it."""
         return len(self.readers) > 1
 
     @property
     def allowed(self) -> str:
-        """Return what it may be, in words."""
+        """Describe the allowed values."""
         words = [KINDS[self.kind][1]]
         if self.positive:
             words.append('above 0')
@@ -102,26 +102,26 @@ class Field:
 
     def checked(self, name: str, value: Any) -> Any:
         """
-        Return a value, a list as a tuple; raise SceneError if it cannot be.
+        Return a valid value, lists as tuples; raise SceneError if it is not allowed.
 
-        A whole number is taken for the number that it is; an empty list may be of any kind.
+        An integer is accepted as a float; an empty list may be of any kind.
         """
         several = self.kind.endswith('_array')
-        # The client library hands over an empty list as nothing at all.
+        # rclpy represents an empty list as None.
         value = () if several and value is None else plain(value)
         if isinstance(value, tuple) != several:
             raise self.error(name, value)
-        taken = [self._taken(one) for one in (value if several else [value])]
-        if len(taken) > LONGEST_LIST or not all(map(self._holds, taken)):
+        items = [self._converted(one) for one in (value if several else [value])]
+        if len(items) > LONGEST_LIST or not all(map(self._holds, items)):
             raise self.error(name, value)
-        return tuple(taken) if several else taken[0]
+        return tuple(items) if several else items[0]
 
     def error(self, name: str, value: Any) -> SceneError:
-        """Return the error that says what the parameter must be, and what it is."""
+        """Return the error that states the allowed values and the actual one."""
         shown = list(value) if isinstance(value, tuple) else value
         return SceneError(f'{elided(name, 100)} must be {self.allowed}, not {quoted(shown)}')
 
-    def _taken(self, value: Any) -> Any:
+    def _converted(self, value: Any) -> Any:
         try:
             return float(value) if type(value) is int and self._type is float else value
         except OverflowError:
@@ -146,13 +146,13 @@ class Field:
 
 @cached(2048)
 def _with(field: Field, *other: Tuple[str, Any]) -> Field:
-    """Return a field in which something is other; the same one for all mechanisms of a type."""
+    """Return a field with attributes replaced, cached: mechanisms of a type share it."""
     return replace(field, **dict(other))
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter as a node declares it: its full name, what it is, and its value."""
+    """A parameter to declare: full name, field and value."""
 
     name: str
     field: Field
@@ -160,25 +160,25 @@ class Parameter:
 
 
 class Values:
-    """The values that are given, by full parameter name, to be taken one by one."""
+    """Values by full parameter name, consumed one by one."""
 
     def __init__(self, given: Mapping[str, Any]):
         self._left = dict(given)
         self.parameters: List[Parameter] = []
 
     def left(self, prefix: str = '') -> List[str]:
-        """Return the names that begin with a prefix, of the values not taken yet."""
+        """Return the names with a prefix whose values are not consumed yet."""
         return sorted(name for name in self._left if name.startswith(prefix))
 
     def take(self, name: str, field: Field, default: Any) -> Any:
-        """Return the value of a parameter, and remember it as one that there is."""
+        """Consume and validate a value, and add the parameter to `parameters`."""
         value = field.checked(name, self._left.pop(name)) if name in self._left else default
         self.parameters.append(Parameter(name, field, value))
         return value
 
 
 def refuse_unknown(names: Iterable[str], known: List[str]) -> None:
-    """Raise SceneError for a name that neither is a parameter nor the client library's own."""
+    """Raise SceneError for a name that is no parameter of the scene or of rclpy."""
     for name in names:
         known = [f'{name}.type', *known] if f'{name}.*' in known else known
         if not _ROS.match(name):
@@ -187,5 +187,5 @@ def refuse_unknown(names: Iterable[str], known: List[str]) -> None:
 
 
 def plain(value: Any) -> Any:
-    """Return a value, any kind of list as a tuple."""
+    """Return a value, with any kind of list as a tuple."""
     return tuple(value) if isinstance(value, (list, tuple, array)) else value

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A mechanism of a scene: its linkage, size, legs, look and inputs, read from its parameters."""
+"""A mechanism of a scene: linkage, scale, legs, markers and inputs, read from parameters."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ IN_SPACE = ('a linkage in space: pictures, the page and robot models are of link
             'plane')
 TYPES = (*mechanisms.TYPES, *mechanisms.WRITTEN)
 
-# What a frame may be called, as links of robots are: in tf2 no name begins with a slash.
+# Frame names are as free as link names in URDF; tf2 forbids a leading slash.
 FRAME_NAME = (r'\w[^\x00-\x1f\x7f-\xa0\u200b-\u200f\u2028-\u202f\u2060-\u206f'
               r'\ud800-\udfff\ufeff]{0,99}')
 FRAME = re.compile(f'({FRAME_NAME})?')
@@ -52,8 +52,8 @@ SCALE = Field('double', 'Factor of every length.', positive=True, readers=(KINEM
 LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.', 1, 50,
                   readers=(KINEMATICS,))
 MIRRORED = Field('bool', 'Whether each leg has a mirror image on the other side; '
-                 'if never set: where there is more than one pair.', readers=(KINEMATICS,))
-POINTS = Field('string_array', 'Joints that are wanted in the markers.', readers=(KINEMATICS,))
+                 'default: with more than one pair.', readers=(KINEMATICS,))
+POINTS = Field('string_array', 'Joints that markers display.', readers=(KINEMATICS,))
 POSE = Field('double_array', "Pose of the linkage's plane in frame_id: "
              'x, y, z [m], roll, pitch, yaw [rad].', rule='six of them', readers=(KINEMATICS,))
 OWN_FRAME_ID = Field('string', "Frame that its pose is in; empty: the scene's.",
@@ -71,7 +71,7 @@ LOADS = Field('string_array', "Loads that the inputs hold, in the linkage's plan
 
 @dataclass(frozen=True)
 class SceneMechanism:
-    """A mechanism in a scene: one leg, its reach and scale, its legs, its look and its inputs."""
+    """One mechanism: the linkage of a leg, its reach, scale, copies, markers and inputs."""
 
     name: str
     linkage: Mechanism
@@ -90,30 +90,30 @@ class SceneMechanism:
     parameters: Tuple[Parameter, ...] = some(compare=False, repr=False)
 
     def is_of(self, given: Mapping[str, Any]) -> bool:
-        """Return whether it was read from these very values."""
+        """Return whether it was read from exactly these values."""
         return self.given is given or self.given.keys() == given.keys() and all(
             self.given[key] is value for key, value in given.items())
 
     @property
     def in_space(self) -> bool:
-        """Whether it is of rods: then it has no picture, page or robot model of its own."""
+        """Whether it is a linkage of rods, which has no picture, page or robot model."""
         return len(self.linkage.axes) > 2
 
     @property
     def first(self) -> InputSettings:
-        """Return the first input, for most linkages the only one."""
+        """The first input; most linkages have only one."""
         return next(iter(self.inputs.values()))
 
     def scale_of(self, output: str) -> float:
-        """Return by what an output is multiplied to be seen in the scene."""
+        """Return the factor of an output: the scale for a length, 1 for an angle."""
         return 1.0 if self.linkage.is_angle(output) else self.scale
 
     def measured(self, output: str, value: float, near: float) -> Tuple[float, float]:
         """
-        Return the input that an output tells [rad or m], and d output / d input there.
+        Return the input for a measured output [rad or m], and d output / d input.
 
-        It goes on from where it was near, without a jump where it can; NaN outside the reach or
-        the sweep that is set.
+        Of several solutions it is the continuous one, or else the nearest, to `near`; NaN outside
+        the reach or the user's sweep.
         """
         drive, own, unit = self.first, self.scale_of(self.first.input.name), self.scale_of(output)
         ends = drive.ends and (drive.ends[0] / own, drive.ends[1] / own)
@@ -125,7 +125,7 @@ class SceneMechanism:
 
     def from_source(self, drive: InputSettings, position: float, speed: Optional[float],
                     near: Optional[float]) -> Tuple[float, Optional[float]]:
-        """Return an input and its speed as its source tells, going on from where it was near."""
+        """Convert a source's position and speed to an input's, continuous from `near`."""
         value = drive.ratio * position + drive.offset
         speed = None if speed is None else drive.ratio * speed
         if not drive.measures:
@@ -134,7 +134,7 @@ class SceneMechanism:
         return found, speed / rate if speed is not None and rate else None
 
     def to_source(self, drive: InputSettings, value: float, speed: float) -> Tuple[float, float]:
-        """Return an input and its speed as its source would tell it."""
+        """Convert an input and its speed to its source's position and speed."""
         if output := drive.measures:
             own, unit = self.scale_of(drive.input.name), self.scale_of(output)
             rate = float(self.linkage.joint_rates(value / own, [output])[output]) * unit / own
@@ -143,28 +143,28 @@ class SceneMechanism:
         return (value - drive.offset) / drive.ratio, speed / drive.ratio
 
     def efforts(self, values: Sequence[float]) -> Tuple[float, ...]:
-        """Return what each input, at these values, gives against the loads [N m or N]."""
+        """Return each input's effort that balances the loads at these values [N m or N]."""
         units = [self.scale_of(name) for name in self.inputs]
         own = [value / unit for value, unit in zip(values, units)]
-        # Where all is so much larger, a force has a longer lever; a moment has none.
+        # The scale lengthens the levers of forces; moments do not depend on it.
         loads = {name: load if isinstance(load, float) else tuple(
             self.scale * part for part in load) for name, load in self.loads.items()}
         found = self.linkage.effort(own if len(own) > 1 else own[0], loads)
         return tuple(float(effort) / unit for effort, unit in zip(found, units))
 
     def assembly(self) -> Assembly:
-        """Return its legs on their inputs."""
+        """Return all legs as one assembly."""
         return Assembly(self.linkage, self.leg_pairs, self.mirrored, self.scale, self.reach)
 
     @property
     def tracer(self) -> str:
-        """Return the joint whose curve is shown, the linkage's own tracer if it is wanted."""
+        """The joint of the locus: the linkage's tracer if it is among `points`, else the last."""
         return self.linkage.tracer if self.linkage.tracer in self.points else self.points[-1]
 
 
 def read_machine(name: str, given: Mapping[str, Any], old: Optional[SceneMechanism],
                  strict: bool) -> SceneMechanism:
-    """Return a mechanism from its values; the one before, where they are the same."""
+    """Read a mechanism; return the old one if the values are unchanged."""
     if old and old.is_of(given):
         return old
     values = Values(given)
@@ -202,13 +202,13 @@ def _linkage(name: str, type_: str, values: Values) -> Tuple[Mechanism, Tuple[Ar
     branches = _branches(name, design, values)
     try:
         linkage = _built(design, tuple(dimensions.items()), tuple(branches.items()))
-        # How far one of several inputs reaches depends on the others: only a pose tells.
+        # The reach of one of several inputs depends on the others.
         first, *others = linkage.inputs
         reach = ((first.low, first.high),) if others else tuple(linkage.reach())
     except ValueError as error:
         raise SceneError(f'{name}.dimensions: {error}') from None
     if not reach:
-        # Those that are not the usual ones first: of many only some are named.
+        # Changed dimensions come first, since a long list is shortened.
         usual = sorted(dimensions, key=lambda key: dimensions[key] == design.dimensions[key])
         lengths = listed(f'{key}={dimensions[key]:g}' for key in usual)
         raise SceneError(f'{name}.dimensions must let the {type_} be assembled at some '
@@ -230,24 +230,24 @@ def _design(name: str, type_: str, values: Values) -> Design:
 
 
 def _dimensions(name: str, design: Design, values: Values) -> Dict[str, float]:
-    taken = {}
+    chosen = {}
     for key in design.dimensions:
         field = DIMENSION.about(key, design.name, positive=key not in design.signed)
-        taken[key] = values.take(f'{name}.dimensions.{key}', field, design.dimensions[key])
-    return taken
+        chosen[key] = values.take(f'{name}.dimensions.{key}', field, design.dimensions[key])
+    return chosen
 
 
 def _branches(name: str, design: Design, values: Values) -> Dict[str, int]:
-    taken = {}
+    chosen = {}
     for key, sign in design.branches.items():
         field = BRANCH.about(key, design.name)
-        taken[key] = values.take(f'{name}.branches.{key}', field, sign) or sign
-    return taken
+        chosen[key] = values.take(f'{name}.branches.{key}', field, sign) or sign
+    return chosen
 
 
 @cached(16, shared=True)
 def _built(design: Design, dimensions: tuple, branches: tuple) -> Mechanism:
-    """Return a linkage; the same one for the same dimensions."""
+    """Build a linkage, cached by its dimensions."""
     own: Dict[str, Any] = {} if design.name in mechanisms.TYPES else {
         'joints': design.joints, 'tracer': design.tracer}
     return mechanisms.create(design.name, branches=dict(branches), **own, **dict(dimensions))
@@ -255,7 +255,7 @@ def _built(design: Design, dimensions: tuple, branches: tuple) -> Mechanism:
 
 def _legs(name: str, linkage: Mechanism, values: Values) -> Tuple[int, bool]:
     able = _can_have_more_legs(linkage)
-    # A slider for what cannot be changed would only be refused.
+    # A parameter that cannot change has no slider.
     pairs, mirrored = (field.about(read_only=not able) for field in (LEG_PAIRS, MIRRORED))
     pairs = values.take(f'{name}.leg_pairs', pairs, 1)
     mirrored = values.take(f'{name}.mirrored', mirrored, pairs > 1)

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Sliders: between which values one may move a parameter, so that something can be seen.
+Useful ranges for sliders of parameters.
 
-They guide and refuse nothing. The ends are whole stops: the sliders of rqt_reconfigure have a
-hundred, counted from zero. No ROS is needed.
+Ranges are suggestions: values beyond them are allowed. The ends are multiples of the step, because
+sliders of rqt_reconfigure have a hundred steps counted from zero. No ROS is needed.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from ..linkage.inputs import Arc
 from ..linkage.mechanism import Mechanism
 
 STOPS = 100
-# How far from its value a length may be moved, in parts of it or, from 0, of the longest bar.
+# Smallest and largest change tried, as fractions of the length, or of the longest bar if it is 0.
 LEAST, MOST = 1e-4, 9.0
 TRIED = 48
-# The least step, as a part of the value.
+# Smallest step, as a fraction of the value.
 FINEST = 1e-5
 LARGEST = 1e300
 ANGLES, FEW_ANGLES = 91, 13
 
 
 def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
-    """Return the least and greatest value for the slider of a number; None: it has none."""
+    """Return the lowest and highest value of a parameter's slider; None without a slider."""
     field, value = parameter.field, parameter.value
     if field.low is not None and field.high is not None:
         return field.low, field.high
@@ -50,7 +50,7 @@ def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
 
 
 def _used(machine: SceneMechanism) -> Optional[Tuple[float, float]]:
-    """Return between which crank angles it has to be assembled; None: somewhere at least."""
+    """Return the crank's range in which it must be assembled; None: at one angle at least."""
     first, *others = machine.inputs.values()
     if others or not first.input.is_whole(first.reach):
         return None
@@ -59,7 +59,7 @@ def _used(machine: SceneMechanism) -> Optional[Tuple[float, float]]:
 
 @cached(16)
 def _length(linkage: Mechanism, key: str, positive: bool, used: Optional[Arc]) -> Arc:
-    """Return how far a length may be moved with the linkage still assembled."""
+    """Return the range of a dimension in which the linkage can be assembled."""
     value = float(linkage.dimensions[key])
     size = abs(value) or float(linkage.longest)
     low, high = (_farthest(linkage, key, value, sign * size, used, positive)
@@ -69,7 +69,7 @@ def _length(linkage: Mechanism, key: str, positive: bool, used: Optional[Arc]) -
 
 def _farthest(linkage: Mechanism, key: str, value: float, size: float, used: Optional[Arc],
               positive: bool) -> float:
-    """Return the last value on one side up to which all that are tried can be assembled."""
+    """Return the end of the range on one side: every sample up to it can be assembled."""
     most = 0.9 * abs(size) if positive and size < 0.0 else MOST * abs(size)
     steps = np.geomspace(LEAST * abs(size), most, TRIED) * math.copysign(1.0, size)
     good, bad = 0.0, None
@@ -105,7 +105,7 @@ def _assembled(linkage: Mechanism, key: str, values: np.ndarray,
 
 
 def _whole_stops(value: float, low: float, high: float) -> Tuple[float, float]:
-    """Return the ends of a hundred whole stops between two ends, that hold a value."""
+    """Round a range to a hundred whole steps that include the value."""
     low, value, high = (min(max(x, -LARGEST), LARGEST) for x in (low, value, high))
     step = max((high - low) / (STOPS + 1), FINEST * abs(value), 1.0 / LARGEST)
     first = min(math.ceil(low / step), math.floor(value / step))

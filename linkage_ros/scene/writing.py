@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Scenes as parameter files: what `load` reads. Needs PyYAML, no ROS."""
+"""Write scenes as parameter files, for `load` and ROS. Needs PyYAML, no ROS."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from .parameter_file import plain, TEXT
 
 
 def in_yaml(given: Mapping[str, Any]) -> str:
-    """Return a parameter file with these values, by full parameter name."""
+    """Return the text of a parameter file with values by full parameter name."""
     import yaml
 
     class Dumper(yaml.SafeDumper):
-        """Quotes texts that ROS would read as something else, such as y, nan and 1e5."""
+        """Quotes texts that ROS would read as another type, such as y, nan and 1e5."""
 
     Dumper.add_representer(str, lambda dumper, text: dumper.represent_scalar(
         TEXT, text, None if isinstance(plain(text), str) else "'"))
@@ -26,7 +26,7 @@ def in_yaml(given: Mapping[str, Any]) -> str:
     for name, value in given.items():
         shown = list(value) if isinstance(value, tuple) else value
         if shown == []:
-            # ROS reads no empty list, and it is what is there without.
+            # rcl cannot read an empty list, which is the default anyway.
             continue
         numbers = isinstance(shown, list) and not any(isinstance(one, str) for one in shown)
         text = yaml.dump({name: shown}, Dumper=Dumper, width=1000,
@@ -40,14 +40,14 @@ NOTHING = re.compile(r'(?!)')
 
 def without_defaults(scene: Scene, always: re.Pattern = NOTHING) -> Dict[str, Any]:
     """
-    Return the values that tell a scene from what it is without them.
+    Return a scene's values by name, without those that equal their defaults.
 
-    Values whose whole name matches `always` are returned even so.
+    Values whose whole name matches `always` are always included.
 
     Raises
     ------
     SceneError
-        If the nodes would not start with them: a start that is not where its input moves.
+        If nodes could not start with them: a start outside its input's sweep or reach.
 
     """
     kept = {parameter.name: parameter.value for parameter in scene.parameters}
