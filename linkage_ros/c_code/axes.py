@@ -14,7 +14,7 @@ from ..scene.joint_names import JointName
 from ..scene.motion import Motion
 from ..words import listed
 
-# Outputs whose Jacobian has a smaller part of its size left do not tell the inputs.
+# Relative size of a Jacobian below which outputs do not determine the inputs.
 DEPENDENT = 1e-9
 
 
@@ -37,7 +37,7 @@ class Axis(NamedTuple):
 
 def axis(machine: SceneMechanism, output: str, name: str = '', factor: float = 1.0,
          offset: float = 0.0, wraps: bool = False) -> Axis:
-    """Return the axis of an output, from its value in the scene by a factor and an offset."""
+    """Return the axis of an output, with a factor and an offset from its value in the scene."""
     linkage = machine.linkage
     factor *= machine.scale_of(output)
     counts_turns = output in (*machine.inputs, *linkage.geared)
@@ -47,7 +47,7 @@ def axis(machine: SceneMechanism, output: str, name: str = '', factor: float = 1
 
 
 def actuators(machine: SceneMechanism) -> List[Axis]:
-    """Return what the sources of a mechanism's inputs tell."""
+    """Return the axes of the sources of a mechanism's inputs."""
     return [axis(machine, drive.measures or name, drive.source, 1.0 / drive.ratio,
                  -drive.offset / drive.ratio) for name, drive in machine.inputs.items()]
 
@@ -59,7 +59,7 @@ def joints(machine: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
     Parameters
     ----------
     machine : SceneMechanism
-        Of several legs it is the first.
+        Its first leg is used.
     names : sequence of str
         Joints by their names in the scene, or outputs after the mechanism's name: 'leg_P.x'.
         Default: a chain of links from the ground, those that `joint_names` names first.
@@ -67,7 +67,7 @@ def joints(machine: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
     Raises
     ------
     ValueError
-        If one does not exist, or they do not tell all inputs.
+        If one does not exist, or they do not determine all inputs.
 
     """
     for name in names:
@@ -86,7 +86,7 @@ def joints(machine: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
 
 
 def output_of(machine: SceneMechanism, name: str) -> Optional[str]:
-    """Return the output that a name in the scene stands for, None if it is none."""
+    """Return the output with a name in the scene, or None."""
     for link in machine.linkage.joints:
         called = machine.joints.get(_key(machine, link))
         if called and called.name == name:
@@ -96,18 +96,18 @@ def output_of(machine: SceneMechanism, name: str) -> Optional[str]:
 
 
 def start(machine: SceneMechanism) -> List[float]:
-    """Return where the inputs start, in the linkage's own units."""
+    """Return the starts of the inputs, in the linkage's own units."""
     return [Motion.of(drive).at(0)[0] / machine.scale_of(name)
             for name, drive in machine.inputs.items()]
 
 
 def _key(machine: SceneMechanism, link: str) -> str:
-    """Return by what a link of the first leg is found among the joints' names."""
+    """Return the key of a link of the first leg among the joints' names."""
     return link if link in machine.inputs else next(iter(machine.assembly().legs)) + link
 
 
 def _chain(machine: SceneMechanism) -> List[str]:
-    """Return links, each on the one before it, that tell the inputs."""
+    """Return a chain of links that determines the inputs."""
     links = machine.linkage.links
     barrels = {link.parent for link in links if link.name in machine.inputs}
     chosen: List[str] = []

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Poses of a linkage as C functions, for dimensions that are set or that may be changed."""
+"""Poses of a linkage as C functions, for constant or changeable dimensions."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ class Code:
     Parameters
     ----------
     name : str
-        What its functions' names begin with.
+        Prefix of its functions.
     linkage : Mechanism
-        What is written; of an open one every dimension is an array of one, see `open_linkage`.
+        The linkage; with changeable dimensions it is that of `open_linkage`.
     single : bool
         Whether it computes with float instead of double.
     is_open : bool
-        Whether the constants stand in a struct, to be set for other dimensions.
+        Whether the constants are in a struct, for changeable dimensions.
 
     """
 
@@ -56,7 +56,7 @@ class Code:
 
     def function(self, head: str, pose: Pose, arguments: Sequence[str],
                  ending: Callable[[List[str]], List[str]]) -> str:
-        """Return a C function that does what some Python code does, from codes of its inputs."""
+        """Return a C function with the operations of a Pose, from the code of its arguments."""
         constants, lines, outputs = pose.statements(self.dialect)
         ends = ending(outputs)
         text = '\n'.join([code for _, code in lines] + ends)
@@ -75,14 +75,14 @@ class Code:
         return '\n'.join([head, '{', *body, *ends, '}', ''])
 
     def constant(self, node: Real, value: float) -> str:
-        """Return the code of an expression of dimensions that has a value."""
+        """Return the code of an expression of dimensions, and its value as a constant."""
         if not self.is_open:
             return self.literal(value)
         code = f'c->k[{self._constants.setdefault(node, len(self._constants))}]'
         return f'{code} > 0.5' if node.op in _CONDITIONS else code
 
     def helpers(self) -> str:
-        """Return the roots and gates that decide whether a linkage can be assembled."""
+        """Return the helper functions for roots and gates, which are NaN out of reach."""
         n, number, f, zero = self.name, self.number, self.suffix, self.literal(0.0)
         return '\n'.join([
             '/* A limit that is missed by rounding counts as reached. */',
@@ -143,7 +143,7 @@ class Code:
 
 
 def open_linkage(linkage: Mechanism) -> Mechanism:
-    """Return a linkage whose code decides nothing by its dimensions, which may change."""
+    """Return a linkage whose code is valid for all dimensions."""
     return linkage.with_dimensions(**{
         name: np.array([value]) for name, value in linkage.dimensions.items()})
 

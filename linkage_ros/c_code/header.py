@@ -4,8 +4,8 @@
 """
 A mechanism as a C99 header: pose, rates, reach, and the inverse of some outputs.
 
-It does the operations of the Python code in the same order, so the results are the same up to the
-C library's sine, cosine and arctangent.
+The operations and their order are those of the Python code, so the results are equal up to the C
+library's sine, cosine and arctangent.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ..linkage.inputs import Input
 from ..scene import SceneMechanism
 from ..words import listed, plain_text
 
-# How many values of the input the error of `float` is measured at.
+# Number of inputs at which the error of `float` is measured.
 SAMPLED = 2001
 
 
@@ -34,13 +34,13 @@ def written(machine: SceneMechanism, outputs: Sequence[str] = (), single: bool =
     Parameters
     ----------
     machine : SceneMechanism
-        Of a scene; its scale is applied, of several legs the first is written.
+        Mechanism of a scene; lengths include its scale, and only its first leg is written.
     outputs : sequence of str
-        What `input_for` takes: an inverse is written for each.
+        Outputs, as for `input_for`, with an inverse each.
     single : bool
         Whether it computes with float instead of double.
     joints : sequence of str
-        What a controller commands, see `axes.joints`.
+        Commanded joints, see `axes.joints`.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def written(machine: SceneMechanism, outputs: Sequence[str] = (), single: bool =
 
 
 def opened(machine: SceneMechanism, joints: Sequence[str] = ()) -> str:
-    """Return a header of actuators and joints alone, for dimensions that are given to it."""
+    """Return a header of actuators and joints alone, for changeable dimensions."""
     sides = Sides(machine, joints, is_open=True)
     text = sides.text()
     names = ', '.join(sides.linkage.dimensions) or 'none'
@@ -61,7 +61,7 @@ def opened(machine: SceneMechanism, joints: Sequence[str] = ()) -> str:
 
 
 def guarded(sides: Sides, about: Sequence[str], parts: Sequence[str]) -> str:
-    """Return parts of a header as one, with its first lines and what has to be included."""
+    """Join the parts of a header, with comments, includes and a guard."""
     name, single = sides.machine.name, sides.code.number == 'float'
     guard = f'{name.upper()}_LINKAGE_H'
     lines = [f'{name}: {sides.linkage.type}, written by linkage_ros.', *about,
@@ -81,7 +81,7 @@ class _Header:
                  outputs: Sequence[str]):
         self.machine, self.name = machine, machine.name
         self.linkage = machine.linkage
-        # On a board nobody asks where points in space are.
+        # Points in space are of no use on a board.
         self.points = () if machine.in_space else machine.linkage.points
         self.inputs = [input_.name for input_ in self.linkage.inputs]
         for output in outputs:
@@ -98,7 +98,7 @@ class _Header:
             self.code.number, self.code.literal, self.code.times)
 
     def text(self) -> str:
-        """Return all of it."""
+        """Return the whole header."""
         text = self.sides.text()
         return guarded(self.sides, self._about(), [
             self.code.helpers(), self._struct(), self._solve(), self._rates(), self._reach(), text,
@@ -139,7 +139,7 @@ class _Header:
 
     def _function(self, head: str, pose: Pose, ending: Callable[[List[str]], List[str]],
                   scaled: bool = True) -> str:
-        """Return a C function of the inputs that does what some Python code does."""
+        """Return a C function of the inputs with the operations of a Pose."""
         return self.code.function(head, pose, [
             self._times(name, 1.0 / self.machine.scale_of(name) if scaled else 1.0)
             for name in self.inputs], ending)
@@ -198,7 +198,7 @@ class _Header:
                           f'    return {" || ".join(tests)};', '}', ''])
 
     def _inverse(self, outputs: Tuple[str, ...]) -> str:
-        """Return what users call: from outputs and inputs, in the scene's units, to inputs."""
+        """Return the users' inverse: from outputs and near inputs, in scene units, to inputs."""
         linkage, number = self.linkage, self.number
         n, tag = len(outputs), '_'.join(field(linkage, output) for output in outputs)
         said = ', '.join(f'{output} [{"rad" if linkage.is_angle(output) else "m"}]'
@@ -225,7 +225,7 @@ class _Header:
               for i, code in enumerate(made)), '    return 1;', '}', ''])
 
     def _error(self) -> str:
-        """Return in words how far single precision is off, over the reach."""
+        """Describe the error of single precision over the reach."""
         linkage = self.linkage
         if len(self.inputs) > 1:
             return 'float: how far joints are off was not measured, as there are several inputs.'

@@ -32,7 +32,7 @@ def constants(names: Iterable[str]) -> List[str]:
 
 
 def field(linkage: Mechanism, output: str) -> str:
-    """Return what an output is called in C."""
+    """Return the name of an output in C."""
     plain = re.sub(r'\W+', '_', output).strip('_')
     if '.' in output or '(' in output:
         return plain

@@ -14,7 +14,7 @@ from .names import comment, constants, filled, literal
 from .sides import template
 from ..scene import SceneMechanism
 
-# What a package may be called.
+# Names of packages.
 PACKAGE = re.compile(r'(?=.{2,64}$)[a-z](_?[a-z0-9])*', re.ASCII)
 
 
@@ -35,7 +35,7 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
     Raises
     ------
     ValueError
-        If a joint does not exist, or joints do not tell all inputs.
+        If a joint does not exist, or joints do not determine all inputs.
 
     """
     classes = [text.title().replace('_', '') for text in constants(

@@ -4,8 +4,8 @@
 """
 Actuators to joints and joints to actuators, as C functions.
 
-Both are outputs of the linkage, and the inputs lie between: positions go back to the inputs and
-on, velocities by the exact Jacobians, efforts by their transposes, so that no power is lost.
+Both are outputs of the linkage. Positions are converted through the inputs, velocities by the
+exact Jacobians, efforts by their transposes, so that power is conserved.
 """
 
 from importlib.resources import files
@@ -28,7 +28,7 @@ LIMITS = {'double': (1e-6, 1e-12, 1e-13, 1e-9, 1e-14),
           'float': (1e-3, 1e-5, 4e-6, 1e-5, 2e-6)}
 # Poses from a closed form and of a search, its longest step [rad, sizes] and the smallest part.
 CLOSED, SEARCHED, LONGEST, FINEST = 4, 64, 0.5, 2.0 ** -12
-# Poses that are tried to find one to start from.
+# Samples for the first pose of a search.
 SAMPLES = 4096
 
 
@@ -41,7 +41,7 @@ class Sides:
     """
     Writes the actuators and joints of a mechanism, and inverses of its other outputs.
 
-    Of an open one the dimensions may be changed; see `axes.joints` for `names`.
+    See `axes.joints` for `names`.
     """
 
     def __init__(self, machine: SceneMechanism, names: Sequence[str] = (), single: bool = False,
@@ -91,7 +91,7 @@ class Sides:
         return '{ ' + ', '.join(f'{{ {self.code.row(row)} }}' for row in rows) + ' }'
 
     def _counted(self, i: int, ends: Sequence[float]) -> Tuple[float, ...]:
-        """Return values of an input in the scene counted in its size."""
+        """Return values of an input in units of its size."""
         unit = self.sizes[i] * self.machine.scale_of(self.linkage.inputs[i].name)
         return tuple(end / unit for end in ends)
 
@@ -99,7 +99,7 @@ class Sides:
         return [value / size for value, size in zip(start(self.machine), self.sizes)]
 
     def _ways(self) -> Iterator[Tuple[float, ...]]:
-        """Yield for each input where its samples begin, how far they go, and by which part."""
+        """Yield the start, range and step of each input's samples."""
         for i, drive in enumerate(self.machine.inputs.values()):
             low, high = self._counted(i, drive.ends or max(
                 drive.reach, key=lambda arc: arc[1] - arc[0]))
@@ -156,7 +156,7 @@ class Sides:
                    f'{code.literal(0.5)});')
 
     def _strokes(self) -> Iterator[str]:
-        """Yield what ends a pose with an input of length beyond its way."""
+        """Yield the code that refuses inputs beyond their strokes."""
         for i, (drawn, input_, size) in enumerate(zip(
                 self.linkage.structure.built.inputs, self.machine.linkage.inputs, self.sizes)):
             if not input_.turns:
@@ -165,7 +165,7 @@ class Sides:
                 yield f'    if (!(q[{i}] >= {low} && q[{i}] <= {high}))\n        return 0;'
 
     def _loads(self) -> Iterator[Tuple[str, float]]:
-        """Yield outputs whose rates the loads of the scene work on, and by how much."""
+        """Yield outputs on which the scene's loads work, with their factors."""
         scale, links = self.machine.scale, {link.name: link for link in self.linkage.links}
         for name, load in self.machine.loads.items():
             if not isinstance(load, float):
@@ -219,7 +219,7 @@ class Sides:
             'inside': f'\n                && {self.name}_inside(start[next])' * measured})
 
     def _beside(self, i: int, value: str) -> str:
-        """Return code for a value of an input plus the turns that take it next to near."""
+        """Return code for a value of an input plus the turns that bring it closest to near."""
         input_, code = self.machine.linkage.inputs[i], self.code
         turn = code.literal(math.tau * input_.period)
         return value if not input_.turns else (
@@ -228,10 +228,10 @@ class Sides:
 
     def _modes(self, tag: str, closed: InverseLinkage,
                values: Sequence[str]) -> Tuple[str, int]:
-        """Return the function for the inputs of all assembly modes, and how many there are."""
+        """Return the function for the inputs of all assembly modes, and their number."""
         inputs, number = self.machine.linkage.inputs, self.code.number
         n, code = len(inputs), Code(self.name, self.machine.linkage, number == 'float')
-        # Where an input comes round after some turns only, each turn has a pose of its own.
+        # If an input has a period of several turns, each turn has its own pose.
         turns = list(product(*closed.turns))
         count = len(closed.modes) * len(turns)
         program = Program([value for mode in closed.modes for value in mode.inputs], len(values),
@@ -254,7 +254,7 @@ class Sides:
             self.machine.linkage.bind(program), values, ending), count
 
     def checks(self) -> Iterator[Tuple[Real, str]]:
-        """Yield what has to be above zero for other dimensions, and what is said if it is not."""
+        """Yield expressions of dimensions that must be positive, with their error messages."""
         built = self.linkage.structure.built
         for bar in built.bars:
             yield bar.length, f'the bar {bar.first}-{bar.second} must be longer than zero'

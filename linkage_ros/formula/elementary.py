@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Sine, cosine and arctangent in arithmetic that a processor does for several numbers at once.
+Sine, cosine and arctangent by arithmetic alone, for SIMD code.
 
-Sine and cosine are off by less than one ulp, the arctangent by less than two. The polynomials are
-those of fdlibm (k_sin.c, k_cos.c, s_atan.c; Sun Microsystems, 1993), angles are reduced as by Cody
-and Waite (Software Manual for the Elementary Functions, 1980).
+The error of sine and cosine is below one ulp, that of the arctangent below two. The polynomials
+are those of fdlibm (k_sin.c, k_cos.c, s_atan.c; Sun Microsystems, 1993). The argument reduction is
+that of Cody and Waite (Software Manual for the Elementary Functions, 1980).
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from .expression import Real, real, where
 QUARTER = (float.fromhex('0x1.921fb54440000p+0'), float.fromhex('0x1.68c234c4c0000p-39'),
            float.fromhex('0x1.98a2e03707345p-77'))
 PER_QUARTER = 0.6366197723675814
-# Has no digits after the point, nor has what is added to it.
+# Sums with this number are rounded to integers.
 WHOLE = 1.5 * 2.0 ** 52
-# What is larger in size is for the C library.
+# The C library computes larger angles.
 LARGEST_ANGLE = 2.0 ** 15 * QUARTER[0]
 SINE = (-1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
         2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10)
@@ -36,14 +36,14 @@ ARCTANGENT = (3.33333333333329318027e-01, -1.99999999998764832476e-01, 1.4285714
 # From the first slope on, angles are counted from the second's: its angle, and the digits after.
 ARCTANGENT_STARTS = ((0.4375, 0.5, 4.63647609000806093515e-01, 2.26987774529616870924e-17),
                      (0.6875, 1.0, 7.85398163397448278999e-01, 3.06161699786838301793e-17))
-# What pi is more than math.pi.
+# pi - math.pi.
 REST_OF_PI = 1.2246467991473532e-16
-# Between these, halves lose nothing and sums are finite.
+# Between these, halves are exact and sums are finite.
 LEAST_HALVED, MOST_ADDED = 2.0 ** -1000, 2.0 ** 1000
 
 
 def sine_and_cosine(x: Real) -> Tuple[Real, Real, Real]:
-    """Return sin x and cos x, and where that holds."""
+    """Return sin x and cos x, and whether they are valid."""
     quarters = _rounded(x * PER_QUARTER)
     angle, rest = _reduced(x, quarters)
     sine, cosine = _sine(angle, rest), _cosine(angle, rest)
@@ -56,12 +56,12 @@ def sine_and_cosine(x: Real) -> Tuple[Real, Real, Real]:
 
 
 def _rounded(x: Real) -> Real:
-    """Return the nearest integer, which is no negative zero: it would turn that of an angle."""
+    """Return the nearest integer, with a positive zero: a negative one would change signs."""
     return (x + WHOLE) - WHOLE
 
 
 def _reduced(x: Real, quarters: Real) -> Tuple[Real, Real]:
-    """Return x less quarter turns, to twice as many digits, as a sum."""
+    """Return x minus quarter turns, to twice as many digits, as a sum of two numbers."""
     high, middle, low = (quarters * part for part in QUARTER)
     first = x - high
     second = first - middle
@@ -96,7 +96,7 @@ def _signed(x: Real, positive: Real) -> Real:
 
 
 def arctangent(y: Real, x: Real) -> Tuple[Real, Real]:
-    """Return the angle of (x, y), and where that holds."""
+    """Return the angle of (x, y), and whether it is valid."""
     height, width = abs(y), abs(x)
     steep = width < height
     low, high = where(steep, width, height), where(steep, height, width)
@@ -111,6 +111,6 @@ def arctangent(y: Real, x: Real) -> Tuple[Real, Real]:
     angle = start - ((ratio * (square * _polynomial(ARCTANGENT, square)) - rest) - ratio)
     angle = where(steep, math.pi / 2 - (angle - REST_OF_PI / 2), angle)
     angle = where(x < 0.0, math.pi - (angle - REST_OF_PI), angle)
-    # The library knows what infinity comes to, and the signs of zeros.
+    # The C library handles infinities and signs of zeros.
     usual = where(high > LEAST_HALVED, where(high < MOST_ADDED, height, 0.0), 0.0) > 0.0
     return _signed(angle, y > 0.0), usual

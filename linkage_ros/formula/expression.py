@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Numbers that remember how they were made.
+Symbolic expressions of real and complex numbers.
 
-A construction of `linkage.planar` is written once, in ordinary operators, on `Real` and `Complex`
-values. What it leaves behind is an expression: a graph that `program` turns into code for one
-pose, for arrays and for an accelerator, and that `derivative` differentiates. The order of the
-operations is kept exactly as written, because the accuracy of a stable form lives in it.
+A construction of `linkage.planar` is written once, with ordinary operators on `Real` and `Complex`
+values. Its result is an expression graph: `program` generates code from it for single poses,
+arrays and machine code, and `derivative` differentiates it. The order of operations is exactly as
+written, because numerical stability depends on it.
 """
 
 from __future__ import annotations
@@ -33,11 +33,10 @@ class Real:
     """
     One operation on real numbers, or a leaf: a constant, a dimension or an argument.
 
-    `varies` tells whether the value depends on an argument, such as a crank angle; what does not
-    is computed once for each change of dimensions. `operands` are the expressions that the
-    operation is done on: a leaf has none. `positive` marks what is known to be above
-    zero. `rate` is the rate where geometry knows it in fewer operations than differentiating the
-    expression takes.
+    `varies`: the value depends on an argument, such as a crank angle; other values are computed
+    once for each change of dimensions. `operands` are the operation's arguments; a leaf has none.
+    `positive`: the value is known to be above zero. `rate` is a geometric formula of the rate, if
+    it needs fewer operations than the derivative of the expression.
     """
 
     __slots__ = ('op', 'args', 'operands', 'varies', 'positive', 'rate')
@@ -145,7 +144,7 @@ _LEAVES = frozenset({'constant', 'dimension', 'argument'})
 
 
 def operation(name: str, *operands: Real) -> Real:
-    """Return an operation of `operations` on some operands; what can be is done at once."""
+    """Return an operation of `operations` on operands, evaluated at once if possible."""
     row = OPERATIONS[name]
     if row.folded and (found := row.folded(*operands)) is not None:
         return real(found)
@@ -166,12 +165,12 @@ def dimension(name: str, positive: bool = True) -> Real:
 
 
 def argument(index: int) -> Real:
-    """Return the leaf for what is given with each pose: an input, or a lever's angle."""
+    """Return the leaf for an argument of each pose: an input, or a lever's angle."""
     return Real('argument', (index,), varies=True)
 
 
 def sine(x: Real) -> Real:
-    """Return sin x."""
+    """Return the sine of x."""
     return operation('sin', x)
 
 
@@ -195,9 +194,9 @@ def square_root(x: Number) -> Real:
 
 def root(x: Real, tolerance: Real) -> Real:
     """
-    Return the root of a radicand that decides whether a linkage can be assembled.
+    Return the root of a radicand that is negative if a linkage cannot be assembled.
 
-    Zero within the tolerance (a limit that is hit up to rounding counts as reached), NaN below.
+    Zero within the tolerance (a limit reached up to rounding), NaN below.
     """
     return operation('root', x, real(tolerance))
 
@@ -219,9 +218,9 @@ def nearest_integer(x: Real) -> Real:
 
 def exact_sum(*terms: Number) -> Real:
     """
-    Return a sum that has lost no digit, however much cancels.
+    Return an accurate sum under any cancellation.
 
-    Terms that are sums themselves are taken apart. Source: Ogita, Rump and Oishi, "Accurate sum
+    Terms that are sums are expanded. Source: Ogita, Rump and Oishi, "Accurate sum
     and dot product", SIAM J. Sci. Comput. 26 (2005), algorithm SumK.
     """
     parts = [t for term in terms for t in _summands(real(term)) if t.value != 0.0]
@@ -231,7 +230,7 @@ def exact_sum(*terms: Number) -> Real:
 
 
 def _distilled(terms: List[Real]) -> List[Real]:
-    """Return what each addition of a sum has lost to rounding, and the sum at last."""
+    """Return the rounding error of each addition of a sum, and last the sum."""
     total, *rest = terms
     lost = []
     for term in rest:
@@ -241,7 +240,7 @@ def _distilled(terms: List[Real]) -> List[Real]:
 
 
 def _summands(x: Real) -> list:
-    """Return the terms that a sum or difference is made of."""
+    """Return the terms of a sum or difference."""
     terms, waiting = [], [(x, False)]
     while waiting:
         x, minus = waiting.pop()
@@ -311,7 +310,7 @@ class Complex:
         return square_root(self.squared())
 
     def direction(self) -> Complex:
-        """Return the unit vector along this one; along x where dimensions leave it no length."""
+        """Return the unit vector along this one; along x if dimensions make its length zero."""
         if self.y.value == 0.0 and self.x.op == 'negative' and self.x.args[0].positive:
             return Complex(-1.0, 0.0)
         length = self.length()
@@ -332,7 +331,7 @@ def dot(p: Complex, q: Complex) -> Real:
 
 
 def unknown(node: Real, needed: Callable, known: dict) -> Iterator[Real]:
-    """Yield an expression after all that it needs; each is known when the next is asked for."""
+    """Yield unknown operands of an expression before their users, and last the expression."""
     waiting = [node]
     while waiting:
         if waiting[-1] in known:
@@ -347,7 +346,7 @@ def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
     """
     Differentiate an expression with respect to time.
 
-    `rates` are those of the arguments, by index; what is left out stands still. `known` are the
+    `rates` are those of the arguments, by index; missing ones are zero. `known` are the
     derivatives found so far, shared between calls.
     """
     def needed(x: Real) -> Iterable[Real]:
@@ -383,7 +382,7 @@ def substituted(outputs: Sequence[Real], arguments: Sequence[Real]) -> List[Real
 
 
 class Rate(NamedTuple):
-    """A rate that geometry knows: a formula of the rates of some expressions."""
+    """A geometric rate: a formula of the rates of some expressions."""
 
     of: Tuple[Real, ...]
     formula: Callable
@@ -395,13 +394,13 @@ def with_rate(x: Real, *of: Real, formula: Callable) -> Real:
         return x
     if x.op == 'negative':
         return -with_rate(x.args[0], *of, formula=lambda *rates: -formula(*rates))
-    # A node of its own: what it stands for may be part of another expression, or of the formula.
+    # A separate node, since x may be part of another expression, or of the formula.
     return Real('rated', (x,), positive=x.positive, rate=Rate(of, formula))
 
 
 def with_spin(vector: Complex, spin: Rate) -> Complex:
-    """Return a vector of constant length with the angular velocity that is given."""
-    # Each part changes by the other with its own rate, not by what that is made of.
+    """Return a vector of constant length with a given angular velocity."""
+    # The rate of each part uses the other part with its own rate.
     turned = Complex(
         with_rate(vector.x, *spin.of, formula=lambda *d: -(spin.formula(*d) * turned.y)),
         with_rate(vector.y, *spin.of, formula=lambda *d: spin.formula(*d) * turned.x))

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Arrays of poses by machine code: eight poses at a time, and on all cores.
+Machine code for arrays of poses: eight poses at a time, on all cores.
 
-Sine, cosine and arctangent are those of `elementary`, the rest is done as in `llvm_code`. What a
-pose comes to depends neither on the poses beside it nor on the number of cores.
+Sine, cosine and arctangent are those of `elementary`, other operations those of `llvm_code`. The
+result of a pose depends neither on the other poses nor on the number of cores.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from ..cache import cached
 # One register of AVX-512; with AVX2 and SSE2, too, eight are about as fast as any.
 LANES = 8
 VECTOR = ir.VectorType(NUMBER, LANES)
-# Fewer operations than these, some 0.15 ms, are not worth another thread.
+# Operations that justify another thread, some 0.15 ms.
 SHARE = 3 * 2 ** 19
 # The first pose and the one after the last, all poses, then addresses: of the addresses of the
 # arguments, of the constants and of the results.
@@ -53,7 +53,7 @@ class Arrays:
         share = max(self._share, -(-size // cores))
 
         def solve_from(first: int) -> None:
-            # What is referred to here lives as long as a thread needs it.
+            # These references keep the arrays alive while threads use them.
             places = (ctypes.c_int64 * len(given))(*map(address, given))
             self._run(first, min(first + share, size), size, places,
                       address(constants), address(out))
@@ -67,14 +67,14 @@ class Arrays:
 
 
 def _cores() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of cores that this process may use."""
     own = getattr(os, 'sched_getaffinity', None)
     return len(own(0)) if own else os.cpu_count() or 1
 
 
 @cached(1)
 def _threads(_: int, cores: int) -> ThreadPoolExecutor:
-    """Return the threads of a process; another that is forked from it has none of them."""
+    """Return the thread pool of a process; a forked process needs its own."""
     return ThreadPoolExecutor(cores, 'linkage_ros arrays')
 
 
@@ -93,7 +93,7 @@ def _module(operations: Sequence, constants: Sequence[int],
         return builder.bitcast(builder.gep(array, [offset]), VECTOR.as_pointer())
 
     with builder.each(last, first=first, step=LANES) as pose:
-        # The last eight poses of all may overlap those before.
+        # The last eight poses may overlap those before.
         latest = builder.sub(size, count(LANES))
         at = builder.select(builder.icmp_signed('<', pose.i, latest), pose.i, latest)
         append(operations, known, _operators(builder), VECTOR, lambda index: builder.load(
@@ -113,7 +113,7 @@ def _in_all_lanes(builder: Builder, number: ir.Value) -> ir.Value:
 
 
 def _operators(builder: Builder) -> Dict[str, Callable]:
-    """Return what each operation on eight poses appends to the code."""
+    """Return the code generators of operations on eight poses."""
     spell = builder.operations()
     turned = _approximated(builder, spell, sine_and_cosine, (spell['sin'], spell['cos']))
     angle = _approximated(builder, spell, arctangent, (partial(_by_lane, builder, 'atan2'),))
@@ -132,7 +132,7 @@ def _by_lane(builder: Builder, name: str, *operands: ir.Value) -> ir.Value:
 
 def _approximated(builder: Builder, spell: Dict[str, Callable], approximation: Callable,
                   library: Sequence[Callable]) -> Callable:
-    """Return what appends functions of `elementary`, and the library's where they do not hold."""
+    """Return a code generator: `elementary`, or the C library where that is not valid."""
     @cached()
     def appended(*operands: ir.Value) -> List[ir.Value]:
         operations, outputs = _listed(approximation, len(operands))

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Expressions turned into machine code, by llvmlite.
+Compile expressions to machine code, by llvmlite.
 
-The operations are those of the plain Python code, done in the same order on the same numbers, so
-the results are the same to the last bit.
+The operations and their order are those of the plain Python code, so the results have the same
+bits.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ llvm.initialize_native_asmprinter()
 
 
 def compiled(module: ir.Module) -> llvm.ExecutionEngine:
-    """Return what holds the machine code of a module, for as long as it lives."""
+    """Compile a module; its machine code lives as long as the returned engine."""
     target = llvm.Target.from_default_triple().create_target_machine(
         cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=3)
     code = llvm.parse_assembly(str(module))
@@ -52,7 +52,7 @@ class Builder(ir.IRBuilder):
     """Appends operations on numbers, or on vectors of them, to the code of a function."""
 
     def operations(self) -> Dict[str, Callable]:
-        """Return what appends each operation, by name."""
+        """Return the code generators of operations, by name."""
         return {name: partial(row.llvm, self) for name, row in OPERATIONS.items()}
 
     def called(self, name: str, *operands: ir.Value) -> ir.Value:
@@ -67,7 +67,7 @@ class Builder(ir.IRBuilder):
     @contextmanager
     def each(self, last: ir.Value, total: Optional[ir.Value] = None, first: Any = 0,
              step: int = 1) -> Iterator[Turn]:
-        """Write what is done for each number below the last; a total may be carried along."""
+        """Write a loop over numbers below `last`, optionally with an accumulated total."""
         before, first = self.block, count(first) if isinstance(first, int) else first
         head, body, end = (self.function.append_basic_block() for _ in range(3))
         self.branch(head)
@@ -87,7 +87,7 @@ class Builder(ir.IRBuilder):
 
 @dataclass
 class Turn:
-    """A turn of a loop: its number, what is carried along, and that at its end."""
+    """An iteration of a loop: its number, and the total at its start and end."""
 
     i: ir.Value
     total: Optional[ir.Value]
@@ -96,10 +96,10 @@ class Turn:
 
 class Loop:
     """
-    A loop over poses in machine code, which lives as long as this.
+    A loop over poses in machine code, which lives as long as this object.
 
-    An operation is a number, a name and operands: others' numbers, an argument's, or a value.
-    `constants` are the numbers of what is given with each call, `outputs` of what is wanted.
+    An operation is a number, a name and operands: numbers of other operations or of an argument,
+    or a value. `constants` and `outputs` are the numbers of each call's constants and results.
     """
 
     def __init__(self, operations: Sequence, constants: Sequence[int], outputs: Sequence[int]):
@@ -110,17 +110,17 @@ class Loop:
     @staticmethod
     def arguments(given: np.ndarray, constants: np.ndarray, out: np.ndarray) -> tuple:
         """
-        Return what to call `run` with, as long as the arrays live.
+        Return the arguments of `run`, valid as long as the arrays live.
 
-        It solves at what is given, shape (arguments, poses) and C-contiguous, and fills out,
-        shape (outputs, poses).
+        `given` (arguments, poses) is C-contiguous; the results are written to `out` (outputs,
+        poses).
         """
         by_output, by_pose = (stride // out.itemsize for stride in out.strides)
         return given.shape[1], *map(address, (given, constants, out)), by_pose, by_output
 
 
 def address(array: np.ndarray) -> int:
-    """Return where an array's numbers begin in memory."""
+    """Return the address of an array's numbers."""
     return array.__array_interface__['data'][0]
 
 
@@ -148,7 +148,7 @@ def _module(operations: Sequence, constants: Sequence[int],
 
 def append(operations: Sequence, known: dict, spell: dict, kind: ir.Type,
            argument: Callable[[int], ir.Value]) -> None:
-    """Append operations on a kind of number to the code; their values are known by number."""
+    """Append operations on a type of numbers to the code; `known` receives their values."""
     for number, name, operands in operations:
         if name == 'constant':
             known[number] = ir.Constant(kind, operands[0])

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-From the bytes of one message to the bytes of others, in one call of machine code.
+Process a message in one native call, from its bytes to the bytes of other messages.
 
-The numbers of a message that differs from a known one in numbers alone are taken to where loops
-over poses expect them; the loops run; what they found is put into other messages. Where all that
-lies is in tables of addresses, so one piece of code serves all scenes.
+The numbers of a message with a known layout are copied to the arguments of loops over poses, the
+loops run, and their results are copied into other messages. Tables of addresses describe all
+copies, so that one piece of code serves all scenes.
 """
 
 from __future__ import annotations
@@ -26,44 +26,43 @@ from ..cache import cached
 
 BYTE = ir.IntType(8)
 FIELD_TYPES = {'i': COUNT, 'f': NUMBER}
-# Every table is rows of these, whole numbers and addresses ('i8') or floats ('f8').
-# A number of the message: factor * number + plus goes to an address.
+# Rows of tables: integers and addresses ('i8') or floats ('f8').
+# A number of the message: factor * number + plus is written to an address.
 TAKE = np.dtype([('offset', 'i8'), ('to', 'i8'), ('factor', 'f8'), ('plus', 'f8')])
-# A loop, what it is called with, and how many numbers from `out` on have to be finite.
+# A loop, its arguments, and the count of numbers from `out` on that must be finite.
 LOOP = np.dtype([('code', 'i8'), ('poses', 'i8'), ('given', 'i8'), ('constants', 'i8'),
                  ('out', 'i8'), ('by_pose', 'i8'), ('by_output', 'i8'), ('size', 'i8')])
-# What a loop is given, times a factor and plus something, has to be so near a middle, turns aside.
+# Limits of a loop's argument: factor * argument + plus must be near a middle, up to whole turns.
 LIMIT = np.dtype([('loop', 'i8'), ('at', 'i8'), ('factor', 'f8'), ('plus', 'f8'),
                   ('middle', 'f8'), ('half', 'f8'), ('turn', 'f8')])
-# A number that is multiplied and added to in place, and whole turns come off it.
+# A number to scale and shift in place, then to wrap by whole turns.
 CHANGE = np.dtype([('at', 'i8'), ('factor', 'f8'), ('plus', 'f8'), ('turn', 'f8')])
-# Eight bytes that are copied.
+# Eight bytes to copy.
 PUT = np.dtype([('from', 'i8'), ('to', 'i8')])
-# The tables of a pipeline, and those of what ends it.
+# The tables of a pipeline, and those of its ending.
 TABLES = {'takes': TAKE, 'copies': PUT, 'loops': LOOP, 'limits': LIMIT}
 ENDING = {'changes': CHANGE, 'puts': PUT}
-# What the code is called with: the length of the known message, its bytes and which of them count;
-# the stamp; which loops failed; then the size and the address of each table.
+# The code's arguments: length, bytes and mask of the known message; the stamp; which loops failed;
+# then the size and the address of each table.
 HEAD = ('length', 'same', 'mask', 'stamp', 'failed')
 
-# What is returned instead of the number of loops that failed.
+# Return values other than the number of failed loops.
 OTHER_MESSAGE, UNSTAMPED = -1, -2
-# Where the stamp of a message lies, after the header that says how it is encoded.
+# Offset of a message's stamp, after the encapsulation header.
 STAMP = 4
-# So near an end of a limit, relatively, it is for others to decide.
+# Relative margin at a limit, within which Python decides.
 LIMIT_MARGIN = 1e-9
 INFINITE = 0x7FF << 52
 
 
 class Pipeline:
     """
-    What is done with each message of one kind.
+    The processing of messages with one layout.
 
-    `same` is a message of that kind, `mask` has the bits in which all are the same. Into `stamp`,
-    int64 (2,), go the bytes of a message's stamp, for an ending to copy; its second number stands
-    for the stamp of a message that has none, or zero. The other arrays are of the types in TABLES;
-    the `owner` is whatever their addresses lie in. `failed` says which loops did not find finite
-    numbers within their limits in the last call.
+    `same` is such a message, `mask` has the bits that all share. `stamp`, int64 (2,), receives a
+    message's stamp, for an ending to copy; its second number replaces a missing stamp, or is zero.
+    The other arrays have the types in TABLES; `owner` keeps their memory alive. `failed` marks the
+    loops without finite numbers within their limits in the last call.
     """
 
     def __init__(self, same: bytes, mask: bytes, stamp: np.ndarray, owner: Any, takes: Any,
@@ -79,15 +78,15 @@ class Pipeline:
 
     def run(self, message: bytes, ending: Optional[Ending]) -> int:
         """
-        Take, run and, if no loop failed, do what ends it.
+        Read the message, run the loops and, if none failed, the ending.
 
-        It returns how many loops failed; OTHER_MESSAGE or UNSTAMPED where nothing was done.
+        Return the number of failed loops; OTHER_MESSAGE or UNSTAMPED without any effect.
         """
         return self._run(message, len(message), ending.address if ending else 0)
 
 
 class Ending:
-    """What becomes of the numbers that a pipeline has found: tables of the types in ENDING."""
+    """The use of a pipeline's results: tables of the types in ENDING."""
 
     def __init__(self, owner: Any, changes: Any, puts: Any):
         tables = _Tables(ENDING, (changes, puts))
@@ -107,21 +106,21 @@ class _Tables:
 
 
 def addresses(array: np.ndarray) -> np.ndarray:
-    """Return where each number of an array lies in memory."""
+    """Return the address of each number of an array."""
     return address(array) + np.add.reduce(
         [index * stride for index, stride in zip(np.indices(array.shape), array.strides)])
 
 
 @cached(1)
 def code() -> Future:
-    """Return the machine code, which is compiled once, in the background."""
+    """Return the machine code, compiled once in the background."""
     return compile_in_background(_compiled)
 
 
 def _compiled() -> Tuple[Callable[[int, bytes, int, int], int], Callable[[int], None], Any]:
-    """Return what runs a pipeline, what runs an ending, and what holds their code."""
+    """Return the functions that run a pipeline and an ending, and the owner of their code."""
     engine = compiled(_module())
-    # It takes microseconds, so it keeps Python's lock.
+    # A call takes microseconds, so it does not release Python's lock.
     run = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int64,
                             ctypes.c_int64)(engine.get_function_address('run'))
     end = ctypes.PYFUNCTYPE(None, ctypes.c_int64)(engine.get_function_address('end'))
@@ -158,7 +157,7 @@ def _module() -> ir.Module:
 
 def _read(write: _Writer, table: ir.Value, head: Sequence[str], kinds: Dict[str, np.dtype]
           ) -> Tuple[Dict[str, ir.Value], Dict[str, Tuple[ir.Value, ir.Value]]]:
-    """Load a head: what it begins with by name, then the size and the address of each table."""
+    """Load a head: its first fields by name, then the size and the address of each table."""
     values = [write.read(write.step(table, i)) for i in range(len(head) + 2 * len(kinds))]
     sizes, places = values[len(head)::2], values[len(head) + 1::2]
     return dict(zip(head, values)), dict(zip(kinds, zip(sizes, places)))
@@ -178,7 +177,7 @@ class _Writer(Builder):
         return self.gep(pointer, [count(i) if isinstance(i, int) else i])
 
     def read(self, pointer: ir.Value) -> ir.Value:
-        # Numbers in a message lie at multiples of 4.
+        # Numbers in a message are aligned to 4 bytes only.
         return self.load(pointer, align=1)
 
     def put(self, value: ir.Value, pointer: ir.Value) -> None:
@@ -191,7 +190,7 @@ class _Writer(Builder):
 
     @contextmanager
     def rows(self, table: Tuple[ir.Value, ir.Value], kind: np.dtype) -> Iterator[Dict]:
-        """Write what is done with each row of a table, {field: value}; '' is its number."""
+        """Write a loop over a table's rows, {field: value}; '' is the row's number."""
         size, start = table
         with self.each(size) as turn:
             at = self.add(start, self.mul(turn.i, count(kind.itemsize)))
@@ -202,7 +201,7 @@ class _Writer(Builder):
 
 
 def _differs(write: _Writer, known: Dict[str, ir.Value], text: ir.Value) -> ir.Value:
-    """Return whether a message differs where all are the same."""
+    """Return whether a message differs in the shared bits."""
     same, mask = (write.place(known[name], BYTE) for name in ('same', 'mask'))
     with write.each(known['length'], BYTE(0)) as turn:
         other, own, counts = (write.read(write.step(each, turn.i)) for each in (text, same, mask))
@@ -211,7 +210,7 @@ def _differs(write: _Writer, known: Dict[str, ir.Value], text: ir.Value) -> ir.V
 
 
 def _stamp(write: _Writer, known: Dict[str, ir.Value], text: ir.Value) -> ir.Value:
-    """Take over the stamp if the message has one; return whether there is none at all."""
+    """Copy the message's stamp, if it has one; return whether no stamp is available."""
     place = write.place(known['stamp'], COUNT)
     own = write.read(write.bitcast(write.step(text, STAMP), COUNT.as_pointer()))
     stamp = write.select(write.icmp_unsigned('==', own, count(0)),

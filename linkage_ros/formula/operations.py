@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Operations on real numbers: one row each, with all that expressions and back ends know of it.
+Operations on real numbers: a table with the code for all back ends, and the derivatives.
 
-All back ends do the same in float64. Elementary functions are those of the C library, of numpy
-over arrays, and of `elementary` over arrays in machine code.
+All back ends have the same results in float64. Elementary functions are those of the C library, of
+numpy for arrays, and of `elementary` for arrays in machine code.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def _gated(x: Any, margin: Any, tolerance: Any) -> Any:
 
 
 def _least(x: Any) -> Any:
-    """Return the least of some numbers, NaN if any is none, in one quick pass."""
+    """Return the minimum of numbers, NaN if any is NaN, in one pass."""
     return np.minimum.reduce(x, axis=None, initial=math.inf)
 
 
@@ -92,7 +92,7 @@ def _gated_in_llvm(b: Any, x: Any, margin: Any, tolerance: Any) -> Any:
 
 
 def _constants(function: Callable) -> Callable:
-    """Return what does a function of constants at once."""
+    """Return a folding rule that evaluates a function of constants."""
     def folded(*operands: Any) -> Optional[float]:
         for x in operands:
             if x.op != 'constant':
@@ -120,7 +120,7 @@ OPERATIONS = {row.name: row for row in (
               lambda do, n, dx, dy: dx - dy, _constants(operator.sub)),
     Operation('multiply', '({} * {})', operator.mul, lambda b, x, y: b.fmul(x, y), '({} * {})',
               _product_rule, _constants(operator.mul), (0, 1), True),
-    # What a sum has lost to rounding, exactly. Source: Knuth, TAOCP 2, sec. 4.2.2, theorem B.
+    # The exact rounding error of a sum. Source: Knuth, TAOCP 2, sec. 4.2.2, theorem B.
     Operation('lost', LOST, _lost, _lost_in_llvm, LOST, folded=_constants(_lost)),
     Operation('divide', '({} / {})', operator.truediv, lambda b, x, y: b.fdiv(x, y), '({} / {})',
               lambda do, n, dx, dy: (dx - n * dy) / n.args[1], None, (0, 1)),
@@ -156,6 +156,6 @@ OPERATIONS = {row.name: row for row in (
     Operation('gated', '({0} if {1} >= -{2} else nan)', _gated, _gated_in_llvm,
               '{name}_gated({}, {}, {})', lambda do, n, dx, *_: do('gated', dx, *n.args[1:])),
 )}
-# What changes in steps alone.
+# Piecewise constant operations.
 WITHOUT_RATE = frozenset(row.name for row in OPERATIONS.values() if row.rate is None)
 COMMUTING = frozenset(row.name for row in OPERATIONS.values() if row.commutes)

@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Expressions turned into code.
+Generate code from expressions.
 
 One list of operations serves every use: plain Python on floats for a single pose, numpy for
-arrays, and machine code where it is asked for. Only what the outputs depend on is in the list,
-each value once; what depends on dimensions alone is worked out when they are set, and so is every
-condition on dimensions: the code for a pose has no branch for it.
+arrays, and machine code on request. The list has each operation that the outputs need once. Values
+and conditions that depend on dimensions alone are evaluated when dimensions are set, so that the
+code for a pose has no branches for them.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _NUMBERS, _NAMED, _OPERANDS = count(), re.compile(r'\bv\d+'), attrgetter('operan
 
 
 def compile_in_background(make: Callable[[], Any]) -> Future:
-    """Return what will be made, in a thread of its own."""
+    """Run `make` in a thread of its own; return its future."""
     thread = ThreadPoolExecutor(1, 'linkage_ros compiler')
     made = thread.submit(make)
     thread.shutdown(wait=False)
@@ -50,7 +50,7 @@ def compile_in_background(make: Callable[[], Any]) -> Future:
 
 @dataclass(frozen=True)
 class Dialect:
-    """How operations and numbers are spelt, and what their code refers to by name."""
+    """Spelling of operations and numbers in code, and the names that the code uses."""
 
     templates: Mapping[str, str]
     names: Mapping[str, Any]
@@ -62,7 +62,7 @@ FLOATS = Dialect({name: row.python for name, row in OPERATIONS.items()}, {
 
 
 def _quiet(function: Any) -> Any:
-    """Return a function of `math` that has NaN where IEEE 754 does, instead of an error."""
+    """Return a function of `math` that returns NaN as in IEEE 754, instead of an error."""
     def quiet(*operands: float) -> np.float64:
         try:
             return np.float64(function(*operands))
@@ -72,7 +72,7 @@ def _quiet(function: Any) -> Any:
     return quiet if callable(function) else function
 
 
-# To the same bits as FLOATS, on numpy's floats: they divide by zero.
+# The same bits as FLOATS, on numpy's floats, which divide by zero.
 QUIET = Dialect(
     {**{name: f'float64({code})' for name, code in FLOATS.templates.items()},
      'rint': 'round_even({})'},
@@ -84,7 +84,7 @@ ARRAYS = Dialect({name: row.array for name, row in OPERATIONS.items()}, {
 
 
 def evaluate(node: Real, dimensions: Mapping, known: dict) -> Any:
-    """Return the value of an expression of dimensions alone; known is shared between calls."""
+    """Evaluate an expression of dimensions alone; `known` is shared between calls."""
     for x in unknown(node, _OPERANDS, known):
         if x.operands:
             known[x] = OPERATIONS[x.op].numpy(*map(known.get, x.operands))[()]
@@ -95,7 +95,7 @@ def evaluate(node: Real, dimensions: Mapping, known: dict) -> Any:
 
 
 class _Listing:
-    """The operations behind some outputs, in an order they can be done in, each once."""
+    """The operations of outputs, each once, in an order of evaluation."""
 
     def __init__(self, outputs: Sequence[Real], decided: Mapping[Real, bool],
                  replaced: Mapping[Real, Real]):
@@ -107,7 +107,7 @@ class _Listing:
             self._known[leaf] = self._number(expression)
         self.outputs = [self._number(node) for node in outputs]
         self._uses = self._count_uses()
-        # The values of dimensions alone that the varying operations start from.
+        # The values of dimensions alone that varying operations use.
         self.constants = [n for n in self._uses if not self.entries[n][0].varies
                           and self.entries[n][0].op != 'constant']
 
@@ -133,7 +133,7 @@ class _Listing:
         return self._numbers[key]
 
     def _count_uses(self) -> Dict[int, int]:
-        """Return how often each value is needed, in the order in which they can be worked out."""
+        """Return the number of uses of each value, in an order of evaluation."""
         uses: Dict[int, int] = {}
         waiting = list(self.outputs)
         while waiting:
@@ -152,7 +152,7 @@ class _Listing:
 
     def statements(self, dialect: Dialect) -> Tuple[List[Tuple[str, str]], List[str]]:
         """Return the assignments as (name, code) and the code of each output."""
-        # What a template has more than once is worked out before.
+        # Operands that a template repeats are evaluated before.
         repeating = {name: [i for i in range(2) if code.count(f'{{{i}}}') > 1]
                      for name, code in dialect.templates.items()}
         repeated = {args[i] for node, args in map(self.entries.__getitem__, self._uses)
@@ -177,7 +177,7 @@ class _Listing:
 
 
 def _with_releases(lines: Sequence[Tuple[str, str]], outputs: Sequence[str]) -> List[str]:
-    """Drop each array after its last use, so that the next one takes over its warm memory."""
+    """Drop each array after its last use, so that the next one reuses its cached memory."""
     reads = [set(_NAMED.findall(code)) for _, code in lines]
     last = {name: index for index, names in enumerate(reads) for name in names}
     kept = set(_NAMED.findall(' '.join(outputs)))
@@ -189,17 +189,17 @@ def _with_releases(lines: Sequence[Tuple[str, str]], outputs: Sequence[str]) -> 
 def _python(listing: _Listing, dialect: Dialect, arguments: int,
             names: Tuple[str, ...] = ()) -> Callable:
     """
-    Return a function of constants, and of what to do instead, to the function of the arguments.
+    Return a factory from constants and a fallback `instead` to the function of the arguments.
 
-    That returns the outputs as a tuple or, where there are names, in pairs: an array (2,) each.
-    What Python's floats raise for is left to `instead`.
+    That function returns the outputs as a tuple or, with names, as an array (2,) for each name.
+    Where Python's floats raise, it calls `instead`.
     """
     lines, outputs = listing.statements(dialect)
     ending = [f'return ({"".join(code + ", " for code in outputs)})']
     if names:
-        # Names of any class, an enum's or numpy's, are written as plain text is.
+        # Names of any class of text, such as enums, are written as plain text.
         rows = ', '.join(f'{str.__repr__(name)}: pairs[{i}]' for i, name in enumerate(names))
-        # Packing floats as bytes takes a quarter of the time numpy needs to convert them.
+        # Packing floats as bytes takes a quarter of the time of numpy's conversion.
         ending = [f'pairs = empty(({len(names)}, 2))', f'pack(pairs, 0, {", ".join(outputs)})',
                   f'return {{{rows}}}']
     body = (_with_releases(lines, outputs) if dialect is ARRAYS
@@ -224,7 +224,7 @@ def _python(listing: _Listing, dialect: Dialect, arguments: int,
 
 
 class _Variant:
-    """The code for one outcome of the conditions on dimensions."""
+    """The code for one combination of the conditions on dimensions."""
 
     def __init__(self, outputs: Sequence[Real], decided: Mapping[Real, bool],
                  replaced: Mapping[Real, Real], arguments: int):
@@ -248,7 +248,7 @@ class _Variant:
 
     @cached_property
     def loop(self) -> Future:
-        """Return the code for many poses as machine code, which is made beside what goes on."""
+        """Return the machine code for many poses, compiled in the background."""
         def make() -> Any:
             from .llvm_code import Loop
 
@@ -258,7 +258,7 @@ class _Variant:
 
     @cached_property
     def arrays(self) -> Any:
-        """Return the code for arrays of poses as machine code."""
+        """Return the machine code for arrays of poses."""
         from .llvm_arrays import Arrays
 
         return Arrays(*self.listing.operations())
@@ -266,9 +266,9 @@ class _Variant:
 
 class Program:
     """
-    Some outputs of a linkage, ready to be bound to dimensions; of so many arguments.
+    Outputs of a linkage as functions of arguments, to be bound to dimensions.
 
-    Some arguments in the outputs may be `replaced` by expressions.
+    Arguments in the outputs may be `replaced` by expressions.
     """
 
     def __init__(self, outputs: Sequence[Real], arguments: int = 1,
@@ -296,7 +296,7 @@ class Program:
 
 
 def _conditions(outputs: Iterable[Real]) -> list:
-    """Return the conditions on dimensions alone that varying operations choose by."""
+    """Return the conditions on dimensions alone that varying operations use."""
     seen: Dict[Real, None] = {}
     for output in outputs:
         for node in unknown(output, lambda x: [a for a in x.operands if a.varies], seen):
@@ -306,7 +306,7 @@ def _conditions(outputs: Iterable[Real]) -> list:
 
 
 class Pose:
-    """The outputs of a program as a function of the arguments, for dimensions that are set."""
+    """The outputs of a program as a function of the arguments, for given dimensions."""
 
     def __init__(self, variant: _Variant, constants: Sequence, shape: tuple, accelerate: bool):
         self.variant = variant
@@ -347,22 +347,22 @@ class Pose:
         return self.variant.placing[names](*self.constants, quietly)
 
     def __call__(self, *arguments: Any) -> Any:
-        """Return the outputs at floats, as floats, or over arrays that are broadcast together."""
+        """Return the outputs as floats, or over broadcast arrays."""
         if not self.shape and set(map(type, arguments)) == {float}:
             return self.at(*arguments)
         return self.over(*arguments)
 
     def over(self, *arguments: Any) -> np.ndarray:
-        """Return the outputs over arrays that are broadcast together, shape (outputs, *shape)."""
+        """Return the outputs over broadcast arrays, shape (outputs, *shape)."""
         arrays = [np.asarray(a, float) for a in arguments]
         return self._swept(arrays) if self.shape else self._flat(
             self._natively if self._accelerate else self._plainly, arrays)
 
     def searched(self, *arguments: Any) -> np.ndarray:
         """
-        Return what `over` does for one set of dimensions, without code for single poses.
+        Return the same as `over` for one set of dimensions, without code for single poses.
 
-        Arguments of single precision are worked on in it.
+        Arguments of single precision are processed in it.
         """
         return self._flat(self._blocks, arguments)
 
@@ -375,8 +375,8 @@ class Pose:
         return self.variant.arrays.solve(given, self._given)
 
     def batch(self, rows: np.ndarray) -> Batch:
-        """Return poses to be solved again and again, into rows (poses, outputs)."""
-        # One by one, however many: what a message says has the bits of machine code.
+        """Return a batch that is solved repeatedly, into rows (poses, outputs)."""
+        # Poses one by one have the same bits as machine code.
         return Batch(self._one_by_one, self.variant.loop if self._accelerate else None,
                      self._given, self.variant.arguments, rows)
 
@@ -408,9 +408,9 @@ class Pose:
 
 class Batch:
     """
-    Poses that are solved again and again, in arrays that stay where they are.
+    Poses that are solved repeatedly, in arrays at fixed addresses.
 
-    The arguments are put into `given` (arguments, poses); `solve` puts the outputs into `rows`
+    The user writes arguments to `given` (arguments, poses); `solve` writes outputs to `rows`
     (poses, outputs).
     """
 
@@ -423,17 +423,17 @@ class Batch:
 
     @property
     def code(self) -> Optional[tuple]:
-        """Where the machine code is and what it is called with, see `Loop`, once there is any."""
+        """Address and arguments of the machine code, see `Loop`; None until it is compiled."""
         self._look()
         return (self._code.address, *self._arguments) if self._run else None
 
     def finish(self) -> None:
-        """Wait for the machine code, if there is to be any."""
+        """Wait for the machine code, if it is being compiled."""
         if self._loop:
             wait([self._loop])
 
     def solve(self) -> None:
-        """Fill the rows: plainly until there is machine code, for which nobody waits."""
+        """Fill the rows, by plain Python until the machine code is compiled."""
         self._look()
         if self._run:
             self._run(*self._arguments)

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-How outputs move with the first input: extremes, dead points, where they rise or fall.
+Outputs over the first input: extremes, dead points, monotone branches.
 
-Numbers come from the linkage's own closures and outputs, each with its exact rate.
+They are computed from the linkage's closures and outputs with their exact rates.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ ONE = 1e-9
 
 
 class Analysis:
-    """How a linkage moves with its first input, where the values of others are held."""
+    """Motion of a linkage with its first input; the other inputs are fixed."""
 
     def __init__(self, linkage: Mechanism, others: Sequence[float] = ()):
         self._linkage, self._others = linkage, tuple(others)
         self._first = linkage.inputs[0]
 
     def extremes(self, output: str, arcs: Optional[Sequence[Arc]] = None) -> list:
-        """Return what `Mechanism.extremes` does."""
+        """Implement `Mechanism.extremes`."""
         linkage = self._linkage
         linkage.check_output(output)
         pose, angular = linkage.bound('output', output), np.array([linkage.is_angle(output)])
@@ -47,7 +47,7 @@ class Analysis:
                  for low, high in parts]
         return [(tuple(least), tuple(greatest)) for least, greatest in found]
 
-    # From here on the first input is counted in its size.
+    # From here on the first input is in units of its size.
 
     def dead_points(self) -> List[float]:
         """Return the values of the input at which a dyad stretches or folds."""
@@ -60,7 +60,7 @@ class Analysis:
         return distinct([*ends, *touched], first)
 
     def branches(self, output: str) -> MonotoneBranches:
-        """Return the branches on which an output rises, or falls, all along."""
+        """Return the branches on which an output is monotone."""
         return self._linkage.cache.get_or_make(
             ('branches', output, *self._others), lambda: self._branches(output))
 
@@ -88,7 +88,7 @@ class Analysis:
         return curve
 
     def _near_zeros(self) -> List[NearZero]:
-        """Return where a dyad stretches or folds, or nearly does."""
+        """Return the inputs at which a dyad stretches or folds, or nearly does."""
         structure = self._linkage.structure
         closures, folds = structure.closures, structure.built.folds
 

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What callers give a mechanism, checked in words that name it and say what is allowed."""
+"""Validation of mechanisms' arguments; errors name the argument and the allowed values."""
 
 from collections.abc import Mapping
 from numbers import Real
@@ -16,7 +16,7 @@ SHORTEST_LENGTH, LONGEST_LENGTH = 1e-300, 1e300
 
 
 def checked_dimensions(design: Design, given: Mapping[str, Any]) -> dict:
-    """Return all dimensions of a design, defaults filled in; raise ValueError for a bad one."""
+    """Return all dimensions of a design with defaults; raise ValueError if one is invalid."""
     for name in given:
         if name not in design.dimensions:
             raise ValueError(f'{design.name} has no dimension {quoted(name)}; '
@@ -56,7 +56,7 @@ BYTES = (bytes, bytearray, memoryview)
 
 
 def numbers(name: str, value: Any) -> np.ndarray:
-    """Return a number or an array of them as float64; raise ValueError, by its name, if not."""
+    """Return a number or an array as float64; raise ValueError, with the name, if invalid."""
     try:
         if isinstance(value, (str, *BYTES)):
             raise TypeError
@@ -67,7 +67,7 @@ def numbers(name: str, value: Any) -> np.ndarray:
 
 
 def _numbers(value: Any) -> np.ndarray:
-    """Return numbers as an array; raise for what only could be converted to some."""
+    """Return numbers as an array; raise for other types that numpy would convert."""
     given = np.asarray(value)
     if isinstance(value, BYTES) or given.dtype.kind not in 'iufO' or not given.size:
         raise TypeError
@@ -78,7 +78,7 @@ def _numbers(value: Any) -> np.ndarray:
 
 
 def checked_branches(design: Design, given: Optional[Mapping[str, int]]) -> dict:
-    """Return all assembly signs of a design; raise ValueError for a bad one."""
+    """Return all assembly signs of a design; raise ValueError if one is invalid."""
     if given is not None and not isinstance(given, Mapping):
         raise ValueError(f'{design.name}: branches must be a mapping from joint to +1 or -1, '
                          f'got {quoted(given)}')

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Arithmetic that users write: numbers and dimensions without spaces between them.
+Arithmetic in joint lines: expressions of numbers and dimensions, without spaces.
 
     2*drive     -base/2     (a+b)*1.5e-3     max(rod,finger)     sqrt(a*a+b*b)     pi/2     -30deg
 """
@@ -22,7 +22,7 @@ from ..words import quoted
 
 # A number, or the name of a dimension or an operation.
 Step = Union[float, str]
-# The power of a length that a result is; None for zero, which is any, NaN for none.
+# Power of a length in a result; None for zero, which has any power, NaN for mixed powers.
 Degree = Optional[float]
 
 SMALLEST_NUMBER, LARGEST_NUMBER = 1e-70, 1e70
@@ -56,16 +56,16 @@ _DEGREES: Mapping[Step, Callable] = {
 
 
 def in_range(number: ArrayLike) -> Any:
-    """Return whether a number, or each of an array, is what IN_RANGE says."""
+    """Return whether a number, or each of an array, satisfies IN_RANGE."""
     size = np.abs(number)
     return (number == 0.0) | (size >= SMALLEST_NUMBER) & (size <= LARGEST_NUMBER)
 
 
 class Formula:
     """
-    Arithmetic in postfix order, numbers among themselves worked out.
+    An expression in postfix order, with constant parts evaluated.
 
-    Raises ValueError if it is none, or a number in it is not what IN_RANGE says.
+    Raises ValueError if the text is invalid, or a number in it violates IN_RANGE.
     """
 
     def __init__(self, text: str):
@@ -77,7 +77,7 @@ class Formula:
 
     @property
     def degree(self) -> Degree:
-        """Return the power of a length that it is: 0, 1, ...; None if zero, NaN if none."""
+        """Return its power of a length: 0, 1, ...; None if zero, NaN if mixed."""
         return self._worked_out(lambda leaf: 1 if leaf in self.names else 0 if leaf else None,
                                 _DEGREES)
 
@@ -87,7 +87,7 @@ class Formula:
                                 _EXPRESSIONS)
 
     def value(self, dimensions: Mapping[str, Any]) -> Any:
-        """Return what it is for dimensions, numbers or arrays; not finite where it is nothing."""
+        """Return its value for dimensions, numbers or arrays; not finite where undefined."""
         with np.errstate(all='ignore'):
             return self._worked_out(
                 lambda leaf: np.float64(leaf) if isinstance(leaf, float) else dimensions[leaf],
@@ -126,7 +126,7 @@ class Formula:
             at = token.end()
 
     def _operand(self, kind: Optional[str], word: str, waiting: List[str]) -> bool:
-        """Take a word where an operand is due; return whether it still is."""
+        """Process a word in an operand's place; return whether an operand is still expected."""
         if word == '-' or kind == 'opened':
             waiting.append('negative ' if word == '-' else word)
             return True
@@ -137,7 +137,7 @@ class Formula:
         return False
 
     def _operator(self, kind: Optional[str], word: str, waiting: List[str]) -> bool:
-        """Take a word behind an operand; return whether another one is due."""
+        """Process a word after an operand; return whether another operand is expected."""
         if word == 'deg':
             self._work_out(word)
             return False
@@ -157,7 +157,7 @@ class Formula:
         return word == ','
 
     def _complete(self, waiting: List[str], binding: int = 0) -> None:
-        """Work out what waits, from the last on, down to a parenthesis or a looser operator."""
+        """Apply waiting operators from the last, down to a parenthesis or a looser one."""
         while waiting and _BINDS.get(waiting[-1], -1) >= binding:
             self._work_out(waiting.pop())
 

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-A linkage written down joint by joint.
+Build a linkage joint by joint.
 
-Each joint is placed by one construction from joints placed before it. From that follow the links,
-the bars that are drawn, the spanning tree of joint angles and the limits of the reach.
+Each joint is placed by one construction from earlier joints. The constructions determine the
+links, the drawn bars, the spanning tree of joint angles and the limits of the reach.
 """
 
 from __future__ import annotations
@@ -33,22 +33,22 @@ from ..formula.expression import (
 )
 
 GROUND = 'ground'
-# Lengths may be counted in a unit of their own; this many metres long.
+# The linkage's own unit of lengths [m].
 UNIT = dimension('[m]')
 
 
 def in_metres(length: Real) -> Real:
-    """Return a length counted in metres."""
+    """Convert a length to metres."""
     return where(abs(UNIT - 1.0) <= 0.0, length, length * UNIT)
 
 
 def in_own_unit(length: Real) -> Real:
-    """Return a length [m] counted in the linkage's own unit."""
+    """Convert a length [m] to the linkage's own unit."""
     return where(abs(UNIT - 1.0) <= 0.0, length, length / UNIT)
 
 
 class ConstructionError(ValueError):
-    """A construction that cannot be on the joints it is given."""
+    """A construction that is impossible on its joints."""
 
 
 class Link(NamedTuple):
@@ -69,7 +69,7 @@ class Link(NamedTuple):
 
 
 class Gear(NamedTuple):
-    """What takes an input's place: another input, times a ratio, plus an offset [rad or m]."""
+    """A geared input: another input times a ratio, plus an offset [rad or m]."""
 
     input: str
     ratio: Real
@@ -115,7 +115,7 @@ class Builder:
         self.directions: Dict[str, Complex] = {}
         self.transmissions: Dict[str, Real] = {}
         self.folds: List[planar.Limit] = []
-        # Limits that are no dead points: the ends of ways.
+        # Limits other than dead points: the ends of strokes.
         self.ways: List[planar.Limit] = []
         self.inputs: List[Input] = []
         self.arguments: List[Real] = []
@@ -123,7 +123,7 @@ class Builder:
         self.yokes: Dict[str, str] = {}
         # The ground joints of the lines that what is added is mirrored in, one after the other.
         self.mirrors: Tuple[Tuple[str, ...], ...] = ()
-        # In space: what the dimensions have to be, and what has to have one pose at most.
+        # In space: demands on dimensions, and links that must have one pose at most.
         self.axes = 'xy'
         self.demands: List[Any] = []
         self.windows: List[Any] = []
@@ -187,7 +187,7 @@ class Builder:
         """Drive a joint along the line from a joint towards another of one link, low to high."""
         word = called or self._numbered('carriage')
         place = self.drive(Input(word, LENGTH, low, high), geared)
-        # As a cylinder has no place beyond its stroke, so a carriage has none beyond its way.
+        # A carriage has no place beyond its ends, as a cylinder beyond its stroke.
         way = abs(low) + abs(high)
         for margin in (place - low, high - place):
             limit = planar.Limit(margin, planar.TOLERANCE * way)
@@ -227,7 +227,7 @@ class Builder:
         self.frames[link][name] = self.frames[link][joint] + offset
 
     def drive(self, input_: Input, geared: Optional[Gear]) -> Real:
-        """Return what stands for an input, an angle [rad] or a length: a new one, or geared."""
+        """Return the expression of an input [rad or m]: a new one, or a geared one."""
         if geared is None:
             leaf = argument(len(self.inputs))
             self.inputs.append(input_)
@@ -244,7 +244,7 @@ class Builder:
         return value
 
     def _direction(self, origin: str, towards: str) -> Tuple[str, Complex, Real]:
-        """Return the link of two joints, the direction between them, and its angle seen there."""
+        """Return the link of two joints, the direction between them, and its angle on the link."""
         side = self._side(origin, towards)
         along = planar.unit(side.vector)
         seen = along
@@ -254,14 +254,14 @@ class Builder:
         return side.link, along, arctangent(seen.y, seen.x)
 
     def _stroke(self, base: str, pivot: str, bar: Real) -> Tuple[Real, Real]:
-        """Return the shortest and the longest that a cylinder can be with a bar to a pivot."""
+        """Return the shortest and longest cylinder that a bar to a pivot allows."""
         if self._are_together(base, pivot):
             apart = self.distance(base, pivot)
             return abs(apart - bar), apart + bar
         return real(0.0), self.points[base].span + self.points[pivot].span + bar
 
     def image(self, name: str, point: str, first: str, second: str) -> None:
-        """Fix a joint to the ground where another is seen in the mirror line of two others."""
+        """Fix a joint to the ground at the mirror image of another in the line of two others."""
         for joint in (point, first, second):
             self._on_ground(joint)
         self.mirrors, origin = ((first, second),), self.points[first]
@@ -505,7 +505,7 @@ class Builder:
         return grounded or self._shared_link(first, second) is not None
 
     def _between(self, first: str, second: str) -> Complex:
-        """Return the vector between two joints; bars from one joint to both keep more digits."""
+        """Return the vector between two joints; bars from a common joint are more accurate."""
         ends = [self.points[end] for end in (first, second)]
         shared = ends[0].stands_on & ends[1].stands_on
         for name in self.points:

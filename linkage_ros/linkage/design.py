@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a type of mechanism is: its joint lines, and the dimensions that it usually has."""
+"""Types of mechanisms: joint lines and default dimensions."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from . import joint_lines, rod_lines
 @dataclass(frozen=True)
 class Design:
     """
-    What a type of mechanism is: the name that users type, its defaults [m] and joint lines.
+    A type of mechanism: its name, default dimensions [m] and joint lines.
 
-    The `tracer` is the joint whose curve is the locus; `signed` dimensions may be zero or
-    negative. `check` takes the lines and a mechanism of this type and raises ValueError for
-    dimensions that cannot be; by default every bar must have a length. Lines `in_space` are those
-    of `rod_lines`, and `inputs` there the joints that are given, by default what is driven.
+    The `tracer` is the joint of the locus; `signed` dimensions may be zero or
+    negative. `check` raises ValueError for a mechanism of this type with invalid dimensions;
+    by default every bar must have a length. Lines `in_space` are those
+    of `rod_lines`, with `inputs` as the given joints, by default the driven ones.
     """
 
     name: str

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What drives a linkage: a crank by its angle, a cylinder by its length.
+Inputs of a linkage: angles of cranks, lengths of cylinders and carriages.
 
-An angle is the same a turn later, a length is not: that is known here and nowhere else.
+This module alone handles the periodicity of angles.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ Arc = Tuple[float, float]
 
 ANGLE, LENGTH = 'angle', 'length'
 
-# The reach of gears that come round after more turns than these is that of one turn: every turn
-# takes as long as the first.
+# Longest period [turns] whose reach is computed: each turn costs as much as the first. The reach
+# of longer periods is that of one turn.
 MOST_COUNTED = 60
 # Values beyond an end of the reach by no more than this [rad] may be that end, rounded.
 ROUNDED_END = 1e-12
@@ -29,11 +29,11 @@ NARROWEST = 2e-15
 
 class Input(NamedTuple):
     """
-    A number that a pose follows from: an ANGLE [rad] or a LENGTH [m], as users call it.
+    An input, by its name: an ANGLE [rad] or a LENGTH [m].
 
-    All poses lie between `low` and `high`: of an angle one period, of a length its longest stroke.
-    `period` says after how many turns all comes round: more than one where it drives others by
-    gears of fractions, infinite where it never does.
+    All poses lie between `low` and `high`: one period of an angle, or the longest stroke.
+    `period` is the number of turns after which poses repeat: above one if it drives cranks by
+    fractional gears, infinite for irrational ratios.
     """
 
     name: str
@@ -44,35 +44,35 @@ class Input(NamedTuple):
 
     @property
     def turn(self) -> float:
-        """Return the angle [rad] after which all comes round."""
+        """Return the angle [rad] after which poses repeat."""
         return math.tau * self.period
 
     @property
     def turns(self) -> bool:
-        """Whether it is the same a turn later."""
+        """Whether it is an angle."""
         return self.kind == ANGLE and self.period < math.inf
 
     @property
     def quantity(self) -> str:
-        """Return what it is, for messages: 'crank angle'."""
+        """Return its description for messages: 'crank angle'."""
         return f'{self.name} {self.kind}'
 
     @property
     def unit(self) -> str:
-        """Return what it is counted in, for messages."""
+        """Return its unit for messages."""
         return 'rad' if self.kind == ANGLE else 'm'
 
     @property
     def size(self) -> float:
-        """Return the power of two [m] in which a stroke is about as long as a turn."""
+        """Return a unit, a power of two [m], in which a stroke is about as long as a turn."""
         return 1.0 if self.kind == ANGLE else 2.0 ** (math.frexp(self.high - self.low)[1] - 2)
 
     def counted(self) -> Input:
-        """Return the same input counted in its size."""
+        """Return the same input in units of its size."""
         return self._replace(low=self.low / self.size, high=self.high / self.size)
 
     def wrapped(self, value: Any) -> Any:
-        """Return values within [low, high) where they turn, else as they are."""
+        """Return angles wrapped to [low, high), and lengths unchanged."""
         return wrapped(value, self.turn) if self.turns else value
 
     def turns_of(self, value: float) -> float:
@@ -80,17 +80,17 @@ class Input(NamedTuple):
         return self.turn * math.floor(value / self.turn + 0.5) if self.turns else 0.0
 
     def beside(self, value: Any, near: Any) -> Any:
-        """Return values plus the whole turns that take them next to others."""
+        """Return values plus the whole turns that bring them closest to others."""
         if not self.turns:
             return value + 0.0 * near
         return value + self.turn * np.round((near - value) / self.turn)
 
     def apart(self, value: Any, other: Any) -> Any:
-        """Return how far values are from others, whole turns aside."""
+        """Return the differences of values and others, without whole turns."""
         return abs(self.wrapped(value - other))
 
     def is_whole(self, arcs: Sequence[Arc]) -> bool:
-        """Return whether it turns all round on some arcs."""
+        """Return whether some arcs are a full rotation."""
         return self.turns and len(arcs) == 1 and arcs[0][1] - arcs[0][0] >= self.turn
 
     def is_cut(self, value: float) -> bool:
@@ -98,7 +98,7 @@ class Input(NamedTuple):
         return value in (self.low, self.high)
 
     def on(self, arcs: Sequence[Arc], value: Any) -> Any:
-        """Return whether values lie on arcs, whole turns and rounding aside."""
+        """Return whether values lie on arcs, up to whole turns and rounding."""
         value, slack = np.asarray(value), ROUNDED_END * self.size
         with np.errstate(invalid='ignore'):
             ahead = [value - low + slack for low, _ in arcs]
@@ -107,7 +107,7 @@ class Input(NamedTuple):
                            for gap, (low, high) in zip(ahead, arcs)], axis=0)
 
     def holds(self, arc: Arc, low: float, high: float) -> bool:
-        """Return whether an arc holds another, whole turns aside."""
+        """Return whether an arc contains another, up to whole turns."""
         turns = self.turn * math.floor((high - arc[0]) / self.turn) if self.turns else 0.0
         return arc[0] <= low - turns and high - turns <= arc[1]
 

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A linkage with its dimensions, and all that can be asked of it."""
+"""A linkage with its dimensions: poses, rates, forces, outputs, inverse and reach."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ from ..formula.expression import derivative, Real
 from ..formula.program import Batch, evaluate, Pose, Program
 from ..words import listed, meant, plain_text, quoted
 
-# Lengths beyond these are counted in a power of two of their own, which changes no bit of a
-# result and keeps squares and products of lengths inside the range of float64.
+# Lengths beyond these have a unit of their own, a power of two. It changes no bit of a result and
+# keeps squares and products of lengths inside the range of float64.
 SMALL_LENGTH, LARGE_LENGTH = 1e-30, 1e30
-# A ratio whose denominator is larger never comes round.
+# Largest denominator of a gear ratio; other ratios are rounded to such a fraction.
 MOST_TURNS = 1000
-# Values of expressions of dimensions that are held: some twenty times those of Jansen's leg.
+# Cached values of expressions of dimensions: some twenty times those of Jansen's leg.
 MOST_VALUES = 10000
 # Quantities of joints; all others are of links.
 OF_POINTS = 'points', 'velocities', 'point accelerations'
@@ -47,7 +47,7 @@ Names = Optional[Sequence[str]]
 
 
 def check_bars(linkage: Mechanism) -> None:
-    """Raise ValueError, with its line, for a bar that has no length."""
+    """Raise ValueError, with the joint line, for a bar of zero length."""
     for (first, second), length in linkage.bar_lengths.items():
         size = np.asarray(length)
         if not np.all((size > 0.0) & np.isfinite(size)):
@@ -57,7 +57,7 @@ def check_bars(linkage: Mechanism) -> None:
 
 
 def _hashable(names: Any) -> Any:
-    """Return names as a tuple, None or one name as it is; raise ValueError if they are none."""
+    """Return names as a tuple, but None or one name unchanged; raise ValueError if invalid."""
     try:
         names = names if names is None or isinstance(names, (str, tuple)) else tuple(names)
         hash(names)
@@ -74,47 +74,47 @@ def _plain(names: Any) -> Any:
 
 class Mechanism:
     """
-    A linkage whose dimensions are set; make one with `linkage_ros.mechanisms.create`.
+    A linkage with given dimensions; create one with `linkage_ros.mechanisms.create`.
 
-    A pose depends on the inputs alone: any value, in any order, gives the same numbers. Joint
-    angles in arrays may differ by two ulps from those asked for one by one. In all methods `theta`
-    is the input, a crank's angle [rad] or a cylinder's length [m], a float or an array; of several
-    inputs a sequence of as many. Answers have its shape, and are NaN where the linkage cannot be
-    assembled. `points` and `joints` are names, by default all; only what they depend on is
-    computed. ValueError says which name or number is wrong, and what is allowed.
+    A pose depends on the inputs alone, not on earlier calls. Joint angles in arrays may differ by
+    two ulps from those of single poses. In all methods `theta` is the input, a crank's angle [rad]
+    or a cylinder's length [m], a float or an array; for several inputs it is a sequence of as
+    many. Results have its shape, and are NaN where the linkage cannot be assembled. `points` and
+    `joints` are names, by default all; fewer names cost less. ValueError names the wrong argument
+    and the allowed values.
 
     Attributes
     ----------
     type : str
-        The name of its type.
+        Name of its type.
     design : Design
-        What it is a mechanism of.
+        Its joint lines and default dimensions.
     dimensions : dict
-        Its dimensions [m] by name.
+        Dimensions [m] by name.
     branches : dict
-        The assembly sign, +1 or -1, of each joint that has two.
+        Assembly sign, +1 or -1, of each joint with two.
     inputs : tuple of Input
-        What drives it: cranks by their angles [rad], cylinders by their lengths [m].
+        Cranks, by their angles [rad], and cylinders and carriages, by their lengths [m].
     points : tuple of str
-        The linkage's joints, in the order in which they are placed.
+        Joints, in the order of the joint lines.
     joints : tuple of str
-        Its moving links, whose joint angles there are.
+        Moving links, which have the joint angles.
     links : tuple of Link
-        What each joint angle is: name, parent, joint, kind, zero [rad] and tip.
+        Definition of each joint angle: name, parent, joint, kind, zero [rad] and tip.
     bars : tuple of (str, str)
-        The joints at the ends of each bar.
+        Joints at the ends of each bar.
     cylinders : tuple of (str, str)
-        The joints at the ends of each cylinder, its base first.
+        Joints at the ends of each cylinder, its base first.
     tracer : str
-        The joint whose curve is the locus.
+        Joint of the locus.
     is_accelerated : bool
-        Whether arrays are solved by compiled code.
+        Whether compiled code solves arrays.
     structure : Structure
-        Its formulas, for any dimensions.
+        Formulas, for any dimensions.
     lengths : mapping
-        Its dimensions in its own unit, and that unit, as its programs are bound to them.
+        Dimensions in the linkage's own unit, and that unit, the arguments of its programs.
     cache : Cache
-        What was worked out of it: reach, inverses, travels.
+        Cached results: reach, inverses, travels.
 
     """
 
@@ -123,7 +123,7 @@ class Mechanism:
         self.type, self.design, self.tracer = design.name, design, design.tracer
         self.dimensions, self.branches = dict(dimensions), dict(branches)
         self.is_accelerated = accelerate
-        # Equal linkages share it, those that were pickled too.
+        # Equal linkages share it, including unpickled ones.
         self.structure = structure_of(design, tuple(self.branches.items()))
         built = self.structure.built
         self.points, self.joints = tuple(built.points), tuple(built.joint_values)
@@ -156,7 +156,7 @@ class Mechanism:
 
     @cached_property
     def frames(self) -> Mapping:
-        """Where each link's joints lie [m] as seen from the link, x along its bar."""
+        """Coordinates of each link's joints [m] in the link's frame, x along its bar."""
         return MappingProxyType({
             link: {name: tuple(map(self._metres, (place.x, place.y)))
                    for name, place in frame.items()}
@@ -164,12 +164,12 @@ class Mechanism:
 
     @property
     def longest(self) -> float:
-        """Return the longest bar [m]; where there is none, the longest way of an input."""
+        """Return the longest bar [m], or without bars the longest stroke of an input."""
         return max(self.bar_lengths.values(),
                    default=max(input_.high - input_.low for input_ in self.inputs))
 
     def line_of(self, *joints: str) -> joint_lines.Line:
-        """Return the line that places one of some joints, the last that does."""
+        """Return the last line that places one of some joints."""
         return [line for line in self.design.lines if set(joints) & set(line.names)][-1]
 
     def triangles(self) -> dict:
@@ -186,11 +186,11 @@ class Mechanism:
         return getattr(expressions, '_make', tuple)(map(self.constants, expressions))
 
     def demands(self) -> list:
-        """Return what dimensions have to make positive: line, amount, and the problem."""
+        """Return quantities that dimensions must make positive: line, value, and the problem."""
         return [self.constants(tuple(demand)) for demand in self.structure.built.demands]
 
     def windows(self) -> list:
-        """Return the links on two hinges in a row that two rods hold, with their limits."""
+        """Return the links on two hinges in a row with two rods, and their limits."""
         return [self.constants(held) for held in self.structure.built.windows]
 
     def value(self, length: Real) -> Any:
@@ -204,14 +204,14 @@ class Mechanism:
         return value if np.ndim(value) else float(value)
 
     def check(self) -> None:
-        """Raise ValueError, with the line, if its dimensions cannot be."""
+        """Raise ValueError, with the joint line, if its dimensions are not allowed."""
         if check := self.design.check:
             check(self.design.lines, self)
         else:
             check_bars(self)
 
     def with_dimensions(self, /, **changed: ArrayLike) -> Mechanism:
-        """Return the same mechanism with other dimensions [m]; raises ValueError like create."""
+        """Return a copy with other dimensions [m]; raises ValueError as `create` does."""
         made = type(self)(
             self.design, checked_dimensions(self.design, {**self.dimensions, **changed}),
             self.branches, self.is_accelerated)
@@ -220,11 +220,11 @@ class Mechanism:
 
     def driven_by(self: Own, *outputs: str, branches: Optional[Mapping[str, int]] = None) -> Own:
         """
-        Return a linkage in space with other inputs: what its joints are for values of others.
+        Return a linkage in space with other joints as its inputs.
 
-        `outputs` are as many joints as it has inputs, given instead of these; `branches` for each
-        rod the side of its crank, 1 as it is drawn or -1, by default its own. Raises ValueError if
-        there is no such joint, or what is left cannot be solved.
+        `outputs` are as many joints as it has inputs, which they replace; `branches` is the side
+        of the crank for each rod, 1 as drawn or -1, by default its own. Raises ValueError if a
+        joint does not exist, or the linkage cannot be solved from these.
         """
         unknown = [name for name in outputs if name not in self.joints]
         if self.axes != 'xyz' or unknown or len({*outputs}) != len(self.inputs):
@@ -239,12 +239,12 @@ class Mechanism:
 
     def accelerated(self) -> Mechanism:
         """
-        Return the same mechanism with arrays solved by compiled code, large ones on all cores.
+        Return a copy that solves arrays by compiled code, large ones on all cores.
 
-        The first call for a set of points compiles for about a tenth of a second. Sine, cosine and
-        arctangent are not the C library's but as good as the rule for errors wants: a pose is the
-        same in any array, on any number of cores, but its last digits may differ from those that
-        it has alone. Raises ImportError without llvmlite.
+        The first call for a set of points compiles for about 0.1 s. Sine, cosine and arctangent
+        are its own and satisfy the rule for errors. A pose is the same in any array, on any number
+        of cores, but its last digits may differ from those of a single pose. Raises ImportError
+        without llvmlite.
         """
         if not find_spec('llvmlite'):
             raise ImportError('accelerated() needs llvmlite: pip install llvmlite')
@@ -253,10 +253,10 @@ class Mechanism:
 
     def period(self, by: int = 0) -> int:
         """
-        Return after how many turns of an input the pose is the same.
+        Return the number of turns of an input after which the pose repeats.
 
-        That is more than one where the input drives others by gears of fractions; a ratio that is
-        none with a denominator up to MOST_TURNS is taken for the nearest that is.
+        It is above one if the input drives cranks by fractional gears. Ratios are rounded to
+        fractions with denominators up to MOST_TURNS.
         """
         ratios = [np.ravel(self.value(derivative(value, {by: 1.0}, {})))
                   for _, value in self.structure.built.driven.values()]
@@ -264,7 +264,7 @@ class Mechanism:
                           for each in ratios for ratio in each if math.isfinite(ratio)))
 
     def _counted_input(self, by: int, input_: Input) -> Input:
-        """Return an input with the values [rad or m] between which all poses lie."""
+        """Return an input with the limits [rad or m] of all poses."""
         if not input_.turns:
             return input_._replace(low=self._metres(input_.low), high=self._metres(input_.high))
         period = self.period(by)
@@ -274,7 +274,7 @@ class Mechanism:
     # --- poses and how they change ---
 
     def solve(self, theta: Inputs, points: Names = None) -> dict:
-        """Return the place of each joint [m]: theta's shape and a last axis for x and y."""
+        """Return the coordinates of each joint [m]: theta's shape and a last axis for x and y."""
         if isinstance(theta, float) and len(self.inputs) == 1:
             wanted = _hashable(points)
             place = self._placers.get(wanted) or self._placer(wanted)
@@ -282,7 +282,7 @@ class Mechanism:
         return self._vectors('points', theta, points)
 
     def _placer(self, wanted: Any) -> Callable:
-        """Return what places joints at one value of the input, a float."""
+        """Return a function from one value of the input, a float, to joints."""
         names, pose = self._ready('points', wanted)
         if pose.shape:
             return lambda theta: self._vectors('points', theta, wanted)
@@ -295,10 +295,10 @@ class Mechanism:
     def acceleration(self, theta: Inputs, rate: Inputs, rate_rate: Inputs,
                      points: Names = None) -> dict:
         """
-        Return the acceleration of each joint [m/s^2], as `solve` returns places.
+        Return the acceleration of each joint [m/s^2], in the form of `solve`.
 
-        `rate` and `rate_rate` are how fast each input moves and how that changes, of shapes that
-        broadcast with theta's. Infinite or NaN at a dead point.
+        `rate` and `rate_rate` are the first and second time derivatives of each input, with shapes
+        that broadcast with theta's. Infinite or NaN at a dead point.
         """
         names, pose = self._ready('point accelerations', points)
         return self._by_point(names, pose.over(*self._motion(theta, rate, rate_rate)))
@@ -307,8 +307,8 @@ class Mechanism:
         """
         Return the angle of each moving link to its parent, or other outputs; see `has_output`.
 
-        Angles [rad] are in (-pi, pi] and counted from the link's `zero`; an input is as given, a
-        slide in m.
+        Angles [rad] are in (-pi, pi], relative to the link's `zero`; inputs are unchanged, slides
+        in m.
         """
         return self._scalars('angles', theta, joints)
 
@@ -318,7 +318,7 @@ class Mechanism:
 
     def joint_accelerations(self, theta: Inputs, rate: Inputs, rate_rate: Inputs,
                             joints: Names = None) -> dict:
-        """Return how the joint rates change [rad/s^2 or m/s^2]; see `acceleration`."""
+        """Return the joints' accelerations [rad/s^2 or m/s^2]; see `acceleration`."""
         names, pose = self._ready('joint accelerations', joints)
         return dict(zip(names, pose.over(*self._motion(theta, rate, rate_rate))))
 
@@ -328,11 +328,11 @@ class Mechanism:
 
     def transmission_angles(self, theta: Inputs, joints: Names = None) -> dict:
         """
-        Return the angle in [0, pi] at which each joint passes on its force, best at pi/2.
+        Return the transmission angle of each joint [rad] in [0, pi]; the best is pi/2.
 
-        The joints are those that a dyad, cylinder, mirror, inversor, slot or slider line places
-        first; 0 and pi are dead points. For a dyad it is the angle between its bars, a cylinder
-        being one; for a slider between its rod and the normal of its line; for a slot between its
+        The joints are the first ones of dyad, cylinder, mirror, inversor, slot and slider lines;
+        0 and pi are dead points. For a dyad it is the angle between its bars (a cylinder is a
+        bar); for a slider between its rod and the normal of its line; for a slot between its
         line and the normal of the radius from pivot to pin. Sources: Norton, "Design of
         Machinery", sec. 3.3; Balli and Chand, "Transmission angle in mechanisms", Mechanism and
         Machine Theory 37 (2002).
@@ -342,11 +342,10 @@ class Mechanism:
     def function(self, points: Names = None, joints: Sequence[str] = (),
                  rates: Sequence[str] = ()) -> Callable:
         """
-        Return the quickest way to one pose after the other.
+        Return the fastest function for single poses.
 
-        It takes the input, a float (or as many as there are inputs), and returns a tuple of
-        floats from one list of operations: x, y of each point, then the joint angles, then the
-        joint rates by each input.
+        Its arguments are the inputs, floats. It returns a tuple of floats: x, y of each point,
+        then the joint angles, then the joint rates by each input.
         """
         return self.posed(points, joints, rates).at
 
@@ -389,19 +388,19 @@ class Mechanism:
 
     def effort(self, theta: Inputs, loads: Mapping[str, ArrayLike]) -> np.ndarray:
         """
-        Return what holds the linkage at rest against loads.
+        Return the inputs' efforts that balance loads at rest.
 
         `loads` are by name: for a joint a force (x, y) [N], for a link a moment [N m],
-        counterclockwise positive; each may have axes of its own in front, in theta's shape.
-        Returned is an array of theta's shape and a last axis for the inputs: the torque of a crank
-        [N m], the force of a cylinder [N], positive where it acts the way the input grows. It
-        grows without bound next to a dead point, and is infinite or NaN there.
+        counterclockwise positive; each may have leading axes of theta's shape.
+        The result has theta's shape and a last axis for the inputs: the torque of a crank
+        [N m], the force of a cylinder [N], positive in the direction of a growing input. It
+        grows without bound next to a dead point, and is infinite or NaN at it.
         """
         return statics.effort(self, theta, loads)
 
     def output_effort(self, output: str, theta: Inputs, effort: ArrayLike) -> Any:
         """
-        Return what an output [N m of an angle, else N] exerts where the only input gives `effort`.
+        Return the effort of an output [N m of an angle, else N] for the only input's `effort`.
 
         Infinite where the output turns back, 0 at a dead point.
         """
@@ -413,8 +412,8 @@ class Mechanism:
         """
         Return whether there is an output of this name.
 
-        That is a link's name, for its joint angle [rad] or slide [m]; a joint's coordinate such as
-        'C.x' [m]; 'distance(A,C)' [m] of two joints; 'angle(A,C)' [rad] from +x to A -> C.
+        Outputs are a link's name, for its joint angle [rad] or slide [m]; a joint's coordinate
+        such as 'C.x' [m]; 'distance(A,C)' [m] of two joints; 'angle(A,C)' [rad] from +x to A -> C.
         """
         return isinstance(name, str) and self.structure.has(name)
 
@@ -427,14 +426,14 @@ class Mechanism:
         return self.structure.moves(output, by)
 
     def check_output(self, output: str) -> None:
-        """Raise ValueError if there is no such output, or it stands still."""
+        """Raise ValueError if an output does not exist or does not move."""
         self.check_there(output)
         if not self.moves(output):
             raise ValueError(f'{plain_text(output)} of {self.type} does not move with the '
                              f'{self.inputs[0].name}')
 
     def check_there(self, output: str) -> None:
-        """Raise ValueError if there is no such output."""
+        """Raise ValueError if an output does not exist."""
         if not self.has_output(output):
             named = (*self.joints, *(f'{name}.{axis}' for name in self.points for axis in 'xy'))
             raise ValueError(
@@ -451,9 +450,9 @@ class Mechanism:
         """
         Return the inverse of as many outputs as there are inputs; see `has_output`.
 
-        It has all answers, the nearest, or the one that goes on from the last; `print` shows the
-        joint lines of its linkage. Raises ValueError if there is no such output, there are not as
-        many as inputs, they do not tell all inputs, or a dimension is an array.
+        It finds all solutions, the nearest, or the continuation of the last; `print` shows the
+        joint lines of its linkage. Raises ValueError if an output does not exist, their number is
+        not that of the inputs, they do not determine all inputs, or a dimension is an array.
         """
         names = (outputs,) if isinstance(outputs, str) and len(self.inputs) == 1 else outputs
         if not isinstance(names, (list, tuple)) or not all(isinstance(x, str) for x in names):
@@ -474,17 +473,17 @@ class Mechanism:
     def input_for(self, output: str, value: ArrayLike, near: Optional[ArrayLike] = None,
                   others: Sequence[float] = ()) -> Any:
         """
-        Return the values of the first input that give an output the value that is wanted.
+        Return the values of the first input for given values of an output.
 
-        `output` is as for `inverse`, an angle with whole turns aside; `others` are the values at
-        which further inputs are held. Without `near` all answers, crank angles in [-pi, pi),
-        ascending, on a last axis that is filled up with NaN and at least one long; with `near` the
-        nearest, whole turns included, in the shape of value and near broadcast. NaN where the
-        output cannot be had, or never changes; a value beyond an extreme by no more than rounding
+        `output` is as for `inverse`; angles are equal up to whole turns. `others` are the fixed
+        values of the other inputs. Without `near`, the result has all solutions, crank angles in
+        [-pi, pi), ascending, on a last axis of length one or more, padded with NaN. With `near` it
+        has the nearest, including whole turns, in the broadcast shape of value and near. It is NaN
+        where the output is unreachable or constant; a value beyond an extreme by rounding
         counts as the extreme.
 
-        A linkage with one change point in a turn is the same only after two turns: for it the
-        answers are those of the turn [-pi, pi), and `near` should lie there.
+        A linkage with one change point in a turn repeats only after two turns: its
+        solutions are those of the turn [-pi, pi), and `near` should lie there.
         """
         value, (inverse, held) = numbers('value', value), self._held(output, others)
         if near is None:
@@ -493,7 +492,7 @@ class Mechanism:
         return inverse.nearest((value, *held), (near, *held))[0][0][()]
 
     def _held(self, output: Any, others: Sequence[float]) -> Tuple[Inverse, List[float]]:
-        """Return the inverse of an output where all inputs but the first are held."""
+        """Return the inverse of an output with all inputs but the first fixed."""
         self.check_output(output)
         if len(others) != len(self.inputs) - 1:
             raise ValueError(f'{self.type} has {len(self.inputs)} inputs: the value of each but '
@@ -502,18 +501,18 @@ class Mechanism:
                 list(map(float, others)))
 
     def servos(self, output: str, value: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
-        """Return all that `input_for` does, and d output / d input there."""
+        """Return all solutions as `input_for` does, and d output / d input there."""
         inputs, rates = self._held(output, ())[0].over(numbers('value', value))
         return inputs[0], rates[0]
 
     def servo_for(self, output: str, value: ArrayLike, near: Optional[ArrayLike] = None,
                   ends: Optional[Tuple[float, float]] = None) -> Sequence:
         """
-        Return one value of the input that gives an output a value, and d output / d input there.
+        Return one value of the input for a value of an output, and d output / d input there.
 
-        Parameters and the choice are those of `Inverse.nearest`, `ends` those of the one input:
-        without `near` the working branch, on which lever and crank turn the same way. Floats, or
-        arrays in the shape of value and near broadcast; NaN where there is none.
+        Parameters and choice are those of `Inverse.nearest`, `ends` those of the one input.
+        Without `near` it is on the working branch, on which lever and crank turn the same way.
+        Floats, or arrays in the broadcast shape of value and near; NaN without a solution.
         """
         inverse, _ = self._held(output, ())
         given = [x if type(x) is float else numbers(name, x)
@@ -523,33 +522,33 @@ class Mechanism:
 
     def follow(self, output: str, value: float, near: float) -> Tuple[float, float]:
         """
-        Return the input that gives an output a value, going on from another without a jump.
+        Return the input for a value of an output, continuous from another input.
 
-        See `Inverse.follow`, for a linkage with one input: the input [rad or m], whole turns kept,
-        and d output / d input there; NaN beyond the next dead point or extreme of the output.
+        See `Inverse.follow`, for a linkage with one input: the input [rad or m] with its whole
+        turns, and d output / d input; NaN beyond the next dead point or extreme of the output.
         """
         (found,), (rate,) = self._held(output, ())[0].follow(value, near)
         return found, rate
 
     def inputs_for(self, outputs: Sequence[str], values: ArrayLike,
                    near: Optional[ArrayLike] = None) -> List[Answer]:
-        """Return what `Inverse.all` does: all values of the inputs for those of outputs."""
+        """Return all values of the inputs for values of the outputs; see `Inverse.all`."""
         return self.inverse(outputs).all(values, near)
 
     def follow_inputs(self, outputs: Sequence[str], values: ArrayLike,
                       near: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
-        """Return what `Inverse.follow` does as arrays, (inputs,) and (outputs, inputs)."""
+        """Return the arrays (inputs,) and (outputs, inputs) of `Inverse.follow`."""
         inputs, rates = self.inverse(outputs).follow(values, near)
         return np.array(inputs), np.reshape(rates, (len(inputs), -1)).T
 
-    # --- all of its motion; further inputs are held at the values `others` ---
+    # --- the whole motion; other inputs are fixed at the values `others` ---
 
     def reach(self, *others: float) -> list:
         """
         Return the values of the first input with which the linkage can be assembled.
 
         Arcs (lo, hi) of a crank [rad] have lo in [-pi, pi) and hi > lo, and a full turn is
-        [(-pi, pi)]; strokes (lo, hi) of a cylinder are in m; [] if it never can be. Raises
+        [(-pi, pi)]; strokes (lo, hi) of a cylinder are in m; the list may be empty. Raises
         ValueError if not every other input is given, or a dimension is an array.
         """
         return list(self.cache.get_or_make(('reach', *others), lambda: self._arcs(others)))
@@ -573,33 +572,33 @@ class Mechanism:
         Return the values of the first input at which a dyad stretches or folds, ascending.
 
         These are the ends of the reach and the change points: there a transmission angle is 0
-        or pi, and the input alone cannot tell how the linkage goes on. Crank angles are in
-        [-pi, pi). Raises what `reach` does.
+        or pi, and the input alone does not determine the motion. Crank angles are in
+        [-pi, pi). Raises ValueError as `reach` does.
         """
         return [dead * self.inputs[0].size for dead in Analysis(self, others).dead_points()]
 
     def distance_to_dead_point(self, theta: ArrayLike, *others: float) -> Any:
-        """Return how far values of the first input are from the nearest dead point, or inf."""
+        """Return the distance of the first input to the nearest dead point [rad or m], or inf."""
         theta = numbers('theta', theta)
         away = [self.inputs[0].apart(theta, dead) for dead in self.dead_points(*others)]
         return np.min([np.full(np.shape(theta), np.inf), *away], axis=0)[()]
 
     def extremes(self, output: str, arcs: Optional[Sequence[Arc]] = None) -> list:
         """
-        Return how far an output goes on arcs of the only input, by default its reach.
+        Return the extremes of an output on arcs of the only input, by default its reach.
 
-        For each arc the least value and the input there, then the greatest; an angle is followed
-        past -pi and pi. By default an arc in which the output jumps, as an angle does where its
+        Each arc has its minimum and the input there, then its maximum; an angle continues
+        past -pi and pi. By default an arc in which the output jumps, as an angle may where its
         ends meet, counts as several.
         """
         return Analysis(self).extremes(output, arcs)
 
     def monotone(self, output: str, most: float) -> Tuple[List[Tuple[float, ...]], Pose]:
         """
-        Return pieces of the reach of the only input on which an output rises or falls all along.
+        Return pieces of the only input's reach on which an output is monotone, and its code.
 
-        Each has the input [rad or m] at both ends, and the output there, which changes by `most`
-        at most; and the code for the output and its rate.
+        Each piece has the input [rad or m] and the output at both ends; the output changes by
+        `most` at most. The code computes the output and its rate.
         """
         size = self.inputs[0].size
         self.check_output(output)
@@ -611,7 +610,7 @@ class Mechanism:
     def bind(self, program: Program) -> Pose:
         """Return a program of its formulas as a function of its arguments."""
         if len(self._evaluated) > MOST_VALUES:
-            # Another dictionary: a thread may be reading this one.
+            # A new dictionary, since a thread may be reading the old one.
             self._evaluated = {}
         return program.bind(self.lengths, self._evaluated, self.is_accelerated)
 
@@ -620,11 +619,11 @@ class Mechanism:
         return self.bind(self.structure.program(kind, names, *by))
 
     def checked(self, outputs: Tuple[str, ...]) -> Pose:
-        """Return the code for outputs, NaN where anything cannot be assembled, and their rates."""
+        """Return the code for outputs and their rates, NaN unless all joints are assembled."""
         return self.bound('checked', outputs)
 
     def margins(self, *inputs: np.ndarray) -> np.ndarray:
-        """Return each limit's margin, not negative where it is kept: (limits, n)."""
+        """Return each limit's margin (limits, n), nonnegative where the limit is satisfied."""
         return self.bound('margins', ()).searched(*inputs)
 
     def _vectors(self, kind: str, theta: Inputs, points: Any, *by: int) -> dict:
@@ -641,7 +640,7 @@ class Mechanism:
         return dict(zip(names, pose.over(*self.each_input(theta))))
 
     def each_input(self, theta: Any, name: str = 'theta') -> Sequence[np.ndarray]:
-        """Return each input's values as an array; raise ValueError for what are none."""
+        """Return each input's values as an array; raise ValueError if they are not numbers."""
         if len(self.inputs) == 1:
             return (numbers(name, theta),)
         if not hasattr(theta, '__len__') or len(theta) != len(self.inputs):
@@ -650,7 +649,7 @@ class Mechanism:
         return [numbers(name, each) for each in theta]
 
     def _checked_by(self, by: Any) -> int:
-        """Return the number of an input; raise ValueError for what is none."""
+        """Return the index of an input; raise ValueError if it is invalid."""
         if isinstance(by, (bool, np.bool_)) or not hasattr(by, '__index__') \
                 or not 0 <= by.__index__() < len(self.inputs):
             raise ValueError(f'by must be the number of an input, from 0 to '
@@ -658,7 +657,7 @@ class Mechanism:
         return int(by)
 
     def _ready(self, kind: str, wanted: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
-        """Return the names that are wanted and the function that computes them."""
+        """Return the requested names and the function that computes them."""
         key = kind, _hashable(wanted), *by
         return self._poses.get(key) or self._pose(kind, _plain(key[1]), *by)
 
@@ -682,7 +681,7 @@ class Mechanism:
 
 
 def _in_own_unit(dimensions: Mapping, fixed: bool) -> dict:
-    """Return dimensions counted in a unit that is a power of two, and that unit in metres."""
+    """Return dimensions in a unit that is a power of two, and that unit [m]."""
     longest = max((np.max(np.abs(length)) for length in dimensions.values()), default=1.0)
     if fixed or SMALL_LENGTH < longest < LARGE_LENGTH:
         return {**dimensions, UNIT.args[0]: 1.0}

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The pose that brings a joint nearest to a place, as a hand that drags it asks for."""
+"""The pose that brings a joint nearest to a place, for dragging by a pointer."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from .inputs import Arc
 from .mechanism import Mechanism
 
 DRAG_SAMPLES = 721
-# A path that crosses itself is not left: all the way of the input counts as a part of its width.
+# Penalty for moving the input through its whole arc, as a fraction of the path's width: where a
+# path crosses itself, the joint stays on its branch.
 LEASH = 0.1
 GAUSS_NEWTON_STEPS, STEP_HALVINGS = 60, 12
 
@@ -23,8 +24,8 @@ def nearest_inputs(linkage: Mechanism, joint: str, place: Sequence[float],
     """
     Return the inputs (inputs,) [rad or m] that bring a joint nearest to a place (x, y) [m].
 
-    Of poses that serve, one near the inputs that are `present` is taken. Each input is on one of
-    its `arcs`, a sequence of (low, high). Raises ValueError if there is no such joint, or the
+    Of equally good poses, the result is near the inputs `present`. Each input is on one of
+    its `arcs`, a sequence of (low, high). Raises ValueError if the joint does not exist, or the
     linkage cannot be assembled on these arcs.
     """
     goal = np.asarray(place, float)
@@ -38,7 +39,7 @@ def nearest_inputs(linkage: Mechanism, joint: str, place: Sequence[float],
 
 def _nearest_sample(linkage: Mechanism, joint: str, goal: np.ndarray, present: float,
                     arcs: Sequence[Arc]) -> Sequence[np.ndarray]:
-    """Return the best of many values of the only input, and the ends of its arc."""
+    """Return the best of many samples of the only input, and the ends of its arc."""
     samples = np.array([np.linspace(*arc, DRAG_SAMPLES) for arc in arcs])
     path = linkage.solve(samples, (joint,))[joint]
     if not np.isfinite(path).any():
@@ -52,7 +53,7 @@ def _nearest_sample(linkage: Mechanism, joint: str, goal: np.ndarray, present: f
 
 def _descended(linkage: Mechanism, joint: str, goal: np.ndarray, value: np.ndarray,
                low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Return inputs between their ends from which no small step leads nearer (Gauss-Newton)."""
+    """Return a local minimum of the distance between the ends of the inputs (Gauss-Newton)."""
     single = len(value) == 1
     sizes = np.array([input_.size for input_ in linkage.inputs])
 

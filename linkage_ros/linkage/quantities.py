@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What can be asked of a linkage, as formulas: places, joint angles, rates, limits, closures.
+Quantities of a linkage as formulas: places, joint angles, rates, limits, closures.
 
-They hold for any dimensions; from them comes the code, with nothing in it that is not asked for.
+They hold for any dimensions. Code is generated from them for the requested quantities only.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ from ..formula.expression import (
 from ..formula.program import Program
 
 Names = Tuple[str, ...]
-# Of two joints: how far they are apart, and where the second is seen from the first.
+# Outputs of two joints: their distance, and the direction from the first to the second.
 PAIR = re.compile(r'(?:distance|angle)\(([A-Za-z]\w*),([A-Za-z]\w*)\)')
 
 
 class Leg(NamedTuple):
     """
-    What tells one leg on the inputs from another.
+    Parameters of one of several legs.
 
-    Its own crank has turned by start + side (angle - lag) [rad]; its side is 1, or -1 if it is
-    mirrored; its size is a factor of every length.
+    Its own crank angle is start + side (angle - lag) [rad]; side is -1 for a mirrored leg, else 1;
+    size is a factor of every length.
     """
 
     lag: Any
@@ -55,19 +55,19 @@ class Leg(NamedTuple):
 
 
 class LinkPoint(NamedTuple):
-    """A point that is no joint: the link that carries it, and where it lies there [m]."""
+    """A point other than a joint: its link, and its coordinates on the link [m]."""
 
     link: str
     x: Any
     y: Any
 
 
-# Joints by name, and spots.
+# Joints by name, and points of links.
 Points = Tuple[Union[str, LinkPoint], ...]
 
 
 class Structure:
-    """A design drawn with its branches: what all mechanisms of that kind share."""
+    """Formulas of a design with its branches, which all its mechanisms share."""
 
     def __init__(self, design: Design, branches: Mapping[str, Any]):
         self.built = Builder()
@@ -85,14 +85,14 @@ class Structure:
             'joint accelerations': self._joint_accelerations}
 
     def program(self, kind: str, names: Any, *by: int) -> Program:
-        """Return the code for outputs of one kind; what they do not depend on is left out."""
+        """Return the code for outputs of one kind, without operations that they do not need."""
         # An acceleration also depends on the inputs' speeds, and on how these change.
         given = (3 if kind.endswith('accelerations') else 1) * len(self.built.inputs)
         return self._programs.get_or_make(
             (kind, names, *by), lambda: Program(self._outputs[kind](names, *by), given))
 
     def legs(self, points: Points, joints: Names, moving: Names) -> Program:
-        """Return the code for a leg of several; see `Mechanism.legs`."""
+        """Return the code for one of several legs; see `Mechanism.legs`."""
         return self._programs.get_or_make(
             (points, joints, moving), lambda: self._legs(points, joints, moving))
 
@@ -101,7 +101,7 @@ class Structure:
                 for part in (place if isinstance(place, Vector) else (place.x, place.y))]
 
     def _place(self, point: Union[str, LinkPoint]) -> Union[Complex, Vector]:
-        """Return where a joint is, or a spot whose coordinates are dimensions."""
+        """Return the place of a joint, or of a link's point whose coordinates are dimensions."""
         if isinstance(point, str):
             return self.built.points[point].place
         return self.built.spot(point.link, Complex(*(
@@ -113,7 +113,7 @@ class Structure:
                 for part in self._points(names)]
 
     def _due(self, rate: Real, value: Real) -> Real:
-        """Return a rate by one input, NaN where other inputs leave no value to have it."""
+        """Return a rate by one input, NaN where the value is NaN because of other inputs."""
         alone = len(self.built.inputs) == 1 and rate.value is None
         return rate if alone or not value.varies else gated(rate, abs(value), real(0.0))
 
@@ -133,7 +133,7 @@ class Structure:
         return in_metres(square_root(arm.square))
 
     def _arm(self, name: str) -> Optional[Arm]:
-        """Return what the name of a distance or an angle is about; None if it is another."""
+        """Return the arm of a distance or an angle; None for another name."""
         pair = PAIR.fullmatch(name)
         return self.built.arm(*pair.groups()) if pair else None
 
@@ -143,7 +143,7 @@ class Structure:
         return [*self._points(points), *self._angles(joints), *chain.from_iterable(turning)]
 
     def checked(self, names: Names) -> List[Real]:
-        """Return outputs, NaN where not all can be assembled, and their rates by each input."""
+        """Return outputs and their rates by each input, NaN unless all joints are assembled."""
         values = self._angles(names)
         for limit in self.built.limits:
             if limit.margin.varies:
@@ -162,7 +162,7 @@ class Structure:
         turning = [sum((rate * (speed if input_.turns else speed / leg.size)
                         for rate, speed, input_ in zip(rates, speeds, inputs)), real(0.0))
                    for rates in zip(*(self._rates(moving, by) for by in range(len(inputs))))]
-        # A mirrored leg's own crank turns backwards, which mirrors its rates once more.
+        # A mirrored leg's own crank turns backwards, which changes the sign of its rates.
         outputs = [*(part * factor for part, factor in zip(self._points(points),
                                                            cycle(factors))),
                    *(value * (across if self._slides(name) else leg.side)
@@ -191,14 +191,14 @@ class Structure:
         return {i: argument(n + i) for i in range(n)}
 
     def _changing(self, rates: List[Real]) -> List[Real]:
-        """Differentiate rates once more, by time: speeds are arguments, and change too."""
+        """Differentiate rates by time; speeds are arguments that change, too."""
         n = len(self.built.inputs)
         known: Dict[Real, Real] = {}
         moving: Dict[int, Number] = {i: argument(n + i) for i in range(2 * n)}
         return [derivative(rate, moving, known) for rate in rates]
 
     def _turning(self, names: Names, speeds: Dict[int, Number]) -> List[Real]:
-        """Return how fast outputs change at speeds of the inputs."""
+        """Return the speeds of outputs at speeds of the inputs."""
         known: Dict[Real, Real] = {}
 
         def d(expression: Real) -> Real:
@@ -223,7 +223,7 @@ class Structure:
         return [rate(name) for name in names]
 
     def _margins(self, _: Names) -> List[Real]:
-        """Return each limit's margin, so much above its tolerance that a reached one is >= 0."""
+        """Return each limit's margin plus its tolerance: >= 0 where the limit is satisfied."""
         return [limit.margin + limit.tolerance for limit in self.built.limits]
 
     def _transmissions(self, names: Names) -> List[Real]:
@@ -231,7 +231,7 @@ class Structure:
 
     @property
     def closures(self) -> List[Limit]:
-        """Return what vanishes where a dyad, a slot, a slider or a kite stretches or folds."""
+        """Return quantities that vanish where a dyad, slot, slider or kite stretches or folds."""
         return [limit for limit in (*self.built.limits, *self.built.folds)
                 if limit.margin.varies and limit not in self.built.ways]
 
@@ -282,5 +282,5 @@ def _vanishes(rate: Real) -> bool:
 
 @cached(32, shared=True)
 def structure_of(design: Design, branches: Tuple[Tuple[str, int], ...]) -> Structure:
-    """Return what mechanisms of a design and its branches share, made once."""
+    """Return the cached structure of a design with its branches."""
     return Structure(design, dict(branches))

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The forces and torques that hold a linkage against loads.
+Forces and torques that balance loads on a linkage.
 
-Forces follow from velocities by virtual work: what the inputs give and what the loads take adds up
-to nothing in every motion that the linkage allows.
+They follow from velocities by the principle of virtual work: the power of inputs and loads is zero
+in every motion of the linkage.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def effort(linkage: Mechanism, theta: Inputs, loads: Mapping[str, ArrayLike]) -> np.ndarray:
-    """Return what `Mechanism.effort` does."""
+    """Implement `Mechanism.effort`."""
     if not isinstance(loads, abc.Mapping):
         raise ValueError('loads must be a mapping from joints to forces and from links to '
                          f'moments, got {quoted(loads)}')
@@ -39,7 +39,7 @@ def effort(linkage: Mechanism, theta: Inputs, loads: Mapping[str, ArrayLike]) ->
 
 def _powers(linkage: Mechanism, theta: Inputs, loads: Mapping[str, ArrayLike],
             by: int) -> Iterator[np.ndarray]:
-    """Yield what each load gives for each unit that an input moves."""
+    """Yield each load's work per unit of an input."""
     for name, load in loads.items():
         name = plain_text(name)
         force = numbers(f'the load on {name}', load)
@@ -48,7 +48,7 @@ def _powers(linkage: Mechanism, theta: Inputs, loads: Mapping[str, ArrayLike],
                 raise ValueError(f'the load on the joint {name} must be a force '
                                  f'{", ".join(linkage.axes)} [N], not {quoted(load)}')
             velocity = linkage.velocity(theta, (name,), by)[name]
-            # A load of nothing takes nothing, however fast its joint moves.
+            # A zero load does no work, even at an infinite velocity.
             yield np.where(force == 0.0, 0.0, force * velocity).sum(axis=-1)
         elif name in linkage.joints:
             chain = list(_chain(linkage, name))
@@ -61,7 +61,7 @@ def _powers(linkage: Mechanism, theta: Inputs, loads: Mapping[str, ArrayLike],
 
 
 def _chain(linkage: Mechanism, name: str) -> Iterator[str]:
-    """Yield the links that turn a link, itself first, down to the ground."""
+    """Yield a link and its parents, down to the ground."""
     links = {link.name: link for link in linkage.links}
     if linkage.axes != 'xy':  # each turns about its own axis, and is loaded about that
         yield name
@@ -73,7 +73,7 @@ def _chain(linkage: Mechanism, name: str) -> Iterator[str]:
 
 
 def output_effort(linkage: Mechanism, output: str, theta: Inputs, effort: ArrayLike) -> Any:
-    """Return what `Mechanism.output_effort` does."""
+    """Implement `Mechanism.output_effort`."""
     if len(linkage.inputs) > 1:
         raise ValueError(f'{linkage.type} has several inputs; the effort of an output is there '
                          'for one')

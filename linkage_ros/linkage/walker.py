@@ -23,10 +23,10 @@ from ..formula.program import Batch
 
 class Layout(NamedTuple):
     """
-    How the numbers of a solution follow each other: a row for each leg, then the inputs.
+    Order of the numbers of a solution: a row for each leg, then the inputs.
 
-    A row holds so many coordinates, joint angles and joint velocities; of the inputs there are
-    the values, where velocities are wanted as many speeds, and room for as many efforts as are.
+    A row has coordinates, joint angles and joint velocities. The inputs have values, speeds if
+    velocities are requested, and room for efforts.
     """
 
     legs: int
@@ -39,12 +39,12 @@ class Layout(NamedTuple):
 
     @property
     def posed(self) -> int:
-        """How many numbers of a row are not velocities."""
+        """Number of a row's values without velocities."""
         return self.coordinates + self.joints
 
     @property
     def size(self) -> int:
-        """How many numbers there are."""
+        """Total number of values."""
         return self._rows_end() + self.inputs + self.speeds + self.efforts
 
     def rows(self, values: np.ndarray) -> np.ndarray:
@@ -52,11 +52,11 @@ class Layout(NamedTuple):
         return values[:self._rows_end()].reshape(self.legs, self.posed + self.velocities)
 
     def driven(self, values: np.ndarray) -> np.ndarray:
-        """Return the inputs' values and, where velocities are wanted, their speeds."""
+        """Return the inputs' values and, if velocities are requested, their speeds."""
         return values[self._rows_end():len(values) - self.efforts]
 
     def effort(self, values: np.ndarray) -> np.ndarray:
-        """Return the efforts of the inputs, which a solution leaves to its user."""
+        """Return the efforts of the inputs, which the user of a solution sets."""
         return values[len(values) - self.efforts:]
 
     def _rows_end(self) -> int:
@@ -65,9 +65,9 @@ class Layout(NamedTuple):
 
 class Solution:
     """
-    The numbers of one `Layout`, in an array of values that stays where it is.
+    The numbers of a `Layout`, in an array at a fixed address.
 
-    The batch solves the legs into the rows of the values; see `Mechanism.legs`.
+    The batch writes the solved legs to its rows; see `Mechanism.legs`.
     """
 
     def __init__(self, layout: Layout, values: np.ndarray, batch: Batch):
@@ -79,18 +79,18 @@ class Solution:
         self._pack: Callable = Struct(f'{self._driven.size}d').pack_into
 
     def finish(self) -> None:
-        """Wait for what makes the first solution slower than the others."""
+        """Wait for the compilation that would delay the first solution."""
         self.batch.finish()
 
     def solve(self, inputs: Sequence[float], speeds: Sequence[float] = ()) -> None:
-        """Solve at inputs [rad or m] and, if velocities are wanted, their speeds [per second]."""
+        """Solve at inputs [rad or m] and, for velocities, their speeds [per second]."""
         if not self.layout.speeds:
             speeds = ()
         for row, value in zip(self._inputs, inputs):
             row.fill(value)
         for row, speed in zip(self._speeds, speeds):
             row.fill(speed)
-        # Packing costs less than assigning to a part of an array.
+        # Packing is faster than assignment to a slice of an array.
         self._pack(self._driven, 0, *inputs, *speeds)
         self.batch.solve()
 
@@ -99,10 +99,10 @@ class Assembly:
     """
     The legs of one mechanism.
 
-    So many pairs, their left legs evenly spread over a turn of the crank; each has a right leg if
-    `mirrored`. More than one leg needs a single crank. `scale` is a factor of every length,
-    `reach` what `linkage.reach()` returns, where that is known. `legs` are by what their joints'
-    names begin with, `joints` the moving links that follow from the inputs.
+    Left legs of pairs are evenly spread over a turn of the crank; each has a right leg if
+    `mirrored`. Several legs need a single crank. `scale` is a factor of every length,
+    `reach` the result of `linkage.reach()`, if known. `legs` are by the prefix of their joints'
+    names; `joints` are the moving links other than the inputs.
     """
 
     def __init__(self, linkage: Mechanism, leg_pairs: int = 1, mirrored: bool = False,
@@ -119,13 +119,13 @@ class Assembly:
         inputs = {input_.name for input_ in linkage.inputs}
         self.joints = tuple(name for name in linkage.joints if name not in inputs)
         self.reach = linkage.reach() if reach is None else reach
-        # How far one of several inputs reaches depends on the others: only a pose tells.
+        # The reach of one of several inputs depends on the others.
         self.is_limited = len(inputs) == 1 and not linkage.inputs[0].is_whole(self.reach)
         self._scale = scale
 
     @property
     def all_joints(self) -> List[str]:
-        """Return the joints of all legs, with what their names begin with."""
+        """Return the joints of all legs, with their legs' prefixes."""
         return [prefix + joint for prefix in self.legs for joint in self.joints]
 
     @cached_property
@@ -138,9 +138,9 @@ class Assembly:
     def solution(self, points: Sequence[Union[str, LinkPoint]] = (), joints: Sequence[str] = (),
                  rates: Optional[Sequence[str]] = None, efforts: int = 0) -> Solution:
         """
-        Return what solves all legs for points, joint angles and rates, and nothing else.
+        Return a solver of all legs for points, joint angles and rates.
 
-        Its values have room for so many efforts.
+        Its values have room for `efforts` efforts.
         """
         inputs, moving = len(self.linkage.inputs), rates is not None
         rates = tuple(rates or ())
@@ -153,7 +153,7 @@ class Assembly:
         return Solution(layout, values, batch)
 
     def within_reach(self, value: float) -> np.ndarray:
-        """Return which legs can be assembled at an input [rad or m], as far as reach tells."""
+        """Return which legs can be assembled at an input [rad or m], by the reach alone."""
         first = self.linkage.inputs[0]
         if not first.turns:
             return first.on(self.reach, [value / self._scale])
@@ -161,7 +161,7 @@ class Assembly:
                                      for leg in self.legs.values()])
 
     def own_inputs(self) -> List[Tuple[float, float]]:
-        """Return for each leg by what the first input is multiplied, and what is added."""
+        """Return for each leg the factor and the offset from the first input to its own."""
         if not self.linkage.inputs[0].turns:
             return [(1.0 / self._scale, 0.0)]
         return [(leg.side, leg.start - leg.side * leg.lag) for leg in self.legs.values()]
@@ -170,7 +170,7 @@ class Assembly:
         """
         Return the curve of a joint of the first leg, over its widest reach [m]: (n, 2).
 
-        Several inputs draw no one curve: there it is empty.
+        With several inputs it is empty.
         """
         if len(self.linkage.inputs) > 1:
             return np.empty((0, 2))
