@@ -15,12 +15,12 @@ SECONDS_BETWEEN_TRIES = 0.02
 
 
 class NoAnswer(Exception):
-    """A service that is not there or does not answer; the text names it."""
+    """A service that is missing or does not answer; the text names it."""
 
 
 class Bridge:
     """
-    What the web's thread asks of a node.
+    Calls from the web's thread to a node.
 
     Parameters
     ----------
@@ -41,12 +41,12 @@ class Bridge:
 
     def ask(self, function: Callable[..., Any], *args: Any) -> asyncio.Future[Any]:
         """
-        Have a function called in the executor's thread, after those that were asked for before.
+        Call a function in the executor's thread, in the order of requests.
 
         Returns
         -------
         asyncio.Future
-            What it returns.
+            The function's result.
 
         """
         future = self.loop.create_future()
@@ -55,14 +55,14 @@ class Bridge:
             try:
                 self.hand_over(_settle, future, function(*args))
             except Exception as error:
-                # Raised where it was asked for, not in the executor, which would end.
+                # Raised in the web's thread: in the executor it would end the node.
                 self.hand_over(_settle, future, None, error)
 
         self._start(work)
         return future
 
     def _start(self, work: Callable[[], None]) -> None:
-        # Unlike a guard condition, a task works with every executor.
+        # A task works with every executor, a guard condition does not.
         executor = self.node.executor
         if executor is not None:
             executor.create_task(work)
@@ -77,11 +77,11 @@ class Bridge:
             raise NoAnswer(f'{client.srv_name} does not answer') from None
 
     def warn(self, text: str, subject: str = '') -> None:
-        """Log what went wrong with a subject, not too often."""
+        """Log a throttled warning about a subject."""
         self._throttle.warn(subject, lambda: text)
 
     def hand_over(self, function: Callable[..., Any], *args: Any) -> None:
-        """Let a function run in the web's thread, if that is still there."""
+        """Run a function in the web's thread, if that is still running."""
         try:
             self.loop.call_soon_threadsafe(function, *args)
         except RuntimeError:

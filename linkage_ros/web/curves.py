@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Curves for the page: what outputs do over a turn or a stroke; a mechanism as a file."""
+"""Curves of outputs over a turn or a stroke, and export of mechanisms, for the page."""
 
 import io
 from typing import Any, Optional, Sequence
@@ -18,12 +18,12 @@ from ..words import listed, meant, quoted
 SAMPLES = 361
 KINDS = POSITION, VELOCITY, ACCELERATION, TRANSMISSION, FORCE = (
     'position', 'velocity', 'acceleration', 'transmission angle', 'force ratio')
-# Of an output and an input in these.
+# Units of the force ratio, by the units of output and input.
 FORCES = {('rad', 'm'): 'N·m/N', ('m', 'rad'): 'N/(N·m)'}
 
 
 class Sweep:
-    """The first input through its reach at 1 rad/s or 1 m/s, the others held [rad or m]."""
+    """A sweep of the first input over its reach at 1 rad/s or 1 m/s; the others are fixed."""
 
     def __init__(self, machine: SceneMechanism, present: Sequence[float]) -> None:
         self.linkage, self.input, self._machine = machine.linkage, machine.first.input, machine
@@ -33,7 +33,7 @@ class Sweep:
         if not reach:
             raise Refused(f'{machine.name} cannot be assembled where its other inputs are')
         lows, highs = zip(*reach)
-        # Between two arcs there is a place without values.
+        # A NaN separates two arcs.
         own = np.unique([*np.linspace(lows, highs, SAMPLES).ravel(), *(
             0.5 * (before + after) for (_, before), (after, _) in zip(reach, reach[1:]))])
         self._size, still = sizes[0], [0.0] * len(others)
@@ -52,7 +52,7 @@ class Sweep:
                   for axis in 'xy')]
 
     def unit(self, kind: str, name: str) -> str:
-        """Return what a quantity is counted in; nothing: a number."""
+        """Return the unit of a quantity; empty for a plain number."""
         own = 'rad' if kind == TRANSMISSION or self.linkage.is_angle(name) else 'm'
         if kind == FORCE:
             return FORCES.get((own, self.input.unit), '')
@@ -75,7 +75,7 @@ class Sweep:
         return {name: value * factor * size(name) for name, value in found.items()}
 
     def poles(self, kind: str, name: str) -> np.ndarray:
-        """Return inputs [rad or m] across which a quantity is not followed: it may be infinite."""
+        """Return inputs [rad or m] at which a quantity may be infinite."""
         if kind in (POSITION, TRANSMISSION):
             return np.empty(0)
         rate = self.of(VELOCITY, (name,))[name]
@@ -101,7 +101,7 @@ def curve(machine: SceneMechanism, present: Sequence[float], kind: str = POSITIO
     x, y, unit = sweep.values, sweep.of(kind, (output,))[output], sweep.unit(kind, output)
     poles = sweep.poles(kind, output)
     after = np.searchsorted(x, poles)
-    # A gap as wide as can be seen.
+    # A visible gap.
     y[after - 1] = y[after] = np.nan
     x, y = np.insert(x, after, poles), np.insert(y, after, np.nan)
     if (kind, unit) == (POSITION, 'rad'):
@@ -114,7 +114,7 @@ def curve(machine: SceneMechanism, present: Sequence[float], kind: str = POSITIO
 
 
 def exported(machine: SceneMechanism, present: Sequence[float], form: str, frame_id: str) -> str:
-    """Return as text: 'csv', all kinds of all outputs in rad and m; 'urdf'; or 'c'."""
+    """Return a text: 'csv', all kinds of all outputs in rad and m; 'urdf'; or 'c'."""
     if form == 'urdf':
         return urdf.describe([machine], machine.frame_id or frame_id)
     if form == 'c':

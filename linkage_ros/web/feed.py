@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Markers for the page: from messages to how they look, which seldom changes, and points."""
+"""Markers for the page: conversion of messages to looks, which rarely change, and points."""
 
 import struct
 from typing import Any, Callable, Mapping, Optional, Sequence
@@ -19,23 +19,23 @@ NO_POINTS = np.empty(0)
 
 class Feed:
     """
-    The newest message of a topic with markers, made ready to be drawn when somebody asks.
+    The newest message of a marker topic, converted for the page on request.
 
-    Messages come in serialised, and those that nobody draws are never unpacked. One that cannot be
-    drawn is dropped: what was drawn before stays.
+    Messages arrive serialised; a message is deserialised only to be drawn. Invalid messages are
+    dropped, and the last valid one stays.
 
     Parameters
     ----------
     topic : str
-        Where the messages come from.
+        Topic of the messages.
     mechanism : str
-        What the markers belong to.
+        Mechanism of the markers.
     type_ : type
         Marker or MarkerArray.
     number : callable
-        Returns a number for the first marker of a message, the second and so on; always the same.
+        Returns a constant number for each index of a marker in a message.
     warn : callable
-        Logs a text about a subject: a message that is dropped, and its topic.
+        Logs a text, a dropped message, about a subject, its topic.
 
     """
 
@@ -49,14 +49,14 @@ class Feed:
         self._warn = warn
         self._drawn: Optional[bytes] = None
         self._layout: Optional[MessageLayout] = None
-        # By the markers' numbers; the places are those of the markers in the message.
+        # By the markers' numbers; places are indices of markers in the message.
         self._looks: dict[int, dict[str, Any]] = {}
         self._places: dict[int, Optional[int]] = {}
         self._records = b''
 
     def drawn(self) -> tuple[dict[int, dict[str, Any]], bytes]:
         """
-        Return what the newest message looks like and where it is.
+        Return the looks and points of the newest message.
 
         Returns
         -------
@@ -72,7 +72,7 @@ class Feed:
             try:
                 self._draw(self.newest)
             except Exception as error:
-                # What the middleware raises is its own affair, and the bytes are anybody's.
+                # Bytes of any publisher, and any exception of the middleware.
                 self._warn(f'a message on {self.topic} is dropped: {error}', self.topic)
         return self._looks, self._records
 
@@ -88,7 +88,7 @@ class Feed:
         numbers = {self._number(i): place for i, place in enumerate(shown)}
         looks = {number: _look(self._mechanism, markers[place])
                  for number, place in numbers.items()}
-        # What is no longer sent is drawn without points.
+        # Markers that are missing now are drawn without points.
         places = {**dict.fromkeys(self._places), **numbers}
         records = _records(places, [np.array([(point.x, point.y, point.z)
                                               for point in marker.points]) for marker in markers])
@@ -107,7 +107,7 @@ def _layout(text: bytes, message: Any, places: Mapping[int, Optional[int]],
 
 
 def _records(places: Mapping[int, Optional[int]], points: Sequence[np.ndarray]) -> bytes:
-    """Return the points of markers, by the markers' numbers and places, as the page reads them."""
+    """Return the page's records of markers' points, by the markers' numbers and places."""
     records = []
     for number, place in places.items():
         shown = _shown(NO_POINTS if place is None else points[place])
@@ -116,7 +116,7 @@ def _records(places: Mapping[int, Optional[int]], points: Sequence[np.ndarray]) 
 
 
 def _shown(numbers: ArrayLike) -> np.ndarray:
-    """Return numbers as they are drawn; raise ValueError if that cannot be."""
+    """Return numbers as float32; raise ValueError if one is not finite or too large."""
     shown = np.asarray(numbers).astype('<f4')
     if not np.isfinite(shown).all():
         raise ValueError('a number in it is not finite, or too large to be drawn')

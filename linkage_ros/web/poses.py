@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the page asks of the library: poses that are wanted, and how dimensions may be moved."""
+"""The page's requests to the library: requested poses, and ranges of dimensions."""
 
 from itertools import combinations
 import math
@@ -18,22 +18,22 @@ from ..words import listed, quoted
 
 ARROWS = {'velocity': 'm/s', 'acceleration': 'm/s²', 'force': 'N'}
 _, ACCELERATION, FORCE = ARROWS
-# By how much a dimension is changed to see which bars follow, as a part of the longest bar.
+# Change of a dimension that detects dependent bars, as a fraction of the longest bar.
 NUDGE = 1e-6
-# How far beyond its end an input is by rounding alone.
+# Tolerance of an input at its end.
 CLOSE = 1e-9
 
 
 class Refused(Exception):
-    """What cannot be done, with the reason."""
+    """A refused request; the text has the reason."""
 
 
 def described(machine: SceneMechanism, present: Sequence[float]) -> dict[str, Any]:
     """
-    Return where a mechanism is, in its scene's size, with its inputs at `present` [rad or m].
+    Describe a mechanism at inputs `present` [rad or m], in the scene's size.
 
-    Of each input the value, the arcs it may be on and the unit; of each output of the first leg
-    the value, the unit, and d output / d input for each input.
+    Each input has value, allowed arcs and unit; each output of the first leg has value, unit, and
+    d output / d input for each input.
     """
     linkage, names = machine.linkage, [
         *(name for name in machine.linkage.joints if name not in machine.inputs),
@@ -96,7 +96,7 @@ def number(text: str) -> dict[str, Any]:
 def reached(machine: SceneMechanism, present: Sequence[float],
             want: Mapping[str, Any]) -> tuple[list[float], str]:
     """
-    Return the inputs [rad or m] that do what is wanted as nearly as can be, and what is short.
+    Return the inputs [rad or m] for a request, or the nearest possible ones and the reason.
 
     Parameters
     ----------
@@ -111,9 +111,9 @@ def reached(machine: SceneMechanism, present: Sequence[float],
     Raises
     ------
     Refused
-        If there is no such thing.
+        If the output or joint does not exist, or has no solution.
     KeyError, TypeError, ValueError
-        If it is not understood.
+        If the request is malformed.
 
     """
     if 'joint' in want:
@@ -172,7 +172,7 @@ def _joint_at(machine: SceneMechanism, present: Sequence[float], joint: str, pla
         raise ValueError(f'joint must be one of {listed(machine.linkage.points)}, '
                          f'not {quoted(joint)}')
     one, own = legs[leg], [machine.scale_of(name) for name in machine.inputs]
-    # A leg's own input, and back: of a lone leg they are the same.
+    # Conversion to a leg's own input and back: trivial for a single leg.
     ways = [[sorted(one.start + one.side * (end - one.lag) for end in arc) for arc in arcs(drive)]
             for drive in machine.inputs.values()]
     found = nearest_inputs(
@@ -184,18 +184,18 @@ def _joint_at(machine: SceneMechanism, present: Sequence[float], joint: str, pla
 
 
 def arcs(drive: InputSettings) -> list[Arc]:
-    """Return where an input may be put [rad or m]."""
+    """Return the allowed intervals of an input [rad or m]."""
     return [drive.ends] if drive.ends else list(drive.reach)
 
 
 def theta_of(values: Sequence[Any]) -> Any:
-    """Return the inputs as a linkage takes them: a sequence only of several."""
+    """Return the inputs as an argument of a linkage: a sequence only if there are several."""
     return values if len(values) > 1 else values[0]
 
 
 def tunable(scene_: Scene, name: str) -> dict[str, Any]:
     """
-    Return between what each dimension of a mechanism may be moved, and which bars follow.
+    Return the range of each dimension of a mechanism, and its dependent bars.
 
     `travel` holds [low, high] by parameter, `bars` pairs of joints, `fixed` the joints that do not
     move, `sides` the words for a branch of +1 and of -1.
@@ -211,7 +211,7 @@ def tunable(scene_: Scene, name: str) -> dict[str, Any]:
 
 
 def _bars(linkage: Mechanism, key: str) -> list[tuple[str, str]]:
-    """Return the pairs of joints whose distance follows a dimension."""
+    """Return the pairs of joints whose distance depends on a dimension."""
     size = NUDGE * float(linkage.longest)
     for step in (size, -size):
         try:

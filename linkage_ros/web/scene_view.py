@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The running scene for the page: found in the ROS graph, drawn, and changed by services."""
+"""The running scene for the page: discovery in the ROS graph, drawing, and changes by services."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ SCENE = 'scene'
 
 Answer = dict[str, Any]
 Result = TypeVar('Result')
-# Marker topics with their publishers, nodes with parameters, and from which topics each hears.
+# Marker topics with their publishers, nodes with parameters, and each node's input topics.
 Marked = tuple[tuple[str, tuple[tuple[str, bytes], ...]], ...]
 Graph = tuple[Marked, tuple[str, ...], dict[str, list[str]]]
 
@@ -66,22 +66,22 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class OpenPage(Protocol):
-    """What is shown the scene."""
+    """A page that displays the scene."""
 
     def tell(self, key: Any, message: dict[str, Any]) -> None:
-        """Send a message; of those with one key the last is enough."""
+        """Send a message; it replaces waiting ones with the same key."""
 
     def offer(self, feed: Feed) -> None:
-        """Send what a feed has, when it is ready to draw it."""
+        """Send a feed's newest message, when the page is ready to draw it."""
 
 
 @dataclass
 class ShownMechanism:
     """
-    A mechanism on the page: the start of its topics, its settings, who tells its inputs.
+    A mechanism on the page: the prefix of its topics, its settings, and its inputs' sources.
 
-    What was sent somewhere is `held` there until a time, or until it is told to be there: what is
-    heard before may be from where it was.
+    An input that was moved is `held` at its new value until a time, or until messages confirm it:
+    earlier messages may have the old value.
     """
 
     key: str
@@ -101,32 +101,32 @@ class ShownMechanism:
         return {f'{self.name}.{name}': setting.value for name, setting in self.settings.items()}
 
     def scene(self) -> scene.Scene:
-        """Return the scene of it alone; raise Refused if its parameters tell none."""
+        """Return the scene of it alone; raise Refused if its parameters are incomplete."""
         if 'type' not in self.settings:
             raise Refused(f'the nodes of {self.name} have not told its parameters yet')
         return _read({'mechanisms': [self.name], **self.values()})
 
     def described(self) -> dict[str, Any]:
-        """Return what the page needs to draw it."""
+        """Describe it for the page."""
         return {'key': self.key, 'name': self.name,
                 'settings': [setting.described() for setting in self.settings.values()]}
 
 
 class SceneView:
     """
-    All mechanisms of the graph, while a page is open; without one nothing is subscribed to.
+    All mechanisms of the graph, while a page is open; otherwise there are no subscriptions.
 
-    Everything but what is handed to the bridge runs in the web's thread.
+    All methods run in the web's thread, except functions passed to the bridge.
 
     Parameters
     ----------
     bridge : Bridge
-        The way to the node.
+        Calls to the node.
 
     Attributes
     ----------
     clients : list
-        Open pages: `tell(key, message)` hears what is new, `offer(feed)` what can be drawn.
+        Open pages, which receive news by `tell(key, message)` and markers by `offer(feed)`.
 
     """
 
@@ -140,7 +140,7 @@ class SceneView:
         self._found: dict[str, Optional[Described]] = {}
         self._watching: Optional[asyncio.Task[None]] = None
         self._stopping: Optional[asyncio.TimerHandle] = None
-        # What follows is changed in the executor's thread alone.
+        # The following attributes are changed in the executor's thread alone.
         self._nodes: dict[str, RemoteNode] = {}
         self._sources: dict[str, Any] = {}
         self._told: dict[str, dict[str, float]] = {}
@@ -149,7 +149,7 @@ class SceneView:
         self._events: Any = None
 
     def add(self, client: OpenPage) -> None:
-        """Show a client the scene, which is watched from the first client on."""
+        """Add a client; the first one starts the observation of the graph."""
         self.clients.append(client)
         if self._stopping:
             self._stopping.cancel()
@@ -159,10 +159,10 @@ class SceneView:
         self._show(client)
 
     def remove(self, client: OpenPage) -> None:
-        """Forget a client; after the last one watching ends, unless it was only a reload."""
+        """Remove a client; after the last one the observation ends, unless it was a reload."""
         self.clients.remove(client)
         if not self.clients:
-            # A node that is still to answer would wait for a client that is gone.
+            # Requests in progress would wait for a client that has left.
             self._stopping = self._bridge.loop.call_later(SECONDS_TO_LINGER, self._stop)
 
     def _stop(self) -> None:
@@ -173,7 +173,7 @@ class SceneView:
         self._bridge.ask(self._close)
 
     def feeds(self) -> list[Feed]:
-        """Return the feeds that have something to draw."""
+        """Return the feeds with messages to draw."""
         return [feed for feed, _ in list(self._feeds.values()) if feed.newest is not None]
 
     async def set(self, key: str, values: Mapping[str, Any]) -> None:
@@ -214,10 +214,10 @@ class SceneView:
     async def pose(self, key: str, want: Optional[Mapping[str, Any]] = None, arrows: str = '',
                    speeds: Any = ()) -> Answer:
         """
-        Return where a mechanism is; if something is wanted, bring it there first and hold it.
+        Describe a mechanism's pose; with a request, move it there first and hold it.
 
-        Takes what `poses.reached` and `poses.arrows` do, returns what `poses.described` does, the
-        arrows if any are asked for, and the reason if that is not all that was wanted.
+        Arguments are those of `poses.reached` and `poses.arrows`. The result is that of
+        `poses.described`, with requested arrows, and the reason if the request is not met exactly.
         """
         mechanism = self._find(key)
         (machine, inputs), reason = self._state(mechanism), ''
@@ -231,14 +231,14 @@ class SceneView:
 
     async def _hold(self, mechanism: ShownMechanism, machine: scene.SceneMechanism,
                     inputs: Sequence[float]) -> None:
-        """Stop the inputs where they are wanted."""
+        """Stop the inputs at requested values."""
         values = {}
         for (name, drive), value in zip(machine.inputs.items(), inputs):
             start = mechanism.settings.get(f'{name}.start')
             if start is None:
                 raise Refused(f'nothing that is known here moves the {name}: no crank_driver runs')
             if value == start.value:
-                # An input goes to a start that is new to it.
+                # An input moves only to a start that differs from the last one.
                 value = math.nextafter(value, sum(poses.arcs(drive)[0]) / 2.0)
             values.update({f'{name}.start': value, f'{name}.speed': 0.0})
         await self.set(mechanism.key, values)
@@ -246,24 +246,24 @@ class SceneView:
         mechanism.until = self._bridge.loop.time() + SECONDS_TO_ARRIVE
 
     async def tune(self, key: str) -> Answer:
-        """Return what `poses.tunable` does."""
+        """Return the result of `poses.tunable`."""
         mechanism = self._find(key)
         return await self._aside(lambda: poses.tunable(mechanism.scene(), mechanism.name))
 
     async def curve(self, key: str, **about: Any) -> Answer:
-        """Return what `curves.curve` does."""
+        """Return the result of `curves.curve`."""
         machine, inputs = self._state(self._find(key))
         return await self._aside(lambda: curves.curve(machine, inputs, **about))
 
     async def export(self, key: str, form: str) -> Answer:
-        """Return what `curves.exported` does."""
+        """Return the result of `curves.exported`."""
         machine, inputs = self._state(self._find(key))
         frame_id = self._general.get(_space(key), {}).get('frame_id', 'world')
         return {'text': await self._aside(
             lambda: curves.exported(machine, inputs, form, frame_id))}
 
     async def save(self, key: str, values: Any = ()) -> Answer:
-        """Return a parameter file of a mechanism's scene: what defines it, and what is set."""
+        """Return a parameter file of a mechanism's scene: its definition and changed values."""
         mechanism, space = self._find(key), _space(key)
         given = dict(self._general.get(space, {}))
         for other in self._mechanisms.values():
@@ -274,7 +274,7 @@ class SceneView:
             lambda: writing.in_yaml(writing.without_defaults(_read(given), DEFINES)))}
 
     async def _aside(self, work: Callable[[], Result]) -> Result:
-        """Return what takes longer than others should wait."""
+        """Run slow work in another thread; return its result."""
         try:
             found: Result = await self._bridge.loop.run_in_executor(None, work)
             return found
@@ -282,7 +282,7 @@ class SceneView:
             raise Refused(str(error)) from None
 
     def _state(self, mechanism: ShownMechanism) -> tuple[scene.SceneMechanism, list[float]]:
-        """Return a machine and its inputs [rad or m] as they were told last, or as they start."""
+        """Return a mechanism and its last received inputs [rad or m], or their starts."""
         if mechanism.machine is None:
             mechanism.machine = mechanism.scene().machines[mechanism.name]
         if mechanism.machine.in_space:
@@ -319,7 +319,7 @@ class SceneView:
             try:
                 await self._look()
             except Exception as error:
-                # What other nodes say of themselves is anything; the next look may find it well.
+                # Other nodes may publish anything; the next look may succeed.
                 self._seen = None
                 self._bridge.warn(f'the scene cannot be read: {error!r}')
             await asyncio.sleep(SECONDS_BETWEEN_LOOKS)
@@ -331,7 +331,7 @@ class SceneView:
             await self._change(*seen)
 
     def _graph(self) -> Graph:
-        """Return what there is in the graph: marker topics, nodes with parameters, services."""
+        """Return the graph's marker topics, nodes with parameters, and services."""
         node = self._bridge.node
         topics = dict(node.get_topic_names_and_types())
         services = node.get_service_names_and_types()
@@ -347,7 +347,7 @@ class SceneView:
         return tuple(shown for shown in marked if shown[1]), nodes, heard
 
     def _heard_by(self, name: str) -> list[str]:
-        """Return the topics from which a node hears where its inputs are."""
+        """Return the topics from which a node receives its inputs."""
         space, own = name.rsplit('/', 1)
         with suppress(NodeNameNonExistentError):
             return [topic for topic, types in
@@ -363,8 +363,8 @@ class SceneView:
         sources = {topic for topics in heard.values() for topic in topics}
         await self._bridge.ask(self._open, list(owners), nodes, sources)
         names = sorted({*GENERAL, *(key.rsplit('/', 1)[1] for key in owners)})
-        # What the nodes that draw describe is theirs, and asked of no other. A parameter without a
-        # description was given to a node that does not read it.
+        # Parameters that drawing nodes describe are read from them only. A parameter without a
+        # description is an override of a node that does not use it.
         found: dict[str, Optional[Described]] = {}
         for part in ([node for node in nodes if node in heard],
                      [node for node in nodes if node not in heard]):
@@ -391,14 +391,14 @@ class SceneView:
         try:
             return await self._nodes[node].parameters(prefixes, known)
         except NoAnswer:
-            # It may be on its way up or down: look again; what it said before holds till then.
+            # It may be starting or ending: look again, and use its last answer until then.
             self._seen = None
             return self._found.get(node)
 
     def _mechanism(self, key: str, own_nodes: Sequence[str],
                    found: Mapping[str, Optional[Described]],
                    heard: Mapping[str, Sequence[str]]) -> ShownMechanism:
-        """Return a mechanism with what the nodes of its namespace say of it, its own first."""
+        """Return a mechanism with the parameters of its namespace's nodes, its own node first."""
         mechanism = ShownMechanism(key, {}, tuple(
             topic for node in own_nodes for topic in heard.get(node, ())))
         spaces = {_space(node) for node in own_nodes}
@@ -423,7 +423,7 @@ class SceneView:
 
     def _open(self, keys: Collection[str], nodes: Collection[str],
               sources: Collection[str]) -> None:
-        """Make what these need that is not there yet, and destroy what nobody needs."""
+        """Create missing clients and subscriptions for these, and destroy all others."""
         topics: dict[str, Any] = {
             f'{key}{ending}': (key, type_, qos) for key in keys for ending, type_, qos in (
                 (MARKERS, MarkerArray, NEWEST), (LOCUS, Marker, LATCHED))}
@@ -473,7 +473,7 @@ class SceneView:
             client.offer(feed)
 
     def _notice(self, event: ParameterEvent) -> None:
-        """Pass on a change that anybody made."""
+        """Forward a change of parameters to the pages."""
         for mechanism in self._mechanisms.values():
             prefix = f'{mechanism.name}.'
             for parameter in (*event.new_parameters, *event.changed_parameters):
@@ -498,7 +498,7 @@ class SceneView:
 
 
 def _read(given: Mapping[str, Any]) -> scene.Scene:
-    """Return the scene that others' parameters tell; raise Refused if they tell none."""
+    """Read a scene from other nodes' parameters; raise Refused if they are invalid."""
     try:
         return scene.read(given, strict=False)
     except scene.SceneError as error:
