@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The command `render`: what to draw, how, and where to, from the command line."""
+"""The command `render`: command line and drawing."""
 
 import argparse
 import math
@@ -64,7 +64,7 @@ def parsed(args):
 
 
 def check_mp4(asked):
-    """Raise RequestError if there can be no MP4."""
+    """Raise RequestError if MP4 is not available."""
     for option in ('loop', 'colours'):
         if getattr(asked, option) is not None:
             raise RequestError(f'--{option} is for .gif only, not for .mp4')
@@ -96,7 +96,7 @@ def draw(asked, machines):
 
 
 def write(asked, picture, times):
-    """Write the picture, and the data if they are wanted."""
+    """Write the picture and, on request, the data."""
     from tqdm import tqdm
 
     from . import files
@@ -117,7 +117,7 @@ def write(asked, picture, times):
 
 
 def moments(asked, picture):
-    """Return when to draw [turns of the first input]."""
+    """Return the times to draw [turns of the first input]."""
     first = picture.panels[0]
     wheel = first.cycle.first
     if not asked.moving:

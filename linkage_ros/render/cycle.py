@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-How a mechanism moves in pictures: where its joints are after so many turns of its first input.
+Motion of a mechanism in pictures: its joints over turns of its first input.
 
-A turn is a whole turn of a crank or, of what moves to and fro, there and back.
+A turn is a full rotation of a crank, or one period of an oscillating input.
 """
 
 import math
@@ -21,7 +21,7 @@ MOST_TURNS = 24  # after which several inputs need not be where they started
 
 
 class Configuration(NamedTuple):
-    """Turns since the start, inputs [rad or m], and what a course has then, (legs, joints, 2)."""
+    """Turns since the start, inputs [rad or m], and joints [m] (legs, joints, 2)."""
 
     turns: float
     inputs: Tuple[float, ...]
@@ -30,12 +30,12 @@ class Configuration(NamedTuple):
 
 class Wheel:
     """
-    An input, from its start through one turn, again and again.
+    An input as a periodic function of turns from its start.
 
     Attributes
     ----------
     period : float
-        Seconds of a turn; infinite for an input that stands still.
+        Period [s]; infinite for an input that stands still.
 
     """
 
@@ -48,7 +48,7 @@ class Wheel:
         self.period = self._turn / abs(drive.speed) if drive.speed else math.inf
 
     def value(self, turns: float) -> float:
-        """Return the input, an angle in [0, 2 pi) or what is in the sweep."""
+        """Return the input, in [0, 2 pi) or in the sweep."""
         travelled = self._sign * self._turn * (turns % 1.0)
         if self._sweep is None:
             return (self._start + travelled) % math.tau
@@ -57,7 +57,7 @@ class Wheel:
         return low + min(place, self._turn - place)
 
     def turns_to(self, value: float) -> float:
-        """Return when it is first at a value [rad or m]; SceneError if it never is."""
+        """Return the first turns at which it has a value [rad or m]; SceneError if never."""
         ends = [value]
         if self._sweep is not None:
             low, high = self._sweep
@@ -72,20 +72,20 @@ class Wheel:
 
 class Cycle:
     """
-    A machine from its start until it is there again.
+    The motion of a mechanism from its start until it repeats.
 
     Attributes
     ----------
     first : Wheel
         The first input.
     period : float
-        Seconds of its turn.
+        Its period [s].
     turns : int
-        Turns of the first input until all are where they started, or MOST_TURNS.
+        Turns of the first input until all inputs are at their starts, or MOST_TURNS.
     prefixes : tuple of str
-        What the names of each leg's joints begin with.
+        Prefixes of the names of each leg's joints.
     course : float array (turns * SAMPLES + 1, legs, joints, 2)
-        All joints in that time, both ends included [m], and behind them the ends of what slides;
+        All joints in that time, both ends included [m], then the ends of slides;
         NaN where they cannot be assembled.
 
     """
@@ -108,7 +108,7 @@ class Cycle:
         self._locus = assembly.locus
 
     def pose(self, turns: float) -> Configuration:
-        """Return where everything is; NaN where it cannot be assembled."""
+        """Return the configuration at a time [turns]; NaN where it cannot be assembled."""
         inputs = tuple(wheel.value(turns * ratio)
                        for wheel, ratio in zip(self._wheels, self._ratios))
         self._solution.solve(inputs)
@@ -116,7 +116,7 @@ class Cycle:
         return Configuration(turns, inputs, rows.reshape(len(rows), -1, 2))
 
     def curve(self, joint: int, start: float, end: float) -> np.ndarray:
-        """Return where a joint is between two times [turns], shape (n, legs, 2) [m]."""
+        """Return the curve of a joint between two times [turns], shape (n, legs, 2) [m]."""
         samples = np.arange(math.ceil(start * SAMPLES), math.ceil(end * SAMPLES))
         before = self.course[samples % (len(self.course) - 1), :, joint]
         return np.concatenate([before, self.pose(end).places[None, :, joint]])
@@ -125,7 +125,7 @@ class Cycle:
         """
         Return the whole curve of the first leg's tracer [m], shape (n, 2).
 
-        It is empty where several inputs are never all back at their start.
+        It is empty if several inputs never return to their starts together.
         """
         curve = self._locus(machine.tracer)
         if len(curve) or self.turns == MOST_TURNS:

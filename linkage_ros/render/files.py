@@ -21,7 +21,7 @@ FINEST = 100  # a GIF counts its time in hundredths of a second
 # Fonts as outlines, and names from a fixed salt: an SVG that is the same everywhere.
 SVG = {'svg.hashsalt': 'linkage_ros', 'svg.fonttype': 'path'}
 
-# What ffmpeg is told so that nothing of time, place and machine is in the file.
+# Options of ffmpeg for files without time, place and machine.
 REPRODUCIBLE = ('-threads', '1', '-fflags', '+bitexact', '-flags:v', '+bitexact',
                 '-map_metadata', '-1')
 
@@ -42,19 +42,19 @@ def gif(picture, times, fps, loop, colours, file: Path, progress):
     Parameters
     ----------
     picture : Picture
-        What moves.
+        Picture to animate.
     times : sequence of float
-        When [turns].
+        Times of the frames [turns].
     fps : float
-        Frames a second.
+        Frames per second.
     loop : int
-        How often it plays; 0: again and again.
+        Number of repetitions; 0: endless.
     colours : int
-        At most so many.
+        Largest number of colours.
     file : Path
-        Where to.
+        Output file.
     progress : callable
-        Hands on the times one by one.
+        Yields the times one by one.
 
     """
     sample = [picture.at(turns) for turns in times[::-(-len(times) // PALETTE_FRAMES)]]
@@ -68,7 +68,7 @@ def gif(picture, times, fps, loop, colours, file: Path, progress):
 
 
 class Palette:
-    """The colours of a GIF: the most frequent, and those that are least like any chosen before."""
+    """The colours of a GIF: the most frequent, and those farthest from all chosen before."""
 
     def __init__(self, pixels, count):
         colours, counts = np.unique(packed(pixels), return_counts=True)
@@ -81,7 +81,7 @@ class Palette:
         self._colours = np.array(chosen)
 
     def reduced(self, pixels):
-        """Return an image whose pixels have the nearest colour there is."""
+        """Return an image whose pixels have the nearest colours of the palette."""
         colours, places = np.unique(packed(pixels), return_inverse=True)
         apart = squares(unpacked(colours)[:, None].astype(int) - self._colours)
         nearest = np.argmin(apart, axis=1).astype(np.uint8)
@@ -106,7 +106,7 @@ def unpacked(colours):
 
 
 def mp4(picture, times, fps, file: Path, progress):
-    """Write a picture at some times as MP4, with ffmpeg; OSError with what it says if it fails."""
+    """Write a picture at some times as MP4; raise OSError with ffmpeg's message if it fails."""
     height, width, _ = picture.at(times[0]).shape
     with replacing(file) as new, tempfile.TemporaryFile() as said:
         encoder = subprocess.Popen([
@@ -127,7 +127,7 @@ def mp4(picture, times, fps, file: Path, progress):
 
 
 def data(picture, times, file: Path):
-    """Write what is drawn: time [s], inputs [rad or m] and joints [m], a row a picture."""
+    """Write the drawn data: time [s], inputs [rad or m] and joints [m], one row per picture."""
     with replacing(file) as new, open(new, 'w', newline='') as lines:
         writer = csv.writer(lines, lineterminator='\n')
         writer.writerow(['time', *(name for panel in picture.panels for name in panel.columns())])
@@ -139,7 +139,7 @@ def data(picture, times, file: Path):
 
 @contextmanager
 def replacing(file: Path):
-    """Hand out a new file's path; it takes the place of the old one if all goes well."""
+    """Yield the path of a new file, which replaces the old one on success."""
     new = file.with_name(f'.{file.name}.new')
     try:
         yield new

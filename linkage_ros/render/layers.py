@@ -34,7 +34,7 @@ PIVOT = Path([(0.0, 0.0), (-0.6, -1.0), (0.6, -1.0), (0.0, 0.0)], closed=True)
 
 
 def whiter(colour, part: float):
-    """Return a colour so much of the way to white."""
+    """Blend a colour with white by a fraction."""
     return tuple(np.array(to_rgb(colour)) * (1.0 - part) + part)
 
 
@@ -77,7 +77,7 @@ class Trace:
 
 
 def standing(curve):
-    """Return the part of a foot's closed curve that is on the ground, shape (n, 2)."""
+    """Return the stance part of a foot's closed curve, shape (n, 2)."""
     height = curve[:, 1] - curve[:, 1].min()
     low = height[:-1] <= STANCE * height.max()
     start = int(np.argmax(low & ~np.roll(low, 1)))
@@ -87,7 +87,7 @@ def standing(curve):
 
 
 def guides(axes, machine, cycle, unit):
-    """Draw the crank circle, a straight line that is traced, and slides on the ground."""
+    """Draw the crank circle, a straight traced line, and guides on the ground."""
     linkage = machine.linkage
     first_leg = cycle.course[:, 0]
     dashed = {'color': GREY, 'lw': 1.6 * unit, 'ls': (0, (6, 4)), 'zorder': 1}
@@ -106,14 +106,14 @@ def guides(axes, machine, cycle, unit):
 
 
 def sliding(machine):
-    """Return what slides, and the places of its ends behind those of the joints."""
+    """Return the slides, and the indices of their ends after those of the joints."""
     first = len(machine.linkage.points)
     return [(shape, slice(first + 2 * k, first + 2 * k + 2))
             for k, shape in enumerate(shapes.drawn(machine, machine.points))]
 
 
 def straight(curve):
-    """Return two ends of a curve that is a straight line, and None for any other or none."""
+    """Return two ends of a curve if it is a straight line, else None."""
     if not len(curve):
         return None
     first = curve[0]
@@ -125,7 +125,7 @@ def straight(curve):
 
 
 def around(frame):
-    """Return a link's joints as they follow each other around their middle."""
+    """Return a link's joints in their order around their centre."""
     seen = {name: complex(*place) for name, place in frame.items()}
     middle = sum(seen.values()) / len(seen)
     return sorted(seen, key=lambda name: cmath.phase(seen[name] - middle))
@@ -166,7 +166,7 @@ class Legs:
                               key=lambda artist: artist.get_zorder())
 
     def _artists(self, axes, parts, white, unit):
-        """Return the artists of one leg by what they draw."""
+        """Return the artists of one leg by part."""
         zorder = 10 + 10 * (1.0 - white)
         made = {}
 
@@ -226,7 +226,7 @@ def fixed(course):
 
 
 class Floor:
-    """What the lowest foot walks on: it moves as far as the foot that stands on it."""
+    """The floor, which moves with the lowest foot."""
 
     MARKS = 9  # in a turn's way
 
@@ -236,7 +236,7 @@ class Floor:
         lowest = np.nan_to_num(feet[:-1, :, 1], nan=np.inf).argmin(axis=1)
         steps = np.diff(feet[:, :, 0], axis=0)[np.arange(len(lowest)), lowest]
         self._way = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
-        # After a turn the marks are where others were; a lone foot brings them back itself.
+        # After a turn the marks coincide with former marks; a single foot returns them itself.
         turn, stride = abs(self._way[-1]), np.ptp(self._way) or 1.0
         self.spacing = turn / self.MARKS if turn > 0.1 * stride else 0.5 * stride
         self._tracer = tracer
@@ -286,7 +286,7 @@ class Headline:
         axes.set_title('\n'.join(fixed_lines), loc='left', fontsize=size)
 
     def show(self, pose):
-        """Write what holds now."""
+        """Update the text."""
         for text, reading in zip(self.artists, readings(self._linkage, pose.inputs, self._short)):
             text.set_text(reading)
 
@@ -317,7 +317,7 @@ def rounded(number, digits):
 
 
 class Names:
-    """The joints' names, each where it is seldom in the way."""
+    """The joints' names, at places that rarely overlap other parts."""
 
     DIRECTIONS = np.exp(1j * np.linspace(0.0, math.tau, 24, endpoint=False))
 
@@ -334,7 +334,7 @@ class Names:
         self._distances = [distance * (1.4 if name in in_slots else 1.0)
                            for name in machine.points]
         size = 8 + 6 * unit
-        # By how much half of a name is wider than half of one letter [pixels].
+        # Half of the difference between the widths of a name and of one letter [pixels].
         self._wider = [0.25 * size * (len(name) - 1) * axes.figure.dpi / 72
                        for name in machine.points]
         self.artists = [axes.annotate(
@@ -361,7 +361,7 @@ class Names:
             obstacles.append([name - half, name + half])
 
     def _curves(self):
-        """Yield the lines that stand still, as starts and ends of their pieces in pixels."""
+        """Yield the fixed lines, as starts and ends of their segments [pixels]."""
         for line in self._axes.lines:
             if len(line.get_xdata()) > CURVED:
                 curve = self._pixels(line.get_xydata())[None, ::5]
@@ -378,7 +378,7 @@ class Names:
 
 
 def clearance(points, starts, ends):
-    """Return how far points (n, m) are from the nearest of lines (n or 1, k), all complex."""
+    """Return the distances of points (n, m) to the nearest lines (n or 1, k), all complex."""
     along = (ends - starts)[:, None]
     from_start = points[:, :, None] - starts[:, None]
     squared = np.abs(along) ** 2
