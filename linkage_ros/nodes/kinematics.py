@@ -56,7 +56,7 @@ class Kinematics(scene_node.SceneNode):
         try:
             next(iter(self.scene.machines.values())).linkage.accelerated()
         except ImportError as error:
-            self.get_logger().info(f'{error}; plain Python moves the legs, to the same places')
+            self.get_logger().info(f'{error}; plain Python is used instead, with the same results')
         joint_state_reader.subscribe(
             self, 'crank_states', self._planner.process, self._planner.discard)
 

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What a simulator needs besides the tree of bodies: where it starts, masses, gears and motors.
+Robot models for simulators: closed loops, initial pose, masses, gears and motors.
 
-All inputs are at their start, so that every loop is closed where a simulation begins.
+All inputs are at their starts, so that every loop is closed at the beginning of a simulation.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Weight(NamedTuple):
 
 
 class Solid(NamedTuple):
-    """A body in the pose where a simulation starts; without a name, its parent is the world."""
+    """A body in its initial pose; without a name, its parent is the world."""
 
     name: str
     parent: str
@@ -45,7 +45,7 @@ class Solid(NamedTuple):
 
 
 class Motor(NamedTuple):
-    """What moves an input: its start, its sweep if any, the mass it moves [kg], its arm [m]."""
+    """The motor of an input: start, sweep if any, moved mass [kg] and arm [m]."""
 
     joint: str
     turns: bool
@@ -56,7 +56,7 @@ class Motor(NamedTuple):
 
 
 class Gear(NamedTuple):
-    """A joint that moves `ratio` times as far as another."""
+    """A joint whose motion is `ratio` times that of another."""
 
     joint: str
     input: str
@@ -64,7 +64,7 @@ class Gear(NamedTuple):
 
 
 class Assembled(NamedTuple):
-    """A robot model with its loops closed, and what it is made of [kg/m^3]."""
+    """A robot model with closed loops, and its density [kg/m^3]."""
 
     name: str
     density: float
@@ -108,7 +108,7 @@ def assembled(robot: Robot, density: float = DENSITY) -> Assembled:
 
 def _solved(machine: SceneMechanism, starts: Dict[str, float]
             ) -> Tuple[Dict[str, float], Dict[str, Dict[str, float]]]:
-    """Return joints' positions at the start; of those that are geared, the rate by each input."""
+    """Return the initial positions of joints, and the rates of geared ones by each input."""
     assembly, called, inputs = machine.assembly(), machine.joints, list(machine.inputs)
     solution = assembly.solution((), assembly.joints, assembly.joints)
     values = dict(starts)
@@ -131,7 +131,7 @@ def _solved(machine: SceneMechanism, starts: Dict[str, float]
 
 def _slots(machine: SceneMechanism, bodies: Sequence[Body], positions: Dict[str, float]
            ) -> Iterator[Body]:
-    """Yield what runs in the slot of a yoke, which no joint of the tree stands for."""
+    """Yield the bodies in slots of yokes, which have no joint in the tree."""
     at: Dict[str, Tuple[complex, float]] = {}
     for body in bodies:
         start, turn = at.get(body.parent, (0j, 0.0))
@@ -157,7 +157,7 @@ def _slots(machine: SceneMechanism, bodies: Sequence[Body], positions: Dict[str,
 
 
 def weight(pieces: Sequence[Piece], density: float) -> Weight:
-    """Return what pieces weigh together, of a density [kg/m^3]; of none at all, nothing."""
+    """Return the common weight of pieces of a density [kg/m^3]; zero without pieces."""
     masses = np.array([density * _volume(piece) for piece in pieces])
     mass = float(masses.sum())
     if not mass:

@@ -2,12 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Robot models: the mechanisms of a scene as a tree of bodies, from which each format is written.
+Robot models: the mechanisms of a scene as a tree of bodies, for all formats.
 
-A robot model is a tree, so each closed loop is cut open at a joint. A body's own frame is on the
-joint that it hangs on, x along its bar; the joints that it carries are points fixed to it. A body
-that was cut off a joint has a point for it too, which coincides with the joint's as long as the
-loop is closed::
+Each closed loop is cut open at a joint. A body's frame is at its parent joint, x along its bar;
+its other joints are fixed points on it. A body that was cut off a joint has a point for this
+joint, which coincides with the joint's own point in a closed loop::
 
     <frame_id>
       <mechanism>_ground_link             at the mechanism's pose; its plane is x-y
@@ -42,16 +41,16 @@ COLOURS = {'bar': palette.BAR, 'driven': palette.DRIVEN, 'slot': palette.SLOT,
 # As parts of the longest bar: radii of bars, joints and barrels, thickness of guides and blocks.
 BAR, JOINT, BARREL, GUIDE, BLOCK = 1 / 80, 1 / 40, 1 / 32, 1 / 80, 1 / 20
 
-# Sizes [m] between which nothing that is drawn is lost in single precision, as displays have it.
+# Range of sizes [m] that displays can draw in single precision.
 SMALLEST, LARGEST = 1e-30, 1e30
 
-# As all formats call them.
+# Names of shapes in all formats.
 ROD, BOX, BALL = 'cylinder', 'box', 'sphere'
 Place = Tuple[float, float]
 
 
 class Piece(NamedTuple):
-    """What is seen of a body from start to end [m], as thick as a radius, or as a box is [m]."""
+    """A visible shape of a body, from start to end [m], with a radius or a box's sizes [m]."""
 
     shape: str
     colour: str
@@ -61,7 +60,7 @@ class Piece(NamedTuple):
 
     @property
     def length(self) -> float:
-        """How long it is [m]."""
+        """Its length [m]."""
         return math.dist(self.start, self.end)
 
     @property
@@ -89,12 +88,12 @@ class Point(NamedTuple):
     radius: float
 
     def ball(self, place: Place = (0.0, 0.0)) -> Piece:
-        """Return what is seen of it, at a place of its own frame or of another."""
+        """Return its visible ball, at a place in its own frame or in another."""
         return Piece(BALL, 'joint', self.radius, place, place)
 
 
 class Joint(NamedTuple):
-    """What moves a body: its z turns or its x slides, as `sign` says; limits, if there are any."""
+    """The joint of a body: rotation about z or sliding along x, with a sign and limits, if any."""
 
     name: str
     kind: str
@@ -103,7 +102,7 @@ class Joint(NamedTuple):
 
     @property
     def axis(self) -> Tuple[float, float, float]:
-        """Return the direction in which it turns or slides."""
+        """Return its axis."""
         return (self.sign, 0.0, 0.0) if self.kind == 'prismatic' else (0.0, 0.0, self.sign)
 
 
@@ -138,21 +137,21 @@ class Part:
 
     @cached_property
     def joints(self) -> List[str]:
-        """Return what the joints are called, those that are fixed as well."""
+        """Return the names of all joints, including fixed ones."""
         return [name for body in self.bodies for name in (
             body.joint.name if body.joint else f'{body.name}_fixed',
             *(f'{point.name}_fixed' for point in body.points))]
 
     @cached_property
     def links(self) -> List[str]:
-        """Return what the bodies and their points are called."""
+        """Return the names of the bodies and their points."""
         return [name for body in self.bodies for name in (
             body.name, *(point.name for point in body.points))]
 
 
 @dataclass
 class Robot:
-    """Some mechanisms, below a root that is no body."""
+    """Mechanisms below a root link without a body."""
 
     name: str
     root: str
@@ -184,11 +183,11 @@ def robot(machines: Iterable[SceneMechanism], frame_id: str,
     Parameters
     ----------
     machines : iterable of SceneMechanism
-        What is in it; the model of a single one bears its name.
+        Mechanisms of the model; a model of one mechanism has its name.
     frame_id : str
-        The root link: the frame of the poses of those that have none of their own.
+        The root link: the frame of the poses of mechanisms without their own frame.
     width : float, optional
-        How thick bars are [m], and all else in proportion; None: a 40th of the longest bar.
+        Thickness of bars [m], with all else in proportion; None: 1/40 of the longest bar.
 
     Raises
     ------
@@ -204,7 +203,7 @@ def together(robots: Sequence[Robot]) -> Robot:
     """
     Return robot models as one; raise SceneError if they make no tree.
 
-    All have the same root link, or that of one is a link of another.
+    They have the same root link, or the root of one is a link of another.
     """
     if len(robots) == 1:
         return robots[0]
@@ -223,7 +222,7 @@ def together(robots: Sequence[Robot]) -> Robot:
 
 
 def _root(robots: Sequence[Robot], above: Mapping[str, str]) -> str:
-    """Return the link that all models hang on, by the root of the model that a link is in."""
+    """Return the common root link of all models; `above` maps a link to its model's root."""
     frames = list(dict.fromkeys(robot.root for robot in robots))
     for _ in list(frames):
         frames = [above.get(frame, frame) for frame in frames]
@@ -318,7 +317,7 @@ class _Tree:
             travel = self._machine.scale * travel[0], self._machine.scale * travel[1]
         x, y = self._place(side, link.parent, link.joint)
         called = self._machine.joints[prefix + link.name]
-        # Where the link is when what is published is zero.
+        # The link's position at a published value of zero.
         back = -called.sign * called.offset
         if prismatic:
             x, y = x + side * back * math.cos(zero), y + side * back * math.sin(zero)
@@ -358,7 +357,7 @@ class _Tree:
                                              end))
 
     def _add_points(self, prefix, side, link, body, points, ends):
-        """Add joints of a link, those that it was cut off as well."""
+        """Add joints of a link, including those that it was cut off."""
         for point in points:
             name = met = f'{self._machine.name}_{prefix}{point}'
             ends[point] += 1
@@ -368,7 +367,7 @@ class _Tree:
                                      met if name != met else '', JOINT * self._thickness))
 
     def _with_hub(self, body) -> Body:
-        """Return a body; one that carries no joint is seen, and weighs, where it hangs."""
+        """Return a body; one without joints has a visible hub with a weight."""
         if not body.points:
             origin = (0.0, 0.0)
             body.pieces.append(Piece(BALL, 'joint', JOINT * self._thickness, origin, origin))
@@ -388,7 +387,7 @@ class _Tree:
 
 
 def _input_travels(machine, assembly) -> Dict[str, Optional[Travel]]:
-    """Return the outermost ends of each input's reach, unscaled; None: it turns all round."""
+    """Return the outermost ends of each input's reach, unscaled; None: full rotation."""
     found: Dict[str, Optional[Travel]] = {}
     for input_ in machine.linkage.inputs:
         single = len(machine.inputs) == 1
@@ -398,7 +397,7 @@ def _input_travels(machine, assembly) -> Dict[str, Optional[Travel]]:
             continue
         low, high = min(lo for lo, _ in arcs), max(hi for _, hi in arcs)
         sweep = machine.inputs[input_.name].sweep if input_.turns else None
-        # A crank is in the turn that it is driven in.
+        # A crank's angle is in the turn of its sweep.
         turns = math.tau * math.floor((sweep[1] - low) / math.tau) if sweep else 0.0
         found[input_.name] = low + turns, high + turns
     return found

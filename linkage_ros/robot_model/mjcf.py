@@ -4,8 +4,8 @@
 """
 Robot models as MJCF, for MuJoCo: bodies as in the URDF, each loop closed by `connect`.
 
-Positions of joints are those that are published; a servo holds each input, and the keyframe
-`start` has them all where their loops are closed.
+Positions of joints equal the published ones. A servo holds each input; the keyframe `start` has
+closed loops.
 
 Format: MuJoCo's XML reference (mujoco.readthedocs.io).
 """
@@ -23,12 +23,12 @@ from .bodies import BALL, BOX, COLOURS, numbers, Piece, ROD
 from .. import palette
 from ..scene import SceneError
 
-# Steps [s] for a linkage of a metre; what is smaller swings faster.
+# Time steps [s] for a linkage of a metre; smaller linkages oscillate faster.
 STEP, LARGE = 1e-3, 1.0
 # A servo yields by a thousandth [rad or of the longest bar] to the weight of it all.
 STIFFNESS = 1000.0
 GRAVITY = 9.81
-# The least moment of inertia [kg m^2] that MuJoCo takes.
+# The smallest moment of inertia [kg m^2] that MuJoCo accepts.
 LEAST = 1e-14
 
 
@@ -102,7 +102,7 @@ def _add_piece(body: ElementTree.Element, piece: Piece) -> None:
 
 
 def _add_motor(actuator: ElementTree.Element, motor: Motor) -> None:
-    """Add a servo that weight does not move far, and that is not as strong as to tear a loop."""
+    """Add a servo that is stiff against weight, but too weak to break a loop."""
     force = motor.mass * GRAVITY
     most = 10.0 * force * (motor.arm if motor.turns else 1.0)
     stiffness = STIFFNESS * force * (motor.arm if motor.turns else 1.0 / motor.arm)

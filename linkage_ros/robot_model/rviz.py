@@ -17,9 +17,9 @@ GROUP = 'rviz_common/Group'
 NEEDS_TRANSFORMS = ('rviz_default_plugins/RobotModel', 'rviz_default_plugins/TF')
 
 
-# How far away a camera is that sees a ball of radius 1 and room about it: its view is 45 degrees.
+# Distance of a camera with a view of 45 degrees that shows a ball of radius 1 with a margin.
 AWAY = 1.1 / math.sin(math.radians(22.5))
-# A camera looks down on an upright plane by so much [rad], and on a flat one almost straight.
+# Downward angle [rad] of the camera on an upright plane, and on a flat one.
 DOWN, STEEPEST = 0.15, 1.56
 
 
@@ -35,13 +35,13 @@ def adapted(config: dict, machines: Mapping[str, SceneMechanism], frame_id: str,
     machines : mapping
         The mechanisms to be shown, by name; the camera sees them all.
     frame_id : str
-        The frame that their poses are in.
+        The frame of their poses.
     namespace : str
-        What their topics begin with; empty: none.
+        Namespace of their topics; empty: none.
     robot_model : bool
         Whether to show what needs a robot_state_publisher as well.
     frame_prefix : str
-        What the robot_state_publishers put before the names of their frames.
+        Prefix of the robot_state_publishers' frames.
 
     Returns
     -------

@@ -5,8 +5,8 @@
 Robot models as SDF, for Gazebo: bodies as in the URDF, each loop closed by a fixed joint.
 
 Where a loop was cut, a pin turns on the body that was cut off and is fixed to the other one, so
-it has two parents. Engines of Gazebo that read only trees get the second by DetachableJoint.
-Positions of joints are counted from the start of the inputs: there Gazebo has its zeros.
+it has two parents. For engines of Gazebo that read only trees, DetachableJoint adds the second.
+Positions of joints are relative to the starts of the inputs, Gazebo's zeros.
 
 Format: the SDFormat specification (sdformat.org/spec).
 """
