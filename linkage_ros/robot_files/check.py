@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A mechanism of a scene held against its robot, whose loops are closed in space."""
+"""Comparison of a scene's mechanism with its robot, whose loops are closed in space."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Found(NamedTuple):
     beyond: str
 
     def said(self, name: str) -> str:
-        """Return what is said of a mechanism that is right."""
+        """Return the report on a mechanism without differences."""
         moved = ', '.join(f'{source} from {low:.4g} to {high:.4g}'
                           for source, low, high in self.ranges)
         beyond = f'; not beyond {self.beyond}' if self.beyond else ''
@@ -170,7 +170,7 @@ def _differences(machine: scene.SceneMechanism, component: Component, sources: L
 
 
 class _Tracker:
-    """Closes the loops of a component with its motors elsewhere, step by step."""
+    """Closes the loops of a component at other motor positions, step by step."""
 
     def __init__(self, robot: Robot, component: Component, driven: Sequence[str],
                  sources: List[str], slack: float):

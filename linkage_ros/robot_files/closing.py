@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A robot in the closed pose that is nearest to the one it is given in."""
+"""A robot in the closed pose nearest to that of its file."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ FOLDED, ASIDE = 1e-6, 0.1
 
 
 def check_names(robot: Robot, names: Iterable[str]) -> None:
-    """Raise RequestError for a name that no joint has which moves in one way."""
+    """Raise RequestError for a name without a joint of one degree of freedom."""
     for name in names:
         if name not in robot.positions:
             raise RequestError(f'there is no joint {name!r}; allowed: '
@@ -37,7 +37,7 @@ def check_names(robot: Robot, names: Iterable[str]) -> None:
 
 
 def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
-    """Return a robot with some of its joints elsewhere; raise RequestError for what is none."""
+    """Return a robot with some joints moved; raise RequestError for an unknown joint."""
     positions, moves = robot.positions, {}
     check_names(robot, values)
     for body, (_, joint) in trees(robot)[0].items():
@@ -56,7 +56,7 @@ def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
 
 
 def held(robot: Robot, values: Mapping[str, float]) -> Robot:
-    """Return a robot, some of whose joints stay where they are put."""
+    """Return a robot with some joints fixed at given positions."""
     made = posed(robot, values)
     return replace(made, joints=[
         replace(joint, kind=FIXED, position=None) if joint.name in values else joint
@@ -64,7 +64,7 @@ def held(robot: Robot, values: Mapping[str, float]) -> Robot:
 
 
 def _with_followers(robot: Robot) -> Robot:
-    """Return a robot with the joints that follow others where these have them."""
+    """Return a robot with dependent joints at the positions that follow from the others."""
     late, positions = {}, robot.positions
     for _, joint in trees(robot)[0].values():
         if joint.name in robot.follows and joint.position is not None:
@@ -99,7 +99,7 @@ class Closed(NamedTuple):
 
 
 def closed(robot: Robot) -> Closed:
-    """Return a robot with its loops closed; motors stay where they are, where they can."""
+    """Return a robot with closed loops; motors stay at their positions if possible."""
     robot = _with_followers(robot)
     moves: Dict[str, np.ndarray] = {}
     positions: Dict[str, float] = {}
@@ -158,7 +158,7 @@ def _check_unfolded(component: Component, poses: Poses, motors: List[str], least
 
 
 def _refuse_fold(component: Component, poses: Poses, motors: List[str], aside: np.ndarray) -> None:
-    """Raise ValueError with both poses next to one in which bars lie in line, if two there are."""
+    """Raise ValueError with both poses if a pose with bars in line has two neighbours."""
     still, ends = component.held(motors), True
     for ahead in (ASIDE, -ASIDE):
         step = component.towards_limits(motors, ahead)

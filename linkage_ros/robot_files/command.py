@@ -84,7 +84,7 @@ class _NotPlaced(ValueError):
 
 
 def described(robot: Robot) -> Tuple[Dict[str, Any], List[str]]:
-    """Return the parameters of a robot's scene, and what is left out and what was checked."""
+    """Return the parameters of a robot's scene, and reports on omissions and checks."""
     given: Dict[str, Any] = {'mechanisms': []}
     closed = closing.closed(robot)
     robot, said = closed.robot, closed.said
@@ -125,7 +125,7 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str]]:
 
 
 def _values(said: Sequence[str]) -> Dict[str, float]:
-    """Return what texts such as JOINT=VALUE say; raise RequestError for one that is none."""
+    """Parse texts such as JOINT=VALUE; raise RequestError for an invalid one."""
     found = {}
     for each in said:
         name, _, value = each.rpartition('=')
@@ -205,7 +205,7 @@ def _why(drawing: Drawing) -> str:
 
 def _checked(robot: Robot, drawing: Drawing, others: Sequence[str]
              ) -> Tuple[str, Dict[str, Any], List[str]]:
-    """Return a mechanism's name and parameters, and what is to be said, once it has its pose."""
+    """Return a mechanism's name and parameters, and its report, for a given pose."""
     name = plain(drawing.moved_by[0].name, 60)
     name = f'{name}_{len(others)}' if name in others else name
     loop, given = drawing.loop, {

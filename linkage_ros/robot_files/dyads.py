@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Joint lines of a planar loop of a robot: what drives it, then dyad after dyad."""
+"""Joint lines of a planar loop of a robot: its inputs, then its dyads."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Drawing(Dyads):
         return (pin for body in self.parts for pin in self.on[body].items())
 
     def measured_by(self, joint: Joint) -> Optional[Tuple[str, float, float]]:
-        """Return the link that tells a joint's position, its sign, and where it is, if any."""
+        """Return the link whose angle is a joint's position, with sign and position, if any."""
         if not self.parts.keys() >= {*joint.bodies}:
             return None
         parent, child = joint.bodies
@@ -123,7 +123,7 @@ class Drawing(Dyads):
         return number, ''
 
     def position(self, joint: Joint) -> float:
-        """Return where the motor of a joint is in the file."""
+        """Return the position of a joint's motor in the file."""
         return joint.position or 0.0
 
     def alike(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:

@@ -73,7 +73,7 @@ def groups(robot: Robot, stiff: Collection[str] = ()) -> List[Group]:
 
 def _parts(robot: Robot, home: Dict[str, str], group: Group, stiff: Collection[str]
            ) -> List[Group]:
-    """Return what is planar of loops that as a whole are not."""
+    """Return the planar parts of loops that are not planar as a whole."""
     names = {joint.name for joint in group.joints if joint.position is not None}
     if names & {*robot.driven} <= {*stiff}:
         stiff = ()
@@ -114,7 +114,7 @@ def _blocks(robot: Robot, home: Mapping[str, str], joints: Sequence[Joint]) -> L
 
 
 def _merged(robot: Robot, home: Mapping[str, str], rigid: Sequence[Joint]) -> Dict[str, str]:
-    """Return the body that each has become one with; the root keeps its name."""
+    """Return the merged body of each body; the root keeps its name."""
     home = dict(home)
     for joint in rigid:
         first, second = sorted((top(home, body) for body in joint.bodies), key=top(
@@ -124,14 +124,14 @@ def _merged(robot: Robot, home: Mapping[str, str], rigid: Sequence[Joint]) -> Di
 
 
 def _on(home: Mapping[str, str], joints: Sequence[Joint]) -> List[Joint]:
-    """Return joints between bodies that have become one with others."""
+    """Return joints between merged bodies."""
     moved = [replace(joint, bodies=(home[joint.bodies[0]], home[joint.bodies[1]]))
              for joint in joints]
     return [joint for joint in moved if len({*joint.bodies}) == 2]
 
 
 def _with_balls(robot: Robot, joints: List[Joint]) -> List[Joint]:
-    """Return joints with one ball for each two or three hinges that cross in a point."""
+    """Return joints with a ball in place of two or three hinges that cross in a point."""
     on: Dict[str, List[Joint]] = {}
     for joint in joints:
         for body in joint.bodies:
@@ -187,7 +187,7 @@ def _lean(joint: Joint, normal: np.ndarray) -> float:
 
 
 def flat(robot: Robot, group: Group, drives: Sequence[str]) -> Loop:
-    """Return loops in their plane; raise ValueError with what is not planar."""
+    """Return loops in their plane; raise ValueError that names nonplanar parts."""
     ground, frame_id, joints, *_ = group
     hinges, lean = check_planar(ground, joints, drives)
     base = robot.frames[frame_id]

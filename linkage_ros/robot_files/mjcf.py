@@ -54,7 +54,7 @@ def read(path: str) -> Robot:
 
 
 def _compiled(path: str) -> Any:
-    """Return a model without its meshes: its files may be elsewhere."""
+    """Return a model without meshes, whose files may be missing."""
     import mujoco as mj
 
     # What it warns of, and writes to a file, is dynamics.
@@ -72,7 +72,7 @@ def _compiled(path: str) -> Any:
 
 
 def _tie(robot: Robot, model: Any, i: int, bodies: Any, names: Any) -> None:
-    """Add what an equality makes of two bodies or joints."""
+    """Add the constraint of an equality between two bodies or joints."""
     import mujoco as mj
 
     kind, given = mj.mjtEq(model.eq_type[i]).name[5:].lower(), model.eq_data[i]

@@ -148,7 +148,7 @@ class Rods:
 
     @staticmethod
     def _limits(link: Link) -> Optional[Tuple[float, float]]:
-        """Return a joint's limits, counted from where it is; None where they say nothing."""
+        """Return a joint's limits relative to its position; None without limits."""
         joint = link.joint
         if joint.limits is None or joint.position is None:
             return None
@@ -172,7 +172,7 @@ class Rods:
         yield 'only_named', True
 
     def _zero(self, name: str) -> float:
-        """Return what an input is in the pose of the robot: an angle of 0, a length as it is."""
+        """Return an input's value in the robot's pose: 0 for an angle, the length for a length."""
         line = next((line for line in self.rods if line.startswith(f'{name} cylinder ')), None)
         if line is None:
             return 0.0
@@ -247,7 +247,7 @@ def _ranges(machine: scene.SceneMechanism, found: Rods) -> Dict[str, Tuple[float
 
 
 def _corners(machine: scene.SceneMechanism, found: Rods) -> Iterator[str]:
-    """Yield where the motors are at the corners of the hinges' limits."""
+    """Yield the motors' positions at the corners of the hinges' limits."""
     for held in machine.linkage.windows():
         names = [line.names[0] for line in held.lines]
         inverse = machine.linkage.driven_by(*names)

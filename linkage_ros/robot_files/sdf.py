@@ -105,7 +105,7 @@ class _Model:
         return robot
 
     def named(self, where: str, name: str, is_model: bool = False) -> str:
-        """Return the whole name of what a part calls by a name."""
+        """Return the full name of an element by its name in a part."""
         scope = where if is_model else where.rpartition('::')[0]
         if name == 'world':
             return name

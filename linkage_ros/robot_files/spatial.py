@@ -32,7 +32,7 @@ _TREE = {FIXED: 0, SLIDE: 1, FREE: 2, BALL: 3, HINGE: 4}
 
 
 class Element(NamedTuple):
-    """What moves in one way: about or along an axis; a ball in three."""
+    """A joint: rotation about or motion along an axis, or a ball with three rotations."""
 
     joint: Joint
     kind: str
@@ -226,7 +226,7 @@ class Component:
 
     @property
     def positions(self) -> Dict[str, float]:
-        """Where the file has each joint that has a name and moves in one way."""
+        """Positions in the file of named joints with one degree of freedom."""
         return {joint.name: joint.position for joint in self.joints
                 if joint.position is not None}
 
@@ -407,7 +407,7 @@ class Component:
         return names, int(np.linalg.matrix_rank(ways, 1e-6)) if names else 0
 
     def farthest_apart(self, two: Poses, determined: Any) -> Tuple[str, float, float]:
-        """Return the joint that two poses have the farthest apart, and where each has it."""
+        """Return the joint with the largest difference between two poses, and both positions."""
         apart = np.abs(self.away(two.positions[:1] - two.positions[1:]))[0] * determined
         apart *= [each.joint.position is not None for each in self._elements]
         if not apart.any():
@@ -431,7 +431,7 @@ class Component:
                 if each.joint.position is not None and not moves]
 
     def read(self, poses: Poses) -> Dict[str, np.ndarray]:
-        """Return where joints with a name are [rad or m]; those of cuts are wrapped."""
+        """Return the positions of named joints [rad or m]; those of cuts are wrapped."""
         found = {each.joint.name: each.sign * poses.positions[:, i] + each.joint.position
                  for i, each in enumerate(self._elements) if each.joint.position is not None}
         frames = self._frames(poses)

@@ -201,7 +201,7 @@ class Reader:
                              for name in loops.get(key, ())] or self.robot.driven
 
     def _change(self, name: str, kind: str) -> None:
-        """Make a joint of the tree one of another type, about axes of its frame."""
+        """Change the type of a joint of the tree, with axes in its frame."""
         joint = next((joint for joint in self.robot.joints if joint.name == name), None)
         if joint is None:
             raise RequestError(f'there is no joint {name!r} to be made {kind}')
