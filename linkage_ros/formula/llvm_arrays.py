@@ -49,7 +49,8 @@ class Arrays:
         size = given[0].size
         if size < LANES:
             return self.solve([np.resize(each, LANES) for each in given], constants)[:, :size]
-        out, cores = np.empty((self._outputs, size)), _cores()
+        out = np.empty((self._outputs, size))
+        cores = _cores() if size > self._share else 1
         share = max(self._share, -(-size // cores))
 
         def solve_from(first: int) -> None:

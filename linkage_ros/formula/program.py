@@ -39,6 +39,8 @@ FEW_POSES = 32
 DEEPEST = 16
 _NUMBERS, _NAMED, _OPERANDS = count(), re.compile(r'\bv\d+'), attrgetter('operands')
 
+_Step = Tuple[Real, Optional[Callable], Sequence[Real]]
+
 
 def compile_in_background(make: Callable[[], Any]) -> Future:
     """Run `make` in a thread of its own; return its future."""
@@ -85,13 +87,35 @@ ARRAYS = Dialect({name: row.array for name, row in OPERATIONS.items()}, {
 
 def evaluate(node: Real, dimensions: Mapping, known: dict) -> Any:
     """Evaluate an expression of dimensions alone; `known` is shared between calls."""
-    for x in unknown(node, _OPERANDS, known):
-        if x.operands:
-            known[x] = OPERATIONS[x.op].numpy(*map(known.get, x.operands))[()]
-        else:
-            value, = x.args
-            known[x] = np.asarray(dimensions[value] if x.op == 'dimension' else value, float)[()]
+    _work_out(map(_step, unknown(node, _OPERANDS, known)), dimensions, known)
     return known[node]
+
+
+def _step(node: Real) -> _Step:
+    """Return an expression of dimensions with its function, None of a leaf, and operands."""
+    return node, OPERATIONS[node.op].numpy if node.operands else None, node.operands
+
+
+def _steps(nodes: Iterable[Real]) -> List[_Step]:
+    """Return all that expressions need, and these, in an order in which they can be worked out."""
+    known: Dict[Real, _Step] = {}
+    for node in nodes:
+        for x in unknown(node, _OPERANDS, known):
+            known[x] = _step(x)
+    return list(known.values())
+
+
+def _work_out(steps: Iterable[_Step], dimensions: Mapping, known: dict) -> None:
+    """Add the values of expressions to those that are known."""
+    for node, function, operands in steps:
+        if node in known:
+            continue
+        if function:
+            known[node] = function(*[known[x] for x in operands])[()]
+        else:
+            value, = node.args
+            known[node] = np.asarray(
+                dimensions[value] if node.op == 'dimension' else value, float)[()]
 
 
 class _Listing:
@@ -231,6 +255,7 @@ class _Variant:
         self.listing = _Listing(outputs, decided, replaced)
         self.arguments, self.outputs = arguments, len(outputs)
         self.constants = [self.listing.entries[n][0] for n in self.listing.constants]
+        self.steps = _steps(self.constants)
         # The code for one pose that returns the outputs in pairs, by name.
         self.placing = Cache(partial(_python, self.listing, FLOATS, arguments))
 
@@ -277,18 +302,21 @@ class Program:
         self._arguments = arguments
         self._replaced = replaced or {}
         self._conditions = _conditions(self._outputs)
+        self._deciding = _steps(self._conditions)
         self._variants = Cache()
 
     def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False) -> Pose:
         """Return the outputs as functions of the arguments; dimensions are floats or arrays."""
         swept = any(np.ndim(v) for v in dimensions.values())
         with np.errstate(all='ignore'):
-            decisions = () if swept else tuple(
-                bool(evaluate(c, dimensions, known)) for c in self._conditions)
+            if not swept:
+                _work_out(self._deciding, dimensions, known)
+            decisions = () if swept else tuple(bool(known[c]) for c in self._conditions)
             variant = self._variants.get_or_make(decisions, lambda: _Variant(
                 self._outputs, dict(zip(self._conditions, decisions)), self._replaced,
                 self._arguments))
-            constants = [evaluate(c, dimensions, known) for c in variant.constants]
+            _work_out(variant.steps, dimensions, known)
+        constants = [known[c] for c in variant.constants]
         if not swept:
             constants = list(map(float, constants))
         shape = np.broadcast_shapes(*map(np.shape, constants)) if swept else ()

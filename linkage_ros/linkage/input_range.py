@@ -51,15 +51,8 @@ def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Calla
         From values of the input, shape (n,), to the coordinates of all joints, shape (any, n).
 
     """
-    def failing(theta: Any) -> Any:
-        """Return the number of the first limit that is not kept, that of all where none is."""
-        with np.errstate(invalid='ignore'):
-            kept = margins(np.ravel(theta)) >= 0.0
-        return np.vstack([kept, np.zeros(kept.shape[1:], bool)]).argmin(axis=0).reshape(
-            np.shape(theta))
-
     def assembled(theta: Any) -> Any:
-        return failing(theta) == len(limits)
+        return _failing(margins, theta) == len(limits)
 
     closed = [limit for limit in limits if limit.ends and limit.ends.theta.args[0] == 0]
     ends = [end + math.tau * turn for limit in closed for end in _crank_ends(limit, value)
@@ -68,7 +61,7 @@ def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Calla
         # What follows a turn later may be another assembly: the arcs are then those of [-pi, pi].
         ends.append(input_.low)
     if any(x.margin.varies and x not in closed for x in limits):
-        ends += [end for arc in input_.between(ends) for end in _limits(margins, failing, *arc)]
+        ends += [end for arc in input_.between(ends) for end in _limits(margins, *arc)]
     found = reachable_arcs(ends, assembled, input_, lambda: _is_periodic(places, input_))
     if input_.is_whole(found):
         return found
@@ -76,7 +69,19 @@ def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Calla
     return [(lo, hi) for lo, hi in trimmed if lo < hi]
 
 
-def _limits(margins: Callable, failing: Callable, lo: float, hi: float) -> List[float]:
+def _failing(margins: Callable, theta: Any) -> Any:
+    """Return the number of the first limit that is not kept, that of all where none is."""
+    return _first_below(margins(np.ravel(theta))).reshape(np.shape(theta))
+
+
+def _first_below(values: np.ndarray) -> np.ndarray:
+    """Return for each column of margins the first row that is not kept, else their number."""
+    with np.errstate(invalid='ignore'):
+        kept = values >= 0.0
+    return np.vstack([kept, np.zeros(kept.shape[1:], bool)]).argmin(axis=0)
+
+
+def _limits(margins: Callable, lo: float, hi: float) -> List[float]:
     """
     Return the values on an arc next to which a limit stops or starts to be the first not kept.
 
@@ -87,20 +92,24 @@ def _limits(margins: Callable, failing: Callable, lo: float, hi: float) -> List[
     for _ in range(ROUNDS):
         theta = np.unique(np.concatenate([
             sampled(*arc, SAMPLES, FEWEST) for arc in zip(ends, ends[1:])]))
-        theta = np.unique(np.concatenate([theta, _touches(margins, theta)]))
-        first = failing(theta)
+        values = margins(theta)
+        touches = _touches(margins, theta, values)
+        if len(touches):
+            theta = np.unique(np.concatenate([theta, touches]))
+            values = margins(theta)
+        first = _first_below(values)
         place = np.flatnonzero(first[1:] != first[:-1])
-        before, after = refined(lambda x, as_before=first[place][:, None]: failing(x) == as_before,
-                                theta[place], theta[place + 1])
+        before, after = refined(
+            lambda x, as_before=first[place][:, None]: _failing(margins, x) == as_before,
+            theta[place], theta[place + 1])
         known, ends = len(ends), sorted({lo, hi, *before.tolist(), *after.tolist()})
         if len(ends) == known or len(ends) > MOST:
             break
     return ends[1:-1]
 
 
-def _touches(margins: Callable, theta: np.ndarray) -> np.ndarray:
-    """Return where margins come nearest to zero between samples."""
-    values = margins(theta)
+def _touches(margins: Callable, theta: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return where margins come nearest to zero between samples, from their values there."""
     row, place = np.nonzero(near_misses(values))
     sign = np.sign(values[row, place + 1])[:, None]
     chosen = np.arange(len(row))
@@ -114,8 +123,11 @@ def _touches(margins: Callable, theta: np.ndarray) -> np.ndarray:
 
 def _trimmed(assembled: Callable, lo: float, hi: float) -> Arc:
     """Return an arc whose ends can be assembled."""
-    ends, middle = np.array([lo, hi]), np.full(2, lo + INSIDE * (hi - lo))
-    low, high = np.where(assembled(ends), ends, refined(assembled, middle, ends)[0]).tolist()
+    ends = np.array([lo, hi])
+    beyond = ~assembled(ends)
+    middle = np.full(np.count_nonzero(beyond), lo + INSIDE * (hi - lo))
+    ends[beyond] = refined(assembled, middle, ends[beyond])[0]
+    low, high = ends.tolist()
     return low, high
 
 

@@ -535,11 +535,11 @@ class Inverse:
 
     def _within_turns(self, values: np.ndarray) -> np.ndarray:
         """Return values (outputs, questions) as `_reduced` does; NaN what is not finite."""
-        far = ~(np.abs(values) <= math.tau)
-        if not far.any():
+        near = np.abs(values) <= math.tau
+        if near.all():
             return values
         values = np.where(np.isfinite(values), values, np.nan)
-        far &= np.array(self._angular)[:, None]
+        far = ~near & np.array(self._angular)[:, None]
         values[far] = np.arctan2(np.sin(values[far]), np.cos(values[far]))
         return values
 
@@ -559,13 +559,17 @@ class Inverse:
                 part[:len(kept)] = each
 
     def _away(self, inputs: np.ndarray, others: np.ndarray) -> np.ndarray:
-        """Return the squares of how far inputs (inputs, n) are from others, in their sizes."""
-        total: Any = 0.0
+        """Return the squares of how far inputs (inputs, ...) are from others, in their sizes."""
+        total = []
         for x, y, (_, turn, _), size in zip(inputs, others, self._turned, self._sizes):
             gap = x - y
-            gap = gap - turn * np.rint(gap / turn) if math.isfinite(turn) else gap / size
-            total = total + gap * gap
-        return total
+            if math.isfinite(turn):
+                gap -= turn * _rounded(gap / turn)
+            else:
+                gap /= size
+            gap *= gap
+            total.append(gap)
+        return reduce(operator.iadd, total)
 
     def _one_each(self, values: Any, name: str = 'values') -> Tuple[float, ...]:
         """Return one number for each output; raise ValueError if there are not as many."""
@@ -679,11 +683,10 @@ class Inverse:
 
     def _breaks(self, inputs: np.ndarray, mode: int) -> np.ndarray:
         """Return after which questions another answer is nearer than that of the same mode."""
-        own = inputs[mode]
-        kept = self._away(own[:, 1:], own[:, :-1])
-        for other in (*inputs[:mode], *inputs[mode + 1:]):
-            kept[self._away(other[:, 1:], own[:, :-1]) <= kept] = np.nan
-        return np.append(np.flatnonzero(kept != kept), own.shape[1] - 1)
+        away = self._away(inputs.swapaxes(0, 1)[:, :, 1:], inputs[mode, :, None, :-1])
+        own = away[mode].copy()
+        away[mode] = np.inf
+        return np.append(np.flatnonzero(~(own < np.fmin.reduce(away))), inputs.shape[2] - 1)
 
     def _going_on(self, inputs: np.ndarray, start: Sequence[float], limits: Sequence
                   ) -> np.ndarray:
@@ -691,8 +694,8 @@ class Inverse:
         places = inputs.copy()
         for row, begin, pair, (_, turn, _) in zip(places, start, limits, self._turned):
             if math.isfinite(turn):
-                turns = np.rint((row[:-1] - row[1:]) / turn)
-                turns[:1] += round((begin - row[0]) / turn)
+                turns = _rounded((row[:-1] - row[1:]) / turn)
+                turns[:1] += round((begin - float(row[0])) / turn)
                 if turns.any():
                     row[1:] += turn * np.cumsum(turns)
             row[0] = begin
@@ -921,6 +924,11 @@ def _columns(inputs: np.ndarray, rates: np.ndarray) -> List[Found]:
 
 def _greater(x: Real, y: Real) -> Real:
     return where(x < y, y, x)
+
+
+def _rounded(values: np.ndarray) -> np.ndarray:
+    """Round an array that is used no more in place: to the nearest integers."""
+    return cast(np.ndarray, np.rint(values, out=values))
 
 
 def _before(one: Sequence[Real], other: Sequence[Real]) -> Real:

@@ -19,14 +19,14 @@ from numpy.typing import ArrayLike
 from . import joint_lines, statics
 from .analysis import Analysis
 from .arguments import checked_dimensions, numbers
-from .builder import in_metres, UNIT
+from .builder import UNIT
 from .design import Design
 from .input_range import arcs
 from .inputs import Arc, Input, MOST_COUNTED
 from .inverse import Answer, Inverse
 from .quantities import LinkPoint, Points, structure_of
 from ..cache import Cache
-from ..formula.expression import derivative, Real
+from ..formula.expression import derivative, Real, real
 from ..formula.program import Batch, evaluate, Pose, Program
 from ..words import listed, meant, plain_text, quoted
 
@@ -200,7 +200,8 @@ class Mechanism:
 
     def _metres(self, length: Real) -> Any:
         """Return the value [m] of a length of dimensions alone: a float, or an array."""
-        value = self.value(in_metres(length))
+        with np.errstate(all='ignore'):
+            value = self.value(real(length)) * self.lengths[UNIT.args[0]]
         return value if np.ndim(value) else float(value)
 
     def check(self) -> None:
@@ -554,7 +555,7 @@ class Mechanism:
         return list(self.cache.get_or_make(('reach', *others), lambda: self._arcs(others)))
 
     def _arcs(self, others: Tuple[float, ...]) -> List[Arc]:
-        margins, points = self.bound('margins', ()), self._ready('points', None)[1]
+        margins = self.bound('margins', ())
         if margins.shape:
             raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
                              'not for arrays')
@@ -565,7 +566,7 @@ class Mechanism:
         return [(lo * first.size, hi * first.size) for lo, hi in arcs(
             lambda value: margins.searched(value * first.size, *others), first.counted(),
             self.structure.built.limits, self.value,
-            lambda theta: points.searched(theta, *others))]
+            lambda theta: self._ready('points', None)[1].searched(theta, *others))]
 
     def dead_points(self, *others: float) -> list:
         """

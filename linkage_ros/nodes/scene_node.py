@@ -147,6 +147,8 @@ class SceneNode(Node):
     def create_service(self, srv_type: Any, srv_name: str, callback: Callable, **kwargs: Any
                        ) -> Any:
         """Create a service that responds with the reason if its callback raises."""
+        if srv_type is SetParameters:
+            callback = partial(self._set_readable, callback)
         return super().create_service(
             srv_type, srv_name, partial(self._respond, callback), **kwargs)
 
@@ -162,17 +164,21 @@ class SceneNode(Node):
 
     def _respond(self, callback: Callable, request: Any, response: Any) -> Any:
         try:
-            if isinstance(request, SetParameters.Request) and len(request.parameters) > 1:
-                results = self._parameters_of_scene.set_readable(request.parameters)
-                response.results = [results.get(i) or self._respond(
-                    callback, SetParameters.Request(parameters=[one]),
-                    SetParameters.Response()).results[0]
-                    for i, one in enumerate(request.parameters)]
-                return response
             return callback(request, response)
         except Exception as error:
             self.report('a request', error)
             return refused(response, elided(f'internal error: {error!r}', 299))
+
+    def _set_readable(self, callback: Callable, request: Any, response: Any) -> Any:
+        """Set several parameters together, and what cannot be read one by one."""
+        if len(request.parameters) < 2:
+            return callback(request, response)
+        results = self._parameters_of_scene.set_readable(request.parameters)
+        response.results = [results.get(i) or self._respond(
+            callback, SetParameters.Request(parameters=[one]),
+            SetParameters.Response()).results[0]
+            for i, one in enumerate(request.parameters)]
+        return response
 
     def _changed(self, changed: List[scenes.Parameter]) -> None:
         """Prepare the newest scene, and announce the changes."""

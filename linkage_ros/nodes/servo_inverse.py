@@ -143,17 +143,18 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
     (positions,), (rates,) = inverse.positions([np.array(values) if n > 1 else values[0]], start)
     if n > 1:
         finite = np.isfinite(positions)
+        success = bool(finite.all())
         response.servo_angle = array('d', positions.tobytes())
         response.reduction = array('d', rates.tobytes())
-        response.success = bool(finite.all())
-        response.reachable = [True] * n if response.success else finite.tolist()
+        reachable = [True] * n if success else finite.tolist()
     else:
+        success = math.isfinite(positions)
         response.servo_angle, response.reduction = [positions], [rates]
-        response.success = math.isfinite(positions)
-        response.reachable = [response.success]
-    if not response.success:
+        reachable = [success]
+    response.success, response.reachable = success, reachable
+    if not success:
         response.message = elided(_complaint(inverse, [
-            value for value, reached in zip(values, response.reachable) if not reached]), MESSAGE)
+            value for value, reached in zip(values, reachable) if not reached]), MESSAGE)
 
 
 def solve_together(machine: scene.SceneMechanism, request: Any, response: Any) -> None:

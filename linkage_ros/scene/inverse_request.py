@@ -93,10 +93,15 @@ class InverseRequest:
         self._units = [machine.scale_of(name) for name in self.outputs]
         self._scales = [machine.scale_of(name) for name in machine.inputs]
         self._actuators = [drive.actuator for drive in self._drives]
+        # The rate of each output by the first actuator, by the second and so on, of its own.
+        self._rate_units = [unit / scale * ratio
+                            for scale, (ratio, _) in zip(self._scales, self._actuators)
+                            for unit in self._units]
         # The ends of the sweeps as the linkage counts them.
         self._ends = [drive.ends and (drive.ends[0] / scale, drive.ends[1] / scale)
                       for drive, scale in zip(self._drives, self._scales)]
         self._many: Any = None
+        self._quicker: Any = None
 
     def inputs_of(self, positions: Sequence[Any]) -> List[Any]:
         """Return the inputs [rad or m] of their actuators' positions."""
@@ -127,18 +132,16 @@ class InverseRequest:
             second and so on; NaN where a value cannot be had.
 
         """
-        inverse, n, many = self._inverse, len(self._units), isinstance(values[0], np.ndarray)
+        inverse, many = self._inverse, isinstance(values[0], np.ndarray)
         each = near is not None and np.size(near[0]) == np.size(values[0])
         values = [value / unit for value, unit in zip(values, self._units)]
         if near is not None:
             near = [input_ / scale for input_, scale in zip(self.inputs_of(near), self._scales)]
         if many and np.size(values[0]) >= MANY:
-            inverse = self._accelerated()
+            inverse = self._quicker or self._accelerated()
         found, rates = (inverse.path if many and not each else inverse.nearest)(
             values, near, self._ends)
-        return (self.positions_of([input_ * scale for input_, scale in zip(found, self._scales)]),
-                [rate * (self._units[i % n] / self._scales[i // n] * self._actuators[i // n][0])
-                 for i, rate in enumerate(rates)])
+        return self.positions_of(_times(found, self._scales)), _times(rates, self._rate_units)
 
     def _accelerated(self) -> Any:
         """Return the inverse in machine code as soon as it is there, for which nobody waits."""
@@ -149,8 +152,9 @@ class InverseRequest:
                 return inverse
 
             self._many = compile_in_background(make)
-        ready = self._many.done() and not self._many.exception()
-        return self._many.result() if ready else self._inverse
+        if self._many.done() and not self._many.exception():
+            self._quicker = self._many.result()
+        return self._quicker or self._inverse
 
     def command(self, values: Sequence[float], speeds: Optional[Sequence[float]],
                 near: Sequence[float], jumps: bool = False) -> Command:
@@ -287,6 +291,10 @@ class InverseRequest:
         found = self._machine.linkage.extremes(self.outputs[0], [
             (low / scale, high / scale) for low, high in self._arcs])
         return [[(value * self._units[0], at * scale) for value, at in span] for span in found]
+
+
+def _times(values: Sequence[Any], factors: Sequence[float]) -> List[Any]:
+    return [value if factor == 1.0 else value * factor for value, factor in zip(values, factors)]
 
 
 def _inside(drive: InputSettings, input_: Input, value: float) -> float:
