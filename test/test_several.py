@@ -101,6 +101,35 @@ def test_whole_turns_are_kept_and_a_singular_pose_is_not_passed():
     np.testing.assert_allclose(back, near, atol=1e-9)
 
 
+@pytest.mark.parametrize('seed', [0, *(
+    pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 40))])
+@pytest.mark.parametrize('hung', ['zero O geared', 'zero Q geared', 'beside'])
+def test_an_input_that_is_held_is_held_in_its_own_turn(hung, seed):
+    # A second crank is geared to the one that is held: a turn later it is elsewhere.
+    rng = np.random.default_rng(seed)
+    long, short = rng.uniform(1.6, 2.0, 4).round(3), rng.uniform(0.4, 0.8, 4).round(3)
+    ratio = rng.choice(['1/2', '1/3', '3/2', '-1/2', '0.4', '5/61', '2', '0.3183', '65/64'])
+    where = {'zero Q geared': 'F'}.get(hung, 'Q')
+    linkage = mechanisms.create('custom', joints=(
+        'O ground 0 0', 'Q ground 0.7 0', f'E crank O {short[0]}',
+        f'F crank Q {short[1]} called drive',
+        f'G crank {where} {short[2]} {hung.replace("beside", "geared")} drive {ratio} 0.3',
+        *((f'M dyad E F {long[0]} {long[1]} left', f'N dyad G Q {short[3]} {short[2]} left')
+          if hung == 'beside' else (f'M dyad E G {long[0]} {long[1]} left',))))
+    poses = rng.uniform((-3.0, -25.0), (3.0, 25.0), (100, 2))
+    assembled = np.isfinite(np.concatenate([*linkage.solve(poses.T).values()], axis=1)).all(axis=1)
+    poses = iter(poses[assembled].tolist())
+    for output in ('M.x', 'M.y', 'distance(O,M)', 'angle(E,M)') * 2:
+        theta, held = next(poses)
+        value = float(linkage.joint_angles((theta, held), (output,))[output])
+        answers = linkage.input_for(output, value, others=(held,))
+        there = linkage.joint_angles((answers, np.full_like(answers, held)), (output,))[output]
+        np.testing.assert_allclose(np.exp(1j * there), np.exp(1j * value), atol=1e-9)
+        assert np.abs(np.exp(1j * answers) - np.exp(1j * theta)).min() < 1e-6
+        nearest = linkage.input_for(output, value, theta, (held,))
+        assert nearest == pytest.approx(theta, abs=1e-6)
+
+
 @pytest.mark.slow
 def test_outputs_of_few_inputs_are_solved_first():
     # Two levers side by side, and a bar between them that both move.
