@@ -467,11 +467,14 @@ class Inverse:
             if gap - gap == 0.0:
                 gap = math.remainder(gap, turn)
             gaps.append(gap)
-            away, allowed = abs(gap), ROUNDING * scale
+            away, allowed, own = abs(gap), ROUNDING * scale, 0.0
             if not away <= allowed:
                 for rate, x, size in zip(row[n + i::n], inputs, self._sizes):
                     allowed += slack * abs(rate) * max(size, abs(x))
-                sure = sure and away <= min(allowed, ENDED * scale)
+                    # Next to a dead point the last digit of an input may be worth more than that.
+                    own += 2.0 ** -52 * abs(rate) * abs(x)
+                own = min(own, OTHER * scale) if own < math.inf else 0.0
+                sure = sure and away <= max(min(allowed, ENDED * scale), own)
             if not away / scale <= most:
                 most = away / scale
         return gaps, sure, most
