@@ -3,6 +3,7 @@
 
 """Several outputs are wanted of several inputs: all answers, and nothing else, by circles."""
 
+from itertools import product
 import math
 
 from linkage_ros import mechanisms, scene
@@ -128,6 +129,28 @@ def test_an_input_that_is_held_is_held_in_its_own_turn(hung, seed):
         assert np.abs(np.exp(1j * answers) - np.exp(1j * theta)).min() < 1e-6
         nearest = linkage.input_for(output, value, theta, (held,))
         assert nearest == pytest.approx(theta, abs=1e-6)
+
+
+def test_two_dyads_beyond_the_ends_of_their_rockers_are_not_taken_for_the_other_sides():
+    # A rocker turns back where its dyad stretches: next to that the other side is an answer, too.
+    rng, beyond, found = np.random.default_rng(1), 3e-8, 0
+    for _ in range(12):
+        lines, ends = [], []
+        for name, at in ('O', 0), ('R', 7):
+            a, b, c = rng.uniform(0.8, 1.6, 3).round(3)
+            lines += [f'{name} ground {at} 0', f'{name}q ground {at + 2} 0',
+                      f'{name}a crank {name} {a}', f'{name}b dyad {name}a {name}q {b} {c} left']
+            ends.append(math.pi - math.acos((4.0 + (b + c) ** 2 - a * a) / (4.0 * (b + c)))
+                        if abs(2.0 - b - c) < a < 2.0 + b + c and b + c < 2.0 + a else math.nan)
+        linkage = mechanisms.create('custom', joints=lines)
+        for sides in product((1.0, -1.0), repeat=4 * bool(np.isfinite(ends).all())):
+            values = np.multiply(sides[:2], ends) + beyond * np.array(sides[2:])
+            for answer in linkage.inputs_for(('Oq_Ob', 'Rq_Rb'), values):
+                there = [*linkage.joint_angles(answer.inputs, ('Oq_Ob', 'Rq_Rb')).values()]
+                away = np.angle(np.exp(1j * (np.array(there) - values)))
+                assert np.abs(away).max() < 1.5 * beyond, (lines, values)
+                found += 1
+    assert found > 30
 
 
 @pytest.mark.slow

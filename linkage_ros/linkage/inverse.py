@@ -443,8 +443,11 @@ class Inverse:
         mode //= math.prod(map(len, closed.turns))
         turning = np.reshape(self._choices.get_or_make(mode, lambda: self.linkage.bind(Program(
             [*chain(*closed.modes[mode].rates)], n, closed.given))).at(*values), (n, n))
-        if np.linalg.det(turning @ np.reshape(rates, (n, n)).T) < 0.0:
-            return None
+        with np.errstate(invalid='ignore'):
+            # The identity but for rounding; each dyad on its other side turns a sign.
+            both = turning @ np.reshape(rates, (n, n)).T
+            if np.linalg.det(both) < 0.0 or (np.diag(both) < 0.0).any():
+                return None
         try:
             with np.errstate(all='ignore'):
                 found = 1.0 / turning if n == 1 else np.linalg.inv(turning)
