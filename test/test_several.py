@@ -3,6 +3,7 @@
 
 """Several outputs are wanted of several inputs: all answers, and nothing else, by circles."""
 
+from itertools import product
 import math
 
 from linkage_ros import mechanisms, scene
@@ -99,6 +100,57 @@ def test_whole_turns_are_kept_and_a_singular_pose_is_not_passed():
         assert linkage.inputs_for(outputs, (0.6, beyond)) == []
     back, _ = linkage.follow_inputs(outputs, foot, inputs)
     np.testing.assert_allclose(back, near, atol=1e-9)
+
+
+@pytest.mark.parametrize('seed', [0, *(
+    pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 40))])
+@pytest.mark.parametrize('hung', ['zero O geared', 'zero Q geared', 'beside'])
+def test_an_input_that_is_held_is_held_in_its_own_turn(hung, seed):
+    # A second crank is geared to the one that is held: a turn later it is elsewhere.
+    rng = np.random.default_rng(seed)
+    long, short = rng.uniform(1.6, 2.0, 4).round(3), rng.uniform(0.4, 0.8, 4).round(3)
+    ratio = rng.choice(['1/2', '1/3', '3/2', '-1/2', '0.4', '5/61', '2', '0.3183', '65/64'])
+    where = {'zero Q geared': 'F'}.get(hung, 'Q')
+    linkage = mechanisms.create('custom', joints=(
+        'O ground 0 0', 'Q ground 0.7 0', f'E crank O {short[0]}',
+        f'F crank Q {short[1]} called drive',
+        f'G crank {where} {short[2]} {hung.replace("beside", "geared")} drive {ratio} 0.3',
+        *((f'M dyad E F {long[0]} {long[1]} left', f'N dyad G Q {short[3]} {short[2]} left')
+          if hung == 'beside' else (f'M dyad E G {long[0]} {long[1]} left',))))
+    poses = rng.uniform((-3.0, -25.0), (3.0, 25.0), (100, 2))
+    assembled = np.isfinite(np.concatenate([*linkage.solve(poses.T).values()], axis=1)).all(axis=1)
+    poses = iter(poses[assembled].tolist())
+    for output in ('M.x', 'M.y', 'distance(O,M)', 'angle(E,M)') * 2:
+        theta, held = next(poses)
+        value = float(linkage.joint_angles((theta, held), (output,))[output])
+        answers = linkage.input_for(output, value, others=(held,))
+        there = linkage.joint_angles((answers, np.full_like(answers, held)), (output,))[output]
+        np.testing.assert_allclose(np.exp(1j * there), np.exp(1j * value), atol=1e-9)
+        assert np.abs(np.exp(1j * answers) - np.exp(1j * theta)).min() < 1e-6
+        nearest = linkage.input_for(output, value, theta, (held,))
+        assert nearest == pytest.approx(theta, abs=1e-6)
+
+
+def test_two_dyads_beyond_the_ends_of_their_rockers_are_not_taken_for_the_other_sides():
+    # A rocker turns back where its dyad stretches: next to that the other side is an answer, too.
+    rng, beyond, found = np.random.default_rng(1), 3e-8, 0
+    for _ in range(12):
+        lines, ends = [], []
+        for name, at in ('O', 0), ('R', 7):
+            a, b, c = rng.uniform(0.8, 1.6, 3).round(3)
+            lines += [f'{name} ground {at} 0', f'{name}q ground {at + 2} 0',
+                      f'{name}a crank {name} {a}', f'{name}b dyad {name}a {name}q {b} {c} left']
+            ends.append(math.pi - math.acos((4.0 + (b + c) ** 2 - a * a) / (4.0 * (b + c)))
+                        if abs(2.0 - b - c) < a < 2.0 + b + c and b + c < 2.0 + a else math.nan)
+        linkage = mechanisms.create('custom', joints=lines)
+        for sides in product((1.0, -1.0), repeat=4 * bool(np.isfinite(ends).all())):
+            values = np.multiply(sides[:2], ends) + beyond * np.array(sides[2:])
+            for answer in linkage.inputs_for(('Oq_Ob', 'Rq_Rb'), values):
+                there = [*linkage.joint_angles(answer.inputs, ('Oq_Ob', 'Rq_Rb')).values()]
+                away = np.angle(np.exp(1j * (np.array(there) - values)))
+                assert np.abs(away).max() < 1.5 * beyond, (lines, values)
+                found += 1
+    assert found > 30
 
 
 @pytest.mark.slow

@@ -34,6 +34,8 @@ from typing import (
 
 # Of the size of a linkage, what is rounding.
 ROUNDING = 1e-12
+# A joint on the line of a bar is told from it up to so many of its lengths away.
+BESIDE = 1.0 + ROUNDING
 
 Pin = Tuple[str, complex]
 
@@ -224,10 +226,12 @@ class Dyads:
         if name := self.known(body, place):
             return name, self.on[body][name]
         said, on, part = self.said, self.on[body], self.parts[body]
-        # On the bar from which the triangle is the least flat.
-        bars = [(abs(((place - start) / (end - start)).imag), (first, start), (second, end))
+        # On a bar on whose line it is, as near as that is long, or from which the triangle is the
+        # least flat.
+        bars = [(math.inf if abs(seen.imag * (end - start)) < self.near and abs(seen) < BESIDE
+                 else abs(seen.imag), (first, start), (second, end))
                 for (first, start), (second, end) in combinations(on.items(), 2)
-                if abs(end - start) > self.near]
+                if abs(end - start) > self.near for seen in ((place - start) / (end - start),)]
         if body == self.ground:
             line = f'ground {said(place.real)} {said(place.imag)}'
         elif part.slide and [each.joint for each in self.parts.values() if each.slide].count(
@@ -262,9 +266,16 @@ class Dyads:
         name, end = next(((name, end) for name, end in self.on[body].items()
                           if name not in (origin, but)
                           and abs(((end - at) / axis).imag) < ROUNDING * self.size), None) \
-            or self.fixed(body, at + axis * (max(abs(end - at) for end in self.on[body].values())
-                                             or self.size))
+            or self.fixed(body, at + axis * self._length(body, at))
         return (origin, at), name, (end - at) / abs(end - at)
+
+    def _length(self, body: str, place: complex) -> float:
+        """Return how long a line through a place on a body is to be for the least rounding."""
+        away = [abs(end - place) for end in self.on[body].values()]
+        if body == self.ground:
+            return max(away) or self.size
+        # As long as a triangle's side that is known: such a triangle is the least flat.
+        return min((gap for gap in away if gap >= self.near), default=self.size)
 
     def end(self, body: str) -> Pin:
         """Return the first joint of the lines on a body."""
@@ -301,10 +312,11 @@ class Dyads:
         centred = hinge.places[1 - way]
         origin, rail = next(self._rails(body), (centred, 1.0 + 0.0j))
         foot = origin + rail * ((centred - origin) / rail).real
-        # On the line that something slides on, where that passes the hinge.
-        place = next((pin[body] for pin in self.pins
-                      if body in pin and abs(pin[body] - centred) > self.near),
-                     centred + self.size * rail if abs(foot - centred) < self.near else foot)
+        # On the line that something slides on where that passes the hinge, before any far joint:
+        # a foot told from that would be rounded in the size of what is far.
+        place = foot if abs(foot - centred) >= self.near else next(
+            (pin[body] for pin in self.pins
+             if body in pin and abs(pin[body] - centred) > self.near), centred + self.size * rail)
         sign = -1.0 if way else 1.0
         start = sign * hinge.zero + phase((place - centred) / along)
         quarters = self.quarters(start) if base == self.ground else None

@@ -171,6 +171,11 @@ class Inverse:
         self._sizes = [input_.size for input_ in linkage.inputs]
         self._check, self._choices = linkage.checked(outputs), Cache()
         self.inputs = tuple(map(self._coming_round, range(self._n), linkage.inputs))
+        # After how much an output is the same: a turn, of an input that is held its period.
+        held = {input_.name: input_ for input_ in self.inputs}
+        self._rounds = [math.inf if not angular or name in held and not held[name].turns else
+                        held[name].turn if name in held else math.tau
+                        for name, angular in zip(outputs, self._angular)]
         # Of each input half a period, the period, and below what it is zero.
         self._turned = [(0.5 * input_.turn, input_.turn, LEAST) if input_.turns else
                         (math.inf, math.inf, LEAST * input_.size) for input_ in self.inputs]
@@ -184,7 +189,7 @@ class Inverse:
             self._solve = linkage.bind(Program(self._rows, self._n, self.closed.given))
         else:
             self._search: Any = Analysis(linkage).branches(*outputs) if self._n == 1 else Search(
-                linkage, outputs)
+                linkage, outputs, self._rounds)
 
     @cached_property
     def _rated(self) -> Pose:
@@ -231,7 +236,8 @@ class Inverse:
         Parameters
         ----------
         values : float or array-like (outputs,)
-            What the outputs are to be [rad or m], angles with whole turns aside.
+            What the outputs are to be [rad or m], angles with whole turns aside, an input that is
+            held with whole periods.
         near : array-like (inputs,), optional
             Values of the inputs [rad or m] to which the answers are brought by whole turns, the
             nearest first, a length being counted in parts of about its stroke.
@@ -334,12 +340,16 @@ class Inverse:
         # At an end of the reach outputs may be NaN, not where a limit is missed by far.
         other = reduce(lambda unknown, margin: where(margin < 0.0, 0.0, unknown), margins, where(
             abs(inputs[0]) < LARGE, math.nan, 0.0))
-        for i, (angular, scale) in enumerate(zip(self._angular, self._scales)):
+        held = {input_.name for input_ in self.inputs}
+        for i, (turn, scale) in enumerate(zip(self._rounds, self._scales)):
             gap = reached[i] - argument(i)
-            if angular and self.outputs[i] in self.linkage.structure.built.driven:
+            if self._angular[i] and self.outputs[i] in {
+                    *self.linkage.structure.built.driven} - held:
                 # What is given is what is had, in whatever turn.
                 gap = 0.0 * gap
-            elif angular:
+            elif self.outputs[i] in held and math.isfinite(turn):
+                gap = gap - turn * nearest_integer(gap / turn)
+            elif math.isfinite(turn):
                 gap = where(math.pi < gap, gap - math.tau, where(gap < -math.pi, gap + math.tau,
                                                                  gap))
             gaps.append(gap)
@@ -384,8 +394,8 @@ class Inverse:
 
     def _reduced(self, values: Tuple[float, ...]) -> Tuple[float, ...]:
         """Return values with angles beyond a turn within one: sine and cosine lose no digit."""
-        return tuple(math.atan2(math.sin(x), math.cos(x)) if angular and abs(x) > math.tau else x
-                     for x, angular in zip(values, self._angular))
+        return tuple(float(_within_turn(x, turn)) if abs(x) > turn else x
+                     for x, turn in zip(values, self._rounds))
 
     def _own(self, mode: int, inputs: Tuple[float, ...], values: Sequence[float],
              within: bool = True) -> Optional[Found]:
@@ -433,8 +443,11 @@ class Inverse:
         mode //= math.prod(map(len, closed.turns))
         turning = np.reshape(self._choices.get_or_make(mode, lambda: self.linkage.bind(Program(
             [*chain(*closed.modes[mode].rates)], n, closed.given))).at(*values), (n, n))
-        if np.linalg.det(turning @ np.reshape(rates, (n, n)).T) < 0.0:
-            return None
+        with np.errstate(invalid='ignore'):
+            # The identity but for rounding; each dyad on its other side turns a sign.
+            both = turning @ np.reshape(rates, (n, n)).T
+            if np.linalg.det(both) < 0.0 or (np.diag(both) < 0.0).any():
+                return None
         try:
             with np.errstate(all='ignore'):
                 found = 1.0 / turning if n == 1 else np.linalg.inv(turning)
@@ -452,16 +465,19 @@ class Inverse:
                 slack: float) -> Tuple[List[float], bool, float]:
         """Return what outputs miss, whether that is rounding, and the most, in their sizes."""
         n, gaps, sure, most = self._n, [], True, 0.0
-        for i, (value, angular, scale) in enumerate(zip(values, self._angular, self._scales)):
+        for i, (value, turn, scale) in enumerate(zip(values, self._rounds, self._scales)):
             gap = row[i] - value
-            if angular and gap - gap == 0.0:
-                gap = math.remainder(gap, math.tau)
+            if gap - gap == 0.0:
+                gap = math.remainder(gap, turn)
             gaps.append(gap)
-            away, allowed = abs(gap), ROUNDING * scale
+            away, allowed, own = abs(gap), ROUNDING * scale, 0.0
             if not away <= allowed:
                 for rate, x, size in zip(row[n + i::n], inputs, self._sizes):
                     allowed += slack * abs(rate) * max(size, abs(x))
-                sure = sure and away <= min(allowed, ENDED * scale)
+                    # Next to a dead point the last digit of an input may be worth more than that.
+                    own += 2.0 ** -52 * abs(rate) * abs(x)
+                own = min(own, OTHER * scale) if own < math.inf else 0.0
+                sure = sure and away <= max(min(allowed, ENDED * scale), own)
             if not away / scale <= most:
                 most = away / scale
         return gaps, sure, most
@@ -539,8 +555,9 @@ class Inverse:
         if near.all():
             return values
         values = np.where(np.isfinite(values), values, np.nan)
-        far = ~near & np.array(self._angular)[:, None]
-        values[far] = np.arctan2(np.sin(values[far]), np.cos(values[far]))
+        for row, turn in zip(values, self._rounds):
+            far = np.abs(row) > turn
+            row[far] = _within_turn(row[far], turn)
         return values
 
     def _single(self, inputs: np.ndarray, rates: np.ndarray) -> None:
@@ -744,9 +761,9 @@ class Inverse:
             0, count * size, size)] or [self._rows[i:i + size + 1] for i in range(
                 0, len(self._rows), size + 1)]
         unknown = reduce(lambda found, row: where(row[0] <= 1.0, found, math.nan), rows, real(0.0))
-        for value, angular in zip(values, () if count else self._angular):
-            if angular:
-                unknown = unknown + where(abs(value) <= math.tau, 0.0, math.nan)
+        for value, turn in zip(values, () if count else self._rounds):
+            if math.isfinite(turn):
+                unknown = unknown + where(abs(value) <= turn, 0.0, math.nan)
         choices = []
         for rank, (verdict, *row) in enumerate(rows):
             places, misses = zip(*(self._place(by, row, near, limit)
@@ -836,8 +853,8 @@ class Inverse:
         start = self._check.at(*near)[:self._n]
         if any(x != x for x in start):
             return None
-        gaps = [math.remainder(value - now, math.tau) if angular else value - now
-                for value, now, angular in zip(values, start, self._angular)]
+        gaps = [math.remainder(value - now, turn)
+                for value, now, turn in zip(values, start, self._rounds)]
         steps = math.ceil(max(abs(gap) / scale for gap, scale in zip(gaps, self._scales)) / STEP)
         at = {mode: near for mode, place in self._modes(start, near)
               if max(abs(x - y) / size for x, y, size in zip(place, near, self._sizes)) < ALIKE}
@@ -909,6 +926,11 @@ class Inverse:
         signs['det'] = 0 if self.margin(inputs) < SINGULAR else _sign(float(np.linalg.det(
             self._jacobian(self._rated.at(*inputs)[self._n:]))), 0.0)
         return signs
+
+
+def _within_turn(value: Any, turn: float) -> Any:
+    count = turn / math.tau
+    return count * np.arctan2(np.sin(value / count), np.cos(value / count))
 
 
 def _sign(value: float, size: float) -> int:

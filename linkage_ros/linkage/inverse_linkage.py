@@ -421,7 +421,8 @@ class _Sketch(Dyads):
             at_zero = self._linkage.posed((), (name,), (name,)).at(*[0.0] * len(
                 self._linkage.inputs))
             ratio, offset = (1.0, 0.0) if name == input_.name else (at_zero[1 + by], at_zero[0])
-            count = round(abs(ratio) * input_.period) if input_.turns else 1
+            held = name in self._outputs and name == input_.name
+            count = round(abs(ratio) * input_.period) if input_.turns and not held else 1
             return _Read(name, ends, ratio, offset, tuple(
                 turn * math.tau / abs(ratio) for turn in range(count)))
         raise ValueError(f'{input_.name} is not placed')

@@ -75,22 +75,28 @@ def dependent(outputs: Names, rows: Sequence[int]) -> ValueError:
 class Search:
     """Outputs as functions of the inputs, all of them counted in their sizes inside."""
 
-    def __init__(self, linkage: Mechanism, outputs: Names):
+    def __init__(self, linkage: Mechanism, outputs: Names, turns: Sequence[float]):
         self.outputs, self.inputs = outputs, [input_.counted() for input_ in linkage.inputs]
         self.sizes = np.array([input_.size for input_ in linkage.inputs])
-        self._angular = np.array(list(map(linkage.is_angle, outputs)))
-        self.scale = np.where(self._angular, 1.0, linkage.longest)
+        # After how much an output is the same; inputs that are outputs, by where they are in both.
+        self._turns = np.array(turns)
+        self._given = {outputs.index(input_.name): by for by, input_ in enumerate(self.inputs)
+                       if input_.name in outputs}
+        self.scale = np.where(list(map(linkage.is_angle, outputs)), 1.0, linkage.longest)
         self._pose, self._margins = linkage.posed((), outputs, outputs), linkage.margins
         self.blocks = blocks(linkage, outputs)
         self._check_told()
 
     def answers(self, values: np.ndarray) -> np.ndarray:
         """Return all inputs that give outputs their values, in rows."""
-        middle = [0.5 * (input_.low + input_.high) for input_ in self.inputs]
-        found = np.array([middle] if np.isfinite(values).all() else []).reshape(-1, len(middle))
-        for block in self.blocks:
-            found = np.concatenate([found[:0], *(
-                self.solutions(q, values, *block) for q in found)])
+        start = [0.5 * (input_.low + input_.high) for input_ in self.inputs]
+        for place, by in self._given.items():
+            start[by] = values[place] / self.sizes[by]
+        found = np.array([start] if np.isfinite(values).all() else []).reshape(-1, len(start))
+        for rows, columns in self.blocks:
+            if not self._given.keys() >= {*rows}:
+                found = np.concatenate([found[:0], *(
+                    self.solutions(q, values, rows, columns) for q in found)])
         return (found[self._held(found * self.sizes)]) * self.sizes
 
     def _held(self, inputs: np.ndarray) -> np.ndarray:
@@ -111,7 +117,8 @@ class Search:
     def _missed(self, rows: np.ndarray, target: np.ndarray) -> _Pair:
         n = len(target)
         missed = rows[:n].T - target
-        missed -= np.where(self._angular, math.tau * np.round(missed / math.tau), 0.0)
+        whole = np.isfinite(self._turns)
+        missed[:, whole] -= self._turns[whole] * np.round(missed[:, whole] / self._turns[whole])
         jacobian = rows[n:].reshape(n, n, rows.shape[1]).transpose(2, 1, 0)
         return missed / self.scale, jacobian * self.sizes / self.scale[:, None]
 
@@ -129,9 +136,10 @@ class Search:
         def moved(q: np.ndarray, step: np.ndarray) -> np.ndarray:
             """Return inputs after a step, within one turn and their strokes."""
             q = q.copy()
-            q[:, columns] += step
-            return np.stack([input_.wrapped(x) if input_.turns else x.clip(input_.low, input_.high)
-                             for input_, x in zip(self.inputs, q.T)], axis=-1)
+            for by, x in zip(columns, (q[:, columns] + step).T):
+                input_ = self.inputs[by]
+                q[:, by] = input_.wrapped(x) if input_.turns else x.clip(input_.low, input_.high)
+            return q
 
         def beyond(q: np.ndarray) -> np.ndarray:
             """Return poses on both sides of solutions, where others may lie behind a fold."""
