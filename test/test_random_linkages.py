@@ -102,6 +102,11 @@ MENDED = {
         'A ground 0 0', 'C ground 0 0.4692682948918445', 'D crank A 0.3838513370796755',
         'E antiparallelogram A C D', 'F yoke E A along D', 'H slot D F 0 out 0.37'),
         (1.7703773345200866,)),
+    'a cell on a cylinder that is long beside its base': ((
+        'A ground 0 0', 'B ground -5.46641130381081e-23 0',
+        'D cylinder A B 1.1595959378308743e-20 left',
+        'H J K inversor A D 2.685253038322849e-20 2.982014311130956e-20'),
+        (1.1643742128158774e-20,)),
     'an image of a joint of the ground': ((
         'A ground 0 0', 'C ground 0.170347395 0', 'D ground 0.03191923 1.50131151692',
         'E crank A 1', 'K image A D C'), (0.3,)),

@@ -230,6 +230,11 @@ def exact_sum(*terms: Number) -> Real:
     return reduce(operator.add, parts, real(0.0))
 
 
+def sum_and_lost(first: Real, second: Real) -> Tuple[Real, Real]:
+    """Return a sum of two, and what rounding has lost of it, exactly."""
+    return first + second, operation('lost', first, second)
+
+
 def _distilled(terms: List[Real]) -> List[Real]:
     """Return what each addition of a sum has lost to rounding, and the sum at last."""
     total, *rest = terms
