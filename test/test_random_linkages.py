@@ -121,6 +121,13 @@ def test_what_once_broke_the_rule_keeps_it(name):
     assert not drawing_accuracy.broken(subject.fitted(np.array([given]), True, motion=motion))
 
 
+# A narrow arc of the reach beside an arm that nearly vanishes; a fold that is zero all along.
+@pytest.mark.parametrize('seed', [1758, 1736])
+def test_reach_and_dead_points_that_were_missed_once(seed):
+    found = problems([seed], lambda _: (checks.reach, checks.dead_points))
+    assert not found, report(found)
+
+
 # --- that the check is a check ------------------------------------------------------------------
 
 @pytest.mark.slow

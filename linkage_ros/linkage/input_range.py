@@ -23,6 +23,8 @@ from .planar import Limit
 # Samples of a whole turn in search of ends without a closed form, samples of an arc at least, and
 # how often arcs inside arcs are searched.
 SAMPLES, FEWEST, ROUNDS = 720, 33, 4
+# How often the step is halved towards a value at which a margin nearly vanishes.
+HALVINGS = 12
 # Where an arc is looked at: in its middle, symmetric linkages may have an arm of no length.
 INSIDE = 0.49
 # What places may differ by from turn to turn, as a part of their size, and be the same.
@@ -99,7 +101,11 @@ def _limits(margins: Callable, failing: Callable, lo: float, hi: float) -> List[
 
 
 def _touches(margins: Callable, theta: np.ndarray) -> np.ndarray:
-    """Return where margins come nearest to zero between samples."""
+    """
+    Return where margins come nearest to zero between samples, and ever denser towards there.
+
+    An arm that nearly vanishes there turns fast, and with it what hangs on it.
+    """
     values = margins(theta)
     row, place = np.nonzero(near_misses(values))
     sign = np.sign(values[row, place + 1])[:, None]
@@ -109,7 +115,10 @@ def _touches(margins: Callable, theta: np.ndarray) -> np.ndarray:
         found = margins(angles.ravel()).reshape(-1, *angles.shape)
         return sign * found[row, chosen]
 
-    return lowest(distance, theta[place], theta[place + 2])
+    lo, hi = theta[place], theta[place + 2]
+    found = lowest(distance, lo, hi)[:, None]
+    steps = np.outer(hi - lo, 0.5 ** np.arange(1, HALVINGS))
+    return np.clip(np.hstack([found, found - steps, found + steps]).ravel(), theta[0], theta[-1])
 
 
 def _trimmed(assembled: Callable, lo: float, hi: float) -> Arc:
