@@ -107,6 +107,10 @@ MENDED = {
         'D cylinder A B 1.1595959378308743e-20 left',
         'H J K inversor A D 2.685253038322849e-20 2.982014311130956e-20'),
         (1.1643742128158774e-20,)),
+    'a rocker that hardly moves while its coupler does': ((
+        'A ground 0 0', 'C ground -1.198753553 0', 'D crank A 0.354772347866',
+        'E dyad D C 0.37805917181 0.37805917181+1.198753553-0.354772347866 right',
+        'F slider E 3.166 A along C out'), (-2.2665130987562727,)),
     'an image of a joint of the ground': ((
         'A ground 0 0', 'C ground 0.170347395 0', 'D ground 0.03191923 1.50131151692',
         'E crank A 1', 'K image A D C'), (0.3,)),

@@ -426,7 +426,7 @@ def mirror(arm: Arm, point: Complex, offset: Real, ends: Sequence[Complex],
             (*turning.of, *own.of), lambda *rates, own=own: gated(
                 2.0 * turning.formula(*rates[:len(turning.of)])
                 - own.formula(*rates[len(turning.of):]), abs(image.x + image.y), real(0.0)))))
-    return _with_velocity(image, arm.foot, bars[0]), *bars
+    return with_velocity(image, arm.foot, bars[0]), *bars
 
 
 def parallel(bar: Complex, place: Complex) -> Complex:
@@ -440,7 +440,7 @@ def parallel(bar: Complex, place: Complex) -> Complex:
     return same
 
 
-def _with_velocity(place: Complex, start: Complex, bar: Complex) -> Complex:
+def with_velocity(place: Complex, start: Complex, bar: Complex) -> Complex:
     """Return a place with the velocity of the end of a bar of constant length from a start."""
     turning = spin(bar)
     return Complex(
