@@ -102,6 +102,15 @@ MENDED = {
         'A ground 0 0', 'C ground 0 0.4692682948918445', 'D crank A 0.3838513370796755',
         'E antiparallelogram A C D', 'F yoke E A along D', 'H slot D F 0 out 0.37'),
         (1.7703773345200866,)),
+    'a cell on a cylinder that is long beside its base': ((
+        'A ground 0 0', 'B ground -5.46641130381081e-23 0',
+        'D cylinder A B 1.1595959378308743e-20 left',
+        'H J K inversor A D 2.685253038322849e-20 2.982014311130956e-20'),
+        (1.1643742128158774e-20,)),
+    'a rocker that hardly moves while its coupler does': ((
+        'A ground 0 0', 'C ground -1.198753553 0', 'D crank A 0.354772347866',
+        'E dyad D C 0.37805917181 0.37805917181+1.198753553-0.354772347866 right',
+        'F slider E 3.166 A along C out'), (-2.2665130987562727,)),
     'an image of a joint of the ground': ((
         'A ground 0 0', 'C ground 0.170347395 0', 'D ground 0.03191923 1.50131151692',
         'E crank A 1', 'K image A D C'), (0.3,)),
@@ -114,6 +123,13 @@ def test_what_once_broke_the_rule_keeps_it(name):
     subject = checks.Subject(random_linkages.Design(joints, {}, {}), np.random.default_rng(0), 400)
     motion = drawing_accuracy.Motion((1.0,), (0.3,))
     assert not drawing_accuracy.broken(subject.fitted(np.array([given]), True, motion=motion))
+
+
+# A narrow arc of the reach beside an arm that nearly vanishes; a fold that is zero all along.
+@pytest.mark.parametrize('seed', [1758, 1736])
+def test_reach_and_dead_points_that_were_missed_once(seed):
+    found = problems([seed], lambda _: (checks.reach, checks.dead_points))
+    assert not found, report(found)
 
 
 # --- that the check is a check ------------------------------------------------------------------

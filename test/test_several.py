@@ -209,3 +209,16 @@ def test_answers_lie_in_the_sweeps_or_the_reason_says_so():
     assert wanted.answers((0.05, 0.15), (3.2, 0.0)) == []
     assert wanted.reason(0.05, 0.15) == (
         'P.x, P.y at 0.05, 0.15 takes inputs outside crank.sweep [3, 3.5]')
+
+
+@pytest.mark.parametrize('held', [0.5, 0.5 + math.tau, 0.5 - math.tau])
+def test_a_geared_crank_is_held_in_the_turn_that_is_given(held):
+    linkage = mechanisms.create('custom', joints=[
+        'O ground 0 0', 'Q ground 1 0', 'A crank O 1', 'P crank Q 1 called drive',
+        'F crank Q 0.7 geared drive 0.5 0', 'B dyad A F 1.5 1.6 left'])
+    wanted = linkage.joint_angles([0.8, held], ['FB'])['FB']
+    answers = linkage.input_for('FB', wanted, others=[held])
+    assert np.min(np.abs(answers - 0.8)) < 1e-9
+    for answer in (*answers, linkage.input_for('FB', wanted, near=0.8, others=[held])):
+        found = linkage.joint_angles([answer, held], ['FB'])['FB']
+        assert math.remainder(found - wanted, math.tau) == pytest.approx(0.0, abs=1e-12)

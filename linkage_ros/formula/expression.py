@@ -229,6 +229,11 @@ def exact_sum(*terms: Number) -> Real:
     return reduce(operator.add, parts, real(0.0))
 
 
+def sum_and_lost(first: Real, second: Real) -> Tuple[Real, Real]:
+    """Return a sum of two, and what rounding has lost of it, exactly."""
+    return first + second, operation('lost', first, second)
+
+
 def _distilled(terms: List[Real]) -> List[Real]:
     """Return the rounding error of each addition of a sum, and last the sum."""
     total, *rest = terms

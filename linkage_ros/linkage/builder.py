@@ -281,7 +281,12 @@ class Builder:
         """Join bars of to_first and to_second [m] from two joints, left of first -> second."""
         found = planar.dyad(self.arm(first, second), to_first, to_second, side)
         self.limits += found.limits
-        self._pair(name, first, second, found, to_first, to_second)
+        start, pivot = self.points[first], self.points[second]
+        place = start.place + found.first
+        if start.home != GROUND == pivot.home:
+            # About a joint of the ground it can only turn.
+            place = planar.with_velocity(place, pivot.place, found.second)
+        self._pair(name, first, second, found, to_first, to_second, place=place)
 
     def rigid(self, name: str, first: str, second: str, to_first: Real, to_second: Real,
               side: float) -> None:

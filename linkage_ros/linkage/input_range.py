@@ -23,6 +23,8 @@ from .planar import Limit
 # Samples of a whole turn in search of ends without a closed form, samples of an arc at least, and
 # how often arcs inside arcs are searched.
 SAMPLES, FEWEST, ROUNDS = 720, 33, 4
+# How often the step is halved towards a value at which a margin nearly vanishes.
+HALVINGS = 12
 # Where an arc is looked at: in its middle, symmetric linkages may have an arm of no length.
 INSIDE = 0.49
 # What places may differ by from turn to turn, as a part of their size, and be the same.
@@ -109,7 +111,11 @@ def _limits(margins: Callable, lo: float, hi: float) -> List[float]:
 
 
 def _touches(margins: Callable, theta: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return where margins come nearest to zero between samples, from their values there."""
+    """
+    Return where margins come nearest to zero between samples, and ever denser towards there.
+
+    An arm that nearly vanishes there turns fast, and with it what hangs on it.
+    """
     row, place = np.nonzero(near_misses(values))
     sign = np.sign(values[row, place + 1])[:, None]
     chosen = np.arange(len(row))
@@ -118,7 +124,10 @@ def _touches(margins: Callable, theta: np.ndarray, values: np.ndarray) -> np.nda
         found = margins(angles.ravel()).reshape(-1, *angles.shape)
         return sign * found[row, chosen]
 
-    return lowest(distance, theta[place], theta[place + 2])
+    lo, hi = theta[place], theta[place + 2]
+    found = lowest(distance, lo, hi)[:, None]
+    steps = np.outer(hi - lo, 0.5 ** np.arange(1, HALVINGS))
+    return np.clip(np.hstack([found, found - steps, found + steps]).ravel(), theta[0], theta[-1])
 
 
 def _trimmed(assembled: Callable, lo: float, hi: float) -> Arc:

@@ -41,6 +41,7 @@ from ..formula.expression import (
     spin,
     square,
     square_root,
+    sum_and_lost,
     where,
     with_rate,
     with_spin,
@@ -153,9 +154,11 @@ class Arm:
         length = self._length
         if length is None:
             return self.within(first + second, size), self.beyond(first - second, size)
-        # However short it is, it is added last.
-        margins = ((first + (second - length)) * (first + (second + length)),
-                   ((length + second) - first) * (first + (length - second)))
+        # What varies comes last, for what comes next to nothing by that is exact.
+        (near, near_lost), (far, far_lost) = sum_and_lost(second, -length), \
+            sum_and_lost(second, length)
+        margins = (((first + near) + near_lost) * (first + far),
+                   ((far - first) + far_lost) * ((first - near) - near_lost))
         longer, shorter = (gated(margin, self.square, real(0.0)) for margin in margins)
         return (self._limit(first + second, size, 1.0, longer),
                 self._limit(first - second, size, -1.0, shorter))
@@ -341,7 +344,8 @@ def extended(arm: Arm, first: Real, second: Real, side: float, longest: Real) ->
     """
     Return the dyad whose first bar is a cylinder c, up to `longest` [m]; of that the direction.
 
-    With a bar r, u = (|w|^2 - r^2 + c^2) / 2|w|^2. As the cylinder grows, both turn by c / (v
+    With a bar r, u = (|w|^2 - r^2 + c^2) / 2|w|^2; r^2 is taken off the larger of the other two,
+    which leaves a part that the third side bounds. As the cylinder grows, both turn by c / (v
     |w|^2) for each metre, the barrel by (1 - (|w|^2 - r^2) / c^2) / 2 of that: nothing cancels
     where the bar is as long as the arm, and c and v vanish together.
     """
@@ -350,7 +354,9 @@ def extended(arm: Arm, first: Real, second: Real, side: float, longest: Real) ->
     power = arm.square - square(second) if length is None else \
         (length - second) * (length + second)
     v = _height(arm, limits, side, False)
-    u = _known_with(v, arm.vector, (power + square(first)) / (2.0 * arm.square))
+    twice = where(square(first) <= arm.square, power + square(first),
+                  (first - second) * (first + second) + arm.square)
+    u = _known_with(v, arm.vector, twice / (2.0 * arm.square))
     growth, turning = _growth(arm, first, second, v), spin(arm.vector)
 
     def with_growing(bar: Complex, grown: Real, widened: Real) -> Complex:
@@ -420,7 +426,7 @@ def mirror(arm: Arm, point: Complex, offset: Real, ends: Sequence[Complex],
             (*turning.of, *own.of), lambda *rates, own=own: gated(
                 2.0 * turning.formula(*rates[:len(turning.of)])
                 - own.formula(*rates[len(turning.of):]), abs(image.x + image.y), real(0.0)))))
-    return _with_velocity(image, arm.foot, bars[0]), *bars
+    return with_velocity(image, arm.foot, bars[0]), *bars
 
 
 def parallel(bar: Complex, place: Complex) -> Complex:
@@ -434,7 +440,7 @@ def parallel(bar: Complex, place: Complex) -> Complex:
     return same
 
 
-def _with_velocity(place: Complex, start: Complex, bar: Complex) -> Complex:
+def with_velocity(place: Complex, start: Complex, bar: Complex) -> Complex:
     """Return a place with the velocity of the end of a bar of constant length from a start."""
     turning = spin(bar)
     return Complex(

@@ -131,10 +131,10 @@ class Subject:
         arms = self.drawn([value])[0].arms.values()
         return any(not np.all(arm >= SHORTEST) for arm in arms)
 
-    def away(self, value, others):
-        """Return how far a value of the first input is from the nearest of others."""
-        turn = self.inputs[0].turn
-        return min((abs((value - other + turn / 2) % turn - turn / 2) if self.turns
+    def away(self, value, others, turn=None):
+        """Return how far a value of the first input is from the nearest of others, or turns on."""
+        turn = (self.inputs[0].turn if turn is None else turn) if self.turns else math.inf
+        return min((abs((value - other + turn / 2) % turn - turn / 2) if math.isfinite(turn)
                     else abs(value - other) for other in others), default=math.inf)
 
     def place(self, output, drawing, unit):
@@ -392,7 +392,8 @@ def _vanishing(subject):
     held, values = subject.reachable(drawing), subject.values
     found = []
     for k, row in enumerate(_closures(drawing, values.shape)):
-        if not np.all(np.isfinite(row)) or np.max(np.abs(row)) < 1e-12:
+        # What is zero all along is rounding, which a short arm may make larger here and there.
+        if not np.all(np.isfinite(row)) or np.median(np.abs(row)) < 1e-12:
             continue
         changes = np.flatnonzero((row[:-1] < 0.0) != (row[1:] < 0.0))
         for i in changes[held[changes] | held[changes + 1]][:20]:
@@ -521,6 +522,9 @@ def _false(subject, output, target, answers, turns, scale):
 
 def _lost(subject, output, target, answers, turns, scale, value, good):
     """Yield crossings of the value that are not among the answers."""
+    # Outputs of gears that hardly ever come round have a period of their own.
+    names = (output, *(input_.name for input_ in subject.inputs[1:]))
+    turn = subject.mechanism.inverse(names).inputs[0].turn
     gap = _gap(value, target, turns)
     change = (gap[:-1] < 0.0) != (gap[1:] < 0.0)
     change &= good[:-1] & good[1:] & (np.abs(np.diff(gap)) < 0.2 * scale)
@@ -535,7 +539,7 @@ def _lost(subject, output, target, answers, turns, scale, value, good):
             lo, hi = grid[at - 1], grid[at]
         if not abs(row[at]) < 1e-7 * scale:
             continue  # a jump
-        if subject.away(hi, answers) > subject.scale * (1e-5 + 1e3 * abs(row[at]) / scale):
+        if subject.away(hi, answers, turn) > subject.scale * (1e-5 + 1e3 * abs(row[at]) / scale):
             slope = abs(value[i + 1] - value[i]) / scale
             # It may have crossed in a narrow gap of the reach.
             if slope > 1e-9 and not {'fails', 'slips'} & subject.states(float(hi)):
