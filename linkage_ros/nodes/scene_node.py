@@ -240,7 +240,7 @@ def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_clas
         _refuse_arguments(args)
     except (RuntimeError, scenes.SceneError) as error:
         # rclpy's message may quote a long argument.
-        rclpy.try_shutdown()
+        _shut_down()
         unknown = isinstance(error, rclpy_implementation.UnknownROSArgsError)
         what = 'nothing after --ros-args is called ' if unknown else ''
         hint = '; allowed: -p, -r, --params-file, --log-level, ...' if unknown else ''
@@ -267,8 +267,13 @@ def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_clas
         gc.enable()
         for node in nodes:
             node.destroy_node()
-        rclpy.try_shutdown()
+        _shut_down()
     return 0
+
+
+def _shut_down() -> None:
+    # rclpy would put the default handlers in, though it has installed none: a signal then kills.
+    rclpy.try_shutdown(uninstall_handlers=False)
 
 
 def _spin(executor: Any, nodes: List[Node], shutdown: ShutdownHandler,
