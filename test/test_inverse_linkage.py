@@ -159,6 +159,18 @@ def test_an_input_that_comes_round_after_two_turns_is_answered_in_both():
             assert linkage.input_for(output, value, near=theta) == pytest.approx(theta, abs=1e-7)
 
 
+def test_an_input_is_read_from_a_gear_that_has_no_place_where_the_input_is_zero():
+    # At a cylinder of no length the carriage would be beyond its way.
+    linkage = custom('A ground 0 0', 'B ground 0.4 0', 'C cylinder A B 0.3 left',
+                     'D carriage B along A -0.7 -0.2 geared cylinder -1.5 0.2 called drive',
+                     'E dyad D A 0.6 0.5 left')
+    inverse = linkage.inverse('AE')
+    assert inverse.closed and 'carriage' not in str(inverse)
+    for length in np.linspace(*linkage.reach()[0], 7)[1:-1]:
+        angle = linkage.joint_angles(length, ['AE'])['AE']
+        assert linkage.input_for('AE', angle, near=length) == pytest.approx(length, rel=1e-12)
+
+
 def test_an_angle_that_jumps_where_its_ends_meet_is_answered_on_both_sides():
     linkage = custom('O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'L slot Q A 0 out 2.2')
     for theta in np.linspace(-3.1, 3.1, 63):

@@ -206,9 +206,7 @@ class Inverse:
         """Return an input with the period of the outputs, where its own has too many turns."""
         if not input_.turns or self.linkage.period(by) == input_.period:
             return input_
-        geared = self.linkage.geared_to(by)
-        rates = self.linkage.posed((), (), geared).at(*([0.0] * self._n))[
-            by * len(geared):][:len(geared)]
+        rates = [self.linkage.gear(name, by)[0] for name in self.linkage.geared_to(by)]
         return input_._replace(period=next((
             period for period in (1.0, *(1.0 / abs(rate) for rate in rates if abs(rate) > 1.0))
             if self._repeats(by, math.tau * period)), math.inf))

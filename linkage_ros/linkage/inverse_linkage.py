@@ -418,9 +418,7 @@ class _Sketch(Dyads):
                 ends = self._ends(self._links[name])
             except ValueError:
                 continue
-            at_zero = self._linkage.posed((), (name,), (name,)).at(*[0.0] * len(
-                self._linkage.inputs))
-            ratio, offset = (1.0, 0.0) if name == input_.name else (at_zero[1 + by], at_zero[0])
+            ratio, offset = (1.0, 0.0) if name == input_.name else self._linkage.gear(name, by)
             held = name in self._outputs and name == input_.name
             count = round(abs(ratio) * input_.period) if input_.turns and not held else 1
             return _Read(name, ends, ratio, offset, tuple(

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from . import joint_lines, statics
 from .analysis import Analysis
 from .arguments import checked_dimensions, numbers
-from .builder import UNIT
+from .builder import in_metres, UNIT
 from .design import Design
 from .input_range import arcs
 from .inputs import Arc, Input, MOST_COUNTED
@@ -440,6 +440,14 @@ class Mechanism:
             raise ValueError(
                 f'{self.type} has no output {quoted(output)}; allowed: distance(A,B) and '
                 f'angle(A,B) of two joints, {listed(named)}{meant(output, named)}')
+
+    def gear(self, name: str, by: int = 0) -> Tuple[float, float]:
+        """Return ratio and offset [rad or m] by which an input drives a link, anywhere."""
+        input_, value = self.structure.built.driven[name]
+        value = value if input_.turns else in_metres(value)
+        program = Program([derivative(value, {by: 1.0}, {}), value], len(self.inputs))
+        ratio, offset = self.bind(program).at(*[0.0] * len(self.inputs))
+        return ratio, offset
 
     def geared_to(self, by: int) -> List[str]:
         """Return the links that one of the inputs drives by gears."""
