@@ -21,7 +21,7 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import remove_ros_args
+from rclpy.utilities import remove_ros_args, try_shutdown
 
 from .log import Incidents, InvalidHandle, RCLError, refused
 from .ownership import Announcer, Follower
@@ -240,7 +240,7 @@ def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_clas
         _refuse_arguments(args)
     except (RuntimeError, scenes.SceneError) as error:
         # rclpy's message may quote a long argument.
-        _shut_down()
+        try_shutdown()
         unknown = isinstance(error, rclpy_implementation.UnknownROSArgsError)
         what = 'nothing after --ros-args is called ' if unknown else ''
         hint = '; allowed: -p, -r, --params-file, --log-level, ...' if unknown else ''
@@ -267,13 +267,9 @@ def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_clas
         gc.enable()
         for node in nodes:
             node.destroy_node()
-        _shut_down()
+        # `rclpy.try_shutdown` would put the default signal handlers in: the next signal kills.
+        try_shutdown()
     return 0
-
-
-def _shut_down() -> None:
-    # rclpy would put the default handlers in, though it has installed none: a signal then kills.
-    rclpy.try_shutdown(uninstall_handlers=False)
 
 
 def _spin(executor: Any, nodes: List[Node], shutdown: ShutdownHandler,
