@@ -496,23 +496,9 @@ class Mechanism:
         """
         value, (inverse, held) = numbers('value', value), self._held(output, others)
         if near is None:
-            return self._in_their_turns(inverse.over(value, *held)[0], held)
+            return inverse.over(value, *held)[0][0]
         near = numbers('near', near)
-        ends = [(x - math.pi, x + math.pi) if input_.turns and input_.period > 1 else None
-                for input_, x in zip(self.inputs[1:], held)]
-        return inverse.nearest((value, *held), (near, *held), (None, *ends))[0][0][()]
-
-    def _in_their_turns(self, answers: np.ndarray, held: Sequence[float]) -> np.ndarray:
-        """Return the first inputs of answers in which others are in the turns they are held in."""
-        first, *others = answers
-        turned = [(rows - x, input_.turn) for input_, rows, x in zip(self.inputs[1:], others, held)
-                  if input_.turns and input_.period > 1]
-        for gaps, turn in turned:
-            first = np.where(np.remainder(gaps + math.pi, turn) < math.tau, first, np.nan)
-        if not turned:
-            return first
-        most = max(int(np.isfinite(first).sum(axis=-1).max(initial=0)), 1)
-        return np.sort(first, axis=-1)[..., :most]
+        return inverse.nearest((value, *held), (near, *held))[0][0][()]
 
     def _held(self, output: Any, others: Sequence[float]) -> Tuple[Inverse, List[float]]:
         """Return the inverse of an output with all inputs but the first fixed."""
