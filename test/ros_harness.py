@@ -89,6 +89,13 @@ class Graph:
                 continue
         return held
 
+    def all_logged(self, node, log):
+        """Return the list that gathers /rosout when it has all that a node logged before."""
+        end = f'so far {len(log)}'
+        node.get_logger().info(end)
+        self.until(lambda: any(message.msg == end for message in log))
+        return log
+
     def set(self, node, meanwhile=lambda: None, **values):
         """
         Set parameters through the node's service; __ stands for a point in a name.
