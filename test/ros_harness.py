@@ -3,6 +3,7 @@
 
 """Real nodes on real topics: in this process, or as the processes that users start."""
 
+import gc
 import itertools
 import math
 import os
@@ -11,6 +12,7 @@ import sys
 import time
 
 from domains import Domain
+from rcl_interfaces.msg import Log
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -89,8 +91,14 @@ class Graph:
                 continue
         return held
 
+    def log(self):
+        """Return the list that gathers what nodes log that are started after this."""
+        # What is left of another node would take their loggers away from them, if of their names.
+        gc.collect()
+        return self.listen(Log, '/rosout', 1000)
+
     def all_logged(self, node, log):
-        """Return the list that gathers /rosout when it has all that a node logged before."""
+        """Return the list that gathers /rosout when it has all that a node has logged."""
         end = f'so far {len(log)}'
         node.get_logger().info(end)
         self.until(lambda: any(message.msg == end for message in log))

@@ -3,7 +3,6 @@
 
 """What the kinematics node makes of crank messages, however they come and whatever they say."""
 
-import gc
 import math
 import struct
 import sys
@@ -16,7 +15,6 @@ pytest.importorskip('rclpy')
 
 from linkage_ros.nodes import kinematics  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from rcl_interfaces.msg import Log  # noqa: E402
 from rclpy.logging import LoggingSeverity  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
@@ -30,10 +28,8 @@ class Hand:
     """A kinematics node, what it publishes and says, and a publisher of crank messages."""
 
     def __init__(self, graph, mechanism='jansen', parameters=None):
-        # What is left of another node would take its logger away from this one, of the same name.
-        gc.collect()
         self._graph = graph
-        self.said = graph.listen(Log, '/rosout', 50)
+        self.said = graph.log()
         self.joints = graph.listen(JointState, f'{mechanism}/joint_states', 100)
         self.markers = graph.listen(MarkerArray, f'{mechanism}/markers', 100)
         self.node = graph.start(Kinematics, parameters or {'mechanisms': [mechanism]})
@@ -283,7 +279,7 @@ def test_nothing_is_missed_where_nothing_or_everything_was_heard(graph):
 
 def test_without_llvmlite_the_node_says_so(graph, monkeypatch):
     monkeypatch.setitem(sys.modules, 'llvmlite', None)
-    said = graph.listen(Log, '/rosout', 50)
+    said = graph.log()
     graph.start(Kinematics, {'mechanisms': ['jansen']})
     graph.until(lambda: [m for m in said
                          if m.level == LoggingSeverity.INFO and 'llvmlite' in m.msg])

@@ -14,7 +14,6 @@ pytest.importorskip('rclpy')
 from linkage_ros import mechanisms  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from rcl_interfaces.msg import Log  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from ros_harness import Graph  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
@@ -259,7 +258,7 @@ def test_velocities_are_left_out_where_they_are_infinite(graph):
 
 
 def test_an_angle_out_of_reach_is_passed_over_with_a_warning(graph):
-    logged = graph.listen(Log, '/rosout')
+    logged = graph.log()
     bench = Bench(graph, 'cell', CELL)
     graph.until(lambda: bench.node.count_subscribers('/rosout'))
     bench.joints_at(1.0)
@@ -558,11 +557,13 @@ def test_a_pin_in_a_slot_is_a_block_on_a_guide_that_turns_with_the_lever(graph):
 
 
 def test_a_length_that_cannot_be_is_said_in_metres(graph):
-    # Of a name of its own: what is logged goes out on a publisher of the logger's name.
-    graph.start(Kinematics, {'mechanisms': ['lift'], 'lift.type': 'custom', 'lift.scale': 2.0,
-                             'lift.joints': BOOM['boom.joints'][:4]})
-    heard, drawn = graph.listen(Log, '/rosout'), graph.listen(MarkerArray, 'lift/markers')
+    heard = graph.log()
+    node = graph.start(Kinematics, {
+        'mechanisms': ['lift'], 'lift.type': 'custom', 'lift.scale': 2.0,
+        'lift.joints': BOOM['boom.joints'][:4]})
+    drawn = graph.listen(MarkerArray, 'lift/markers')
     push = graph.crank(['lift_cylinder'])
+    graph.until(lambda: node.count_subscribers('/rosout'))
     push([2.0], drawn)
     push.send([9.0])
     graph.until(lambda: [m for m in heard if 'lift cannot be assembled at cylinder length 9 m; '
@@ -584,11 +585,12 @@ def test_an_encoder_on_the_rocker_drives_as_the_crank_does(graph):
 
 
 def test_a_draw_wire_that_says_what_cannot_be_is_passed_over(graph):
+    heard = graph.log()
     node = graph.start(Kinematics, {
         'mechanisms': ['wired'], 'wired.type': 'four_bar',
         'wired.crank.measures': 'distance(O,B)', 'wired.crank.start': 0.7})
     linkage, states = mechanisms.create('four_bar'), graph.listen(JointState, 'wired/joint_states')
-    heard = graph.listen(Log, '/rosout')
+    graph.until(lambda: node.count_subscribers('/rosout'))
     measure = graph.crank(['wired_distance(O,B)'])
     length = float(linkage.joint_angles(0.9, ['distance(O,B)'])['distance(O,B)'])
     assert measure([length], states).position[0] == pytest.approx(0.9)
@@ -723,8 +725,9 @@ def test_a_gear_alone_has_its_ratio_sign_zero_and_speed(graph):
 
 
 def test_motors_and_passive_joints_share_a_topic_and_nobody_hears_himself(graph):
+    heard = graph.log()
     graph.start(Kinematics, KNEE, cli_args=SHARED)
-    said, answers, heard = [], [], graph.listen(Log, '/rosout')
+    said, answers = [], []
 
     def sort(message):
         (answers if 'right_slide' in message.name else said).append(message)

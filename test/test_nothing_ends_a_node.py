@@ -20,7 +20,7 @@ from linkage_ros import scene  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
-from rcl_interfaces.msg import Log, ParameterEvent  # noqa: E402
+from rcl_interfaces.msg import ParameterEvent  # noqa: E402
 from rclpy.logging import LoggingSeverity  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.publisher import Publisher  # noqa: E402
@@ -57,7 +57,7 @@ def slips(monkeypatch):
 @pytest.fixture
 def log(graph):
     """Return what was logged."""
-    return graph.listen(Log, '/rosout', 1000)
+    return graph.log()
 
 
 def errors(log):
