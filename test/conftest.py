@@ -35,6 +35,8 @@ def pytest_collection_modifyitems(items):
                 case.add_marker(pytest.mark.slow)
     for item in items:
         if item.get_closest_marker('slow'):
+            if item.get_closest_marker('exhaustive'):
+                raise pytest.UsageError(f'{item.nodeid} is slow and exhaustive')
             item.add_marker(pytest.mark.long)
 
 

@@ -172,8 +172,8 @@ def check_assemblies(ankle, window, rng, count):
     return there.sum()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize('seed, count, poses', few_and_many([(3, 2, 500)], [
+@pytest.mark.parametrize('seed, count, poses', few_and_many([
+    pytest.param(3, 2, 500, marks=pytest.mark.slow)], [
     (2000 + seed, 5, 10000) for seed in range(20)]))
 def test_no_pose_is_of_another_assembly(seed, count, poses):
     found = [check_assemblies(*each, poses) for each in ankles(seed, count)]

@@ -240,9 +240,9 @@ def test_the_joints_are_chosen_by_their_names(machines, tmp_path):
         np.testing.assert_allclose(position, expected(leg, inputs)[0], atol=1e-9)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize('seeds', [
-    range(3), pytest.param(range(3, 12), marks=pytest.mark.long),
+    pytest.param(range(3), marks=pytest.mark.slow),
+    pytest.param(range(3, 12), marks=pytest.mark.long),
     pytest.param(range(12, 100), marks=EXHAUSTIVE)])
 def test_random_linkages_go_both_ways(tmp_path, seeds):
     machines = []
