@@ -240,7 +240,7 @@ def many(tmp_path):
     return path
 
 
-@pytest.mark.sample(1)
+@pytest.mark.sample(0)
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('publishers', [
     0, pytest.param(100, marks=EXHAUSTIVE), pytest.param(1500, marks=EXHAUSTIVE)])
@@ -266,7 +266,7 @@ def test_a_signal_ends_the_start_of_a_thousand_mechanisms(processes, many, name,
             ends_quietly(process, number)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.sample(0)
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('name', [
     'servo_inverse', pytest.param('scene', marks=EXHAUSTIVE)])
@@ -286,7 +286,7 @@ def test_a_signal_ends_a_long_trajectory(processes, tmp_path, name, number):
         ends_quietly(process, number)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize('number', SIGNALS)
 def test_a_signal_ends_a_node_that_compiles(processes, number):
     process = Process('kinematics', CONFIG / 'all.yaml')
@@ -309,7 +309,7 @@ def without_llvmlite(tmp_path, monkeypatch):
         [str(tmp_path), os.environ.get('PYTHONPATH', '')]))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ['kinematics', 'scene'])
 def test_without_llvmlite_a_message_that_nobody_listens_to_ends_nothing(
         processes, without_llvmlite, name):

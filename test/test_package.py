@@ -110,6 +110,7 @@ def test_all_that_make_installs_is_locked_with_hashes():
             for version in versions} <= locked
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('slip, complaint', [
     ('', ''), ('0', 'has another hash'), (None, 'Hashes are required')])
 def test_what_has_another_hash_or_none_is_not_installed(tmp_path, slip, complaint):

@@ -72,7 +72,8 @@ def check_random_rods(seed, count):
     return assembled
 
 
-@pytest.mark.parametrize('seed, count', few_and_many([(1, 100)], [
+@pytest.mark.parametrize('seed, count', few_and_many([
+    (1, 10), pytest.param(1, 100, marks=pytest.mark.slow)], [
     (100 + seed, 20000) for seed in range(10)]))
 def test_a_rod_on_a_hinge_is_right_to_the_last_digits(seed, count):
     assert check_random_rods(seed, count) > 0.4 * count
@@ -131,7 +132,8 @@ def check_ankle(ankle, window, rng, poses, exact):
                 assert error <= RULE * given + np.spacing(abs(value))
 
 
-@pytest.mark.parametrize('seed, count, poses', few_and_many([(2, 3, 500)], [
+@pytest.mark.parametrize('seed, count, poses', few_and_many([
+    pytest.param(2, 3, 500, marks=pytest.mark.slow)], [
     (1000 + seed, 10, 10000) for seed in range(20)]))
 def test_two_rods_find_every_pose_inside_the_limits(seed, count, poses):
     for ankle, window, rng in ankles(seed, count):

@@ -142,8 +142,9 @@ def test_an_answer_is_taken_between_the_ends_whole_turns_included(near, ends, an
     assert low <= theta <= high
 
 
-@pytest.mark.parametrize('kind, output', [('slotted_lever', 'lever'), ('four_bar', 'QB'),
-                                          ('jansen', 'G.x'), ('slider_crank', 'block')])
+@pytest.mark.parametrize('kind, output', [
+    ('slotted_lever', 'lever'), ('four_bar', 'QB'), ('slider_crank', 'block'),
+    pytest.param('jansen', 'G.x', marks=pytest.mark.slow)])
 def test_the_value_at_an_end_is_had_at_that_end(kind, output):
     linkage, rng = mechanisms.create(kind), np.random.default_rng(5)
     joint, _, axis = output.rpartition('.')

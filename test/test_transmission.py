@@ -334,7 +334,7 @@ def proved(package, name, compiler, count, *flags):
     assert tried == count and good > 0.9 * count
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize('compiler', COMPILERS)
 def test_a_transmission_is_proved(tmp_path, compiler):
     proved(written(tmp_path, ROOT / 'examples' / 'leg.yaml'), 'knee', compiler, 5000)
@@ -384,6 +384,7 @@ def test_what_cannot_be_configured_is_refused_in_words(refusals, words, said):
     assert said in ended.stdout
 
 
+@pytest.mark.slow
 def test_other_dimensions_are_those_of_another_linkage(refusals):
     for a, angle in ((90.0, 0.4), (80.0, 1.1), (120.0, -2.0)):
         ended = subprocess.run([refusals, 'parameter', 'a', str(a), str(angle)],
