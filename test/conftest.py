@@ -5,6 +5,7 @@
 
 import atexit
 from collections import defaultdict
+from functools import cache
 import gc
 import math
 import os
@@ -44,6 +45,21 @@ def pytest_collection_finish():
     """Leave what has been imported and collected to itself: collecting garbage takes less."""
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture(scope='module')
+def machines(request):
+    """Return the mechanisms of the module's SCENE."""
+    from linkage_ros import scene
+
+    return scene.read(request.module.SCENE).machines
+
+
+@pytest.fixture(scope='module')
+def library(request, machines, tmp_path_factory):
+    """Return a function that returns one of them in C, as the module compiles it, once."""
+    return cache(lambda name: request.module.compiled(
+        tmp_path_factory.mktemp('c'), [machines[name]]))
 
 
 @pytest.fixture

@@ -95,6 +95,7 @@ class Graph:
         """Return the list that gathers what nodes log that are started after this."""
         # What is left of another node would take their loggers away from them, if of their names.
         gc.collect()
+        gc.freeze()
         return self.listen(Log, '/rosout', 1000)
 
     def all_logged(self, node, log):

@@ -7,9 +7,8 @@ import ctypes
 import math
 import random
 import re
-import shutil
-import subprocess
 
+from c_libraries import loaded
 import gmpy2
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
@@ -454,9 +453,6 @@ def test_a_linkage_a_million_times_the_size_has_the_same_angles(g1):
 @pytest.fixture(scope='module')
 def compiled(tmp_path_factory):
     """Return the ankle as C, with its inverse."""
-    compiler = shutil.which('cc')
-    if not compiler:
-        pytest.skip('there is no C compiler')
     folder = tmp_path_factory.mktemp('c')
     machine = scene.read({'mechanisms': ['ankle'], 'ankle.type': 'rods',
                           'ankle.joints': list(G1)}).machines['ankle']
@@ -481,11 +477,7 @@ int there_and_back_(const double *joints, double *actuators, double *again)
     return status;
 }
 """
-    (folder / 'ankle.c').write_text('#include <string.h>\n' + text + calls)
-    subprocess.run([compiler, '-std=c99', '-Wall', '-Wextra', '-pedantic', '-Werror', '-O2',
-                    '-shared', '-fPIC', 'ankle.c', '-o', 'ankle.so', '-lm'],
-                   check=True, cwd=folder)
-    return text, ctypes.CDLL(str(folder / 'ankle.so'))
+    return text, loaded(folder, '#include <string.h>\n' + text + calls)
 
 
 def test_the_pose_in_c_has_no_loop_and_no_heap(compiled):
