@@ -26,7 +26,8 @@ def pytest_collection_modifyitems(items):
     """Leave what is beyond the sample of a sweep to the slow tests, which are long."""
     sweeps = defaultdict(list)
     for item in items:
-        if item.get_closest_marker('sample') and not item.get_closest_marker('long'):
+        if item.get_closest_marker('sample') and not (
+                item.get_closest_marker('long') or item.get_closest_marker('slow')):
             sweeps[item.nodeid.partition('[')[0]].append(item)
     for cases in sweeps.values():
         count, = cases[0].get_closest_marker('sample').args
@@ -42,9 +43,10 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_collection_finish():
-    """Leave what has been imported and collected to itself: collecting garbage takes less."""
+    """Leave what has been imported and collected to itself, and collect garbage less often."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(20_000, 20, 20)
 
 
 @pytest.fixture(scope='module')

@@ -85,7 +85,7 @@ class Graph:
         while not (held := predicate()):
             assert time.monotonic() < deadline, 'did not happen in time'
             try:
-                self.executor.spin_once(timeout_sec=0.02)
+                self.executor.spin_once(timeout_sec=0.005)
             except InvalidHandle:
                 # Another thread ended a node while this one waited for it.
                 continue

@@ -56,7 +56,7 @@ class Driver:
 
 
 def test_all_cranks_of_the_catalogue_turn_on_system_time(graph):
-    graph.start(CrankDriver)
+    graph.start(CrankDriver, {'rate': 500.0})
     heard = graph.listen(JointState, 'crank_states')
     graph.until(lambda: len(heard) > 10)
     for message in heard:

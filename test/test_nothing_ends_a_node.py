@@ -34,8 +34,6 @@ from visualization_msgs.msg import MarkerArray  # noqa: E402
 CONFIG = Path(__file__).parents[1] / 'config'
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 LEVER = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}
-# What a process may still compute after a signal [s], however busy the machine is.
-ENDS_WITHIN = 1.0
 
 
 @pytest.fixture
@@ -216,7 +214,12 @@ def cpu(process):
 
 
 def ends_quietly(process, number):
-    """Let a process end by a signal; return what else it printed."""
+    """
+    Let a process end by a signal; return what else it printed.
+
+    It computes less after the signal than before, when it did little more than its imports: left
+    alone with what it was busy with, it would compute more.
+    """
     def of_ended():
         used = resource.getrusage(resource.RUSAGE_CHILDREN)
         return used.ru_utime + used.ru_stime
@@ -225,7 +228,7 @@ def ends_quietly(process, number):
     process.interrupt(number)
     code, printed = process.end()
     assert code == 0 and 'Traceback' not in printed and 'rror' not in printed, printed
-    assert of_ended() - others - before < ENDS_WITHIN
+    assert of_ended() - others - before < before
     return printed
 
 
@@ -281,7 +284,7 @@ def test_a_signal_ends_a_long_trajectory(processes, tmp_path, name, number):
         graph.until(lambda: publisher.get_subscription_count()
                     and graph.node.count_publishers('servo_trajectory'))
         before = cpu(process)
-        publisher.publish(trajectory(5000, **{'m_P.x': 0.059, 'm_P.y': 0.1}))
+        publisher.publish(trajectory(10_000, **{'m_P.x': 0.059, 'm_P.y': 0.1}))
         graph.until(lambda: cpu(process) > before + 0.2)
         ends_quietly(process, number)
 

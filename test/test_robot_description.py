@@ -136,6 +136,7 @@ def test_a_new_dimension_makes_a_new_description(graph):
     assert ends == pytest.approx([2.0 * math.acos(5.0 / (2.0 * r)) for r in (3.0, 3.1)])
 
 
+@pytest.mark.slow
 def test_the_command_prints_the_robot_of_a_scene():
     code, printed = Process('urdf', CATALOGUE).end()
     found = scene.load(str(CATALOGUE))
@@ -213,6 +214,7 @@ def test_what_is_not_understood_is_refused_in_one_line(capsys, arguments, compla
     assert printed.out == '' and printed.err.count('\n') == 1 and complaint in printed.err
 
 
+@pytest.mark.slow
 def test_a_scene_is_described_without_ros():
     code = ('import sys; sys.modules["rclpy"] = None; '
             'from linkage_ros.robot_model.command import main; sys.exit(main(sys.argv[1:]))')

@@ -174,9 +174,10 @@ def test_machine_code_takes_the_answers_that_plain_python_takes(near, ends):
     np.testing.assert_allclose(found, alone, rtol=1e-12, atol=1e-15)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('kind, outputs', [
-    ('slotted_lever', ['lever']), ('four_bar', ['QB']), ('slider_crank', ['B.x']),
-    ('jansen', ['DF']), ('five_bar', ['P.x', 'P.y'])])
+    ('slotted_lever', ['lever']), ('jansen', ['DF']), ('four_bar', ['QB']),
+    ('slider_crank', ['B.x']), ('five_bar', ['P.x', 'P.y'])])
 def test_a_path_is_the_nearest_answer_to_the_last_value_after_value(kind, outputs):
     rng = np.random.default_rng(len(kind))
     linkage = mechanisms.create(kind)
