@@ -310,27 +310,20 @@ class Inverse:
                 inputs = [value + turn for value, turn in zip(mode.inputs, turns)]
                 # What outputs say of a linkage's inputs the inverse's say by their place.
                 row = substituted(forward, inputs)
-                verdict, *answer = self._judged(inputs, row[:n], row[n:n + n * n], [
+                answer = self._judged(inputs, row[:n], row[n:n + n * n], [
                     margin + FAR * limit.tolerance
                     for margin, limit in zip(row[n + n * n:], limits)])
-                if n == 1:
-                    # The lesser rate is the more exact.
-                    answer[1] = where(self._scales[0] / self._sizes[0] < abs(answer[1]),
-                                      1.0 / mode.rates[0][0], answer[1])
-                parts += [verdict, *answer]
+                parts += [*answer, *(_inverse(mode.rates) if n < 3 else row[n:n + n * n])]
         return parts
 
     def _own_mode(self, mode: Mode) -> List[Real]:
         """Return the inputs of a mode that need not be held to the forward formula, and rates."""
-        (a, b), (c, d) = mode.rates
-        det = a * d - b * c
         return [where(abs(sum(mode.inputs, real(0.0))) < LARGE, 1.0, 0.0),
-                *map(self._counted, range(self._n), mode.inputs),
-                d / det, -c / det, -b / det, a / det]
+                *map(self._counted, range(self._n), mode.inputs), *_inverse(mode.rates)]
 
     def _judged(self, inputs: Sequence[Real], reached: Sequence[Real], rates: Sequence[Real],
                 margins: Sequence[Real]) -> List[Real]:
-        """Return whether inputs are an answer, these after a step of Newton's, and their rates."""
+        """Return whether inputs are an answer, and these after a step of Newton's method."""
         n, gaps, det = self._n, [], self._determinant(rates)
         size = math.prod(self._scales) / math.prod(self._sizes)
         verdict = real(1.0) if det is None else where(
@@ -338,18 +331,10 @@ class Inverse:
         # At an end of the reach outputs may be NaN, not where a limit is missed by far.
         other = reduce(lambda unknown, margin: where(margin < 0.0, 0.0, unknown), margins, where(
             abs(inputs[0]) < LARGE, math.nan, 0.0))
-        held = {input_.name for input_ in self.inputs}
         for i, (turn, scale) in enumerate(zip(self._rounds, self._scales)):
             gap = reached[i] - argument(i)
-            if self._angular[i] and self.outputs[i] in {
-                    *self.linkage.structure.built.driven} - held:
-                # What is given is what is had, in whatever turn.
-                gap = 0.0 * gap
-            elif self.outputs[i] in held and math.isfinite(turn):
+            if math.isfinite(turn):
                 gap = gap - turn * nearest_integer(gap / turn)
-            elif math.isfinite(turn):
-                gap = where(math.pi < gap, gap - math.tau, where(gap < -math.pi, gap + math.tau,
-                                                                 gap))
             gaps.append(gap)
             other = where(NEIGHBOURS * scale < abs(gap), 0.0, where(
                 abs(gap) <= NEIGHBOURS * scale, math.nan, other))
@@ -363,7 +348,7 @@ class Inverse:
                 steepest <= STEEP * scale, verdict, math.nan), other)
         polished = [self._counted(by, x - step)
                     for by, (x, step) in enumerate(zip(inputs, self._steps(gaps, rates)))]
-        return [verdict, *polished, *rates]
+        return [verdict, *polished]
 
     def _counted(self, by: int, x: Real) -> Real:
         """Return an input as it is counted: an angle in the turns from -pi, zero without sign."""
@@ -940,6 +925,15 @@ def _columns(inputs: np.ndarray, rates: np.ndarray) -> List[Found]:
     found = [(tuple(row), tuple(rate)) for row, rate in zip(
         inputs[:, :, 0].tolist(), rates[:, :, 0].tolist()) if row[0] == row[0]]
     return sorted(found)
+
+
+def _inverse(rates: Sequence[Sequence[Real]]) -> List[Real]:
+    """Return d output / d input, by each input, of the rates of up to two inputs by outputs."""
+    if len(rates) == 1:
+        return [1.0 / rates[0][0]]
+    (a, b), (c, d) = rates
+    det = a * d - b * c
+    return [d / det, -c / det, -b / det, a / det]
 
 
 def _greater(x: Real, y: Real) -> Real:
