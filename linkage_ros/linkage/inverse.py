@@ -12,7 +12,7 @@ searched: one input between the extremes of the output, several by steps on the 
 
 from __future__ import annotations
 
-from functools import cached_property, reduce
+from functools import cached_property, partial, reduce
 from itertools import chain, combinations, product
 import math
 import operator
@@ -36,7 +36,8 @@ from numpy.typing import ArrayLike
 from .analysis import Analysis
 from .arguments import numbers
 from .curves import LEAST
-from .inputs import Input
+from .input_range import is_periodic
+from .inputs import Input, spread
 from .inverse_linkage import InverseLinkage, Mode, taken_apart
 from .inverse_rods import taken_apart as rods_taken_apart
 from .planar import TOLERANCE
@@ -85,8 +86,6 @@ STEP, ALIKE = 0.3, 1e-5
 CLOSE, ULPS = 1e-7, 4 * 2.0 ** -52
 # More than any input.
 LARGE = 1e300
-# Poses in which outputs are compared with those a turn later.
-SAMPLES = 64
 # So many values of a path are looked at together.
 BLOCK = 1024
 
@@ -169,7 +168,7 @@ class Inverse:
         self._angular = [linkage.is_angle(name) for name in outputs]
         self._scales = [1.0 if angular else linkage.longest for angular in self._angular]
         self._sizes = [input_.size for input_ in linkage.inputs]
-        self._check, self._choices = linkage.checked(outputs), Cache()
+        self._check, self._programs = linkage.checked(outputs), Cache()
         self.inputs = tuple(map(self._coming_round, range(self._n), linkage.inputs))
         # After how much an output is the same: a turn, of an input that is held its period.
         held = {input_.name: input_ for input_ in self.inputs}
@@ -207,23 +206,17 @@ class Inverse:
         if not input_.turns or self.linkage.period(by) == input_.period:
             return input_
         rates = [self.linkage.gear(name, by)[0] for name in self.linkage.geared_to(by)]
-        return input_._replace(period=next((
-            period for period in (1.0, *(1.0 / abs(rate) for rate in rates if abs(rate) > 1.0))
-            if self._repeats(by, math.tau * period)), math.inf))
+        periods = (1.0, *(1.0 / abs(rate) for rate in rates if abs(rate) > 1.0), math.inf)
+        return next(each for each in (input_._replace(period=period) for period in periods)
+                    if not each.turns or is_periodic(partial(self._outputs_over, by), each))
 
-    def _repeats(self, by: int, turn: float) -> bool:
-        """Return whether poses are the same after an input has turned by so much [rad]."""
-        parts = np.outer(np.arange(1, SAMPLES + 1), np.sqrt([2, 3, 5, 7, 11, 13, 17, 19][
-            :self._n])) % 1.0
-        inputs = [x.low + part * (x.high - x.low) for x, part in zip(self.linkage.inputs, parts.T)]
-        first = self._check.over(*inputs)[:self._n]
-        inputs[by] = inputs[by] + turn
-        gaps = self._check.over(*inputs)[:self._n] - first
-        for gap, angular, scale in zip(gaps, self._angular, self._scales):
-            gap -= math.tau * np.round(gap / math.tau) * angular
-            gap /= scale
-        return bool(np.all(np.isnan(gaps) == np.isnan(first)) and not np.nanmax(
-            np.abs(gaps), initial=0.0) > ENDED)
+    def _outputs_over(self, by: int, values: np.ndarray) -> np.ndarray:
+        """Return the outputs, angles as directions, over one input; the others are spread."""
+        inputs = spread(self.linkage.inputs, len(values))
+        inputs[by] = values
+        rows = zip(self._check.over(*inputs), self._angular, self._scales)
+        return np.concatenate([[np.cos(row), np.sin(row)] if angular else [row / scale]
+                               for row, angular, scale in rows])
 
     # All answers.
 
@@ -424,8 +417,9 @@ class Inverse:
             rows = (self._check.at(*beside) for beside in self._beside(inputs))
             rates = next((row[n:] for row in rows if np.isfinite(row).all()), rates)
         mode //= math.prod(map(len, closed.turns))
-        turning = np.reshape(self._choices.get_or_make(mode, lambda: self.linkage.bind(Program(
-            [*chain(*closed.modes[mode].rates)], n, closed.given))).at(*values), (n, n))
+        pose = self._programs.get_or_make(('rates', mode), lambda: self.linkage.bind(Program(
+            [*chain(*closed.modes[mode].rates)], n, closed.given)))
+        turning = np.reshape(pose.at(*values), (n, n))
         with np.errstate(invalid='ignore'):
             # The identity but for rounding; each dyad on its other side turns a sign.
             both = turning @ np.reshape(rates, (n, n)).T
@@ -723,7 +717,7 @@ class Inverse:
 
     def _choice(self, *what: Any) -> Pose:
         """Return the code that `_make_choice` makes."""
-        return self._choices.get_or_make(what, lambda: self._make_choice(*what))
+        return self._programs.get_or_make(what, lambda: self._make_choice(*what))
 
     def _make_choice(self, count: int, follows: bool, ended: Tuple[bool, ...]) -> Pose:
         """
