@@ -33,7 +33,6 @@ from typing import (
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .analysis import Analysis
 from .arguments import numbers
 from .curves import LEAST
 from .input_range import is_periodic
@@ -41,7 +40,7 @@ from .inputs import Input, spread
 from .inverse_linkage import InverseLinkage, Mode, taken_apart
 from .inverse_rods import taken_apart as rods_taken_apart
 from .planar import TOLERANCE
-from .search import blocks, Search, SINGULAR
+from .search import blocks, search_for, SINGULAR
 from ..cache import Cache
 from ..formula.expression import (
     argument,
@@ -187,8 +186,7 @@ class Inverse:
             self._row = 1 + self._n * (self._n + 1)
             self._solve = linkage.bind(Program(self._rows, self._n, self.closed.given))
         else:
-            self._search: Any = Analysis(linkage).branches(*outputs) if self._n == 1 else Search(
-                linkage, outputs, self._rounds)
+            self._search = search_for(linkage, outputs, self.inputs, self._rounds)
 
     @cached_property
     def _rated(self) -> Pose:
@@ -814,16 +812,7 @@ class Inverse:
         values = self._reduced(values)
         if self.closed:
             return self._along(values, near) or nothing
-        if self._n > 1:
-            inputs, jacobian = self._search.followed(np.array(near), np.array(values))
-            return tuple(inputs.tolist()), tuple(jacobian.T.ravel().tolist())
-        first = self.inputs[0]
-        turns, size = first.turns_of(near[0]), self._sizes[0]
-        found, rate = self._search.follow(self._rated.at, size, values[0], near[0] - turns)
-        if self._search.is_one and first.is_whole(self.linkage.reach()):
-            # The output turns all round with the crank: beyond pi they go on together.
-            turns = float(first.beside(found, near[0])) - found
-        return (found + turns,), (rate,)
+        return self._search.follow(values, near)
 
     def _along(self, values: Tuple[float, ...], near: Tuple[float, ...]) -> Optional[Found]:
         """Return what the mode that the inputs are in leads to."""
@@ -865,16 +854,7 @@ class Inverse:
 
     def _searched(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return all answers as `_found` does."""
-        if self._n == 1:
-            inputs = self._search.answers(values[0])[:, None] * self._sizes[0]
-            rates = self._rated.over(inputs.ravel())[1].reshape(inputs.shape)
-            return self.inputs[0].wrapped(np.where(
-                np.abs(inputs) < self._turned[0][2], 0.0, inputs)), rates
-        found = [self._search.answers(column) for column in values.T]
-        most = max((len(each) for each in found), default=0)
-        inputs = np.full((max(most, 1), self._n, len(found)), np.nan)
-        for column, each in enumerate(found):
-            inputs[:len(each), :, column] = each
+        inputs = self._search.answers(values)
         rates = self._rated.over(*inputs.swapaxes(0, 1))[self._n:].swapaxes(0, 1)
         return inputs, rates
 

@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The inverse of outputs that belong together and do not come apart, by steps on the exact Jacobian.
+The search for inputs that give outputs their values, where the inverse has no closed form.
 
-Outputs that depend on few inputs are solved first, for those alone. Levenberg-Marquardt steps lead
-down from a grid over all that the inputs can be, then from both sides of each solution, as those
-next to a fold come in pairs.
+One input is searched on the branches on which its output is monotone (`BranchSearch`), several by
+steps on the exact Jacobian (`StepSearch`); both have the same methods. Of several, outputs that
+depend on few inputs are solved first, for those alone. Levenberg-Marquardt steps lead down from a
+grid over the ranges of the inputs, then from both sides of each solution, as solutions next to a
+fold come in pairs.
 
 Sources: Nocedal and Wright, "Numerical Optimization", sec. 10.3 (the steps); Gosselin and Angeles,
 "Singularity analysis of closed-loop kinematic chains", IEEE Trans. Robotics and Automation 6
@@ -17,10 +19,13 @@ from __future__ import annotations
 
 from itertools import chain, combinations
 import math
-from typing import Callable, List, Optional, Sequence, Set, Tuple, TYPE_CHECKING
+from typing import Callable, List, Optional, Sequence, Set, Tuple, TYPE_CHECKING, Union
 
 import numpy as np
 
+from .analysis import Analysis
+from .curves import LEAST
+from .inputs import Input
 from .quantities import Names
 from ..words import listed
 
@@ -42,6 +47,7 @@ ROUNDED, CLOSE = 32 * 2.0 ** -53, 1e-13
 PIECES, SHORTEST, REFINED = 40, 1e-10, 30
 
 _Pair = Tuple[np.ndarray, np.ndarray]
+_Found = Tuple[Tuple[float, ...], Tuple[float, ...]]
 
 
 def blocks(linkage: Mechanism, outputs: Names) -> List[Tuple[List[int], List[int]]]:
@@ -72,8 +78,54 @@ def dependent(outputs: Names, rows: Sequence[int]) -> ValueError:
                       f'{listed(outputs[row] for row in rows)} depends on too few')
 
 
-class Search:
-    """Outputs as functions of the inputs, all of them counted in their sizes inside."""
+def search_for(linkage: Mechanism, outputs: Names, inputs: Sequence[Input],
+               turns: Sequence[float]) -> Union[BranchSearch, StepSearch]:
+    """
+    Return the search for the inputs of outputs.
+
+    Parameters
+    ----------
+    linkage : Mechanism
+        The linkage.
+    outputs : sequence of str
+        As many as there are inputs.
+    inputs : sequence of Input
+        Those of the linkage, with the periods of the outputs.
+    turns : sequence of float
+        For each output after how much it is the same [rad], or inf.
+
+    """
+    return StepSearch(linkage, outputs, turns) if len(outputs) > 1 else BranchSearch(
+        linkage, outputs[0], inputs[0])
+
+
+class BranchSearch:
+    """One output as a function of the only input, in monotone branches."""
+
+    def __init__(self, linkage: Mechanism, output: str, input_: Input):
+        self._input, self._linkage = input_, linkage
+        self._branches = Analysis(linkage).branches(output)
+        self._pose = linkage.posed((), (output,), (output,))
+
+    def answers(self, values: np.ndarray) -> np.ndarray:
+        """Return all inputs (answers, 1, n) for values (1, n), NaN where there are fewer."""
+        inputs = self._branches.answers(values[0])[:, None] * self._input.size
+        return np.asarray(self._input.wrapped(
+            np.where(np.abs(inputs) < LEAST * self._input.size, 0.0, inputs)))
+
+    def follow(self, values: Sequence[float], near: Sequence[float]) -> _Found:
+        """Return what `Inverse.follow` does."""
+        turns = self._input.turns_of(near[0])
+        found, rate = self._branches.follow(
+            self._pose.at, self._input.size, values[0], near[0] - turns)
+        if self._branches.is_one and self._input.is_whole(self._linkage.reach()):
+            # The output turns all round with the crank: beyond pi they go on together.
+            turns = float(self._input.beside(found, near[0])) - found
+        return (found + turns,), (rate,)
+
+
+class StepSearch:
+    """Outputs as functions of several inputs, all of them counted in their sizes inside."""
 
     def __init__(self, linkage: Mechanism, outputs: Names, turns: Sequence[float]):
         self.outputs, self.inputs = outputs, [input_.counted() for input_ in linkage.inputs]
@@ -88,6 +140,14 @@ class Search:
         self._check_told()
 
     def answers(self, values: np.ndarray) -> np.ndarray:
+        """Return all inputs (answers, inputs, n) for values (outputs, n), NaN where fewer."""
+        found = [self._answers(column) for column in values.T]
+        inputs = np.full((max(map(len, found), default=0) or 1, *values.shape), np.nan)
+        for column, each in enumerate(found):
+            inputs[:len(each), :, column] = each
+        return inputs
+
+    def _answers(self, values: np.ndarray) -> np.ndarray:
         """Return all inputs that give outputs their values, in rows."""
         start = [0.5 * (input_.low + input_.high) for input_ in self.inputs]
         for place, by in self._given.items():
@@ -97,9 +157,10 @@ class Search:
             if not self._given.keys() >= {*rows}:
                 found = np.concatenate([found[:0], *(
                     self.solutions(q, values, rows, columns) for q in found)])
-        return (found[self._held(found * self.sizes)]) * self.sizes
+        inputs = found * self.sizes
+        return np.asarray(inputs[self._are_assembled(inputs)])
 
-    def _held(self, inputs: np.ndarray) -> np.ndarray:
+    def _are_assembled(self, inputs: np.ndarray) -> np.ndarray:
         """Return for rows of inputs whether all of the linkage can be assembled there."""
         with np.errstate(invalid='ignore'):
             return np.asarray((self._margins(*inputs.T) >= 0.0).all(axis=0))
@@ -191,13 +252,13 @@ class Search:
                 kept.append((q[i], CLOSE * (1.0 + values[i, 0]) / max(values[i, -1], CLOSE)))
         return np.array([each for each, _ in kept]).reshape(-1, q.shape[1])
 
-    def followed(self, near: np.ndarray, target: np.ndarray) -> _Pair:
-        """Return what `Inverse.follow` does, the rates as d outputs / d inputs."""
-        inputs, jacobian = self._followed(near / self.sizes, target)
-        inputs = inputs * self.sizes
-        if not self._held(inputs[None])[0]:
-            inputs, jacobian = inputs * np.nan, jacobian * np.nan
-        return inputs, jacobian * self.scale[:, None] / self.sizes
+    def follow(self, values: Sequence[float], near: Sequence[float]) -> _Found:
+        """Return what `Inverse.follow` does."""
+        inputs, jacobian = self._followed(near / self.sizes, np.array(values))
+        inputs, rates = inputs * self.sizes, (jacobian * self.scale[:, None] / self.sizes).T
+        if not self._are_assembled(inputs[None])[0]:
+            inputs, rates = inputs * np.nan, rates * np.nan
+        return tuple(inputs.tolist()), tuple(rates.ravel().tolist())
 
     def _followed(self, q: np.ndarray, target: np.ndarray) -> _Pair:
         start, jacobian = self._at(q, target)
