@@ -32,18 +32,18 @@ from ..words import listed
 if TYPE_CHECKING:
     from .mechanism import Mechanism
 
-# Starts of a search at first and at most, and those of them that can be assembled at least.
+# Grid points of a search at first and at most, and the least number that can be assembled.
 STARTS, MOST_STARTS, ASSEMBLED = 1024, 1 << 16, 250
-# Steps from a start, how far one goes at most, and their damping: at first, at least, and in vain.
+# Steps from a start, the longest one, and their damping: initial, least, and that of giving up.
 STEPS, LONGEST_STEP = 40, 0.7
 DAMPING, LEAST_DAMPING, HOPELESS, TINY = 1e-3, 1e-14, 1e4, 1e-300
-# Newton steps that polish a solution; halvings of the way to what may lie beside it.
+# Newton steps that polish a solution; halvings of the distance at which a twin is searched.
 POLISHING, HALVINGS = 3, 24
-# Below this margin a pose is singular; below it wherever one looks, outputs tell too little.
+# Below the first margin a pose is singular; below the second in most poses, outputs are dependent.
 SINGULAR, DEPENDENT = 1e-6, 1e-10
-# Rounding of an output, and of an input where the Jacobian is one.
+# Rounding of an output, and of an input where the Jacobian is the identity.
 ROUNDED, CLOSE = 32 * 2.0 ** -53, 1e-13
-# Pieces of a way from pose to pose, the shortest of them, and Newton steps to the end of each.
+# Steps of a motion that is followed, the shortest of them, and Newton steps to the end of each.
 PIECES, SHORTEST, REFINED = 40, 1e-10, 30
 
 _Pair = Tuple[np.ndarray, np.ndarray]
@@ -52,9 +52,9 @@ _Found = Tuple[Tuple[float, ...], Tuple[float, ...]]
 
 def blocks(linkage: Mechanism, outputs: Names) -> List[Tuple[List[int], List[int]]]:
     """
-    Return outputs that are solved one after the other, and the inputs that they tell.
+    Return groups of outputs that are solved in turn, and the inputs that each group determines.
 
-    Raises ValueError if they cannot tell all inputs.
+    Both are numbers in their order. Raises ValueError if the outputs cannot determine all inputs.
     """
     needs = [{by for by in range(len(outputs)) if linkage.moves(name, by)} for name in outputs]
     left: Set[int] = set(range(len(needs)))
@@ -74,7 +74,7 @@ def blocks(linkage: Mechanism, outputs: Names) -> List[Tuple[List[int], List[int
 
 def dependent(outputs: Names, rows: Sequence[int]) -> ValueError:
     """Return the error for outputs of which some depend on too few inputs."""
-    return ValueError(f'{listed(outputs)} do not tell all inputs: '
+    return ValueError(f'{listed(outputs)} do not determine all inputs: '
                       f'{listed(outputs[row] for row in rows)} depends on too few')
 
 
@@ -130,14 +130,14 @@ class StepSearch:
     def __init__(self, linkage: Mechanism, outputs: Names, turns: Sequence[float]):
         self.outputs, self.inputs = outputs, [input_.counted() for input_ in linkage.inputs]
         self.sizes = np.array([input_.size for input_ in linkage.inputs])
-        # After how much an output is the same; inputs that are outputs, by where they are in both.
+        # The period of each output; outputs that are inputs, by their numbers in both.
         self._turns = np.array(turns)
         self._given = {outputs.index(input_.name): by for by, input_ in enumerate(self.inputs)
                        if input_.name in outputs}
         self.scale = np.where(list(map(linkage.is_angle, outputs)), 1.0, linkage.longest)
         self._pose, self._margins = linkage.posed((), outputs, outputs), linkage.margins
         self.blocks = blocks(linkage, outputs)
-        self._check_told()
+        self._check_independent()
 
     def answers(self, values: np.ndarray) -> np.ndarray:
         """Return all inputs (answers, inputs, n) for values (outputs, n), NaN where fewer."""
@@ -166,7 +166,7 @@ class StepSearch:
             return np.asarray((self._margins(*inputs.T) >= 0.0).all(axis=0))
 
     def over(self, q: np.ndarray, target: np.ndarray) -> _Pair:
-        """Return what outputs miss of their target, and the Jacobian, for each row of q."""
+        """Return the errors of the outputs from their target, and the Jacobian, per row of q."""
         return self._missed(self._pose.searched(*(q * self.sizes).T), target)
 
     def _at(self, q: np.ndarray, target: np.ndarray) -> _Pair:
@@ -185,9 +185,9 @@ class StepSearch:
 
     def solutions(self, q: np.ndarray, target: np.ndarray, rows: List[int],
                   columns: List[int]) -> np.ndarray:
-        """Return where some outputs are what they should be; other inputs are those of q."""
+        """Return the poses at which some outputs have their values; other inputs are fixed."""
         def missed(q: np.ndarray) -> Tuple[np.ndarray, ...]:
-            """Return what outputs miss, how much (inf where unknown), the Jacobian, rounding."""
+            """Return errors, their norm (inf where there is none), the Jacobian, and rounding."""
             gap, jacobian = self.over(q, target)
             gap, jacobian = gap[:, rows], jacobian[:, rows][:, :, columns]
             known = np.isfinite(gap).all(axis=1) & np.isfinite(jacobian).all(axis=(1, 2))
@@ -203,7 +203,7 @@ class StepSearch:
             return q
 
         def beyond(q: np.ndarray) -> np.ndarray:
-            """Return poses on both sides of solutions, where others may lie behind a fold."""
+            """Return poses on both sides of solutions: a twin may lie behind a fold."""
             weakest = np.linalg.svd(missed(q)[2])[2][:, -1]
             away = LONGEST_STEP * np.outer([1.0, -1.0], 0.5 ** np.arange(HALVINGS)).ravel()
             return known(moved(np.repeat(q, len(away), axis=0),
@@ -222,7 +222,7 @@ class StepSearch:
         return found
 
     def _starts(self, q: np.ndarray, columns: List[int], known: Callable) -> np.ndarray:
-        """Return poses over all that some inputs can be, more of them where few can be had."""
+        """Return a grid of assembled poses over some inputs, finer where few are assembled."""
         starts, many = np.empty((0, len(q))), STARTS
         while len(starts) < ASSEMBLED and many <= MOST_STARTS:
             n = math.ceil(many ** (1.0 / len(columns)) if len(columns) > 1 else many / 4)
@@ -233,8 +233,8 @@ class StepSearch:
             starts, many = known(starts), 4 * many
         return starts
 
-    def _check_told(self) -> None:
-        """Raise ValueError if the outputs do not tell the inputs in most poses."""
+    def _check_independent(self) -> None:
+        """Raise ValueError if the outputs do not determine the inputs in most poses."""
         n = len(self.inputs)
         q = self._starts(np.zeros(n), list(range(n)), lambda q: q[np.isfinite(
             self.over(q, np.zeros(n))[1]).all(axis=(1, 2))])
@@ -243,14 +243,14 @@ class StepSearch:
             raise dependent(self.outputs, range(n))
 
     def _distinct(self, q: np.ndarray, missed: Callable) -> np.ndarray:
-        """Return each solution once, those that are farthest from singular first."""
+        """Return each solution once, the farthest from singular first."""
         values = np.linalg.svd(missed(q)[2], compute_uv=False)
-        kept: List[Tuple[np.ndarray, float]] = []
+        distinct: List[Tuple[np.ndarray, float]] = []
         for i in np.argsort(-values[:, -1]):
             if all(max(input_.apart(x, y) for input_, x, y in zip(self.inputs, q[i], other)) > near
-                   for other, near in kept):
-                kept.append((q[i], CLOSE * (1.0 + values[i, 0]) / max(values[i, -1], CLOSE)))
-        return np.array([each for each, _ in kept]).reshape(-1, q.shape[1])
+                   for other, near in distinct):
+                distinct.append((q[i], CLOSE * (1.0 + values[i, 0]) / max(values[i, -1], CLOSE)))
+        return np.array([each for each, _ in distinct]).reshape(-1, q.shape[1])
 
     def follow(self, values: Sequence[float], near: Sequence[float]) -> _Found:
         """Return what `Inverse.follow` does."""
@@ -276,7 +276,7 @@ class StepSearch:
 
     def _corrected(self, start: np.ndarray, target: np.ndarray, aim: np.ndarray,
                    side: float) -> Optional[_Pair]:
-        """Return where outputs miss their target by an aim, near a start on one side of folds."""
+        """Return the pose near a start whose errors are `aim`, without passing a fold."""
         q, last = start, LONGEST_STEP
         for _ in range(REFINED):
             gap, jacobian = self._at(q, target)
@@ -296,12 +296,12 @@ class StepSearch:
 
 
 def _rounding(q: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
-    """Return what rounding makes outputs miss: their own, and that of the inputs."""
+    """Return the errors that rounding of the outputs and of the inputs makes."""
     return ROUNDED * (1.0 + (np.abs(jacobian) @ np.maximum(1.0, np.abs(q))[..., None])[..., 0])
 
 
 def _descended(q: np.ndarray, missed: Callable, moved: Callable) -> np.ndarray:
-    """Return the solutions that Levenberg-Marquardt steps from some poses lead to."""
+    """Return the solutions that Levenberg-Marquardt steps reach from some poses."""
     (gap, size, jacobian, rounding), damping, found = missed(q), np.full(len(q), DAMPING), []
     for _ in range(STEPS):
         there = (np.abs(gap) <= rounding).all(axis=1)
@@ -325,7 +325,7 @@ def _descended(q: np.ndarray, missed: Callable, moved: Callable) -> np.ndarray:
 
 
 def _polished(q: np.ndarray, missed: Callable, moved: Callable) -> np.ndarray:
-    """Return solutions after some steps of Newton's method, where these are better."""
+    """Return solutions after those steps of Newton's method that reduce their errors."""
     for _ in range(POLISHING):
         gap, size, jacobian, _ = missed(q)
         trial = moved(q, -(np.linalg.pinv(jacobian) @ gap[..., None])[..., 0])
