@@ -354,8 +354,8 @@ class Mechanism:
               rates: Sequence[str] = ()) -> Pose:
         """Return the code behind `function`."""
         requested = tuple(self._names(kind, _plain(_hashable(names)))
-                       for kind, names in (('points', points), ('angles', joints),
-                                           ('rates', rates)))
+                          for kind, names in (('points', points), ('angles', joints),
+                                              ('rates', rates)))
         return self.bound('parts', requested)
 
     def legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...],
