@@ -275,7 +275,8 @@ def methods(ours, motors):
         yield f'table of {nodes} x {nodes}, bilinear', table(ours, nodes, motors), False
     yield 'polynomial of degree 8 (the reference), numpy', degree_eight, False
     for count in (1, 2, 3):
-        yield f'pinocchio, {count} Newton steps from the preceding pose', pinocchio_loops(count), True
+        yield (f'pinocchio, {count} Newton steps from the preceding pose',
+               pinocchio_loops(count), True)
     for count in (10, 100):
         yield f'MuJoCo, {count} time steps per pose', mujoco_steps(count), True
 
