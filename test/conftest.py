@@ -43,7 +43,7 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_collection_finish():
-    """Leave what has been imported and collected to itself, and collect garbage less often."""
+    """Exclude imports and collected tests from garbage collection, and collect less often."""
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 20, 20)
@@ -59,7 +59,7 @@ def machines(request):
 
 @pytest.fixture(scope='module')
 def library(request, machines, tmp_path_factory):
-    """Return a function that returns one of them in C, as the module compiles it, once."""
+    """Return a function that returns one of them as a C library, compiled once."""
     return cache(lambda name: request.module.compiled(
         tmp_path_factory.mktemp('c'), [machines[name]]))
 

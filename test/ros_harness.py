@@ -92,14 +92,14 @@ class Graph:
         return held
 
     def log(self):
-        """Return the list that gathers what nodes log that are started after this."""
-        # What is left of another node would take their loggers away from them, if of their names.
+        """Return a list that gathers the log messages of nodes that are started later."""
+        # An ended node of the same name that is not collected yet would still own their loggers.
         gc.collect()
         gc.freeze()
         return self.listen(Log, '/rosout', 1000)
 
     def all_logged(self, node, log):
-        """Return the list that gathers /rosout when it has all that a node has logged."""
+        """Return a list of log messages once it has all that a node has logged."""
         end = f'so far {len(log)}'
         node.get_logger().info(end)
         self.until(lambda: any(message.msg == end for message in log))
@@ -152,7 +152,7 @@ class Graph:
         return tick
 
     def crank(self, names, topic='crank_states'):
-        """Return a hand on cranks."""
+        """Return a publisher of crank angles."""
         return Crank(self, names, topic)
 
 
@@ -179,7 +179,7 @@ class Crank:
         return self._graph.until(answered)[0]
 
     def send(self, angles, velocities=()):
-        """Publish angles once: whatever is answered later was not passed over before."""
+        """Publish angles once; what is published later is handled later."""
         self._publisher.publish(self._message(angles, velocities))
 
     def _message(self, angles, velocities):
