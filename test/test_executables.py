@@ -44,7 +44,7 @@ def test_a_signal_ends_a_node_quietly(harness, name, stop):
     assert process.end() == (0, '')
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize('name', EXECUTABLES)
 def test_more_signals_than_one_end_a_node_as_quietly(harness, name, stop):
@@ -87,7 +87,7 @@ def test_a_signal_ends_what_is_still_being_imported(harness, tmp_path, name, sto
     assert process.end() == (0, '')
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize('name', EXECUTABLES)
 def test_a_thread_that_computes_does_not_hold_up_the_end(harness, name):
     done = subprocess.run([sys.executable, '-c', textwrap.dedent(f"""
@@ -131,6 +131,7 @@ def test_arguments_that_there_are_not_end_in_one_sentence(harness, capfd, name, 
     assert one_sentence(capfd.readouterr().err, said)
 
 
+@pytest.mark.slow
 def test_so_they_do_as_a_process(harness):
     name, (arguments, said) = NODES[0], ARGUMENTS[0]
     done = subprocess.run([sys.executable, '-m', harness.module(name), *arguments], cwd=ROOT,

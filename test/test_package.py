@@ -304,7 +304,7 @@ def only_line(command, folder, environment):
     return said
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
 @pytest.mark.parametrize('lines, settings, complaint', [
     ([], {'PYTHON': 'nowhere'}, 'PYTHON=nowhere is no command'),

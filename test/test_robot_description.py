@@ -43,7 +43,7 @@ def given(name):
             **SCENES[name]}
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name, library', [
     *((name, Pinocchio) for name in SCENES), ('slotted_lever', Yourdfpy),
     *(pytest.param(name, Yourdfpy, marks=pytest.mark.long) for name in SCENES)])

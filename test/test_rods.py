@@ -480,12 +480,14 @@ int there_and_back_(const double *joints, double *actuators, double *again)
     return text, loaded(folder, '#include <string.h>\n' + text + calls)
 
 
+@pytest.mark.slow
 def test_the_pose_in_c_has_no_loop_and_no_heap(compiled):
     pose_ = compiled[0][:compiled[0].index('ankle_side')]
     assert 'ankle_solve' in pose_ and 'ankle_rates' in pose_ and not re.search(
         r'\b(for|while|do|goto|malloc)\b(?! it)', re.sub(r'/\*.*?\*/', '', pose_, flags=re.S))
 
 
+@pytest.mark.slow
 def test_from_pitch_and_roll_to_motors_and_back_in_c(compiled, g1):
     turn = compiled[1].there_and_back_
     turn.argtypes = 3 * [ctypes.c_void_p]
@@ -498,6 +500,7 @@ def test_from_pitch_and_roll_to_motors_and_back_in_c(compiled, g1):
         np.testing.assert_allclose(back, values, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_c_is_python(compiled, g1):
     solve = compiled[1].pose_
     solve.argtypes = [ctypes.c_double, ctypes.c_double, ctypes.c_void_p]

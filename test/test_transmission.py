@@ -127,7 +127,7 @@ def expected(machine, inputs):
     return position, rates, joint, signs[:, None] * turning
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
 def test_both_ways_are_those_of_the_scene(library, machines, name):
     machine = machines[name]
@@ -187,7 +187,7 @@ def test_a_singular_pose_is_said(library, machines):
     assert status == 2 and velocity == 0.0 and np.isfinite(position)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
 def test_nothing_that_comes_in_gets_out_as_no_number(library, machines, name):
     machine, rng = machines[name], np.random.default_rng(4)
@@ -200,6 +200,7 @@ def test_nothing_that_comes_in_gets_out_as_no_number(library, machines, name):
         assert 0 <= status < 8 and np.isfinite(found).all()
 
 
+@pytest.mark.slow
 def test_the_joints_are_chosen_by_their_names(machines, tmp_path):
     leg, boom = machines['leg'], machines['boom']
     assert [each.name for each in joints(leg)] == ['leg_crank', 'leg_AP']
@@ -267,6 +268,7 @@ def test_all_ground_links_of_the_catalogue_but_one_are_closed_forms():
     assert len(closed) == 16 and [key for key in closed if not closed[key]] == [('klann', 'CF')]
 
 
+@pytest.mark.slow
 def test_names_of_any_letters_are_texts(tmp_path):
     source = 'a*/ "b"\\ ??/\n%s é'
     machine, = scene.read({

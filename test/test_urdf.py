@@ -338,7 +338,7 @@ def test_a_limit_leaves_a_millionth_to_spare(kind):
         assert high - angles[name].max() == pytest.approx(spare, rel=0.01)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize('arguments', [
     ['robot_model'], ['robot_model', '--format', 'mjcf'], ['c_code', ROOT / 'config/all.yaml']],
     ids=str)

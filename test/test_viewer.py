@@ -349,6 +349,7 @@ def test_what_kinematics_does_not_show_is_set_on_the_node_that_does(graph, show)
             for name in ('dimensions.b', 'spring')] == [1.0, 3.0, 2.0, 2.0]
 
 
+@pytest.mark.slow
 def test_what_every_node_is_given_is_of_the_node_that_reads_it(show):
     running = show({**LEG, 'leg.crank.speed': 1.0, 'rate': 30.0})
     driver, = (node for node in running.nodes if isinstance(node, CrankDriver))
@@ -449,6 +450,7 @@ def test_what_cannot_be_brought_about_says_why(lever, mechanism, want, reason):
     assert lever.values('lever.crank.speed') == [1.0]
 
 
+@pytest.mark.slow
 def test_any_joint_of_any_leg_is_brought_where_it_can_be(show):
     running = show({**RATE, 'mechanisms': ['walker'], 'walker.type': 'jansen',
                     'walker.leg_pairs': 3, 'walker.scale': 0.01})
@@ -474,6 +476,7 @@ def test_any_joint_of_any_leg_is_brought_where_it_can_be(show):
     assert math.remainder(crank['value'] - theta, math.tau) == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_what_is_saved_starts_the_tuned_scene_again(show, tmp_path):
     running = show({**LEVER, 'drop.pose': [0.0, 0.0, 0.5, 1.5, 0.0, 0.0]})
 
