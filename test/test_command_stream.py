@@ -130,7 +130,7 @@ def test_two_outputs_of_one_input_and_a_name_of_nobody_are_said(stream, capfd):
     assert stream.want(['flap', 'lever_A.x', 'boom'], [flap(0.2), 100.0, 1.0]).keys() == {'servo'}
     said = capfd.readouterr().err
     assert 'flap and lever_A.x are moved by one input: name one of them' in said
-    assert 'nothing is called boom' in said
+    assert 'no output is called boom' in said
 
 
 def test_hostile_bytes_end_nothing(stream, graph):
@@ -312,7 +312,7 @@ def test_a_trajectory_of_a_foot_and_a_bucket(graph, several_plan):
     (['flap'], [([0.0], []), ([4.0], [])], 'point 1: flap cannot be 4: the lever reaches'),
     (['flap'], [([0.0, 1.0], [])], 'point 0 must have 1 positions'),
     (['flap'], [([0.0], [1.0, 2.0])], 'as many velocities or none, not 1 and 2'),
-    (['flap', 'wing'], [([0.0, 0.0], [])], 'nothing is called wing'),
+    (['flap', 'wing'], [([0.0, 0.0], [])], 'no output is called wing'),
     (['flap', 'flap'], [([0.0, 0.0], [])], 'flap and flap are moved by one input'),
     (['bar_A.x'], [([1e3], [])], 'point 0: bar_A.x cannot be 1000'),
     (['flap'], [([math.nan], [])], 'point 0: flap cannot be nan: a value must be finite')])
