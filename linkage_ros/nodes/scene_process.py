@@ -16,7 +16,12 @@ NAME = 'scene'
 
 
 def nodes() -> Iterator[SceneNode]:
-    """Create the nodes: the owner of the geometry first, crank_driver last."""
+    """
+    Create the nodes.
+
+    `kinematics` is first, so that the others adopt its parameters; `crank_driver` is last, since
+    it calls the others' subscriptions.
+    """
     kinematics = Kinematics()
     yield kinematics
     inverse = ServoInverse()
@@ -25,7 +30,7 @@ def nodes() -> Iterator[SceneNode]:
 
 
 def main(args: Any = None) -> int:
-    """Run the nodes; return the exit code."""
+    """Run the nodes with command-line arguments `args`; return the exit code."""
     return scene_node.run_together(nodes, NAME, args)
 
 
