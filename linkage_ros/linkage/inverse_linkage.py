@@ -119,7 +119,7 @@ def _of_sketch(outputs: Names, sketch: _Sketch) -> InverseLinkage:
     used = {name for read in sketch.reads for end in read.ends for name in end.joints}
     for line in lines[::-1]:
         if used & {*line.names}:
-            used |= {*line.stands_on}
+            used |= {*line.depends_on}
     lines = [line for line in lines if used & {*line.names}]
     drives = {line.names[0]: sketch.driving[line.names[0]] for line in lines if line.drives}
     if sorted(name for name, *_ in drives.values()) != sorted(outputs):
