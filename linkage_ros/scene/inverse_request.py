@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Future
 from functools import cached_property
 import math
 from typing import Any, List, Mapping, NamedTuple, Optional, Sequence, Tuple
@@ -100,8 +101,7 @@ class InverseRequest:
         # The ends of the sweeps as the linkage counts them.
         self._ends = [drive.ends and (drive.ends[0] / scale, drive.ends[1] / scale)
                       for drive, scale in zip(self._drives, self._scales)]
-        self._many: Any = None
-        self._quicker: Any = None
+        self._compilation: Optional[Future] = None
 
     def inputs_of(self, positions: Sequence[Any]) -> List[Any]:
         """Return the inputs [rad or m] of their actuators' positions."""
@@ -138,23 +138,22 @@ class InverseRequest:
         if near is not None:
             near = [input_ / scale for input_, scale in zip(self.inputs_of(near), self._scales)]
         if many and np.size(values[0]) >= MANY:
-            inverse = self._quicker or self._accelerated()
+            inverse = self._accelerated()
         found, rates = (inverse.path if many and not each else inverse.nearest)(
             values, near, self._ends)
         return self.positions_of(_times(found, self._scales)), _times(rates, self._rate_units)
 
     def _accelerated(self) -> Any:
-        """Return the inverse in machine code as soon as it is there, for which nobody waits."""
-        if self._many is None:
+        """Return the inverse in machine code once it is compiled; until then in Python."""
+        if self._compilation is None:
             def make() -> Any:
                 inverse = self._machine.linkage.accelerated().inverse(tuple(self.outputs))
                 inverse.path([np.zeros(MANY)] * len(self.outputs))
                 return inverse
 
-            self._many = compile_in_background(make)
-        if self._many.done() and not self._many.exception():
-            self._quicker = self._many.result()
-        return self._quicker or self._inverse
+            self._compilation = compile_in_background(make)
+        done = self._compilation.done() and not self._compilation.exception()
+        return self._compilation.result() if done else self._inverse
 
     def command(self, values: Sequence[float], speeds: Optional[Sequence[float]],
                 near: Sequence[float], jumps: bool = False) -> Command:
