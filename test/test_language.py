@@ -430,7 +430,7 @@ def test_the_names_of_dimensions_are_texts(names):
 @pytest.mark.parametrize('given', [None, 5, 'mechanisms', ['mechanisms'], {5: 1.0}, {None: 1.0},
                                    {b'mechanisms': ['jansen']}, {('mechanisms',): 1}])
 def test_a_scene_is_given_by_the_names_of_parameters(given):
-    with pytest.raises(scene.SceneError, match='a scene is values by the names of parameters'):
+    with pytest.raises(scene.SceneError, match='a scene must map names of parameters to their'):
         scene.read(given)
 
 

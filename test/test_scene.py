@@ -186,12 +186,13 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
         '<world/>', 'w\u200bw', '\u2028', 'w\u2028', 'w\x85', 'w\ud800')],
     ({'frame_prefix': '/left'}, 'frame_prefix must be a text .* up to 100 characters'),
     ({'jansen.frame_id': 'my\nthigh'}, 'jansen.frame_id must be a text .* up to 100 characters'),
-    *[({'jansen.joint_names': [text]}, 'jansen.joint_names must be texts such as .* each about '
-       'another of crank, BC, .*, not ') for text in (
+    *[({'jansen.joint_names': [text]}, 'jansen.joint_names must be texts such as .* each for a '
+       'different one of crank, BC, .*, not ') for text in (
         '', 'BC', 'BC=', '=shin', 'BC=3', 'BC=left shin', 'ZZ=shin', 'left0_BC=shin', 'BC=shin+',
         'BC=""', 'BC="', 'BC="shin', 'BC="sh"in"', r'BC="\x"',
         'BC=shin+x', 'BC=shin+1+1', 'BC==shin', 'BC=--shin', 'BC=' + 'x' * 900 + '!')],
-    ({'jansen.joint_names': ['BC=a', 'BC=b']}, "jansen.joint_names must be .* another .*'BC=b'"),
+    ({'jansen.joint_names': ['BC=a', 'BC=b']},
+     "jansen.joint_names must be .* different one .*'BC=b'"),
     ({'jansen.joint_names': ['BC=knee', 'EF=-knee']}, 'jansen.joint_names must give each joint '
      'of the scene a name of its own: jansen.BC and jansen.EF are both knee'),
     ({'jansen.joint_names': ['BC=water_drop_CB']}, 'jansen.joint_names must give .* '
