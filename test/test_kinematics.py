@@ -705,7 +705,7 @@ def test_what_the_inputs_hold_against_loads_is_their_effort(graph):
         result = graph.set(node, left__loads=wrong)
         assert not result.successful and 'left.loads must be texts such as' in result.reason
     result = graph.set(node, left__loads=['B=1 2 3'])
-    assert not result.successful and 'a force has as many parts as a place: x, y' in result.reason
+    assert not result.successful and 'a force must have the components x, y' in result.reason
 
 
 def test_a_sign_and_a_zero_hold_where_some_legs_are_left_out(graph):

@@ -12,7 +12,6 @@ import time
 import traceback
 from typing import Any, Callable, Hashable, Iterable, List, Set
 
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
 RCLError = rclpy_implementation.RCLError
@@ -87,15 +86,3 @@ class Incidents:
                 return None
 
         return guarded
-
-
-def refused(response: Any, reason: str) -> Any:
-    """Return a service's response to a request that failed."""
-    result = SetParametersResult(successful=False, reason=reason)
-    if hasattr(response, 'results'):
-        response.results.append(result)
-    elif hasattr(response, 'message'):
-        response.success, response.message = False, reason
-    elif isinstance(getattr(response, 'result', None), SetParametersResult):
-        response.result = result
-    return response

@@ -11,7 +11,7 @@ import gc
 import sys
 from typing import Any, Callable, Iterable, Iterator, List, Mapping, Optional
 
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rcl_interfaces.srv import SetParameters
 import rclpy
 from rclpy.clock import Clock, ClockType
@@ -23,7 +23,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args, try_shutdown
 
-from .log import Incidents, InvalidHandle, RCLError, refused
+from .log import Incidents, InvalidHandle, RCLError
 from .ownership import Announcer, Follower
 from .parameters import SceneParameters
 from .shutdown import ShutdownHandler
@@ -174,7 +174,7 @@ class SceneNode(Node):
             return callback(request, response)
         except Exception as error:
             self.report('a request', error)
-            return refused(response, elided(f'internal error: {error!r}', 299))
+            return _refused(response, elided(f'internal error: {error!r}', 299))
 
     def _set_parameters(self, callback: Callable, request: Any, response: Any) -> Any:
         """Set valid parameters together; `callback` of rclpy refuses the others one by one."""
@@ -224,6 +224,18 @@ class SceneNode(Node):
         except scenes.SceneError:
             self.destroy_node()
             raise
+
+
+def _refused(response: Any, reason: str) -> Any:
+    """Return a service's response to a request that failed."""
+    result = SetParametersResult(successful=False, reason=reason)
+    if hasattr(response, 'results'):
+        response.results.append(result)
+    elif hasattr(response, 'message'):
+        response.success, response.message = False, reason
+    elif isinstance(getattr(response, 'result', None), SetParametersResult):
+        response.result = result
+    return response
 
 
 def run(node_class: Callable[[], Node], name: str, args: Any = None,

@@ -122,8 +122,8 @@ def _read(name: str, input_: Input, reach: Tuple[Arc, ...], values: Values,
         field.about(input_.name, input_.unit, **(TURNS if field is START and input_.turns else {}))
         for field in (SPEED, START, SWEEP))
     name = f'{name}.{input_.name}'
-    speed = values.take(f'{name}.speed', speed_field, _usual_speed(input_, reach))
-    chosen = values.left(f'{name}.start')
+    speed = values.take(f'{name}.speed', speed_field, _default_speed(input_, reach))
+    has_start = values.unused(f'{name}.start')
     start = values.take(f'{name}.start', start_field, 0.0)
     sweep = values.take(f'{name}.sweep', sweep_field, ())
     source = _source(name, input_, values)
@@ -138,7 +138,7 @@ def _read(name: str, input_: Input, reach: Tuple[Arc, ...], values: Values,
     drive = InputSettings(input_, reach, speed, start, (low + trimmed, high - trimmed),
                           tuple(sweep) or None, *source)
     settled = not strict or old and (old.start, old.sweep) == (drive.start, drive.sweep)
-    if chosen and not home and not settled:
+    if has_start and not home and not settled:
         raise SceneError(f'{name}.start must be inside the {"sweep" if sweep else "reach"} '
                          f'{in_words(arcs)} {input_.unit}, not {start}')
     return drive
@@ -169,7 +169,7 @@ def _check_measures(name: str, linkage: Mechanism, drive: InputSettings) -> None
         raise SceneError(f'{key}: {error}') from None
 
 
-def _usual_speed(input_: Input, reach: Tuple[Arc, ...]) -> float:
+def _default_speed(input_: Input, reach: Tuple[Arc, ...]) -> float:
     """Return the default speed: 1 rad/s, or about three seconds for a stroke."""
     if input_.turns:
         return 1.0

@@ -57,21 +57,21 @@ def read_joint_names(mechanism: str, joints: Mapping[str, bool], lines: Iterable
 
     `joints` maps each joint to whether it is an angle published without whole turns.
     """
-    usual = {joint: JointName(f'{mechanism}_{joint}', published=not only_named)
-             for joint in joints}
+    default = {joint: JointName(f'{mechanism}_{joint}', published=not only_named)
+               for joint in joints}
     own: Dict[str, JointName] = {}
     for line in lines:
         match = _LINE.fullmatch(line)
         name = _unquoted(match[3]) if match else ''
-        if not match or not name or match[1] not in usual or match[1] in own:
+        if not match or not name or match[1] not in default or match[1] in own:
             raise SceneError(
                 f"{mechanism}.joint_names must be texts such as 'BC=left_shin' or "
-                f"'EF=-\"ankle-2\"+0.35', each about another of {listed(joints, 90)}, not "
+                f"'EF=-\"ankle-2\"+0.35', each for a different one of {listed(joints, 90)}, not "
                 f'{elided(line)!r}')
         offset = float(match[4] or 0.0)
         own[match[1]] = JointName(name, -1.0 if match[2] else 1.0, offset,
                                   wraps=joints[match[1]] and offset != 0.0)
-    return {**usual, **own}
+    return {**default, **own}
 
 
 def quoted_name(name: str) -> str:
@@ -91,9 +91,9 @@ def check_distinct(names: Mapping[str, Mapping[str, JointName]]) -> None:
     """Raise SceneError if two joints of the scene have one published name."""
     owners: Dict[str, str] = {}
     for mechanism, joints in names.items():
-        for joint, called in joints.items():
-            own = f'{mechanism}.{joint}'
-            other = owners.setdefault(called.name, own) if called.published else own
-            if other != own:
+        for joint, own in joints.items():
+            full_name = f'{mechanism}.{joint}'
+            other = owners.setdefault(own.name, full_name) if own.published else full_name
+            if other != full_name:
                 raise SceneError(f'{mechanism}.joint_names must give each joint of the scene a '
-                                 f'name of its own: {other} and {own} are both {called.name}')
+                                 f'name of its own: {other} and {full_name} are both {own.name}')

@@ -58,7 +58,7 @@ def overrides(path: str, node: str) -> Optional[Dict[str, Any]]:
         reason = str(error)
     else:
         return reader.values_of(node)
-    raise SceneError(f'{path} is no parameter file as ROS reads them: {reason}')
+    raise SceneError(f'{path} is not a valid ROS parameter file: {reason}')
 
 
 class _Reader:

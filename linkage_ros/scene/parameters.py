@@ -15,7 +15,7 @@ from typing import Any, Iterable, List, Optional, Tuple, Type
 from ..cache import cached
 from ..words import elided, listed, meant, MESSAGE, quoted
 
-# The nodes that use parameters; OWNER's value counts for parameters that several nodes use.
+# The nodes that use parameters; OWNER decides the value of a parameter that several nodes use.
 DRIVER, KINEMATICS, INVERSE = ALL = 'crank_driver', 'kinematics', 'servo_inverse'
 OWNER = KINEMATICS
 
@@ -112,7 +112,7 @@ class Field:
         if isinstance(value, tuple) != several:
             raise self.error(name, value)
         items = [self._converted(one) for one in (value if several else [value])]
-        if len(items) > LONGEST_LIST or not all(map(self._holds, items)):
+        if len(items) > LONGEST_LIST or not all(map(self._allows, items)):
             raise self.error(name, value)
         return tuple(items) if several else items[0]
 
@@ -131,7 +131,7 @@ class Field:
     def _type(self) -> Type[Any]:
         return KINDS[self.kind][0]
 
-    def _holds(self, value: Any) -> bool:
+    def _allows(self, value: Any) -> bool:
         if type(value) is not self._type:
             return False
         if isinstance(value, str):
@@ -162,23 +162,23 @@ class Parameter:
 class Values:
     """Values by full parameter name, consumed one by one."""
 
-    def __init__(self, given: Mapping[str, Any]):
-        self._left = dict(given)
+    def __init__(self, values: Mapping[str, Any]):
+        self._unused = dict(values)
         self.parameters: List[Parameter] = []
 
-    def left(self, prefix: str = '') -> List[str]:
+    def unused(self, prefix: str = '') -> List[str]:
         """Return the names with a prefix whose values are not consumed yet."""
-        return sorted(name for name in self._left if name.startswith(prefix))
+        return sorted(name for name in self._unused if name.startswith(prefix))
 
     def take(self, name: str, field: Field, default: Any) -> Any:
         """Consume and validate a value, and add the parameter to `parameters`."""
-        value = field.checked(name, self._left.pop(name)) if name in self._left else default
+        value = field.checked(name, self._unused.pop(name)) if name in self._unused else default
         self.parameters.append(Parameter(name, field, value))
         return value
 
 
 def refuse_unknown(names: Iterable[str], known: List[str]) -> None:
-    """Raise SceneError for a name that is no parameter of the scene or of rclpy."""
+    """Raise SceneError unless all names are parameters of the scene or of rclpy."""
     for name in names:
         known = [f'{name}.type', *known] if f'{name}.*' in known else known
         if not _ROS.match(name):

@@ -42,12 +42,12 @@ FRAME_RULE = 'up to 100 characters that can be seen, the first a letter, digit o
 
 TYPE = Field('string', 'Type of the mechanism.', readers=ALL, read_only=True,
              rule=f'one of {", ".join(TYPES)}')
-JOINTS = Field('string_array', 'The linkage, one line a joint.', readers=ALL, read_only=True)
+JOINTS = Field('string_array', 'The linkage, one line per joint.', readers=ALL, read_only=True)
 TRACER = Field('string', 'Joint whose curve is the locus; empty: the last.', readers=ALL,
                read_only=True)
 DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [m].', positive=True,
                   readers=ALL)
-BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the usual one.', -1, 1, readers=ALL)
+BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the default.', -1, 1, readers=ALL)
 SCALE = Field('double', 'Factor of every length.', positive=True, readers=(KINEMATICS, INVERSE))
 LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.', 1, 50,
                   readers=(KINEMATICS,))
@@ -64,7 +64,7 @@ JOINT_NAMES = Field(
     rule="such as 'BC=left_shin', or 'EF=-left_ankle+0.35' for 0.35 minus its position")
 ONLY_NAMED = Field('bool', 'Whether only the joints in joint_names are published.',
                    readers=(KINEMATICS,))
-LOADS = Field('string_array', "Loads that the inputs hold, in the linkage's plane.",
+LOADS = Field('string_array', "Loads that the inputs balance, in the linkage's plane.",
               readers=(KINEMATICS, INVERSE),
               rule="such as 'C=0 -9.81', a force [N] at a joint, or 'EF=2.5', a moment [N m]")
 
@@ -86,13 +86,13 @@ class SceneMechanism:
     joints: Mapping[str, JointName]
     only_named: bool
     loads: Mapping[str, Load]
-    given: Mapping[str, Any] = some(compare=False, repr=False)
+    values: Mapping[str, Any] = some(compare=False, repr=False)
     parameters: Tuple[Parameter, ...] = some(compare=False, repr=False)
 
-    def is_of(self, given: Mapping[str, Any]) -> bool:
+    def is_from(self, values: Mapping[str, Any]) -> bool:
         """Return whether it was read from exactly these values."""
-        return self.given is given or self.given.keys() == given.keys() and all(
-            self.given[key] is value for key, value in given.items())
+        return self.values is values or self.values.keys() == values.keys() and all(
+            self.values[key] is value for key, value in values.items())
 
     @property
     def in_space(self) -> bool:
@@ -112,8 +112,8 @@ class SceneMechanism:
         """
         Return the input for a measured output [rad or m], and d output / d input.
 
-        Of several solutions it is the continuous one, or else the nearest, to `near`; NaN outside
-        the reach or the user's sweep.
+        Of several solutions it is the one that continues from `near`, or else the nearest; NaN
+        outside the reach or the user's sweep.
         """
         drive, own, unit = self.first, self.scale_of(self.first.input.name), self.scale_of(output)
         ends = drive.ends and (drive.ends[0] / own, drive.ends[1] / own)
@@ -162,12 +162,12 @@ class SceneMechanism:
         return self.linkage.tracer if self.linkage.tracer in self.points else self.points[-1]
 
 
-def read_machine(name: str, given: Mapping[str, Any], old: Optional[SceneMechanism],
+def read_machine(name: str, own: Mapping[str, Any], old: Optional[SceneMechanism],
                  strict: bool) -> SceneMechanism:
-    """Read a mechanism; return the old one if the values are unchanged."""
-    if old and old.is_of(given):
+    """Read a mechanism from its own values; return the old one if they are unchanged."""
+    if old and old.is_from(own):
         return old
-    values = Values(given)
+    values = Values(own)
     type_ = values.take(f'{name}.type', TYPE, name)
     if type_ not in TYPES:
         raise SceneError(f'{name}.type must be {TYPE.rule}, not {quoted(type_)}'
@@ -176,9 +176,9 @@ def read_machine(name: str, given: Mapping[str, Any], old: Optional[SceneMechani
     scale = values.take(f'{name}.scale', SCALE, 1.0)
     leg_pairs, mirrored = _legs(name, linkage, values)
     points, pose = _points(name, linkage, values), _pose(name, values)
-    settled = old.inputs if old else {}
+    old_inputs = old.inputs if old else {}
     inputs = {input_.name: read_settings(name, linkage, input_, reach, scale, values,
-                                         settled.get(input_.name), strict)
+                                         old_inputs.get(input_.name), strict)
               for input_ in linkage.inputs}
     frame_id = values.take(f'{name}.frame_id', OWN_FRAME_ID, '')
     only_named = values.take(f'{name}.only_named', ONLY_NAMED, False)
@@ -190,10 +190,10 @@ def read_machine(name: str, given: Mapping[str, Any], old: Optional[SceneMechani
         values.take(f'{name}.joint_names', JOINT_NAMES, ()), only_named)
     loads = read_loads(name, linkage, values.take(f'{name}.loads', LOADS, ()))
     if loads and (leg_pairs > 1 or mirrored):
-        raise SceneError(f'{name}.loads must be empty where there is more than one leg')
-    refuse_unknown(values.left(), [parameter.name for parameter in values.parameters])
+        raise SceneError(f'{name}.loads must be empty for more than one leg')
+    refuse_unknown(values.unused(), [parameter.name for parameter in values.parameters])
     return SceneMechanism(name, linkage, reach, scale, leg_pairs, mirrored, points, pose, inputs,
-                          frame_id, joints, only_named, loads, given, tuple(values.parameters))
+                          frame_id, joints, only_named, loads, own, tuple(values.parameters))
 
 
 def _linkage(name: str, type_: str, values: Values) -> Tuple[Mechanism, Tuple[Arc, ...]]:
@@ -222,7 +222,7 @@ def _design(name: str, type_: str, values: Values) -> Design:
     joints = values.take(f'{name}.joints', JOINTS, ())
     tracer = values.take(f'{name}.tracer', TRACER, '')
     start = f'{name}.dimensions.'
-    dimensions = [key[len(start):] for key in values.left(start)]
+    dimensions = [key[len(start):] for key in values.unused(start)]
     try:
         return mechanisms.design(type_, joints, tracer or None, dimensions)
     except ValueError as error:
@@ -262,7 +262,7 @@ def _legs(name: str, linkage: Mechanism, values: Values) -> Tuple[int, bool]:
     if (pairs > 1 or mirrored) and not able:
         what, allowed = ('leg_pairs', '1') if pairs > 1 else ('mirrored', 'false')
         raise SceneError(f'{name}.{what} must be {allowed}: only a linkage whose one crank '
-                         'turns about x = 0, its angle counted from +x, can have more legs')
+                         'turns about x = 0, its angle measured from +x, can have more legs')
     return pairs, mirrored
 
 

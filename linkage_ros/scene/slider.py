@@ -41,7 +41,7 @@ def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
     name, what, key = (parameter.name.split('.') + ['', ''])[:3]
     machine = scene.machines.get(name)
     if machine and what == 'dimensions':
-        return _length(machine.linkage, key, field.positive, _used(machine))
+        return _length(machine.linkage, key, field.positive, _required_range(machine))
     if machine and what in machine.inputs and key == 'start':
         reach = machine.inputs[what].reach
         ends = [value, *(end for arc in reach for end in arc)]
@@ -49,8 +49,8 @@ def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
     return _whole_stops(value, 0.1 * value, 10.1 * value)
 
 
-def _used(machine: SceneMechanism) -> Optional[Tuple[float, float]]:
-    """Return the crank's range in which it must be assembled; None: at one angle at least."""
+def _required_range(machine: SceneMechanism) -> Optional[Tuple[float, float]]:
+    """Return the input's range in which it must be assembled; None: at one value at least."""
     first, *others = machine.inputs.values()
     if others or not first.input.is_whole(first.reach):
         return None

@@ -13,7 +13,7 @@ from . import read, Scene, SceneError
 from .parameter_file import plain, TEXT
 
 
-def in_yaml(given: Mapping[str, Any]) -> str:
+def in_yaml(values: Mapping[str, Any]) -> str:
     """Return the text of a parameter file with values by full parameter name."""
     import yaml
 
@@ -23,13 +23,13 @@ def in_yaml(given: Mapping[str, Any]) -> str:
     Dumper.add_representer(str, lambda dumper, text: dumper.represent_scalar(
         TEXT, text, None if isinstance(plain(text), str) else "'"))
     texts = ['/**:', '  ros__parameters:']
-    for name, value in given.items():
-        shown = list(value) if isinstance(value, tuple) else value
-        if shown == []:
+    for name, value in values.items():
+        written = list(value) if isinstance(value, tuple) else value
+        if written == []:
             # rcl cannot read an empty list, which is the default anyway.
             continue
-        numbers = isinstance(shown, list) and not any(isinstance(one, str) for one in shown)
-        text = yaml.dump({name: shown}, Dumper=Dumper, width=1000,
+        numbers = isinstance(written, list) and not any(isinstance(one, str) for one in written)
+        text = yaml.dump({name: written}, Dumper=Dumper, width=1000,
                          default_flow_style=numbers and None)
         texts.append(indent(text.rstrip(), '    '))
     return '\n'.join(texts) + '\n'
@@ -50,17 +50,17 @@ def without_defaults(scene: Scene, always: re.Pattern = NOTHING) -> Dict[str, An
         If nodes could not start with them: a start outside its input's sweep or reach.
 
     """
-    kept = {parameter.name: parameter.value for parameter in scene.parameters}
-    whole = dict(kept)
+    values = {parameter.name: parameter.value for parameter in scene.parameters}
+    whole = dict(values)
     for name in whole:
         if always.fullmatch(name):
             continue
-        fewer = {key: value for key, value in kept.items() if key != name}
+        fewer = {key: value for key, value in values.items() if key != name}
         try:
             same = read(fewer, scene, strict=False).parameters
         except SceneError:
             continue
         if {parameter.name: parameter.value for parameter in same} == whole:
-            kept = fewer
-    read(kept)
-    return kept
+            values = fewer
+    read(values)
+    return values
