@@ -4,9 +4,9 @@
 """
 Scenes: a set of mechanisms with their sizes, poses and input motions.
 
-This room alone defines the parameters' names. `read` turns values into a Scene, or raises an error
-that names the wrong parameter and its allowed values. Nodes declare the scene's `parameters`. No
-ROS is needed.
+This package alone defines the names of parameters. `read` turns their values into a Scene, or
+raises an error that names the wrong parameter and its allowed values. Nodes declare the scene's
+`parameters`. No ROS is needed.
 """
 
 from __future__ import annotations
@@ -57,7 +57,12 @@ RATE = Field('double', 'Rate of crank messages [Hz]; 0: none.', 0.0, 1000.0, rea
 
 @dataclass(frozen=True)
 class Scene:
-    """Mechanisms by name, their common frame, and the rate of the crank messages [Hz]."""
+    """
+    Mechanisms by name, their common frame, and the rate of the crank messages [Hz].
+
+    `general` are the parameters of no mechanism; `values` are the values that the scene was read
+    from, by mechanism ('' for general ones) and by full name.
+    """
 
     machines: Mapping[str, SceneMechanism]
     frame_id: str
@@ -73,7 +78,7 @@ class Scene:
                                  for parameter in machine.parameters))
 
     def changed_from(self, old: 'Scene') -> List[Parameter]:
-        """Return the parameters whose values differ from those of an older scene."""
+        """Return the parameters whose values differ from an older scene of the same mechanisms."""
         parts = [(self.general, old.general), *(
             (machine.parameters, old.machines[name].parameters)
             for name, machine in self.machines.items() if machine is not old.machines[name])]
@@ -83,7 +88,11 @@ class Scene:
 
 
 def load(path: str) -> Scene:
-    """Read a scene from a parameter file, as nodes without a namespace do; needs PyYAML."""
+    """
+    Read a scene from the parameter file at `path`, as nodes without a namespace do.
+
+    Needs PyYAML. Raises SceneError as `read` does, and if ROS would refuse the file.
+    """
     found = {node: overrides(path, f'/{node}') for node in ALL}
     if not any(own is not None for own in found.values()):
         raise SceneError(f"{path} must be YAML with '/**:' and below it 'ros__parameters:'")
@@ -108,10 +117,10 @@ def read(values: Mapping[str, Any], before: Optional[Scene] = None, strict: bool
     values : mapping
         Values by full parameter name.
     before : Scene, optional
-        The previous scene: mechanisms whose values are unchanged are reused from it.
+        The previous scene, whose mechanisms are reused if their values are unchanged.
     strict : bool
-        Whether an input's start must lie in its sweep or reach. False for a running scene: there
-        the start does not constrain a change of the sweep or reach.
+        Whether an input's start must be in its sweep or reach. False for a scene that is running:
+        its inputs have left their starts, so sweep and reach may change regardless of these.
 
     Raises
     ------
@@ -128,9 +137,9 @@ def read(values: Mapping[str, Any], before: Optional[Scene] = None, strict: bool
 
 def changed(before: Scene, values: Mapping[str, Any], strict: bool = True) -> Scene:
     """
-    Return a scene with some values changed, by full parameter name.
+    Return the scene `before` with some values changed, which are by full parameter name.
 
-    Only the mechanisms concerned are read again. Raises SceneError as `read` does.
+    Mechanisms without a changed value are reused. `strict` and SceneError are those of `read`.
     """
     parts = dict(before.values)
     for name, part in _by_mechanism(values).items():
@@ -160,7 +169,7 @@ def _read(parts: Mapping[str, Mapping[str, Any]], before: Optional[Scene], stric
 
 
 def _by_mechanism(values: Any) -> Dict[str, Dict[str, Any]]:
-    """Group values by mechanism; general parameters have an empty name."""
+    """Return {mechanism: {full name: value}}, with '' as the mechanism of general parameters."""
     if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
         raise SceneError('a scene must map names of parameters to their values, not be '
                          f'{quoted(values)}')

@@ -24,9 +24,10 @@ _LINE = re.compile(rf'(\w+)=(-?)({_PLAIN}|"(?:[^"\\]|\\.)+")'
 
 class JointName(NamedTuple):
     """
-    Published name of a joint, whose value is sign * position + offset [rad or m].
+    Published name of a joint. Its published value is sign * position + offset [rad or m].
 
-    An angle with its own zero is wrapped to [-pi, pi].
+    `published` tells whether it is in joint states, `wraps` whether the value is wrapped to
+    [-pi, pi].
     """
 
     name: str
@@ -36,12 +37,12 @@ class JointName(NamedTuple):
     wraps: bool = False
 
     def of(self, position: Any) -> Any:
-        """Convert a position, a number or an array, to the published value."""
+        """Return the published value of a position [rad or m], a number or an array."""
         value = self.sign * position + self.offset
         return value - math.tau * np.round(value / math.tau) if self.wraps else value
 
     def travel(self, ends: Tuple[float, float]) -> Optional[Tuple[float, float]]:
-        """Convert limits to published ones; None for an angle that wraps between them."""
+        """Return the limits of the published value; None if it jumps by a turn between them."""
         low, high = sorted(self._replace(wraps=False).of(end) for end in ends)
         if not self.wraps:
             return low, high
@@ -53,9 +54,24 @@ class JointName(NamedTuple):
 def read_joint_names(mechanism: str, joints: Mapping[str, bool], lines: Iterable[str],
                      only_named: bool) -> Dict[str, JointName]:
     """
-    Return the published names of all joints; raise SceneError if a line matches none.
+    Return the published names of all joints of a mechanism, by joint.
 
-    `joints` maps each joint to whether it is an angle published without whole turns.
+    Parameters
+    ----------
+    mechanism : str
+        Name of the mechanism.
+    joints : mapping
+        For each joint whether it is an angle, which wraps if it has an offset.
+    lines : iterable of str
+        Lines of the parameter joint_names, such as 'EF=-left_ankle+0.35'.
+    only_named : bool
+        Whether joints without a line are not published.
+
+    Raises
+    ------
+    SceneError
+        If a line is malformed, names no joint, or names one that another line names.
+
     """
     default = {joint: JointName(f'{mechanism}_{joint}', published=not only_named)
                for joint in joints}
@@ -75,7 +91,7 @@ def read_joint_names(mechanism: str, joints: Mapping[str, bool], lines: Iterable
 
 
 def quoted_name(name: str) -> str:
-    """Return a name as written in `joint_names`: quoted unless plain."""
+    """Return a published name as it is written in joint_names: quoted if it must be."""
     plain = re.fullmatch(_PLAIN, name, re.ASCII)
     return name if plain else json.dumps(name, ensure_ascii=False)
 
@@ -88,7 +104,11 @@ def _unquoted(text: str) -> str:
 
 
 def check_distinct(names: Mapping[str, Mapping[str, JointName]]) -> None:
-    """Raise SceneError if two joints of the scene have one published name."""
+    """
+    Raise SceneError if two joints of the scene are published by one name.
+
+    `names` are by mechanism and joint.
+    """
     owners: Dict[str, str] = {}
     for mechanism, joints in names.items():
         for joint, own in joints.items():
