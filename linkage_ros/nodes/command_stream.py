@@ -35,25 +35,13 @@ PUBLISHERS, UNKNOWN_NAMES, MOST_POINTS = 100, 1000, 10_000
 
 
 class Target(NamedTuple):
-    """
-    The requested outputs of one mechanism.
+    """The requested outputs of a mechanism, and their solver."""
 
-    Attributes
-    ----------
-    named : str
-        Names of the outputs in the message, for texts.
-    request : InverseRequest
-        Their solver.
-    places : tuple of int
-        Index of each output in the message.
-    names : tuple of JointName
-        Published name, sign and offset of each output.
-
-    """
-
+    # Names of the outputs in the message, for texts.
     named: str
     machine: SceneMechanism
     request: InverseRequest
+    # Index in the message, and published name with sign and offset, of each output.
     places: tuple[int, ...]
     names: tuple[JointName, ...]
 
@@ -82,11 +70,7 @@ class Target(NamedTuple):
 
 
 class Command(NamedTuple):
-    """
-    Positions and speeds of a target's actuators, and the `inputs` at these positions.
-
-    Positions and inputs are in rad or m, speeds in rad/s or m/s; `speeds` is None if unknown.
-    """
+    """Actuator positions [rad or m], their speeds or None, and the inputs at these positions."""
 
     target: Target
     inputs: Sequence[float]
@@ -108,17 +92,9 @@ class CommandStream:
     Publishes `servo_commands`, `<mechanism>/commands` and `servo_trajectory`.
 
     Requests arrive on `wanted_states` and `wanted_trajectory`. Each solution continues the last
-    one. If an output is out of reach, its actuator holds the last valid command. A trajectory is
-    solved in a worker thread, unless a newer one replaces it.
-
-    Parameters
-    ----------
-    mechanisms : iterable of str
-        Names of all mechanisms.
-    present : callable
-        present(mechanism) returns the present inputs [rad or m] of a SceneMechanism, inf where
-        they are unknown.
-
+    one; if an output is out of reach, its actuator holds the last valid command. A trajectory is
+    solved in a worker thread; a newer one replaces it. `present(mechanism)` returns the present
+    inputs of a SceneMechanism [rad or m], inf where they are unknown.
     """
 
     def __init__(self, node: Any, mechanisms: Iterable[str],
@@ -282,11 +258,7 @@ class CommandStream:
 
     def _solve(self, message: JointTrajectory, targets: Sequence[Target],
                near: list[Sequence[float]], jumps: list[bool]) -> Optional[Callable[[], None]]:
-        """
-        Solve a trajectory; return a function that publishes the solution.
-
-        Return None if the trajectory is refused or a newer one has arrived.
-        """
+        """Solve a trajectory; return a function to publish it, None if it is not to be."""
         solved = JointTrajectory(header=message.header, joint_names=[
             name for target in targets for name in target.actuators])
         try:

@@ -100,11 +100,7 @@ class DrivenMechanism:
         self.inputs[:, i] = value, 0.0 if speed is None else speed
 
     def measure(self, i: int, position: float, speed: Optional[float]) -> bool:
-        """
-        Solve for input `i` at a sensor's position and speed, and set it as `receive` does.
-
-        Return False if no pose has this position: the input is unchanged.
-        """
+        """Set input `i` by a sensor's position and speed; return False if that is out of reach."""
         drive = self.model.inputs[i]
         near = float(self.inputs[0, i]) if self.known[0, i] else None
         value, speed = self.model.machine.from_source(drive, position, speed, near)
@@ -121,11 +117,7 @@ class DrivenMechanism:
         solution.solve(*self.inputs.tolist())
 
     def assess(self, solution: Solution, is_regular: bool) -> bool:
-        """
-        Update `validity` from a solution before `convert`; return whether it has changed.
-
-        `is_regular` tells that the solution, apart from efforts, is known to be regular.
-        """
+        """Update `validity`, by a check unless it is regular; return whether it has changed."""
         layout, before = solution.layout, self.validity
         if layout.efforts:
             layout.effort(solution.values)[:] = self.model.machine.efforts(self.inputs[0].tolist())
@@ -175,11 +167,7 @@ class DrivenMechanism:
 
     def prepared(self, machine: scene.SceneMechanism, frame_id: str, prefix: str,
                  in_scene: bool) -> MechanismModel:
-        """
-        Return a model of `machine`, with the solver and the messages of its subscribers ready.
-
-        An equal present model is reused. `in_scene`: see `solution`.
-        """
+        """Return a model of `machine`, ready for the subscribers; reuse an equal present one."""
         before = self._model
         if before and before.made_of == (machine, frame_id, prefix):
             return before

@@ -125,10 +125,9 @@ class MechanismModel:
 
     def conversion(self, layout: Layout) -> Optional[Tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """
-        Return factors and offsets from solved to published values, both (values,).
+        Return factors (values,), offsets (values,) and indices of angles to wrap.
 
-        The third array has the indices of angles that are wrapped to [-pi, pi]. None means that
-        all values are published as they are solved.
+        They convert solved to published values. None means that these are equal.
         """
         return None if self._is_plain else self._conversions[layout]
 
@@ -153,11 +152,7 @@ class MechanismModel:
             efforts if validity.has_efforts else ())
 
     def joints(self, validity: Validity, values: np.ndarray) -> List[np.ndarray]:
-        """
-        Return names, positions, velocities and efforts of the assembled legs' published joints.
-
-        Velocities are empty if they are not solved; efforts are 0 except at inputs with loads.
-        """
+        """Return names, positions, velocities (if solved) and efforts (else 0) to publish."""
         layout, n, legs = validity.solution.layout, len(self.inputs), validity.legs()
         chosen = self._published.copy()
         chosen[n:].reshape(layout.legs, -1)[np.isin(np.arange(layout.legs), legs, invert=True)] = 0
@@ -179,11 +174,7 @@ class MechanismModel:
 
 
 def _shown(machine: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
-    """
-    Return the points to solve for the markers, and the pieces of each marker by its id.
-
-    A piece is a joint, line, rod or plate: a list of the indices of its points.
-    """
+    """Return the points of the markers, and by marker id the point indices of its pieces."""
     linkage, names = machine.linkage, machine.points
     if machine.in_space:
         return _shown_spatial(linkage, names)
@@ -218,12 +209,7 @@ def _shown_spatial(linkage: Mechanism, names: Sequence[str]) -> Tuple[Sequence, 
 
 
 def _arranged(layout: Layout, rest: float, joints: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """
-    Return an array in a solution's layout: values of joints, and `rest` elsewhere.
-
-    `joints` has a value for each input and each joint of each leg; `rates` is used in its place
-    for velocities and efforts.
-    """
+    """Return numbers in a solution's layout: values of joints, their rates, and `rest`."""
     values, n = np.full(layout.size, rest), layout.inputs
     rows, driven = layout.rows(values), layout.driven(values)
     driven[:n] = joints[:n]

@@ -45,12 +45,7 @@ FACE = _rgba(palette.PLATE)
 
 def joint_states(stamp: Any, names: Sequence[str], positions: Any, velocities: Any = (),
                  efforts: Any = ()) -> JointState:
-    """
-    Build joint states.
-
-    `stamp` is a Time; the sequences have a number for each name, or none: positions [rad or m],
-    velocities [rad/s or m/s] and efforts [N m or N].
-    """
+    """Build joint states: positions [rad or m], velocities [rad/s or m/s], efforts [N m or N]."""
     message = JointState(name=names, position=array('d', positions),
                          velocity=array('d', velocities), effort=array('d', efforts))
     message.header.stamp = stamp
@@ -65,12 +60,8 @@ class Markers:
     ----------
     name : str
         Name of the mechanism, which is the namespace of its markers.
-    frame_id : str
-        Frame of the markers' pose.
-    pose : sequence of float
-        x, y, z [m], roll, pitch, yaw [rad].
-    size : float
-        Length of the longest bar [m].
+    frame_id, pose, size
+        Frame of the pose; the pose x, y, z [m], roll, pitch, yaw [rad]; longest bar [m].
     shown : mapping
         {id: [[index of a point, ...], ...]}, for each joint, line or triangle its points.
 
@@ -104,11 +95,8 @@ class Markers:
 
 def locus(name: str, frame_id: str, pose: Sequence[float], places: np.ndarray,
           size: float) -> Marker:
-    """
-    Build the marker of the curve through points [m], (n, 2).
-
-    Its stamp stays zero, so that RViz displays it in the frame's latest pose. See Markers.
-    """
+    """Build the marker of the curve through points [m], (n, 2); see Markers."""
+    # Its stamp is zero: RViz uses the latest pose of the frame.
     marker = _marker(name, LOCUS_ID, frame_id, pose, size)
     marker.points = [Point(**dict(zip('xyz', place))) for place in places.tolist()]
     return marker

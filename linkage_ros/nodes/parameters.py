@@ -35,21 +35,10 @@ class SceneParameters:
     """
     Declares the parameters that a node uses, and validates every change.
 
-    Parameters
-    ----------
-    node : Node
-        Created with `automatically_declare_parameters_from_overrides`.
-    role : str
-        One of scenes.ALL, which selects the node's parameters.
-    check : callable
-        check(scene) raises SceneError if the node does not support a scene.
-    changed : callable
-        changed(parameters) is called with the changed Parameters, after `scene` is replaced.
-
-    Raises
-    ------
-    SceneError
-        If the node's initial values are invalid.
+    The `node` is created with `automatically_declare_parameters_from_overrides`. `role`, one of
+    scenes.ALL, selects its parameters. `check(scene)` raises SceneError for a scene that the node
+    does not support. `changed(parameters)` is called with the changed ones, after `scene` is
+    replaced. Raises SceneError if the node's initial values are invalid.
 
     Attributes
     ----------
@@ -89,11 +78,7 @@ class SceneParameters:
         node.add_post_set_parameters_callback(self._adopt)
 
     def set_valid(self, messages: Sequence[ParameterMessage]) -> dict[int, SetParametersResult]:
-        """
-        Set together those parameters of a request that are valid by themselves.
-
-        Return their results by their index in the request.
-        """
+        """Set together those parameters that are valid by themselves; return results by index."""
         valid = {}
         for i, one in enumerate(messages):
             with suppress(scenes.SceneError, KeyError, ValueError):

@@ -59,11 +59,7 @@ class Message(NamedTuple):
 
 @dataclass(eq=False)
 class Output:
-    """
-    What a plan publishes, for one validity of each solution.
-
-    It is regular if all solutions are, and there are no efforts: `Validity` explains the term.
-    """
+    """What a plan publishes for given validities; regular if these are and have no efforts."""
 
     messages: List[Message]
     is_regular: bool

@@ -25,13 +25,9 @@ class PythonBackend:
         """
         Read a serialised message and solve; this backend leaves `output` to `publish`.
 
-        Returns
-        -------
-        bool or set of DrivenMechanism
-            False if the message is from another sender, and nothing is done. True if all solutions
-            are regular and the backend has published `output`. Otherwise the mechanisms whose
-            solutions may be irregular, as `Validity` explains.
-
+        Return False, without any effect, if the message is from another sender. Return True if all
+        solutions are regular (see `Validity`) and `output` has been published. Otherwise return
+        the mechanisms whose solutions may be irregular.
         """
         plan = self._plan
         if plan.sender:

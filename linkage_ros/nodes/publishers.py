@@ -22,15 +22,8 @@ class TrackedPublisher:
     """
     A publisher whose flag `has_subscribers` is updated by events, not by a query per message.
 
-    Parameters
-    ----------
-    node, type_, name, qos
-        As for Node.create_publisher.
-    changed : callable
-        Called on the thread of rclpy's executor when the flag has changed.
-    own : int
-        Number of subscriptions that do not count, since they belong to this process.
-
+    `own` is the number of this process's subscriptions, which do not count. `changed` is called on
+    the thread of rclpy's executor when the flag has changed.
     """
 
     def __init__(self, node: Node, type_: Any, name: str, qos: Any,

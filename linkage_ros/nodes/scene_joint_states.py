@@ -51,11 +51,7 @@ class SceneJointStates:
             self._descriptions.publish(String(data=urdf))
 
     def message(self, mechanisms: Iterable[Any]) -> Optional[Tuple[PatchedPublisher, List]]:
-        """
-        Return a publisher of the joints of `mechanisms`, and the arrays of its values.
-
-        None means that no leg of these DrivenMechanisms is assembled.
-        """
+        """Return a publisher of assembled mechanisms and its arrays; None if none is assembled."""
         parts = tuple((one.model, one.validity) for one in mechanisms
                       if one.validity and one.validity.any_assembled)
         if not parts:

@@ -55,13 +55,7 @@ class SceneNode(Node):
     A subclass overrides `check`, `prepare` and `adopt`, and calls `begin` last in its constructor.
     A change of parameters is validated and answered at once; a worker thread prepares the changed
     scene, then the node adopts it. If further changes arrive meanwhile, only the newest scene is
-    prepared.
-
-    Raises
-    ------
-    SceneError
-        If the initial parameters are invalid.
-
+    prepared. Raises SceneError if the initial parameters are invalid.
     """
 
     def __init__(self, name: str, **kwargs: Any):
@@ -138,11 +132,7 @@ class SceneNode(Node):
 
     def declare_parameters(self, namespace: str, parameters: Any, ignore_override: bool = False
                            ) -> List[Parameter]:
-        """
-        Declare parameters as rclpy does, except for an empty list in a parameter file.
-
-        It has no type; rclpy would refuse it. Dynamic typing accepts it.
-        """
+        """Declare parameters as rclpy does, and allow empty lists in a parameter file."""
         for _, *value, descriptor in (one for one in parameters if len(one) > 2):
             descriptor.dynamic_typing = descriptor.dynamic_typing or value == [None]
         return super().declare_parameters(namespace, parameters, ignore_override)
@@ -240,12 +230,7 @@ def _refused(response: Any, reason: str) -> Any:
 
 def run(node_class: Callable[[], Node], name: str, args: Any = None,
         executor_class: Any = Executor) -> int:
-    """
-    Run the node that `node_class` makes, until SIGINT or SIGTERM.
-
-    `name` is for errors before there is a node; `args` are the command-line arguments, by default
-    sys.argv; `executor_class` is a class of rclpy. Return the exit code of the process.
-    """
+    """Run a node until SIGINT or SIGTERM; return the exit code. `name` is for early errors."""
     return run_together(lambda: [node_class()], name, args, executor_class)
 
 

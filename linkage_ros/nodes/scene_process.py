@@ -16,12 +16,7 @@ NAME = 'scene'
 
 
 def nodes() -> Iterator[SceneNode]:
-    """
-    Create the nodes.
-
-    `kinematics` is first, so that the others adopt its parameters; `crank_driver` is last, since
-    it calls the others' subscriptions.
-    """
+    """Create the nodes, `kinematics` first: the others start with its values of parameters."""
     kinematics = Kinematics()
     yield kinematics
     inverse = ServoInverse()

@@ -49,11 +49,7 @@ def _scene(args: List[str]) -> scene.Scene:
 
 
 class _Reader(scene_node.SceneNode):
-    """
-    A node that reads a scene from its parameters.
-
-    Raises RequestError if `has_file` and the parameter file has no scene for it.
-    """
+    """Reads a scene from parameters; raises RequestError if a parameter file has none."""
 
     def __init__(self, has_file: bool):
         super().__init__(NAME)

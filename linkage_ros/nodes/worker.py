@@ -88,11 +88,7 @@ class Worker:
             return OTHER, self._others.popleft()
 
     def _hand_over(self, kind: str, act: Callable[[], None]) -> None:
-        """
-        Call `act` on the thread of rclpy's executor, and wait until it has returned.
-
-        Without the wait, many functions would queue up there and delay messages together.
-        """
+        """Call `act` on rclpy's executor and wait: a queue of such calls would delay messages."""
         executor, done = self._node.executor, threading.Event()
         if executor is not None:
             executor.create_task(partial(self._act, kind, act, done))

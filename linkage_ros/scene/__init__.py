@@ -57,18 +57,15 @@ RATE = Field('double', 'Rate of crank messages [Hz]; 0: none.', 0.0, 1000.0, rea
 
 @dataclass(frozen=True)
 class Scene:
-    """
-    Mechanisms by name, their common frame, and the rate of the crank messages [Hz].
-
-    `general` are the parameters of no mechanism; `values` are the values that the scene was read
-    from, by mechanism ('' for general ones) and by full name.
-    """
+    """Mechanisms by name, their common frame, and the rate of the crank messages [Hz]."""
 
     machines: Mapping[str, SceneMechanism]
     frame_id: str
     frame_prefix: str
     rate: float
+    # Parameters that belong to no mechanism.
     general: Tuple[Parameter, ...]
+    # What it was read from, by mechanism ('' for general parameters) and full parameter name.
     values: Mapping[str, Mapping[str, Any]] = some(compare=False, repr=False)
 
     @property
@@ -88,11 +85,7 @@ class Scene:
 
 
 def load(path: str) -> Scene:
-    """
-    Read a scene from the parameter file at `path`, as nodes without a namespace do.
-
-    Needs PyYAML. Raises SceneError as `read` does, and if ROS would refuse the file.
-    """
+    """Read a scene from a parameter file, as nodes without a namespace do; needs PyYAML."""
     found = {node: overrides(path, f'/{node}') for node in ALL}
     if not any(own is not None for own in found.values()):
         raise SceneError(f"{path} must be YAML with '/**:' and below it 'ros__parameters:'")
@@ -110,7 +103,7 @@ def load(path: str) -> Scene:
 
 def read(values: Mapping[str, Any], before: Optional[Scene] = None, strict: bool = True) -> Scene:
     """
-    Read a scene from parameter values.
+    Read a scene from parameter values; raise SceneError if one is unknown or not allowed.
 
     Parameters
     ----------
@@ -121,11 +114,6 @@ def read(values: Mapping[str, Any], before: Optional[Scene] = None, strict: bool
     strict : bool
         Whether an input's start must be in its sweep or reach. False for a scene that is running:
         its inputs have left their starts, so sweep and reach may change regardless of these.
-
-    Raises
-    ------
-    SceneError
-        If a parameter is unknown or its value is not allowed.
 
     """
     parts = _by_mechanism(values)

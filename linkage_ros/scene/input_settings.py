@@ -115,12 +115,7 @@ def _scaled(input_: Input, linkage: Mechanism, reach: Tuple[Arc, ...],
 def read_settings(name: str, linkage: Mechanism, input_: Input, reach: Tuple[Arc, ...],
                   scale: float, values: Values, old: Optional[InputSettings],
                   strict: bool) -> InputSettings:
-    """
-    Read the settings of an input, in the scene's units: lengths times `scale`.
-
-    `reach` is that of the linkage; `old` are the previous settings, None for a new scene; `strict`
-    is explained at `scene.read`. Raises SceneError if a value is not allowed.
-    """
+    """Read the settings of an input; its lengths are those of the linkage times `scale`."""
     drive = _read(name, *_scaled(input_, linkage, reach, scale), values, old, strict)
     _check_measures(name, linkage, drive)
     return replace(drive, period=linkage.period(linkage.inputs.index(input_)))

@@ -54,24 +54,11 @@ class JointName(NamedTuple):
 def read_joint_names(mechanism: str, joints: Mapping[str, bool], lines: Iterable[str],
                      only_named: bool) -> Dict[str, JointName]:
     """
-    Return the published names of all joints of a mechanism, by joint.
+    Return the published names of all joints, by joint.
 
-    Parameters
-    ----------
-    mechanism : str
-        Name of the mechanism.
-    joints : mapping
-        For each joint whether it is an angle, which wraps if it has an offset.
-    lines : iterable of str
-        Lines of the parameter joint_names, such as 'EF=-left_ankle+0.35'.
-    only_named : bool
-        Whether joints without a line are not published.
-
-    Raises
-    ------
-    SceneError
-        If a line is malformed, names no joint, or names one that another line names.
-
+    `joints` tells for each joint whether it is an angle, which wraps if it has an offset. `lines`
+    are those of the parameter joint_names. `only_named` leaves the other joints unpublished.
+    Raises SceneError if a line is malformed, or names no joint or one of another line.
     """
     default = {joint: JointName(f'{mechanism}_{joint}', published=not only_named)
                for joint in joints}
@@ -104,11 +91,7 @@ def _unquoted(text: str) -> str:
 
 
 def check_distinct(names: Mapping[str, Mapping[str, JointName]]) -> None:
-    """
-    Raise SceneError if two joints of the scene are published by one name.
-
-    `names` are by mechanism and joint.
-    """
+    """Raise SceneError if two joints of the scene are published by one name."""
     owners: Dict[str, str] = {}
     for mechanism, joints in names.items():
         for joint, own in joints.items():

@@ -20,11 +20,7 @@ _LINE = re.compile(rf'(\w+)=({_FIGURE})(?: +({_FIGURE}))?(?: +({_FIGURE}))?', re
 
 
 def read_loads(mechanism: str, linkage: Mechanism, lines: Iterable[str]) -> Dict[str, Load]:
-    """
-    Return forces by joint and moments by link, from lines such as 'C=0 -9.81' and 'EF=2.5'.
-
-    Raises SceneError, with the name of the `mechanism`, if a line is no load of its linkage.
-    """
+    """Return forces by joint and moments by link; raise SceneError if a line is neither."""
     loads: Dict[str, Load] = {}
     for line in lines:
         match = _LINE.fullmatch(line)

@@ -40,13 +40,8 @@ def overrides(path: str, node: str) -> Optional[Dict[str, Any]]:
     """
     Return the parameter values in a file for a node, by parameter name.
 
-    `node` is its full name, such as '/kinematics'. None means that no section matches it.
-
-    Raises
-    ------
-    SceneError
-        If rcl would refuse the file; the text has rcl's reason.
-
+    `node` is its full name, such as '/kinematics'. None means that no section matches it. Raises
+    SceneError with the reason of rcl if rcl would refuse the file.
     """
     import yaml
 

@@ -161,11 +161,7 @@ class Parameter:
 
 
 class Values:
-    """
-    Values by full parameter name, which are validated and consumed one by one.
-
-    `parameters` are those consumed so far.
-    """
+    """Values by full name, which become validated `parameters` one by one."""
 
     def __init__(self, values: Mapping[str, Any]):
         self._unused = dict(values)

@@ -176,11 +176,7 @@ class SceneMechanism:
 
 def read_machine(name: str, own: Mapping[str, Any], old: Optional[SceneMechanism],
                  strict: bool) -> SceneMechanism:
-    """
-    Read a mechanism from its own values, or return the old one if they are unchanged.
-
-    `strict` and SceneError are those of `scene.read`.
-    """
+    """Read a mechanism from its own values, or return `old` if they are unchanged."""
     if old and old.is_from(own):
         return old
     values = Values(own)

@@ -51,11 +51,7 @@ def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
 
 
 def _required_range(machine: SceneMechanism) -> Optional[Arc]:
-    """
-    Return the angles [rad] of a crank that rotates fully or in a sweep, for `_are_assembled`.
-
-    Return None for other inputs.
-    """
+    """Return the angles [rad] through which a fully rotatable crank moves; None for others."""
     first, *others = machine.inputs.values()
     if others or not first.input.is_whole(first.reach):
         return None
@@ -74,11 +70,7 @@ def _dimension_ends(linkage: Mechanism, key: str, positive: bool, required: Opti
 
 def _farthest(linkage: Mechanism, key: str, value: float, size: float, required: Optional[Arc],
               positive: bool) -> float:
-    """
-    Return the value of a dimension up to which the linkage can be assembled at all values tried.
-
-    The sign of `size` is the direction from the present value; its amount is the unit of changes.
-    """
+    """Return the farthest value on one side: up to it, all values tried can be assembled."""
     most = 0.9 * abs(size) if positive and size < 0.0 else MOST * abs(size)
     steps = np.geomspace(LEAST * abs(size), most, TRIED) * math.copysign(1.0, size)
     good, bad = 0.0, None
@@ -98,7 +90,7 @@ def _are_assembled(linkage: Mechanism, key: str, values: np.ndarray,
     """
     Return for each value of a dimension whether the linkage can be assembled, (values,).
 
-    It has to be at all inputs tried in the range `required`; if that is None, at one of any.
+    It must be at all inputs tried in the range `required`, or at one input if that is None.
     """
     try:
         tried = linkage.with_dimensions(**{key: values[:, None]})

@@ -43,13 +43,9 @@ def without_defaults(scene: Scene, always: re.Pattern = NOTHING) -> Dict[str, An
     """
     Return the values that differ from their defaults, by full parameter name.
 
-    A value whose whole name matches `always` is included even if it is the default.
-
-    Raises
-    ------
-    SceneError
-        If nodes could not start with these values: an input starts outside its sweep or reach.
-
+    A value whose whole name matches `always` is included even if it is the default. Raises
+    SceneError if nodes could not start with these values: an input starts outside its sweep or
+    reach.
     """
     values = {parameter.name: parameter.value for parameter in scene.parameters}
     whole = dict(values)
