@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Commands to actuators that move outputs as single messages or trajectories request."""
+"""Convert requested outputs to commands for actuators, one by one or as trajectories."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Target(NamedTuple):
 
     @property
     def actuators(self) -> list[str]:
-        """The actuators' names: source joints, or inputs whose source joint is a sensor."""
+        """The actuator of each input: its source joint or, if that is a sensor, the input."""
         return [f'{self.machine.name}_{drive.input.name}' if drive.measures else drive.source
                 for drive in self.machine.inputs.values()]
 
@@ -70,7 +70,7 @@ class Target(NamedTuple):
 
 
 class Command(NamedTuple):
-    """Actuator positions [rad or m], their speeds or None, and the inputs at these positions."""
+    """Actuators' positions [rad or m] and, if known, speeds; the inputs at these positions."""
 
     target: Target
     inputs: Sequence[float]
@@ -139,8 +139,8 @@ class CommandStream:
         """
         Return the targets for the output names in a message.
 
-        The second list has the names that are no outputs. The third explains why a mechanism with
-        some of its outputs named has no target.
+        The second list has the names that are no outputs. The third has the reasons why mechanisms
+        with named outputs have no target.
         """
         found: dict[str, list[tuple]] = {}
         targets, unknown, reasons = [], [], []
@@ -188,7 +188,7 @@ class CommandStream:
             self._send(now or stamp, found)
 
     def _near(self, target: Target) -> Sequence[float]:
-        """Return the inputs of the last command; without one, the present inputs or starts."""
+        """Return the inputs to continue from: of the last command, else present, else starts."""
         if last := self._last.get(target.machine.name):
             return last.inputs
         return [position if math.isfinite(position) else drive.start for position, drive in zip(
@@ -196,7 +196,7 @@ class CommandStream:
 
     def _command(self, target: Target, positions: Sequence[float],
                  speeds: Optional[Sequence[float]]) -> Optional[Command]:
-        """Return the command for a target; out of reach, the last valid one or None."""
+        """Return the command for a target or, out of reach, the last valid one, if any."""
         name, now = target.machine.name, time.monotonic()
         last = self._last.get(name)
         # Only the first command, which continues no other, may jump; its search is rate-limited.
@@ -258,7 +258,7 @@ class CommandStream:
 
     def _solve(self, message: JointTrajectory, targets: Sequence[Target],
                near: list[Sequence[float]], jumps: list[bool]) -> Optional[Callable[[], None]]:
-        """Solve a trajectory; return a function to publish it, None if it is not to be."""
+        """Solve a trajectory; return a function to publish it, or None if it is dropped."""
         solved = JointTrajectory(header=message.header, joint_names=[
             name for target in targets for name in target.actuators])
         try:

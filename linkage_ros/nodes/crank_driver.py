@@ -21,7 +21,7 @@ from .. import scene
 from ..scene.motion import Motion
 from ..words import listed
 
-# Largest gain of system time on steady time between two messages that is slewing, no jump [ns].
+# If system time gains more than this on steady time between two messages [ns], it has jumped.
 JUMP = 10 ** 8
 
 # Longest period of a timer that does not overflow [ns]: thirty years.
@@ -98,7 +98,7 @@ class CrankDriver(scene_node.SceneNode):
         return clock.now().nanoseconds if simulated else self.system_time(), simulated
 
     def _follow_clock(self) -> int:
-        """Return the time [ns]. If it has jumped, first shift the motions: no input jumps."""
+        """Return the time [ns]; if it has jumped, shift the motions, so that no input jumps."""
         (now, simulated), steady = self._time(), monotonic_ns()
         reached = 0
         if self._now is not None:
@@ -118,7 +118,7 @@ class CrankDriver(scene_node.SceneNode):
 
     def _position(self, key: Tuple[str, str], drive: scene.InputSettings,
                   now: int) -> Tuple[float, float]:
-        """Return an input's source joint: position [rad or m] and speed [rad/s or m/s]."""
+        """Return position [rad or m] and speed [rad/s or m/s] of an input's source joint."""
         value, speed = self._motions[key].at(now)
         if drive.is_plain:
             return value, speed

@@ -62,7 +62,7 @@ class DrivenMechanism:
 
     @property
     def model(self) -> MechanismModel:
-        """The adopted model; `adopt` has been called before the first message."""
+        """The adopted model, which there is before the first message."""
         assert self._model
         return self._model
 
@@ -86,7 +86,7 @@ class DrivenMechanism:
         return model.solution(joints or in_scene, markers, bool(self.known[1].all()))
 
     def _subscribed(self) -> Tuple[bool, bool]:
-        """Return two flags: its joint states have subscribers, and its markers have."""
+        """Return whether the joint states have subscribers, and whether the markers have."""
         return self._joint_states.has_subscribers, self._markers.has_subscribers
 
     def conversion(self, i: int) -> Tuple[float, float]:
@@ -117,7 +117,7 @@ class DrivenMechanism:
         solution.solve(*self.inputs.tolist())
 
     def assess(self, solution: Solution, is_regular: bool) -> bool:
-        """Update `validity`, by a check unless it is regular; return whether it has changed."""
+        """Update `validity`, with a check unless `is_regular`; return whether it has changed."""
         layout, before = solution.layout, self.validity
         if layout.efforts:
             layout.effort(solution.values)[:] = self.model.machine.efforts(self.inputs[0].tolist())
@@ -167,7 +167,7 @@ class DrivenMechanism:
 
     def prepared(self, machine: scene.SceneMechanism, frame_id: str, prefix: str,
                  in_scene: bool) -> MechanismModel:
-        """Return a model of `machine`, ready for the subscribers; reuse an equal present one."""
+        """Return a model of `machine`, compiled for its subscribers, or an equal present model."""
         before = self._model
         if before and before.made_of == (machine, frame_id, prefix):
             return before
@@ -200,7 +200,7 @@ class DrivenMechanism:
         self._set_locus(None)
 
     def wait_for_deletions(self, deadline: float) -> None:
-        """Wait for subscribers to acknowledge them, up to `deadline` of time.monotonic() [s]."""
+        """Wait for subscribers to acknowledge deletions, up to a monotonic time [s]."""
         for publisher in (self._markers.publisher, self._locus):
             publisher.wait_for_all_acked(Duration(seconds=max(0.0, deadline - time.monotonic())))
 

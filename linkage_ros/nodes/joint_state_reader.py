@@ -118,7 +118,8 @@ class Sender:
     meaning : object
         What `interpret` returned for its first message.
     size : int
-        Length of its messages [bytes]; 0: places are unknown, and only its first message is read.
+        Length of its messages [bytes]; 0: places are unknown, so that it reads its first message
+        only.
     mask, same : int
         Mask of the constant bytes, and their values, both as little-endian integers.
     positions, velocities : int
@@ -153,7 +154,7 @@ class Sender:
         return len(data) == self.size and int.from_bytes(data, 'little') & self.mask == self.same
 
     def read(self, data: bytes) -> Numbers:
-        """Return the numbers of a message for which `has_sent` is true."""
+        """Return the numbers of one of this sender's messages."""
         return self._first[1] or self._unpacked(data)
 
     def _unpacked(self, data: bytes) -> Numbers:
@@ -162,6 +163,6 @@ class Sender:
 
 
 def _bits(numbers: Numbers) -> tuple:
-    """Return the numbers as bytes: unlike as floats, a NaN is equal to itself."""
+    """Return the numbers as bytes, because as a float, NaN is unequal to itself."""
     return numbers.stamp, *(array('d', each).tobytes()
                             for each in (numbers.positions, numbers.velocities))

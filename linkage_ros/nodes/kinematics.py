@@ -74,7 +74,7 @@ class Kinematics(scene_node.SceneNode):
                 continue
             if machine is not before:
                 bodies.size(machine)
-            # Dimensions and sweeps cannot invalidate a robot model; its joint limits are slow.
+            # Dimensions and sweeps cannot invalidate a robot model, whose limits take long.
             alike = replace(machine, linkage=before.linkage, reach=before.reach,
                             inputs=before.inputs)
             if alike != before or new.frame_id != self.scene.frame_id:

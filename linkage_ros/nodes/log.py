@@ -22,14 +22,14 @@ SECONDS, SUBJECTS, ERRORS = 5.0, 1000, 100
 
 
 class Throttle:
-    """Logs warnings, at most one in `SECONDS` about each subject."""
+    """Logs warnings, about each subject at most one in `SECONDS`."""
 
     def __init__(self, logger: Any):
         self._logger = logger
         self._logged: OrderedDict[Any, float] = OrderedDict()
 
     def warn(self, subject: Any, text: Callable[[], str]) -> None:
-        """Log the result of `text`, which is called only if the subject is due."""
+        """Log the result of `text`, unless the subject was logged within the last `SECONDS`."""
         now = time.monotonic()
         if now < self._logged.get(subject, -math.inf) + SECONDS:
             return
@@ -41,7 +41,7 @@ class Throttle:
 
 
 class Once:
-    """A record of logged subjects, up to `most`."""
+    """A record of logged subjects, so that each is logged once and at most `most` are."""
 
     def __init__(self, most: int):
         self._most = most

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The solvers, messages, locus and robot model of a mechanism, which depend on its parameters."""
+"""What follows from a mechanism's parameters: solvers, messages, locus and robot model."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class MechanismModel:
     """
     Everything needed to publish a mechanism; immutable except for its caches.
 
-    The mechanism's pose is in the frame `frame_id`; markers have `prefix` before this name. Raises
+    `frame_id` is the frame of its pose; in markers, this name has the prefix `prefix`. Raises
     SceneError if no robot model can be made of a planar mechanism.
     """
 
@@ -81,14 +81,14 @@ class MechanismModel:
         return messages.Markers(*self._drawn)
 
     def latched(self) -> Tuple[str, Optional[Any]]:
-        """Return its URDF, '' for a spatial linkage, and its locus, None if it has none."""
+        """Return the URDF, '' for a spatial linkage, and the locus's marker, None without one."""
         drawn, size = self._drawn[:3], self._drawn[3]
         curve = self.assembly.locus(self.machine.tracer)
         return (urdf.write(self.robot) if self.robot else '',
                 messages.locus(*drawn, curve, size) if len(curve) > 1 else None)
 
     def solution(self, joints: bool, markers: bool, moving: bool) -> Solution:
-        """Return a solver of all legs for joint states, markers, and velocities if `moving`."""
+        """Return a solver for joint states, for markers and, if `moving`, for velocities."""
         # With several inputs, only the joint angles show whether the linkage is assembled.
         joints = joints or len(self.inputs) > 1
         names = self.assembly.joints if joints else ()
@@ -139,7 +139,7 @@ class MechanismModel:
 
     def publisher(self, publisher: Any, build: Callable, validity: Validity, logger: Any
                   ) -> PatchedPublisher:
-        """Return a patched `publisher` of the message that `build` makes of a solution."""
+        """Return a publisher that patches the message which `build` makes of a solution."""
         return self._publishers.get_or_make((publisher, validity), lambda: PatchedPublisher(
             publisher, lambda stamp, values: build(validity, values, stamp),
             validity.solution.layout.size, logger))
@@ -152,7 +152,7 @@ class MechanismModel:
             efforts if validity.has_efforts else ())
 
     def joints(self, validity: Validity, values: np.ndarray) -> List[np.ndarray]:
-        """Return names, positions, velocities (if solved) and efforts (else 0) to publish."""
+        """Return published joints: names, positions, velocities (empty if unsolved), efforts."""
         layout, n, legs = validity.solution.layout, len(self.inputs), validity.legs()
         chosen = self._published.copy()
         chosen[n:].reshape(layout.legs, -1)[np.isin(np.arange(layout.legs), legs, invert=True)] = 0
@@ -174,7 +174,7 @@ class MechanismModel:
 
 
 def _shown(machine: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
-    """Return the points of the markers, and by marker id the point indices of its pieces."""
+    """Return the markers' points and, by marker id, the point indices of each line or plate."""
     linkage, names = machine.linkage, machine.points
     if machine.in_space:
         return _shown_spatial(linkage, names)
@@ -209,7 +209,7 @@ def _shown_spatial(linkage: Mechanism, names: Sequence[str]) -> Tuple[Sequence, 
 
 
 def _arranged(layout: Layout, rest: float, joints: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Return numbers in a solution's layout: values of joints, their rates, and `rest`."""
+    """Return an array in a solution's layout: `joints` and `rates` in their places, or `rest`."""
     values, n = np.full(layout.size, rest), layout.inputs
     rows, driven = layout.rows(values), layout.driven(values)
     driven[:n] = joints[:n]

@@ -36,17 +36,17 @@ _DOUBLES = {'double': 1, 'geometry_msgs/Point': 3}
 
 
 def pack(stamp: Time) -> bytes:
-    """Return a stamp as eight bytes, little-endian: int32 seconds, uint32 nanoseconds."""
+    """Return a Time as eight bytes, little-endian: int32 seconds, uint32 nanoseconds."""
     return _STAMP.pack(stamp.sec, stamp.nanosec)
 
 
 def pack_time(nanoseconds: int) -> bytes:
-    """Return a time [ns] as a packed stamp."""
+    """Return a time [ns] as `pack` does."""
     return _STAMP.pack(*divmod(nanoseconds, 10 ** 9))
 
 
 def unpack(stamp: bytes) -> Time:
-    """Return the stamp of eight bytes from `pack`."""
+    """Return the Time that `pack` has packed."""
     sec, nanosec = _STAMP.unpack(stamp)
     return Time(sec=sec, nanosec=nanosec)
 
@@ -56,7 +56,7 @@ class Unreadable(ValueError):
 
 
 def deserialized(data: bytes, kind: type) -> Any:
-    """Return the message of type `kind` in serialised `data`; raise Unreadable if it has none."""
+    """Deserialise a message of type `kind`; raise Unreadable if `data` is none."""
     if len(data) < SHORTEST:
         raise Unreadable(f'it must have at least {SHORTEST} bytes')
     try:
@@ -74,7 +74,7 @@ class MessageLayout:
     """
     Places of the numbers in a serialised message, and a mask of its constant bytes.
 
-    `data` is `message` in bytes. Its type may have neither fixed-size arrays nor wide strings.
+    `data` is the serialised `message`. Fixed-size arrays and wide strings are not supported.
     Raises NoLayout if the encoding is not little-endian CDR.
 
     Attributes
@@ -194,7 +194,7 @@ class Template:
         return bytes(self.message)
 
     def places(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the offsets of values in `message`, the values' indices, the stamps' offsets."""
+        """Return arrays: byte offsets of values in `message`, their indices, offsets of stamps."""
         own = np.flatnonzero((self._sources > 0) & (self._sources <= len(self._values)))
         return HEADER + 8 * own, self._sources[own] - 1, np.array(
             [place.start - len(LEAD) for place in self._stamps], int)

@@ -63,7 +63,7 @@ class Markers:
     frame_id, pose, size
         Frame of the pose; the pose x, y, z [m], roll, pitch, yaw [rad]; longest bar [m].
     shown : mapping
-        {id: [[index of a point, ...], ...]}, for each joint, line or triangle its points.
+        By marker id, the point indices of each joint, line or triangle.
 
     """
 

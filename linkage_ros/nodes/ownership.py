@@ -118,7 +118,7 @@ class Follower:
                 'other values, which are followed')
 
     def _warn(self, kind: str, particulars: Sequence[str], what: str) -> None:
-        """Warn of `what` the owner has; warn again only when the particulars have changed."""
+        """Warn that the owner has `what`; repeat it only when the particulars have changed."""
         if particulars and particulars != self._warned.get(kind):
             self._node.get_logger().warning(
                 f'{elided(self._owner)} has {what}: {listed(particulars, 1000)}')

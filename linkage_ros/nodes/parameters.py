@@ -26,7 +26,7 @@ from ..words import elided, quoted
 
 
 class Undeclared(ParameterNotDeclaredException):
-    """A parameter name is unknown; the exception's text is that of the caller."""
+    """A parameter is unknown; unlike that of rclpy, this exception has any text."""
 
     __init__ = Exception.__init__
 

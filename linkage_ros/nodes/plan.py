@@ -37,7 +37,7 @@ TRIED = 2, 4, 8, 16, 32, 64
 
 
 class Route(NamedTuple):
-    """The way of a number: from its index `place` in a sender's messages to an input."""
+    """A position in a sender's messages, by its index `place`, and the input that it sets."""
 
     mechanism: DrivenMechanism
     input: int
@@ -50,7 +50,7 @@ class Route(NamedTuple):
 
 
 class Message(NamedTuple):
-    """A message to publish: its publisher, the arrays of its values, int64 (1,) of its stamp."""
+    """A message to publish: publisher, arrays of its values, packed stamp as int64 (1,)."""
 
     publisher: PatchedPublisher
     values: List[np.ndarray]
@@ -59,7 +59,7 @@ class Message(NamedTuple):
 
 @dataclass(eq=False)
 class Output:
-    """What a plan publishes for given validities; regular if these are and have no efforts."""
+    """What a plan publishes; regular if all its solutions are and none has efforts."""
 
     messages: List[Message]
     is_regular: bool
@@ -108,7 +108,7 @@ class Plan:
         self._backend: Any = PythonBackend(self)
 
     def run(self, data: bytes) -> bool:
-        """Process a serialised message. Return False, and do nothing, if the sender is another."""
+        """Process a serialised message; return False, without effect, if the sender is another."""
         is_current = self._version == self._planner.version
         output = self._output if is_current else None
         result = self._backend.run(data, output if output and output.is_regular else None)
@@ -118,7 +118,7 @@ class Plan:
         return True
 
     def _conclude(self, unchecked: AbstractSet[DrivenMechanism]) -> None:
-        """Publish the solutions; those of `unchecked` mechanisms may be irregular."""
+        """Check and publish the solutions; only those of `unchecked` may be irregular."""
         changed = [one.assess(solution, one not in unchecked) for one, solution in self.solved]
         if True in changed:
             self._planner.version += 1
@@ -194,7 +194,7 @@ class Planner:
         Plan(None, (), mechanisms, self).run(b'')
 
     def _plan(self, sender: Sender, data: bytes) -> Optional[Plan]:
-        """Return the plan for a message that moves a mechanism; mark its inputs as known."""
+        """Return the plan for a message, None if it moves nothing; mark its inputs as known."""
         routes, moving = sender.meaning
         measured = [route for route in routes if route.is_measured]
         failed = self._measure(sender, measured, moving, data) if measured else frozenset()
@@ -215,7 +215,7 @@ class Planner:
 
     def _measure(self, sender: Sender, routes: Sequence[Route], moving: bool,
                  data: bytes) -> frozenset:
-        """Set the inputs of sensors; return the routes of values that no pose has."""
+        """Set the inputs that sensors measure; return the routes of values out of reach."""
         _, positions, velocities = sender.read(data)
         return frozenset(route for route in routes if not route.mechanism.measure(
             route.input, positions[route.place], velocities[route.place] if moving else None))

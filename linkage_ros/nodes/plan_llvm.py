@@ -99,7 +99,7 @@ def _readings(plan: Any) -> Iterator[tuple]:
 
 
 def _copies(mechanism: Any, solution: Solution) -> Iterator[tuple]:
-    """Yield rows of inputs and speeds to copy to every leg: address, destination's address."""
+    """Yield pairs of addresses, from and to, that copy inputs and speeds to every leg."""
     driven = native.addresses(solution.layout.driven(solution.values))
     state = native.addresses(mechanism.inputs).ravel()
     for start, given, own in zip(state, native.addresses(solution.batch.given), driven):
@@ -108,7 +108,7 @@ def _copies(mechanism: Any, solution: Solution) -> Iterator[tuple]:
 
 
 def _limits(loop: int, mechanism: Any, solution: Solution) -> Iterator[tuple]:
-    """Yield a row for each leg: the limits of its input are those of the widest reach."""
+    """Yield a row for each leg: its input must be in the widest interval of the reach."""
     assembly = mechanism.model.assembly
     if not assembly.is_limited:
         return

@@ -59,7 +59,7 @@ class PatchedPublisher:
                            'takes longer', once=True)
 
     def publish(self, stamp: bytes, values: Sequence[Any]) -> None:
-        """Publish it with a stamp (see `pack`) and the numbers of all arrays in `values`."""
+        """Publish the message with a packed stamp and the numbers of all arrays `values`."""
         joined: Any = np.concatenate(values) if len(values) > 1 else values[0]
         if self.template:
             self.publisher.publish(self.template.patched(stamp, joined))

@@ -24,8 +24,9 @@ class SceneJointStates:
     """
     Publishes `joint_states` and `robot_description`.
 
-    If the node receives its source joints on `joint_states`, too, it does not publish these
-    `sources` again. `changed` is called when the first subscriber comes and when the last leaves.
+    If `crank_states` is remapped to `joint_states`, the source joints `sources` are on that topic
+    already, and are not published again. `changed` is called when the first subscriber comes and
+    when the last leaves.
     """
 
     def __init__(self, node: Any, sources: Iterable[str], changed: Callable[[], None]):
@@ -51,7 +52,7 @@ class SceneJointStates:
             self._descriptions.publish(String(data=urdf))
 
     def message(self, mechanisms: Iterable[Any]) -> Optional[Tuple[PatchedPublisher, List]]:
-        """Return a publisher of assembled mechanisms and its arrays; None if none is assembled."""
+        """Return a publisher of assembled mechanisms' joints, and its arrays, or None."""
         parts = tuple((one.model, one.validity) for one in mechanisms
                       if one.validity and one.validity.any_assembled)
         if not parts:

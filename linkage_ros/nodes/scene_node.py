@@ -143,7 +143,7 @@ class SceneNode(Node):
 
     def create_service(self, srv_type: Any, srv_name: str, callback: Callable, **kwargs: Any
                        ) -> Any:
-        """Create a service whose response is a failure with a reason if its callback raises."""
+        """Create a service; if its callback raises, the response is a failure with a reason."""
         if srv_type is SetParameters:
             callback = partial(self._set_parameters, callback)
         return super().create_service(
@@ -230,7 +230,7 @@ def _refused(response: Any, reason: str) -> Any:
 
 def run(node_class: Callable[[], Node], name: str, args: Any = None,
         executor_class: Any = Executor) -> int:
-    """Run a node until SIGINT or SIGTERM; return the exit code. `name` is for early errors."""
+    """Run a node until SIGINT or SIGTERM; return the exit code. `name` is for early messages."""
     return run_together(lambda: [node_class()], name, args, executor_class)
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Scenes: a set of mechanisms with their sizes, poses and input motions.
+A scene: a set of mechanisms with their sizes, poses and input motions.
 
 This package alone defines the names of parameters. `read` turns their values into a Scene, or
 raises an error that names the wrong parameter and its allowed values. Nodes declare the scene's
@@ -125,7 +125,7 @@ def read(values: Mapping[str, Any], before: Optional[Scene] = None, strict: bool
 
 def changed(before: Scene, values: Mapping[str, Any], strict: bool = True) -> Scene:
     """
-    Return the scene `before` with some values changed, which are by full parameter name.
+    Return the scene `before` with some other values, by full parameter name.
 
     Mechanisms without a changed value are reused. `strict` and SceneError are those of `read`.
     """

@@ -42,7 +42,7 @@ class JointName(NamedTuple):
         return value - math.tau * np.round(value / math.tau) if self.wraps else value
 
     def travel(self, ends: Tuple[float, float]) -> Optional[Tuple[float, float]]:
-        """Return the limits of the published value; None if it jumps by a turn between them."""
+        """Return limits of the published value from those of the position; None if it wraps."""
         low, high = sorted(self._replace(wraps=False).of(end) for end in ends)
         if not self.wraps:
             return low, high
@@ -58,7 +58,7 @@ def read_joint_names(mechanism: str, joints: Mapping[str, bool], lines: Iterable
 
     `joints` tells for each joint whether it is an angle, which wraps if it has an offset. `lines`
     are those of the parameter joint_names. `only_named` leaves the other joints unpublished.
-    Raises SceneError if a line is malformed, or names no joint or one of another line.
+    Raises SceneError if a line is malformed, or its joint is unknown or has another line.
     """
     default = {joint: JointName(f'{mechanism}_{joint}', published=not only_named)
                for joint in joints}

@@ -76,7 +76,7 @@ class Motion:
         return cls(drive.speed, drive.sweep, drive.start, since, drive.input.turns, drive.period)
 
     def changed(self, speed: float, sweep: Optional[Arc], now: int) -> Motion:
-        """Return the motion that continues this one without a jump from `now` [ns]."""
+        """Return a motion with another speed and sweep, which continues this one at `now` [ns]."""
         motion = Motion(speed, sweep, since=now, turns=self._turns, period=self._round // TURN)
         phase = self._phase_at(now)
         if sweep == self._sweep:
@@ -97,7 +97,7 @@ class Motion:
         return (self._phase + self._rate * (now - self._since)) % self._period
 
     def _fold(self, phase: int) -> Tuple[int, bool]:
-        """Return the value above the low end at a phase, and whether it is rising there."""
+        """Return how far the value at a phase is above the low end, and whether it rises there."""
         ahead = phase < self._width
         return (phase, ahead) if ahead else (2 * self._width - phase, ahead)
 

@@ -147,7 +147,7 @@ class Field:
 
 @cached(2048)
 def _with(field: Field, *other: Tuple[str, Any]) -> Field:
-    """Return a copy with attributes replaced. Mechanisms of one type share it by the cache."""
+    """Return a cached copy with attributes replaced, which mechanisms of one type share."""
     return replace(field, **dict(other))
 
 
@@ -161,18 +161,18 @@ class Parameter:
 
 
 class Values:
-    """Values by full name, which become validated `parameters` one by one."""
+    """Values by full parameter name; `take` validates one and adds it to `parameters`."""
 
     def __init__(self, values: Mapping[str, Any]):
         self._unused = dict(values)
         self.parameters: List[Parameter] = []
 
     def unused(self, prefix: str = '') -> List[str]:
-        """Return the sorted names, with a prefix, whose values are not consumed yet."""
+        """Return the sorted names that begin with `prefix` and have not been taken."""
         return sorted(name for name in self._unused if name.startswith(prefix))
 
     def take(self, name: str, field: Field, default: Any) -> Any:
-        """Consume and return a valid value, by default `default`; raise SceneError if invalid."""
+        """Return a valid value, `default` if there is none; raise SceneError if it is invalid."""
         value = field.checked(name, self._unused.pop(name)) if name in self._unused else default
         self.parameters.append(Parameter(name, field, value))
         return value

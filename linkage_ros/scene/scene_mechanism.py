@@ -71,13 +71,13 @@ LOADS = Field('string_array', "Loads that the inputs balance, in the linkage's p
 @dataclass(frozen=True)
 class SceneMechanism:
     """
-    A mechanism of a scene.
+    A mechanism of a scene, which has one or more equal legs.
 
-    It has one or more legs. `linkage` is one of them and `reach` that of its first input, both
-    without `scale`, the factor of every length. `points` are the joints that markers display;
-    `pose` is x, y, z [m], roll, pitch, yaw [rad] in `frame_id`, '' for the scene's frame. `inputs`
-    and the published names `joints` are by the names in the linkage, and `loads` by joint for
-    forces [N], by link for moments [N m]. `values` are the values that it was read from.
+    `linkage` is that of a leg, and `reach` the reach of its first input, both before `scale`, a
+    factor of all lengths. `points` are the joints that markers display; `pose` is x, y, z [m],
+    roll, pitch, yaw [rad] in `frame_id`, or in the scene's frame if that is empty. `inputs` are by
+    their names; `joints` are the published names by joint; `loads` are forces by joint, moments by
+    link. `values` are the values that the mechanism was read from.
     """
 
     name: str
@@ -155,7 +155,7 @@ class SceneMechanism:
         return (value - drive.offset) / drive.ratio, speed / drive.ratio
 
     def efforts(self, values: Sequence[float]) -> Tuple[float, ...]:
-        """Return the effort of each input that balances the loads [N m or N] at input values."""
+        """Return the inputs' efforts [N m or N] that balance the loads at inputs `values`."""
         units = [self.scale_of(name) for name in self.inputs]
         own = [value / unit for value, unit in zip(values, units)]
         # The scale lengthens the lever arms of forces; moments do not depend on it.

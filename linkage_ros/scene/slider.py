@@ -51,7 +51,7 @@ def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
 
 
 def _required_range(machine: SceneMechanism) -> Optional[Arc]:
-    """Return the angles [rad] through which a fully rotatable crank moves; None for others."""
+    """Return the angles [rad] that a fully rotatable crank passes; None for other inputs."""
     first, *others = machine.inputs.values()
     if others or not first.input.is_whole(first.reach):
         return None
