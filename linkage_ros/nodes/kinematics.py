@@ -48,7 +48,8 @@ class Kinematics(scene_node.SceneNode):
         self._mechanisms.update((name, DrivenMechanism(self, machine, self._invalidate))
                                 for name, machine in self.scene.machines.items())
         self._planner = Planner([*self._mechanisms.values()], self._scene_joint_states,
-                                joint_state_reader.Reader(self._interpret), self._now)
+                                joint_state_reader.Reader(self._interpret),
+                                lambda: pack_time(self.get_clock().now().nanoseconds))
         self._own: frozenset = frozenset()
         self._missing, self._unknown = set(self._inputs), Once(UNKNOWN_NAMES)
         self._missing_timer = self.create_timer(
@@ -130,9 +131,6 @@ class Kinematics(scene_node.SceneNode):
 
     def _invalidate(self) -> None:
         self._planner.invalidate()
-
-    def _now(self) -> bytes:
-        return pack_time(self.get_clock().now().nanoseconds)
 
     def _interpret(self, message: JointState) -> Tuple[Tuple[Route, ...], bool]:
         """Return the routes from a sender's joints, and whether it sends velocities."""

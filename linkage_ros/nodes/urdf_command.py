@@ -41,22 +41,14 @@ def _scene(args: List[str]) -> scene.Scene:
     """Read the scene from the parameters in the arguments for ROS."""
     rclpy.init(args=args)
     try:
-        reader = _Reader('--params-file' in args)
-        reader.destroy_node()
-        return reader.scene
+        node = scene_node.SceneNode(NAME)
+        node.destroy_node()
     finally:
         rclpy.try_shutdown()
-
-
-class _Reader(scene_node.SceneNode):
-    """Reads a scene from parameters; raises RequestError if a parameter file has none."""
-
-    def __init__(self, has_file: bool):
-        super().__init__(NAME)
-        if has_file and not self.is_given:
-            self.destroy_node()
-            raise command.RequestError("the parameter file must have '/**:' and below it "
-                                       "'ros__parameters:' with a scene")
+    if '--params-file' in args and not node.is_given:
+        raise command.RequestError("the parameter file must have '/**:' and below it "
+                                   "'ros__parameters:' with a scene")
+    return node.scene
 
 
 if __name__ == '__main__':
