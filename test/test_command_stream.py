@@ -243,7 +243,7 @@ def test_of_several_inputs_what_cannot_be_had_is_held_and_said(graph, capfd):
     assert min(abs(found['leg_crank'][0] - left) for left, _ in changed) < 1e-12
     said = capfd.readouterr().err
     for reason in ('leg_P.x and leg_P.y cannot be 9, 9: P.x, P.y at 9, 9 is outside the reach',
-                   'digger has 3 inputs: name as many outputs of it, not digger_H.x and'):
+                   'digger has 3 inputs: name 3 of its outputs, not digger_H.x and'):
         assert reason in said
 
 

@@ -157,8 +157,8 @@ class CommandStream:
                 if len(outputs) > n == 1:
                     reasons.append(f'{called} are moved by one input: name one of them')
                 elif len(outputs) != n:
-                    raise ValueError(f'{mechanism} has {n} inputs: name as many outputs of it, '
-                                     f'not {called}')
+                    raise ValueError(f'{mechanism} has {n} inputs: name {n} of its outputs, not '
+                                     f'{called}')
                 places, joints, own = zip(*outputs[:n])
                 targets.append(Target(' and '.join(elided(names[place]) for place in places),
                                       machine, InverseRequest(machine, joints), places, own))

@@ -109,7 +109,7 @@ class Follower:
         self._warn('unlike', [f'{name} is {quoted(here[name])} here and '
                               f'{quoted(values[name])} there' for name in unlike.values()],
                    'another mechanism, which is not followed')
-        self._warn('missing', sorted(missing), 'other mechanisms')
+        self._warn('missing', sorted(missing), 'other mechanisms; only one of the nodes has')
         if started:
             self._warned.pop('values', None)
             self._warn('values', [

@@ -70,7 +70,7 @@ class SceneNode(Node):
         self._role = name
         self._later: List[Job] = []
         self._first_spin = self.create_timer(
-            0.0, self.guarded('the first spin', self._start_later),
+            0.0, self.guarded('the start of the worker', self._start_later),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     @property
@@ -106,7 +106,7 @@ class SceneNode(Node):
             follower = Follower(self, self._parameters_of_scene)
             self._parameters_of_scene.owner_of = follower.owner_of
         self._namesakes = self.create_timer(
-            SECONDS_BETWEEN_CHECKS, self.guarded('the node names', self._warn_of_namesake),
+            SECONDS_BETWEEN_CHECKS, self.guarded('a check of names', self._warn_of_namesake),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def check(self, new: scenes.Scene) -> None:
