@@ -42,7 +42,7 @@ class Target(NamedTuple):
     machine: SceneMechanism
     request: InverseRequest
     # Index in the message, and published name with sign and offset, of each output.
-    places: tuple[int, ...]
+    indices: tuple[int, ...]
     names: tuple[JointName, ...]
 
     @property
@@ -56,17 +56,17 @@ class Target(NamedTuple):
         """Solve for the positions and speeds in a message; see `InverseRequest.command`."""
         return self.request.command(
             self._values(positions),
-            speeds and [name.sign * speeds[place] for name, place in zip(self.names, self.places)],
+            speeds and [name.sign * speeds[i] for name, i in zip(self.names, self.indices)],
             near, jumps)
 
     def reason(self, positions: Sequence[float]) -> str:
         """Explain why the positions in a message are out of reach."""
-        values = ', '.join(f'{positions[place]:.6g}' for place in self.places)
+        values = ', '.join(f'{positions[index]:.6g}' for index in self.indices)
         return f'{self.named} cannot be {values}: {self.request.reason(*self._values(positions))}'
 
     def _values(self, positions: Sequence[float]) -> list[float]:
-        return [name.sign * (positions[place] - name.offset)
-                for name, place in zip(self.names, self.places)]
+        return [name.sign * (positions[index] - name.offset)
+                for name, index in zip(self.names, self.indices)]
 
 
 class Command(NamedTuple):
@@ -144,24 +144,24 @@ class CommandStream:
         """
         found: dict[str, list[tuple]] = {}
         targets, unknown, reasons = [], [], []
-        for place, named in enumerate(names):
+        for index, named in enumerate(names):
             if output := self._output(named):
-                found.setdefault(output[0].name, []).append((place, *output[1:]))
+                found.setdefault(output[0].name, []).append((index, *output[1:]))
             else:
                 unknown.append(named)
         for mechanism, outputs in found.items():
             machine = self._machines[mechanism]
             n = len(machine.inputs)
-            called = ' and '.join(elided(names[place]) for place, *_ in outputs)
+            called = ' and '.join(elided(names[index]) for index, *_ in outputs)
             try:
                 if len(outputs) > n == 1:
                     reasons.append(f'{called} are moved by one input: name one of them')
                 elif len(outputs) != n:
                     raise ValueError(f'{mechanism} has {n} inputs: name {n} of its outputs, not '
                                      f'{called}')
-                places, joints, own = zip(*outputs[:n])
-                targets.append(Target(' and '.join(elided(names[place]) for place in places),
-                                      machine, InverseRequest(machine, joints), places, own))
+                indices, joints, own = zip(*outputs[:n])
+                targets.append(Target(' and '.join(elided(names[index]) for index in indices),
+                                      machine, InverseRequest(machine, joints), indices, own))
             except ValueError as error:
                 reasons.append(str(error))
         return targets, unknown, reasons

@@ -62,7 +62,7 @@ class DrivenMechanism:
 
     @property
     def model(self) -> MechanismModel:
-        """The adopted model, which there is before the first message."""
+        """The adopted model; it exists before the first message arrives."""
         assert self._model
         return self._model
 

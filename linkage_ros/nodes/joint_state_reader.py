@@ -29,7 +29,7 @@ ANY = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 SENDERS, MASKS = 256, 4
 # Messages longer than this [bytes] are always deserialised.
 LONGEST = 1 << 16
-# While a cache is full, the layout of only one in so many unknown messages is determined.
+# While a cache is full, the layout of only one in SAMPLED unknown messages is determined.
 SAMPLED = 256
 
 

@@ -134,11 +134,11 @@ class Kinematics(scene_node.SceneNode):
 
     def _interpret(self, message: JointState) -> Tuple[Tuple[Route, ...], bool]:
         """Return the routes from a sender's joints, and whether it sends velocities."""
-        places = dict(zip(message.name, range(len(message.position))))
-        routes = tuple(Route(self._mechanisms[mechanism], i, place)
-                       for name, place in places.items()
+        indices = dict(zip(message.name, range(len(message.position))))
+        routes = tuple(Route(self._mechanisms[mechanism], i, index)
+                       for name, index in indices.items()
                        for mechanism, i in self._inputs.get(name, ()))
-        self._check_names(message.name, places)
+        self._check_names(message.name, indices)
         return routes, len(message.velocity) == len(message.name)
 
     def _check_names(self, names: Iterable[str], received: Iterable[str]) -> None:

@@ -84,7 +84,7 @@ class Follower:
         values, wrong = _read((*event.new_parameters, *event.changed_parameters), fields)
         if 'mechanisms' in values or event.node != self._owner:
             self._compare(event, values)
-        # Values that this node has refused may be valid beside the new ones.
+        # Values that this node has refused may be valid together with the new ones.
         changed = {name: value for name, value in {**self._refused, **values}.items()
                    if name in self._owned and not fields[name].read_only
                    and value != self._present(name)}

@@ -37,11 +37,11 @@ TRIED = 2, 4, 8, 16, 32, 64
 
 
 class Route(NamedTuple):
-    """A position in a sender's messages, by its index `place`, and the input that it sets."""
+    """An input, and the index of its source joint in a sender's messages."""
 
     mechanism: DrivenMechanism
     input: int
-    place: int
+    source_index: int
 
     @property
     def is_measured(self) -> bool:
@@ -218,4 +218,5 @@ class Planner:
         """Set the inputs that sensors measure; return the routes of values out of reach."""
         _, positions, velocities = sender.read(data)
         return frozenset(route for route in routes if not route.mechanism.measure(
-            route.input, positions[route.place], velocities[route.place] if moving else None))
+            route.input, positions[route.source_index],
+            velocities[route.source_index] if moving else None))

@@ -91,11 +91,11 @@ class _Ending(native.Ending):
 
 def _readings(plan: Any) -> Iterator[tuple]:
     """Yield rows of numbers to read: byte offset in the message, address, factor, addend."""
-    for mechanism, i, place in plan.readings:
+    for mechanism, i, index in plan.readings:
         state, (factor, plus) = native.addresses(mechanism.inputs), mechanism.conversion(i)
-        yield plan.sender.positions + 8 * place, state[0, i], factor, plus
+        yield plan.sender.positions + 8 * index, state[0, i], factor, plus
         if plan.has_velocities:
-            yield plan.sender.velocities + 8 * place, state[1, i], factor, -0.0
+            yield plan.sender.velocities + 8 * index, state[1, i], factor, -0.0
 
 
 def _copies(mechanism: Any, solution: Solution) -> Iterator[tuple]:

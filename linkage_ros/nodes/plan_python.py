@@ -17,7 +17,7 @@ class PythonBackend:
 
     def __init__(self, plan: Any):
         self._plan, self._solved = plan, frozenset(mechanism for mechanism, _ in plan.solved)
-        self._readings = [(one.mechanism, one.input, one.place,
+        self._readings = [(one.mechanism, one.input, one.source_index,
                            *one.mechanism.conversion(one.input))
                           for one in plan.readings]
 
@@ -44,9 +44,9 @@ class PythonBackend:
         self._plan.stamp[:] = stamp
         for mechanism in self._plan.mechanisms:
             mechanism.stamp[:] = stamp
-        for mechanism, i, place, factor, plus in self._readings:
-            mechanism.receive(i, factor * positions[place] + plus,
-                              factor * velocities[place] if self._plan.has_velocities else None)
+        for mechanism, i, index, factor, plus in self._readings:
+            mechanism.receive(i, factor * positions[index] + plus,
+                              factor * velocities[index] if self._plan.has_velocities else None)
 
     def publish(self, output: Any) -> None:
         """Convert the solutions, and publish the messages of an Output."""
