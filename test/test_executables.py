@@ -87,7 +87,7 @@ def test_a_signal_ends_what_is_still_being_imported(harness, tmp_path, name, sto
     assert process.end() == (0, '')
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', EXECUTABLES)
 def test_a_thread_that_computes_does_not_hold_up_the_end(harness, name):
     done = subprocess.run([sys.executable, '-c', textwrap.dedent(f"""

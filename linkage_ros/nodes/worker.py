@@ -35,6 +35,8 @@ class Worker:
         self._others: Deque[Job] = deque()
         self._thread: Optional[threading.Thread] = None
         self._ended = threading.Event()
+        # Set when rclpy's executor has called a job's result, or will not call it any more.
+        self._called = threading.Event()
 
     def replace(self, kind: str, job: Job) -> None:
         """Queue a job; it replaces a job of the same kind that has not begun."""
@@ -56,6 +58,7 @@ class Worker:
         """Drop the queued jobs, and wait up to TIMEOUT for the running one."""
         with self._lock:
             self._ended.set()
+            self._called.set()
             thread = self._thread
         if thread is not None and thread is not threading.current_thread():
             thread.join(TIMEOUT)
@@ -89,17 +92,19 @@ class Worker:
 
     def _hand_over(self, kind: str, act: Callable[[], None]) -> None:
         """Call `act` on rclpy's executor and wait: a queue of such calls would delay messages."""
-        executor, done = self._node.executor, threading.Event()
-        if executor is not None:
-            executor.create_task(partial(self._act, kind, act, done))
-            while not done.wait(TIMEOUT) and not self._ended.is_set():
-                pass
+        executor = self._node.executor
+        with self._lock:
+            if executor is None or self._ended.is_set():
+                return
+            self._called.clear()
+        executor.create_task(partial(self._act, kind, act))
+        self._called.wait()
 
-    def _act(self, kind: str, act: Callable[[], None], done: threading.Event) -> None:
+    def _act(self, kind: str, act: Callable[[], None]) -> None:
         try:
             if not self._ended.is_set():
                 act()
         except Exception as error:
             self._failed(kind, error)
         finally:
-            done.set()
+            self._called.set()
