@@ -30,7 +30,8 @@ from ..linkage.mechanism import Mechanism
 from ..linkage.walker import Assembly
 from ..words import listed, meant, quoted
 
-IN_SPACE = 'a spatial linkage: pictures, the viewer and robot models need a planar linkage'
+IN_SPACE = ('a linkage in space: pictures, the page and robot models are of linkages in a '
+            'plane')
 TYPES = (*mechanisms.TYPES, *mechanisms.WRITTEN)
 
 # Frame names are as free as link names in URDF; tf2 forbids a leading slash.
@@ -220,7 +221,7 @@ def _linkage(name: str, type_: str, values: Values) -> Tuple[Mechanism, Tuple[Ar
     except ValueError as error:
         raise SceneError(f'{name}.dimensions: {error}') from None
     if not reach:
-        # A long list is shortened at its end: changed dimensions come first.
+        # Changed dimensions come first, since a long list is shortened.
         usual = sorted(dimensions, key=lambda key: dimensions[key] == design.dimensions[key])
         lengths = listed(f'{key}={dimensions[key]:g}' for key in usual)
         raise SceneError(f'{name}.dimensions must let the {type_} be assembled at some '
