@@ -70,7 +70,7 @@ class Reader:
     Cache of the senders of serialised joint states.
 
     `interpret` is called with the first message of each sender. Its result is the `meaning` of all
-    messages of this sender; it must depend on nothing but the names and counts in the message.
+    messages of this sender, so it must not depend on the numbers in the message.
     """
 
     def __init__(self, interpret: Callable[[JointState], Any]):
