@@ -789,7 +789,7 @@ def robot_of(linkage, values):
     for name in linkage.points:
         line = linkage.line_of(name)
         if line.word in ('ground', 'image') or line.word in ('rigid', 'line') \
-                and home.keys() >= {*line.stands_on}:
+                and home.keys() >= {*line.depends_on}:
             home[name] = 'ground'
 
     def frame(name):

@@ -670,7 +670,7 @@ def test_a_saved_scene_names_all_that_defines_it_and_is_the_running_one(show, pa
     saved = tmp_path / 'saved.yaml'
     saved.write_text(asyncio.run(use(running.viewer.url)))
     assert scene.load(str(saved)).parameters == before.parameters
-    given = {key for part in scene.load(str(saved)).given.values() for key in part}
+    given = {key for part in scene.load(str(saved)).values.values() for key in part}
     for name, machine in before.machines.items():
         assert {'mechanisms', f'{name}.type', f'{name}.scale', *(
             f'{name}.dimensions.{key}' for key in machine.linkage.dimensions)} <= given
