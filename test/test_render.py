@@ -371,7 +371,7 @@ def test_several_cranks_turn_as_fast_as_they_were_told_to():
     (['jansen.yaml', '--out', 'a.gif', '--loop', '-1'], 'from 0'),
     (['jansen.yaml', '--out', 'a.png', '--size', '7x7'], '64'),
     (['all.yaml', '--out', 'a.png', '--size', '99x99'], 'size is too small'),
-    (['jansen.yaml', '--out', 'a.png', '--hide', 'legs'], 'legs is no part'),
+    (['jansen.yaml', '--out', 'a.png', '--hide', 'legs'], 'unknown part legs'),
     (['jansen.yaml', '--out', 'a.png', '--trace', 'x'], 'growing'),
     (['jansen.yaml', '--out', 'a.png', '--mechanisms', 'x'], 'allowed: jansen'),
     (['peaucellier.yaml', '--out', 'a.png', '--angle', '180'], 'stays inside'),
