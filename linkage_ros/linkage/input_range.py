@@ -28,8 +28,9 @@ HALVINGS = 12
 # Fraction at which an arc is tested: in the exact middle, an arm of a symmetric linkage may have
 # no length.
 INSIDE = 0.49
-# Places of two turns are equal if they differ by at most this fraction of their size.
-ALIKE = 1e-6
+# Poses that are compared with those a period later. Their places are equal if they differ by at
+# most this fraction of their size.
+PERIODIC, ALIKE = 64, 1e-6
 # The search stops at more ends than these: they are rounding, of the direction of an arm without
 # length.
 MOST = 100
@@ -65,7 +66,7 @@ def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Calla
         ends.append(input_.low)
     if any(x.margin.varies and x not in closed for x in limits):
         ends += [end for arc in input_.between(ends) for end in _limits(margins, *arc)]
-    found = reachable_arcs(ends, assembled, input_, lambda: _is_periodic(places, input_))
+    found = reachable_arcs(ends, assembled, input_, lambda: is_periodic(places, input_))
     if input_.is_whole(found):
         return found
     trimmed = [_trimmed(assembled, *arc) for arc in found]
@@ -142,12 +143,16 @@ def _trimmed(assembled: Callable, lo: float, hi: float) -> Arc:
     return low, high
 
 
-def _is_periodic(places: Callable, input_: Input) -> bool:
-    """Return whether all joints are at the same places a period later."""
-    theta = np.linspace(input_.low, input_.high, 66)[1:-1]
+def is_periodic(places: Callable, input_: Input) -> bool:
+    """
+    Return whether poses are the same a period of an input later.
+
+    `places` takes values of the input, shape (n,), and returns coordinates (any, n).
+    """
+    theta = np.linspace(input_.low, input_.high, PERIODIC + 2)[1:-1]
     now, later = (places(theta + turn) for turn in (0.0, input_.turn))
     with np.errstate(invalid='ignore'):
-        alike = np.abs(now - later) <= ALIKE * np.fmax.reduce(np.abs(now), axis=None)
+        alike = np.abs(now - later) <= ALIKE * np.fmax.reduce(np.abs(now), axis=None, initial=0.0)
     return bool(np.all(alike | (np.isnan(now) & np.isnan(later))))
 
 

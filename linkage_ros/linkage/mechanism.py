@@ -68,7 +68,7 @@ def _hashable(names: Any) -> Any:
 
 
 def _plain(names: Any) -> Any:
-    """Return names that are hashable as plain text, as they are to be held for others."""
+    """Return hashable names as plain text, since a subclass of str may change."""
     return tuple(map(plain_text, names)) if isinstance(names, tuple) else plain_text(names)
 
 
@@ -191,7 +191,7 @@ class Mechanism:
 
     def windows(self) -> list:
         """Return the links on two hinges in a row with two rods, and their limits."""
-        return [self.constants(held) for held in self.structure.built.windows]
+        return [self.constants(window) for window in self.structure.built.windows]
 
     def value(self, length: Real) -> Any:
         """Return the value of an expression of dimensions alone, lengths in its own unit."""
@@ -277,17 +277,17 @@ class Mechanism:
     def solve(self, theta: Inputs, points: Names = None) -> dict:
         """Return the coordinates of each joint [m]: theta's shape and a last axis for x and y."""
         if isinstance(theta, float) and len(self.inputs) == 1:
-            wanted = _hashable(points)
-            place = self._placers.get(wanted) or self._placer(wanted)
+            names = _hashable(points)
+            place = self._placers.get(names) or self._placer(names)
             return place(theta)
         return self._vectors('points', theta, points)
 
-    def _placer(self, wanted: Any) -> Callable:
+    def _placer(self, points: Any) -> Callable:
         """Return a function from one value of the input, a float, to joints."""
-        names, pose = self._ready('points', wanted)
+        names, pose = self._ready('points', points)
         if pose.shape:
-            return lambda theta: self._vectors('points', theta, wanted)
-        return self._placers.get_or_make(_plain(wanted), lambda: pose.placer(names))
+            return lambda theta: self._vectors('points', theta, points)
+        return self._placers.get_or_make(_plain(points), lambda: pose.placer(names))
 
     def velocity(self, theta: Inputs, points: Names = None, by: int = 0) -> dict:
         """Differentiate `solve` by an input [m/rad, m/m]; infinite or NaN at a dead point."""
@@ -353,10 +353,10 @@ class Mechanism:
     def posed(self, points: Names = None, joints: Sequence[str] = (),
               rates: Sequence[str] = ()) -> Pose:
         """Return the code behind `function`."""
-        wanted = tuple(self._names(kind, _plain(_hashable(names)))
-                       for kind, names in (('points', points), ('angles', joints),
-                                           ('rates', rates)))
-        return self.bound('parts', wanted)
+        requested = tuple(self._names(kind, _plain(_hashable(names)))
+                          for kind, names in (('points', points), ('angles', joints),
+                                              ('rates', rates)))
+        return self.bound('parts', requested)
 
     def legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...],
              rows: np.ndarray) -> Batch:
@@ -494,13 +494,13 @@ class Mechanism:
         A linkage with one change point in a turn repeats only after two turns: its
         solutions are those of the turn [-pi, pi), and `near` should lie there.
         """
-        value, (inverse, held) = numbers('value', value), self._held(output, others)
+        value, (inverse, fixed) = numbers('value', value), self._with_others(output, others)
         if near is None:
-            return inverse.over(value, *held)[0][0]
+            return inverse.over(value, *fixed)[0][0]
         near = numbers('near', near)
-        return inverse.nearest((value, *held), (near, *held))[0][0][()]
+        return inverse.nearest((value, *fixed), (near, *fixed))[0][0][()]
 
-    def _held(self, output: Any, others: Sequence[float]) -> Tuple[Inverse, List[float]]:
+    def _with_others(self, output: Any, others: Sequence[float]) -> Tuple[Inverse, List[float]]:
         """Return the inverse of an output with all inputs but the first fixed."""
         self.check_output(output)
         if len(others) != len(self.inputs) - 1:
@@ -511,7 +511,7 @@ class Mechanism:
 
     def servos(self, output: str, value: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
         """Return all solutions as `input_for` does, and d output / d input there."""
-        inputs, rates = self._held(output, ())[0].over(numbers('value', value))
+        inputs, rates = self._with_others(output, ())[0].over(numbers('value', value))
         return inputs[0], rates[0]
 
     def servo_for(self, output: str, value: ArrayLike, near: Optional[ArrayLike] = None,
@@ -523,7 +523,7 @@ class Mechanism:
         Without `near` it is on the working branch, on which lever and crank turn the same way.
         Floats, or arrays in the broadcast shape of value and near; NaN without a solution.
         """
-        inverse, _ = self._held(output, ())
+        inverse, _ = self._with_others(output, ())
         given = [x if type(x) is float else numbers(name, x)
                  for name, x in (('value', value), ('near', near)) if x is not None]
         (found,), (rate,) = inverse.nearest(given[:1], given[1:] or None, [ends])
@@ -536,7 +536,7 @@ class Mechanism:
         See `Inverse.follow`, for a linkage with one input: the input [rad or m] with its whole
         turns, and d output / d input; NaN beyond the next dead point or extreme of the output.
         """
-        (found,), (rate,) = self._held(output, ())[0].follow(value, near)
+        (found,), (rate,) = self._with_others(output, ())[0].follow(value, near)
         return found, rate
 
     def inputs_for(self, outputs: Sequence[str], values: ArrayLike,
@@ -665,23 +665,23 @@ class Mechanism:
                              f'{len(self.inputs) - 1}, got {quoted(by)}')
         return int(by)
 
-    def _ready(self, kind: str, wanted: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
+    def _ready(self, kind: str, requested: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
         """Return the requested names and the function that computes them."""
-        key = kind, _hashable(wanted), *by
+        key = kind, _hashable(requested), *by
         return self._poses.get(key) or self._pose(kind, _plain(key[1]), *by)
 
-    def _pose(self, kind: str, wanted: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
-        names = self._names(kind, wanted)
+    def _pose(self, kind: str, requested: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
+        names = self._names(kind, requested)
         return self._poses.get_or_make(
-            (kind, wanted, *by), lambda: (names, self.bound(kind, names, *by)))
+            (kind, requested, *by), lambda: (names, self.bound(kind, names, *by)))
 
-    def _names(self, kind: str, wanted: Any) -> Tuple[str, ...]:
+    def _names(self, kind: str, requested: Any) -> Tuple[str, ...]:
         what, allowed = ('point', self.points) if kind in OF_POINTS else ('joint', self.joints)
         if kind == 'transmissions':
             what, allowed = 'transmission angle at', tuple(self.structure.built.transmissions)
-        if wanted is None:
+        if requested is None:
             return allowed
-        names = (wanted,) if isinstance(wanted, str) else wanted
+        names = (requested,) if isinstance(requested, str) else requested
         for name in names:
             if name not in allowed and not (what == 'joint' and self.has_output(name)):
                 raise ValueError(f'{self.type} has no {what} {quoted(name)}; '
