@@ -12,7 +12,7 @@ joint, which coincides with the joint's own point in a closed loop::
       <mechanism>_ground_link             at the mechanism's pose; its plane is x-y
         <mechanism>_<link>_link           moved by <mechanism>_<link>, or by its joint_names
           <mechanism>_<point>             fixed, one for each joint of the linkage
-          <mechanism>_<point>_cut         fixed, on the link that has to meet that joint
+          <mechanism>_<point>_cut         fixed, at the same joint on the link that was cut off
 
 Legs of a walker have their prefix before link and point, and one crank for all of them.
 """
@@ -34,11 +34,11 @@ from ..scene import SceneError, SceneMechanism
 from ..scene.scene_mechanism import IN_SPACE
 from ..words import listed
 
-# As in the markers: bars, what inputs move, guides and joints.
+# The colours of the markers: bars, driven bodies, guides and joints.
 COLOURS = {'bar': palette.BAR, 'driven': palette.DRIVEN, 'slot': palette.SLOT,
            'joint': palette.JOINT}
 
-# As parts of the longest bar: radii of bars, joints and barrels, thickness of guides and blocks.
+# Fractions of the longest bar: radii of bars, joints and barrels, thickness of guides and blocks.
 BAR, JOINT, BARREL, GUIDE, BLOCK = 1 / 80, 1 / 40, 1 / 32, 1 / 80, 1 / 20
 
 # Range of sizes [m] that displays can draw in single precision.
@@ -65,14 +65,14 @@ class Piece(NamedTuple):
 
     @property
     def pose(self) -> Tuple[float, ...]:
-        """Its middle x, y, z [m], roll, pitch, yaw: a cylinder's z is laid down, then turned."""
+        """Its middle x, y, z [m], roll, pitch, yaw [rad]; pitch lays a cylinder's z along x."""
         (x, y), (u, v) = self.start, self.end
         return (0.5 * (x + u), 0.5 * (y + v), 0.0,
                 0.0, 0.5 * math.pi if self.shape == ROD else 0.0, math.atan2(v - y, u - x))
 
     @property
     def sizes(self) -> Dict[str, Tuple[float, ...]]:
-        """Its sizes [m], as URDF and SDF call them."""
+        """Its sizes [m], by their names in URDF and SDF."""
         if self.shape == BOX:
             return {'size': (self.length, self.thickness, self.thickness)}
         length = {'length': (self.length,)} if self.shape == ROD else {}
@@ -80,7 +80,7 @@ class Piece(NamedTuple):
 
 
 class Point(NamedTuple):
-    """A joint of the linkage on a body; where a loop was cut, it has to meet another point."""
+    """A joint of the linkage on a body; `meets` is the coinciding point if a loop was cut here."""
 
     name: str
     place: Place
@@ -93,7 +93,7 @@ class Point(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """The joint of a body: rotation about z or sliding along x, with a sign and limits, if any."""
+    """The joint of a body: rotation about z or slide along x, with a sign and optional limits."""
 
     name: str
     kind: str
@@ -108,7 +108,7 @@ class Joint(NamedTuple):
 
 @dataclass
 class Body:
-    """A body on its parent at x, y, z [m], roll, pitch, yaw [rad] where its joint is at zero."""
+    """A body; pose: x, y, z [m], roll, pitch, yaw [rad] on its parent with its joint at zero."""
 
     name: str
     parent: str
@@ -163,15 +163,16 @@ class Robot:
         return [body for part in self.parts for body in part.bodies]
 
     def check_names(self, whose: str) -> None:
-        """Raise SceneError where two links or two joints have the same name."""
+        """Raise SceneError if two links or two joints have the same name."""
         for tag, several in (('joint', [part.joints for part in self.parts]),
                              ('link', [part.links for part in self.parts])):
             names = set().union(*several)
             if tag == 'link' and self.root in names:
-                raise SceneError(f'frame_id must be no link of the robot model, not {self.root!r}')
+                raise SceneError('frame_id must differ from the links of the robot model, '
+                                 f'not be {self.root!r}')
             if len(names) < sum(map(len, several)):
                 (name, _), = Counter(chain(*several)).most_common(1)
-                raise SceneError(f'{whose} must be other names: the robot model would have two '
+                raise SceneError(f'{whose} must have other names: the robot model would have two '
                                  f'{tag}s {name}')
 
 
@@ -192,8 +193,8 @@ def robot(machines: Iterable[SceneMechanism], frame_id: str,
     Raises
     ------
     SceneError
-        If two links or two joints would have the same name, the whole would be no tree, or
-        something is too large or small.
+        If two links or two joints would have the same name, the links would not form a tree, or
+        a size is out of range.
 
     """
     return together([_robot(machine, machine.frame_id or frame_id, width) for machine in machines])
@@ -201,9 +202,9 @@ def robot(machines: Iterable[SceneMechanism], frame_id: str,
 
 def together(robots: Sequence[Robot]) -> Robot:
     """
-    Return robot models as one; raise SceneError if they make no tree.
+    Return robot models as one; raise SceneError if they do not form a tree.
 
-    They have the same root link, or the root of one is a link of another.
+    They must have the same root link, or the root of one must be a link of another.
     """
     if len(robots) == 1:
         return robots[0]
@@ -256,7 +257,7 @@ def _numbers(robot: Robot) -> Iterator[float]:
 
 
 def size(machine: SceneMechanism) -> float:
-    """Return the longest bar [m]; raise SceneError where it cannot be drawn."""
+    """Return the length of the longest bar [m]; raise SceneError if it is out of range."""
     length = machine.scale * float(machine.linkage.longest)
     if not SMALLEST <= length <= LARGEST:
         raise SceneError(
@@ -289,13 +290,13 @@ class _Tree:
             self._add_shapes(side, GROUND, ground)
         yield ground
         if self._shared:
-            yield self._with_hub(self._hung('', 1.0, self._shared))
+            yield self._with_hub(self._moving('', 1.0, self._shared))
         for prefix, leg in self._assembly.legs.items():
             ends: Counter[str] = Counter()
             self._add_points(prefix, leg.side, GROUND, ground, self._frames[GROUND], ends)
             for link in self._links:
                 body = (self._lagging(prefix, leg, link) if link is self._shared
-                        else self._hung(prefix, leg.side, link))
+                        else self._moving(prefix, leg.side, link))
                 self._add_pieces(leg.side, link, body)
                 carried = [point for point in self._frames[link.name] if point != link.joint]
                 self._add_points(prefix, leg.side, link.name, body, carried, ends)
@@ -306,8 +307,8 @@ class _Tree:
         return Body(self._name(prefix, crank.name), self._name('', crank.name),
                     (0.0, 0.0, 0.0, 0.0, 0.0, -leg.lag))
 
-    def _hung(self, prefix, side, link) -> Body:
-        """Return a body that moves on its parent; in a mirrored leg the other way round."""
+    def _moving(self, prefix, side, link) -> Body:
+        """Return a body that moves on its parent; in a mirrored leg, in the opposite direction."""
         prismatic, mirrored = link.kind == 'prismatic', side < 0.0
         zero = math.pi - link.zero if mirrored and link.parent == GROUND else link.zero
         travel = self._travels.get(link.name)
@@ -316,21 +317,22 @@ class _Tree:
         if travel and prismatic:
             travel = self._machine.scale * travel[0], self._machine.scale * travel[1]
         x, y = self._place(side, link.parent, link.joint)
-        called = self._machine.joints[prefix + link.name]
+        published = self._machine.joints[prefix + link.name]
         # The link's position at a published value of zero.
-        back = -called.sign * called.offset
+        back = -published.sign * published.offset
         if prismatic:
             x, y = x + side * back * math.cos(zero), y + side * back * math.sin(zero)
         else:
             zero += back
         if travel:
-            travel = called.travel(travel)
-        joint = Joint(called.name, link.kind, called.sign * (side if prismatic else 1.0), travel)
+            travel = published.travel(travel)
+        joint = Joint(published.name, link.kind,
+                      published.sign * (side if prismatic else 1.0), travel)
         return Body(self._name(prefix, link.name), self._name(prefix, link.parent),
                     (x, y, 0.0, 0.0, 0.0, zero), joint)
 
     def _add_pieces(self, side, link, body):
-        """Add bars as rods, and what slides on a link or is the slide."""
+        """Add a link's bars as rods, and its guides, blocks, barrels and rods."""
         frame = self._frames[link.name]
         for first, second in self._bars:
             if first in frame and second in frame:
@@ -346,7 +348,7 @@ class _Tree:
         """Add guides, blocks, barrels and the rods in them."""
         for shape in self._shapes:
             if shape.start.link == link:
-                start, end = (self._seen(side, link, spot[1:]) for spot in shape[2:])
+                start, end = (self._placed(side, link, spot[1:]) for spot in shape[2:])
                 drawn, thickness = {shapes.GUIDE: (BOX, GUIDE), shapes.BLOCK: (BOX, BLOCK),
                                     shapes.BARREL: (ROD, BARREL), shapes.ROD: (ROD, BAR)
                                     }[shape.kind]
@@ -357,7 +359,7 @@ class _Tree:
                                              end))
 
     def _add_points(self, prefix, side, link, body, points, ends):
-        """Add joints of a link, including those that it was cut off."""
+        """Add joints of a link, including those where it was cut off."""
         for point in points:
             name = met = f'{self._machine.name}_{prefix}{point}'
             ends[point] += 1
@@ -377,11 +379,11 @@ class _Tree:
         return f'{self._machine.name}_{"" if name == GROUND else prefix}{name}_link'
 
     def _place(self, side, link, point):
-        """Return x, y [m] of a point of a link; the ground is mirrored in y, a link in its bar."""
-        return self._seen(side, link, self._frames[link][point])
+        """Return x, y [m] of a joint of a link."""
+        return self._placed(side, link, self._frames[link][point])
 
-    def _seen(self, side, link, place):
-        """Return x, y [m] of a place on a link."""
+    def _placed(self, side, link, place):
+        """Return x, y [m] of a place on a link; the ground is mirrored in y, a link in its bar."""
         x, y = (self._machine.scale * value for value in place)
         return (side * x, y) if link == GROUND else (x, side * y)
 
@@ -397,12 +399,12 @@ def _input_travels(machine, assembly) -> Dict[str, Optional[Travel]]:
             continue
         low, high = min(lo for lo, _ in arcs), max(hi for _, hi in arcs)
         sweep = machine.inputs[input_.name].sweep if input_.turns else None
-        # A crank's angle is in the turn of its sweep.
+        # The limits of a crank are in the same turn as its sweep.
         turns = math.tau * math.floor((sweep[1] - low) / math.tau) if sweep else 0.0
         found[input_.name] = low + turns, high + turns
     return found
 
 
 def numbers(*values: float) -> str:
-    """Return numbers with all their digits; adding zero makes -0.0 plain."""
+    """Return numbers with all their digits, and 0.0 for -0.0."""
     return ' '.join(repr(float(value) + 0.0) for value in values)

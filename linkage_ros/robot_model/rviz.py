@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""RViz's configuration of any scene, made from the one that shows all of the catalogue."""
+"""RViz's configuration of a scene, adapted from that of the catalogue."""
 
 import copy
 import json
@@ -31,15 +31,15 @@ def adapted(config: dict, machines: Mapping[str, SceneMechanism], frame_id: str,
     Parameters
     ----------
     config : dict
-        A configuration with one group of displays a mechanism, which bears its name.
+        A configuration with one group of displays for each mechanism, with its name.
     machines : mapping
-        The mechanisms to be shown, by name; the camera sees them all.
+        The displayed mechanisms, by name; the camera sees all of them.
     frame_id : str
         The frame of their poses.
     namespace : str
         Namespace of their topics; empty: none.
     robot_model : bool
-        Whether to show what needs a robot_state_publisher as well.
+        Whether to enable the displays that need a robot_state_publisher.
     frame_prefix : str
         Prefix of the robot_state_publishers' frames.
 
@@ -66,9 +66,9 @@ def adapted(config: dict, machines: Mapping[str, SceneMechanism], frame_id: str,
 
 
 def _camera(machines: Iterable[SceneMechanism]) -> Dict[str, Any]:
-    """Return from where all that mechanisms reach is seen, square to the plane of the first."""
-    seen, normals = zip(*map(_seen, machines))
-    places, normal = np.concatenate(seen), normals[0]
+    """Return a camera that sees all places of the joints, square to the first one's plane."""
+    clouds, normals = zip(*map(_places, machines))
+    places, normal = np.concatenate(clouds), normals[0]
     low, high = places.min(axis=0), places.max(axis=0)
     x, y, z = (round(float(one), 2) + 0.0 for one in (low + high) / 2)
     pitch = min(max(math.asin(max(-1.0, min(1.0, normal[2]))), DOWN), STEEPEST)
@@ -79,8 +79,8 @@ def _camera(machines: Iterable[SceneMechanism]) -> Dict[str, Any]:
             'Yaw': round(yaw % math.tau, 6)}
 
 
-def _seen(machine: SceneMechanism) -> Tuple[np.ndarray, np.ndarray]:
-    """Return points that a mechanism's joints come to [m], (n, 3), and its plane's normal."""
+def _places(machine: SceneMechanism) -> Tuple[np.ndarray, np.ndarray]:
+    """Return places of a mechanism's joints [m], (n, 3), and the normal of its plane."""
     values = [np.concatenate([np.linspace(low, high, 25) for low, high in (
         [drive.ends] if drive.ends else drive.reach)]) / machine.scale_of(name)
         for name, drive in machine.inputs.items()]
@@ -90,8 +90,8 @@ def _seen(machine: SceneMechanism) -> Tuple[np.ndarray, np.ndarray]:
     places = places[np.isfinite(places).all(axis=1)]
     if machine.mirrored:
         places = np.concatenate([places, places * (-1.0, 1.0)])
-    seen = pose(*machine.pose)
-    return places @ seen[:3, :2].T + seen[:3, 3], seen[:3, 2]
+    matrix = pose(*machine.pose)
+    return places @ matrix[:3, :2].T + matrix[:3, 3], matrix[:3, 2]
 
 
 def _renamed(group, name, namespace):

@@ -72,7 +72,7 @@ def _add_plugin(robot: ElementTree.Element, file: str, name: str, **values: str)
 
 def _add_joint(robot: ElementTree.Element, name: str, joint: Optional[Joint], parent: str,
                child: str) -> ElementTree.Element:
-    """Add a joint, a fixed one where there is none, at the child's frame."""
+    """Add a joint at the child's frame; a fixed one if `joint` is None."""
     element = ElementTree.SubElement(robot, 'joint', name=name,
                                      type=joint.kind if joint else 'fixed')
     _text(element, 'parent', parent)
@@ -84,7 +84,7 @@ def _add_joint(robot: ElementTree.Element, name: str, joint: Optional[Joint], pa
 
 def _add_ends(joint: ElementTree.Element, gear: Optional[Gear], motor: Optional[Motor],
               start: float) -> None:
-    """Say how a joint follows another, or between which ends it is moved."""
+    """Add the gear of a joint, or the limits of its motor."""
     axis, = joint.iter('axis')
     if gear:
         mimic = ElementTree.SubElement(axis, 'mimic', joint=gear.input)

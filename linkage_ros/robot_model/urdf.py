@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Robot models as URDF: the tree, for what moves it by the positions of its joints.
+Robot models as URDF: the tree, for programs that move it by the positions of its joints.
 
-Points are links of their own, fixed to their bodies. There are no inertias, which nothing needs
-that is moved by positions. Limits have effort and velocity 0: not known.
+Points are links of their own, fixed to their bodies. There are no inertias: a model moved by
+positions needs none. Effort and velocity of limits are 0, which means unknown.
 
 Format: the URDF XML specification of ROS (wiki.ros.org/urdf/XML).
 """
@@ -21,7 +21,7 @@ from .bodies import Body, COLOURS, numbers, Part, Piece, Robot
 from .. import palette
 from ..scene import SceneMechanism
 
-# Of a scene most mechanisms are as they were when it is written again.
+# When a scene is written again, most of its mechanisms are unchanged.
 _written: WeakKeyDictionary[Part, str] = WeakKeyDictionary()
 
 
@@ -57,7 +57,7 @@ def _part(part: Part) -> str:
 
 
 def _joint(body: Body) -> str:
-    """Return the joint that a body hangs on."""
+    """Return the joint between a body and its parent."""
     joint = body.joint
     name, kind = (joint.name, joint.kind) if joint else (f'{body.name}_fixed', 'fixed')
     if joint and kind == 'revolute' and not joint.travel:
@@ -76,8 +76,8 @@ def _joint(body: Body) -> str:
 
 
 def _link(name: str, pieces: Iterable[Piece]) -> str:
-    """Return a link, and what is seen of it."""
-    seen = ''.join([f"""\
+    """Return a link with its visual pieces."""
+    visuals = ''.join([f"""\
     <visual>
 {_origin('      ', piece.pose)}\
       <geometry>
@@ -87,7 +87,9 @@ def _link(name: str, pieces: Iterable[Piece]) -> str:
       <material name="{piece.colour}" />
     </visual>
 """ for piece in pieces])
-    return f'  <link name="{name}">\n{seen}  </link>\n' if seen else f'  <link name="{name}" />\n'
+    if not visuals:
+        return f'  <link name="{name}" />\n'
+    return f'  <link name="{name}">\n{visuals}  </link>\n'
 
 
 def _origin(indent: str, pose: Sequence[float]) -> str:
