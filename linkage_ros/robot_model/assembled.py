@@ -158,7 +158,7 @@ def _slots(machine: SceneMechanism, bodies: Sequence[Body], positions: Dict[str,
 
 
 def weight(pieces: Sequence[Piece], density: float) -> Weight:
-    """Return the total weight of pieces with a density [kg/m^3]; zero without pieces."""
+    """Return the common weight of pieces of a density [kg/m^3]; zero without pieces."""
     masses = np.array([density * _volume(piece) for piece in pieces])
     mass = float(masses.sum())
     if not mass:

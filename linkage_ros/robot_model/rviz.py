@@ -67,7 +67,7 @@ def adapted(config: dict, machines: Mapping[str, SceneMechanism], frame_id: str,
 
 def _camera(machines: Iterable[SceneMechanism]) -> Dict[str, Any]:
     """Return a camera that sees all places of the joints, square to the first one's plane."""
-    clouds, normals = zip(*map(_places, machines))
+    clouds, normals = zip(*map(_seen, machines))
     places, normal = np.concatenate(clouds), normals[0]
     low, high = places.min(axis=0), places.max(axis=0)
     x, y, z = (round(float(one), 2) + 0.0 for one in (low + high) / 2)
@@ -79,8 +79,8 @@ def _camera(machines: Iterable[SceneMechanism]) -> Dict[str, Any]:
             'Yaw': round(yaw % math.tau, 6)}
 
 
-def _places(machine: SceneMechanism) -> Tuple[np.ndarray, np.ndarray]:
-    """Return places of a mechanism's joints [m], (n, 3), and the normal of its plane."""
+def _seen(machine: SceneMechanism) -> Tuple[np.ndarray, np.ndarray]:
+    """Return points that a mechanism's joints come to [m], (n, 3), and its plane's normal."""
     values = [np.concatenate([np.linspace(low, high, 25) for low, high in (
         [drive.ends] if drive.ends else drive.reach)]) / machine.scale_of(name)
         for name, drive in machine.inputs.items()]

@@ -72,7 +72,7 @@ def _add_plugin(robot: ElementTree.Element, file: str, name: str, **values: str)
 
 def _add_joint(robot: ElementTree.Element, name: str, joint: Optional[Joint], parent: str,
                child: str) -> ElementTree.Element:
-    """Add a joint at the child's frame; a fixed one if `joint` is None."""
+    """Add a joint, a fixed one where there is none, at the child's frame."""
     element = ElementTree.SubElement(robot, 'joint', name=name,
                                      type=joint.kind if joint else 'fixed')
     _text(element, 'parent', parent)
