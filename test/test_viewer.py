@@ -580,7 +580,7 @@ def test_a_node_that_is_silent_at_first_is_waited_for_and_not_guessed(show, monk
             return reasons, await page.ask('pose', '/leg')
 
     reasons, answer = asyncio.run(use(running.viewer.url))
-    assert reasons == ['the nodes of leg have not told its parameters yet'] * 3
+    assert reasons == ['the parameters of leg are not known yet'] * 3
     g_x = 0.5 * mechanisms.create('jansen').solve(1.0, ('G',))['G'][0]
     assert answer['outputs']['G.x']['value'] == pytest.approx(g_x)
 

@@ -50,7 +50,7 @@ INPUTS_TYPE = 'sensor_msgs/msg/JointState'
 SECONDS_BETWEEN_LOOKS = 1.0
 SECONDS_TO_LINGER = 1.0
 SECONDS_TO_ARRIVE, ARRIVED = 1.0, 1e-6
-# What a scene has beside its mechanisms.
+# Parameters that define a scene, which a saved file always has.
 DEFINES = re.compile(r'mechanisms|[^.]+\.(type|scale|dimensions\..+)')
 GENERAL = 'mechanisms', 'frame_id', 'frame_prefix', 'rate'
 SCENE = 'scene'
@@ -103,7 +103,7 @@ class ShownMechanism:
     def scene(self) -> scene.Scene:
         """Return the scene of it alone; raise Refused if its parameters are incomplete."""
         if 'type' not in self.settings:
-            raise Refused(f'the nodes of {self.name} have not told its parameters yet')
+            raise Refused(f'the parameters of {self.name} are not known yet')
         return _read({'mechanisms': [self.name], **self.values()})
 
     def described(self) -> dict[str, Any]:
@@ -126,7 +126,7 @@ class SceneView:
     Attributes
     ----------
     clients : list
-        Open pages, which receive news by `tell(key, message)` and markers by `offer(feed)`.
+        Open pages, which receive messages by `tell(key, message)`, markers by `offer(feed)`.
 
     """
 
@@ -236,7 +236,7 @@ class SceneView:
         for (name, drive), value in zip(machine.inputs.items(), inputs):
             start = mechanism.settings.get(f'{name}.start')
             if start is None:
-                raise Refused(f'nothing that is known here moves the {name}: no crank_driver runs')
+                raise Refused(f'the {name} cannot be moved: no crank_driver is running')
             if value == start.value:
                 # An input moves only to a start that differs from the last one.
                 value = math.nextafter(value, sum(poses.arcs(drive)[0]) / 2.0)

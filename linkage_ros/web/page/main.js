@@ -1,7 +1,7 @@
 // Copyright 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// The page: what the viewer sends goes into the picture and the panel, what is dragged goes back.
+// The page: passes the viewer's messages to picture and panel, and requests to the viewer.
 
 import { Connection } from './connection.js';
 import { arithmetic, element, put } from './control.js';
@@ -17,7 +17,7 @@ const at = id => document.getElementById(id);
 const [views, status, names, workshop, arrows, whole, notice] = [
   'views', 'status', 'names', 'workshop', 'arrows', 'whole', 'notice'].map(at);
 const naming = names.closest('label');
-/** What a reload keeps. */
+/** State that is kept over a reload. */
 const kept = { shown: '', names: true, workshop: false, arrows: '', ...JSON.parse(sessionStorage.getItem('kept') ?? '{}') };
 let { shown } = kept;
 let scheduled = false;
@@ -49,7 +49,7 @@ function light(mechanism, dimension) {
   draw();
 }
 
-/** Say over the picture what keeps it from being shown or moved; nothing: all is well. */
+/** Show over the picture why it is not available or cannot be moved; an empty text hides it. */
 function say(words) {
   put(notice, { textContent: words, hidden: !words });
 }
@@ -72,13 +72,13 @@ const connection = new Connection({
     for (const one of described) {
       const mechanism = known.get(one.key) ?? new Mechanism(one);
       mechanism.describe(one);
-      // Those of one name in two namespaces are told apart.
+      // Mechanisms of one name in two namespaces have distinct titles.
       mechanism.title = described.some(({ key, name }) => name === one.name && key !== one.key) ? one.key.slice(1) : one.name;
       mechanisms.set(one.key, mechanism);
     }
     at('empty').hidden = mechanisms.size > 0;
     say('');
-    // What was shown before a reload may be found later.
+    // The mechanism that was selected before a reload may be discovered later.
     show(mechanisms.has(kept.shown) ? kept.shown : '');
   },
 
@@ -120,7 +120,7 @@ arithmetic.ask = text => connection.ask({ op: 'read', text });
 
 const panel = new Panel(at('panel'), connection, light, say);
 
-/** Draw once before the next refresh of the screen, then do what is to be done after it. */
+/** Draw once before the next refresh of the screen, then call `after`. */
 function draw(after) {
   if (scheduled && !after) return;
   scheduled = true;

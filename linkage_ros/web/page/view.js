@@ -1,7 +1,7 @@
 // Copyright 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// From where the picture is seen: zoomed, shifted and turned by mouse, fingers and keys.
+// The view of the picture: zoom, shift and rotation by mouse, fingers and keys.
 
 const PIXELS_A_RADIAN = 200;
 const STEP = 40;
@@ -13,7 +13,7 @@ const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDo
 const middle = points => [0, 1].map(i => points.reduce((sum, at) => sum + at[i], 0) / points.length);
 
 export class View {
-  /** Calls `changed()`; leaves alone what `busy()` says that somebody else drags. */
+  /** Calls `changed()`; ignores pointers while `busy()` returns that a joint is dragged. */
   constructor(canvas, busy, changed) {
     Object.assign(this, { canvas, busy, changed, pointers: new Map(), ...WHOLE });
     canvas.addEventListener('pointerdown', event => this.press(event));
@@ -51,7 +51,7 @@ export class View {
     return { right: mix(right, c, out, -s), up: mix(up, e, towards, -f), out: mix(towards, e, up, f) };
   }
 
-  /** Zoom by a factor, with what is at a place in the canvas left there. */
+  /** Zoom by a factor about a place in the canvas. */
   magnify(factor, at) {
     const zoom = Math.min(Math.max(this.zoom * factor, LEAST), MOST);
     const real = zoom / this.zoom;
