@@ -90,8 +90,8 @@ def _seen(machine: SceneMechanism) -> Tuple[np.ndarray, np.ndarray]:
     places = places[np.isfinite(places).all(axis=1)]
     if machine.mirrored:
         places = np.concatenate([places, places * (-1.0, 1.0)])
-    matrix = pose(*machine.pose)
-    return places @ matrix[:3, :2].T + matrix[:3, 3], matrix[:3, 2]
+    seen = pose(*machine.pose)
+    return places @ seen[:3, :2].T + seen[:3, 3], seen[:3, 2]
 
 
 def _renamed(group, name, namespace):

@@ -40,7 +40,7 @@ export class Mechanism {
     }
   }
 
-  /** The number of pairs of legs, and of legs. */
+  /** How many pairs of legs there are, and how many legs. */
   get pairs() {
     return this.value('leg_pairs') ?? 1;
   }

@@ -189,7 +189,7 @@ export class Picture {
     const inFrames = new Map();
     for (const [key, box] of now) {
       let known = this.boxes.get(key) ?? new Box();
-      // A far marker that made the mechanism so large is gone.
+      // It was never so large: something far off was drawn that is gone.
       if (box.size > 0 && known.size > SHRUNK * box.size) known = new Box();
       if (!known.holds(box)) this.boxes.set(key, known.grown(box));
       const frame = frames.get(key);
@@ -218,7 +218,7 @@ export class Picture {
     }
   }
 
-  /** Return the corners of a box in a mechanism's plane, in order, in the view. */
+  /** Return the corners of a box in a mechanism's plane, one after the other, as they are seen. */
   corners(key, { low: [left, bottom], high: [right, top] }) {
     return [[left, bottom], [right, bottom], [right, top], [left, top]].map(
       ([x, y]) => this.maps.get(key).map(([a, b, , d]) => a * x + b * y + d));
@@ -420,7 +420,7 @@ export class Picture {
     }
   }
 
-  /** Write the mechanisms' names below them, without overlap. */
+  /** Write the mechanisms' names below them, none over another. */
   titles() {
     const { context } = this;
     context.font = `600 ${FONT}`;
