@@ -841,8 +841,8 @@ def test_of_many_requests_at_once_each_is_answered(lever):
 @pytest.mark.parametrize('kind, data, code, reason', [
     (aiohttp.WSMsgType.TEXT, b'[' * 100000, 1009, 'a message may have 65536 bytes'),
     (aiohttp.WSMsgType.TEXT, b'\xff\xfe', 1007, 'a text must be UTF-8'),
-    (aiohttp.WSMsgType.CONTINUATION, b'', 1002, 'this is no WebSocket frame'),
-    (3, b'', 1002, 'this is no WebSocket frame'),
+    (aiohttp.WSMsgType.CONTINUATION, b'', 1002, 'this is not a WebSocket frame'),
+    (3, b'', 1002, 'this is not a WebSocket frame'),
 ])
 def test_what_is_no_message_closes_the_connection_with_a_reason(address, kind, data, code, reason):
     async def use():
