@@ -372,9 +372,9 @@ def refusals(tmp_path_factory):
     (['parameter', 'e', '1e6'], 'it cannot be assembled'), (['parameter', 'e', '-3'], ''),
     (['parameter', 'x', '1'], "there is no parameter 'x'; allowed: a b e"),
     (['joint', 'left_flap', 'lever'], ''), (['joint', 'left_flap', 'rod'], ''),
-    (['twice', '', ''], "'slotted_lever_lever', role 'lever', is none of"),
+    (['twice', '', ''], "'slotted_lever_lever' (role 'lever') must be one of"),
     (['none', '', ''], "joint 'slotted_lever_lever' is missing"),
-    (['reduction', '', ''], 'must have no mechanical_reduction'),
+    (['reduction', '', ''], 'must have neither mechanical_reduction'),
     (['handle', 'elbow', ''], "handle 'elbow' belongs to no joint"),
     (['interface', 'effort', ''], 'need a position interface'),
     (['interface', 'temperature', ''], 'one interface in common')])
@@ -481,8 +481,8 @@ def test_a_package_names_what_the_scene_names(tmp_path):
 
 
 @pytest.mark.parametrize('arguments, said', [
-    (['--out', '{0}/My-Package'], 'must end in the name of a package'),
-    (['--out', '{0}'], 'or one that this command wrote'), ([], 'required: --out'),
+    (['--out', '{0}/My-Package'], "must end in the package's name"),
+    (['--out', '{0}'], 'or one written by this command'), ([], 'required: --out'),
     (['--out', '{0}/legs', '--joints', 'elbow'], "no mechanism has a joint 'elbow'")])
 def test_what_cannot_be_written_is_one_sentence(tmp_path, capsys, arguments, said):
     folder = tmp_path / 'mine'
