@@ -94,7 +94,7 @@ class Code:
 
     def struct(self) -> str:
         """Return the struct of constants; call it after all functions have been written."""
-        return '\n'.join(['/* What follows from the dimensions. */', 'typedef struct {',
+        return '\n'.join(['/* Constants that depend on the dimensions. */', 'typedef struct {',
                           f'    double k[{max(len(self._constants), 1)}];', '    int is_own;',
                           f'}} {self.name}_linkage;', ''])
 
@@ -134,7 +134,7 @@ class Code:
                           for i, value in enumerate(self.linkage.dimensions.values())) or '1'
         fills = [f'    c->k[{i}] = d{number[node]};' for node, i in self._constants.items()]
         return '\n'.join([
-            '/* Take dimensions; returns 0, or what is wrong with them. */',
+            '/* Set the dimensions; returns 0, or an error message. */',
             f'static inline const char *{self.name}_set({self.name}_linkage *c, '
             'const double *dimension)', '{',
             *body, *refusals, *fills, f'    c->is_own = {own};',
