@@ -305,7 +305,7 @@ def test_names_of_any_letters_are_texts(tmp_path):
 
 @pytest.mark.skipif(not shutil.which('avr-gcc'), reason='avr-gcc is not installed')
 def test_where_a_double_is_a_float_it_says_so(machines, tmp_path):
-    for single, said in ((False, 'print the header again with --float'), (True, '')):
+    for single, said in ((False, 'generate the header with --float'), (True, '')):
         file = tmp_path / 'lever.c'
         file.write_text(header.written(machines['lever'], (), single) + 'int main(void) { }\n')
         ended = subprocess.run(['avr-gcc', '-mmcu=atmega328p', '-std=c99', '-c', file, '-o',

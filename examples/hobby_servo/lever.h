@@ -4,7 +4,7 @@
  * Input: crank [rad]. Angles [rad] are positive counterclockwise.
  * float: the error of joints is up to 1e-07 of the longest bar at 2001 poses over the reach, without its outermost hundredth.
  * C99 and C++17 without heap, lock or recursion; compile without -ffast-math, which drops the checks.
- * A conversion solves at most 8 poses.
+ * A call of the transmission takes at most 8 poses.
  */
 #ifndef LEVER_LINKAGE_H
 #define LEVER_LINKAGE_H

@@ -66,7 +66,7 @@ def guarded(sides: Sides, about: Sequence[str], parts: Sequence[str]) -> str:
     guard = f'{name.upper()}_LINKAGE_H'
     lines = [f'{name}: {sides.linkage.type}, written by linkage_ros.', *about,
              'C99 and C++17 without heap, lock or recursion; compile without -ffast-math, which '
-             'drops the checks.', f'A conversion solves at most {sides.poses} poses.']
+             'drops the checks.', f'A call of the transmission takes at most {sides.poses} poses.']
     check = '' if single else (
         '\n#if DBL_MANT_DIG < 53\n#error "double is a float on this machine: generate the header '
         'with --float"\n#endif\n')
