@@ -56,7 +56,7 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P carriage O Q 0 1', 'expected "NAME carriage ORIGIN along TOWARDS DISTANCE DISTANCE'),
     ('P carriage O along B 0 1', 'O and B are not joints of one moving link'),
     ('P carriage O along A 1 1',
-     'the carriage must have a way to go: from a lower end to a'),
+     'the lower end of the carriage must be less than its upper end'),
     ('P block A 1 1', 'A is no joint of a block'),
     ('P slider A 1 O along A out', 'the joints that it is placed from must differ'),
     ('P inversor Q A 3 1', 'expected "NAME NAME NAME inversor POLE PIN LENGTH LENGTH"'),
@@ -170,7 +170,7 @@ def test_a_long_circle_and_a_long_list_are_elided():
     {'O ground 0 0'}, frozenset(FOUR_BAR), dict.fromkeys(FOUR_BAR), len, str, object(), iter(()),
     np.array('O ground 0 0'), np.array([])])
 def test_joints_are_a_list_of_lines(joints):
-    with pytest.raises(ValueError, match='joints must be a list of lines, one a joint'):
+    with pytest.raises(ValueError, match='joints must be a list of lines, one per joint'):
         mechanisms.create('custom', joints=joints)
 
 
@@ -197,7 +197,7 @@ def test_a_linkage_needs_a_crank():
 
 
 def test_a_tracer_must_be_a_joint():
-    with pytest.raises(ValueError, match="tracer 'X' is no joint; allowed: O, Q, A, B"):
+    with pytest.raises(ValueError, match="tracer 'X' is not a joint; allowed: O, Q, A, B"):
         mechanisms.create('custom', joints=FOUR_BAR, tracer='X', **LENGTHS)
 
 

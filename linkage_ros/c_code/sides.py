@@ -264,4 +264,5 @@ class Sides:
                    'the others')
         for input_ in built.inputs:
             if not input_.turns:
-                yield real(input_.high) - input_.low, f'the {input_.name} must have a way to go'
+                yield (real(input_.high) - input_.low,
+                       f'the lower end of the {input_.name} must be less than its upper end')
