@@ -232,7 +232,8 @@ def arithmetic(rng, depth):
                        f'({one})', f'({one}-{two})', f'max({one},{two})', f'sqrt({one})'))
 
 
-@pytest.mark.parametrize('count', [40, pytest.param(400, marks=pytest.mark.long)])
+@pytest.mark.parametrize('count', [
+    10, pytest.param(40, marks=pytest.mark.slow), pytest.param(400, marks=pytest.mark.long)])
 def test_arithmetic_is_what_python_makes_of_the_same_letters(count):
     rng, tried = random.Random(5), 0
     known = {**LENGTHS, 'pi': math.pi, 'sqrt': math.sqrt, 'max': max}
@@ -503,6 +504,7 @@ def refused(ask, text) -> bool:
 
 
 @pytest.mark.filterwarnings('error')
+@pytest.mark.sample(12)
 @pytest.mark.parametrize('role, every', [
     *((role, 2 if role in PARSED else 10) for role in (*ROLES, *OUTPUTS)),
     *(pytest.param(role, 1, marks=pytest.mark.long) for role in (*ROLES, *OUTPUTS))])

@@ -946,6 +946,7 @@ def check_dialects(folder, seeds):
     assert moved > len(seeds) // 2
 
 
+@pytest.mark.slow
 def test_random_linkages_come_back_in_any_dialect(tmp_path):
     check_dialects(tmp_path, range(6))
 

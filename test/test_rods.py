@@ -7,9 +7,8 @@ import ctypes
 import math
 import random
 import re
-import shutil
-import subprocess
 
+from c_libraries import loaded
 import gmpy2
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
@@ -72,7 +71,8 @@ def check_random_rods(seed, count):
     return assembled
 
 
-@pytest.mark.parametrize('seed, count', few_and_many([(1, 100)], [
+@pytest.mark.parametrize('seed, count', few_and_many([
+    (1, 10), pytest.param(1, 100, marks=pytest.mark.slow)], [
     (100 + seed, 20000) for seed in range(10)]))
 def test_a_rod_on_a_hinge_is_right_to_the_last_digits(seed, count):
     assert check_random_rods(seed, count) > 0.4 * count
@@ -131,7 +131,8 @@ def check_ankle(ankle, window, rng, poses, exact):
                 assert error <= RULE * given + np.spacing(abs(value))
 
 
-@pytest.mark.parametrize('seed, count, poses', few_and_many([(2, 3, 500)], [
+@pytest.mark.parametrize('seed, count, poses', few_and_many([
+    pytest.param(2, 3, 500, marks=pytest.mark.slow)], [
     (1000 + seed, 10, 10000) for seed in range(20)]))
 def test_two_rods_find_every_pose_inside_the_limits(seed, count, poses):
     for ankle, window, rng in ankles(seed, count):
@@ -172,8 +173,8 @@ def check_assemblies(ankle, window, rng, count):
     return there.sum()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize('seed, count, poses', few_and_many([(3, 2, 500)], [
+@pytest.mark.parametrize('seed, count, poses', few_and_many([
+    pytest.param(3, 2, 500, marks=pytest.mark.slow)], [
     (2000 + seed, 5, 10000) for seed in range(20)]))
 def test_no_pose_is_of_another_assembly(seed, count, poses):
     found = [check_assemblies(*each, poses) for each in ankles(seed, count)]
@@ -453,9 +454,6 @@ def test_a_linkage_a_million_times_the_size_has_the_same_angles(g1):
 @pytest.fixture(scope='module')
 def compiled(tmp_path_factory):
     """Return the ankle as C, with its inverse."""
-    compiler = shutil.which('cc')
-    if not compiler:
-        pytest.skip('there is no C compiler')
     folder = tmp_path_factory.mktemp('c')
     machine = scene.read({'mechanisms': ['ankle'], 'ankle.type': 'rods',
                           'ankle.joints': list(G1)}).machines['ankle']
@@ -480,11 +478,7 @@ int there_and_back_(const double *joints, double *actuators, double *again)
     return status;
 }
 """
-    (folder / 'ankle.c').write_text('#include <string.h>\n' + text + calls)
-    subprocess.run([compiler, '-std=c99', '-Wall', '-Wextra', '-pedantic', '-Werror', '-O2',
-                    '-shared', '-fPIC', 'ankle.c', '-o', 'ankle.so', '-lm'],
-                   check=True, cwd=folder)
-    return text, ctypes.CDLL(str(folder / 'ankle.so'))
+    return text, loaded(folder, '#include <string.h>\n' + text + calls)
 
 
 def test_the_pose_in_c_has_no_loop_and_no_heap(compiled):

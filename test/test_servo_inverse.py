@@ -152,6 +152,7 @@ FIVE_BAR = {'mechanisms': ['leg', 'drop'], 'leg.type': 'five_bar', 'leg.scale': 
 FOOT = {'outputs': ['P.x', 'P.y'], 'values': [0.12, 0.3]}
 
 
+@pytest.mark.slow
 def test_all_working_modes_of_a_foot_are_told_and_the_nearest_comes_first(graph):
     node = graph.start(ServoInverse, FIVE_BAR)
     client = graph.node.create_client(InputsFor, 'inputs_for')

@@ -33,7 +33,7 @@ class Input(NamedTuple):
 
     All poses lie between `low` and `high`: one period of an angle, or the longest stroke.
     `period` is the number of turns after which poses repeat: above one if it drives cranks by
-    fractional gears, infinite for irrational ratios.
+    fractional gears or passes one change point per turn, infinite for irrational ratios.
     """
 
     name: str

@@ -21,8 +21,8 @@ from .analysis import Analysis
 from .arguments import checked_dimensions, numbers
 from .builder import in_metres, UNIT
 from .design import Design
-from .input_range import arcs
-from .inputs import Arc, Input, MOST_COUNTED
+from .input_range import arcs, is_periodic
+from .inputs import Arc, Input, MOST_COUNTED, spread
 from .inverse import Answer, Inverse
 from .quantities import LinkPoint, Points, structure_of
 from ..cache import Cache
@@ -256,21 +256,48 @@ class Mechanism:
         """
         Return the number of turns of an input after which the pose repeats.
 
-        It is above one if the input drives cranks by fractional gears. Ratios are rounded to
-        fractions with denominators up to MOST_TURNS.
+        It is above one if the input drives cranks by fractional gears, or if it passes one change
+        point per turn. Gear ratios are rounded to fractions with denominators up to MOST_TURNS.
+        With arrays of dimensions, change points are ignored.
         """
+        return self.cache.get_or_make(('period', by), lambda: self._period(by))
+
+    def _period(self, by: int) -> int:
         ratios = [np.ravel(self.value(derivative(value, {by: 1.0}, {})))
                   for _, value in self.structure.built.driven.values()]
-        return math.lcm(*(Fraction(float(ratio)).limit_denominator(MOST_TURNS).denominator
-                          for each in ratios for ratio in each if math.isfinite(ratio)))
+        turns = math.lcm(*(Fraction(float(ratio)).limit_denominator(MOST_TURNS).denominator
+                           for each in ratios for ratio in each if math.isfinite(ratio)))
+        if turns > MOST_COUNTED or not self._passes_change_point(by):
+            return turns
+        return turns if is_periodic(lambda theta: self._points_over(by, theta), Input(
+            '', low=-math.pi * turns, high=math.pi * turns, period=turns)) else 2 * turns
+
+    def _passes_change_point(self, by: int) -> bool:
+        """Return whether a dyad of a crank has a gap of nothing but rounding."""
+        gaps = [(limit.tolerance, *limit.ends[:2]) for limit in self.structure.built.limits
+                if limit.ends and limit.ends.theta.args[0] == by]
+        values = [tuple(map(self.value, each)) for each in gaps]
+        return any(np.ndim(tolerance + start + end) == 0 and min(abs(start), abs(end)) <= tolerance
+                   for tolerance, start, end in values)
+
+    def _points_over(self, by: int, values: np.ndarray) -> np.ndarray:
+        """Return the coordinates of all joints over one input; the others are spread."""
+        inputs = spread([self._with_stroke(x) for x in self.structure.built.inputs], len(values))
+        inputs[by] = values
+        return self.bound('points', self.points).searched(*inputs)
 
     def _counted_input(self, by: int, input_: Input) -> Input:
         """Return an input with the limits [rad or m] of all poses."""
         if not input_.turns:
-            return input_._replace(low=self._metres(input_.low), high=self._metres(input_.high))
+            return self._with_stroke(input_)
         period = self.period(by)
         period = period if period <= MOST_COUNTED else 1
         return input_._replace(low=-math.pi * period, high=math.pi * period, period=period)
+
+    def _with_stroke(self, input_: Input) -> Input:
+        """Return an input with its stroke [m]; an angle is unchanged."""
+        return input_ if input_.turns else input_._replace(
+            low=self._metres(input_.low), high=self._metres(input_.high))
 
     # --- poses and how they change ---
 
@@ -486,13 +513,10 @@ class Mechanism:
 
         `output` is as for `inverse`; angles are equal up to whole turns. `others` are the fixed
         values of the other inputs. Without `near`, the result has all solutions, crank angles in
-        [-pi, pi), ascending, on a last axis of length one or more, padded with NaN. With `near` it
-        has the nearest, including whole turns, in the broadcast shape of value and near. It is NaN
-        where the output is unreachable or constant; a value beyond an extreme by rounding
-        counts as the extreme.
-
-        A linkage with one change point in a turn repeats only after two turns: its
-        solutions are those of the turn [-pi, pi), and `near` should lie there.
+        [-pi, pi) or within their period, ascending, on a last axis of length one or more, padded
+        with NaN. With `near` it has the nearest, including whole turns, in the broadcast shape of
+        value and near. It is NaN where the output is unreachable or constant; a value beyond an
+        extreme by rounding counts as the extreme.
         """
         value, (inverse, fixed) = numbers('value', value), self._with_others(output, others)
         if near is None:

@@ -111,9 +111,9 @@ class ServoInverse(scene_node.SceneNode):
     def _receive(self, text: bytes) -> None:
         # `kinematics` logs unreadable messages.
         with suppress(Unreadable):
-            source = self._reader.source(text)
-            positions = source.read(text).positions
-            self._positions.update((name, positions[place]) for name, place in source.meaning)
+            sender = self._reader.sender(text)
+            positions = sender.read(text).positions
+            self._positions.update((name, positions[place]) for name, place in sender.meaning)
 
 
 def solve(inverse: InverseRequest, request: Any, response: Any) -> None:

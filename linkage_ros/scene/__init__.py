@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Scenes: a set of mechanisms with their sizes, poses and input motions.
+A scene: a set of mechanisms with their sizes, poses and input motions.
 
-This room alone defines the parameters' names. `read` turns values into a Scene, or raises an error
-that names the wrong parameter and its allowed values. Nodes declare the scene's `parameters`. No
-ROS is needed.
+This package alone defines the names of parameters. `read` turns their values into a Scene, or
+raises an error that names the wrong parameter and its allowed values. Nodes declare the scene's
+`parameters`. No ROS is needed.
 """
 
 from __future__ import annotations
@@ -63,7 +63,9 @@ class Scene:
     frame_id: str
     frame_prefix: str
     rate: float
+    # Parameters that belong to no mechanism.
     general: Tuple[Parameter, ...]
+    # What it was read from, by mechanism ('' for general parameters) and full parameter name.
     values: Mapping[str, Mapping[str, Any]] = some(compare=False, repr=False)
 
     @property
@@ -73,7 +75,7 @@ class Scene:
                                  for parameter in machine.parameters))
 
     def changed_from(self, old: 'Scene') -> List[Parameter]:
-        """Return the parameters whose values differ from those of an older scene."""
+        """Return the parameters whose values differ from an older scene of the same mechanisms."""
         parts = [(self.general, old.general), *(
             (machine.parameters, old.machines[name].parameters)
             for name, machine in self.machines.items() if machine is not old.machines[name])]
@@ -101,22 +103,17 @@ def load(path: str) -> Scene:
 
 def read(values: Mapping[str, Any], before: Optional[Scene] = None, strict: bool = True) -> Scene:
     """
-    Read a scene from parameter values.
+    Read a scene from parameter values; raise SceneError if one is unknown or not allowed.
 
     Parameters
     ----------
     values : mapping
         Values by full parameter name.
     before : Scene, optional
-        The previous scene: mechanisms whose values are unchanged are reused from it.
+        The previous scene, whose mechanisms are reused if their values are unchanged.
     strict : bool
-        Whether an input's start must lie in its sweep or reach. False for a running scene: there
-        the start does not constrain a change of the sweep or reach.
-
-    Raises
-    ------
-    SceneError
-        If a parameter is unknown or its value is not allowed.
+        Whether an input's start must be in its sweep or reach. False for a scene that is running:
+        its inputs have left their starts, so sweep and reach may change regardless of these.
 
     """
     parts = _by_mechanism(values)
@@ -128,9 +125,9 @@ def read(values: Mapping[str, Any], before: Optional[Scene] = None, strict: bool
 
 def changed(before: Scene, values: Mapping[str, Any], strict: bool = True) -> Scene:
     """
-    Return a scene with some values changed, by full parameter name.
+    Return the scene `before` with some other values, by full parameter name.
 
-    Only the mechanisms concerned are read again. Raises SceneError as `read` does.
+    Mechanisms without a changed value are reused. `strict` and SceneError are those of `read`.
     """
     parts = dict(before.values)
     for name, part in _by_mechanism(values).items():
@@ -160,7 +157,7 @@ def _read(parts: Mapping[str, Mapping[str, Any]], before: Optional[Scene], stric
 
 
 def _by_mechanism(values: Any) -> Dict[str, Dict[str, Any]]:
-    """Group values by mechanism; general parameters have an empty name."""
+    """Return {mechanism: {full name: value}}, with '' as the mechanism of general parameters."""
     if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
         raise SceneError('a scene must map names of parameters to their values, not be '
                          f'{quoted(values)}')

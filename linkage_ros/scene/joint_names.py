@@ -24,9 +24,10 @@ _LINE = re.compile(rf'(\w+)=(-?)({_PLAIN}|"(?:[^"\\]|\\.)+")'
 
 class JointName(NamedTuple):
     """
-    Published name of a joint, whose value is sign * position + offset [rad or m].
+    Published name of a joint. Its published value is sign * position + offset [rad or m].
 
-    An angle with its own zero is wrapped to [-pi, pi].
+    `published` tells whether it is in joint states, `wraps` whether the value is wrapped to
+    [-pi, pi].
     """
 
     name: str
@@ -36,12 +37,12 @@ class JointName(NamedTuple):
     wraps: bool = False
 
     def of(self, position: Any) -> Any:
-        """Convert a position, a number or an array, to the published value."""
+        """Return the published value of a position [rad or m], a number or an array."""
         value = self.sign * position + self.offset
         return value - math.tau * np.round(value / math.tau) if self.wraps else value
 
     def travel(self, ends: Tuple[float, float]) -> Optional[Tuple[float, float]]:
-        """Convert limits to published ones; None for an angle that wraps between them."""
+        """Return limits of the published value from those of the position; None if it wraps."""
         low, high = sorted(self._replace(wraps=False).of(end) for end in ends)
         if not self.wraps:
             return low, high
@@ -53,9 +54,11 @@ class JointName(NamedTuple):
 def read_joint_names(mechanism: str, joints: Mapping[str, bool], lines: Iterable[str],
                      only_named: bool) -> Dict[str, JointName]:
     """
-    Return the published names of all joints; raise SceneError if a line matches none.
+    Return the published names of all joints, by joint.
 
-    `joints` maps each joint to whether it is an angle published without whole turns.
+    `joints` tells for each joint whether it is an angle, which wraps if it has an offset. `lines`
+    are those of the parameter joint_names. `only_named` leaves the other joints unpublished.
+    Raises SceneError if a line is malformed, or its joint is unknown or has another line.
     """
     default = {joint: JointName(f'{mechanism}_{joint}', published=not only_named)
                for joint in joints}
@@ -75,7 +78,7 @@ def read_joint_names(mechanism: str, joints: Mapping[str, bool], lines: Iterable
 
 
 def quoted_name(name: str) -> str:
-    """Return a name as written in `joint_names`: quoted unless plain."""
+    """Return a published name as it is written in joint_names: quoted if it must be."""
     plain = re.fullmatch(_PLAIN, name, re.ASCII)
     return name if plain else json.dumps(name, ensure_ascii=False)
 
@@ -88,7 +91,7 @@ def _unquoted(text: str) -> str:
 
 
 def check_distinct(names: Mapping[str, Mapping[str, JointName]]) -> None:
-    """Raise SceneError if two joints of the scene have one published name."""
+    """Raise SceneError if two joints of the scene are published by one name."""
     owners: Dict[str, str] = {}
     for mechanism, joints in names.items():
         for joint, own in joints.items():

@@ -12,7 +12,7 @@ from .parameters import SceneError
 from ..linkage.mechanism import Mechanism
 from ..words import elided, listed
 
-# A moment [N m], or a force x, y and, in space, z [N].
+# A moment [N m], or a force [N]: x, y and, in a spatial linkage, z.
 Load = Union[float, Tuple[float, ...]]
 
 _FIGURE = r'[+-]?(?:\d{1,99}\.?\d{0,99}|\.\d{1,99})(?:[eE][+-]?\d\d?)?'
@@ -20,7 +20,7 @@ _LINE = re.compile(rf'(\w+)=({_FIGURE})(?: +({_FIGURE}))?(?: +({_FIGURE}))?', re
 
 
 def read_loads(mechanism: str, linkage: Mechanism, lines: Iterable[str]) -> Dict[str, Load]:
-    """Return loads by joint or link; raise SceneError for a line that is not a load."""
+    """Return forces by joint and moments by link; raise SceneError if a line is neither."""
     loads: Dict[str, Load] = {}
     for line in lines:
         match = _LINE.fullmatch(line)

@@ -48,7 +48,7 @@ TRACER = Field('string', 'Joint whose curve is the locus; empty: the last.', rea
 DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [m].', positive=True,
                   readers=ALL)
 BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the default.', -1, 1, readers=ALL)
-SCALE = Field('double', 'Factor of every length.', positive=True, readers=(KINEMATICS, INVERSE))
+SCALE = Field('double', 'Factor of every length.', positive=True, readers=ALL)
 LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.', 1, 50,
                   readers=(KINEMATICS,))
 MIRRORED = Field('bool', 'Whether each leg has a mirror image on the other side; '
@@ -71,7 +71,15 @@ LOADS = Field('string_array', "Loads that the inputs balance, in the linkage's p
 
 @dataclass(frozen=True)
 class SceneMechanism:
-    """One mechanism: the linkage of a leg, its reach, scale, copies, markers and inputs."""
+    """
+    A mechanism of a scene, which has one or more equal legs.
+
+    `linkage` is that of a leg, and `reach` the reach of its first input, both before `scale`, a
+    factor of all lengths. `points` are the joints that markers display; `pose` is x, y, z [m],
+    roll, pitch, yaw [rad] in `frame_id`, or in the scene's frame if that is empty. `inputs` are by
+    their names; `joints` are the published names by joint; `loads` are forces by joint, moments by
+    link. `values` are the values that the mechanism was read from.
+    """
 
     name: str
     linkage: Mechanism
@@ -90,30 +98,30 @@ class SceneMechanism:
     parameters: Tuple[Parameter, ...] = some(compare=False, repr=False)
 
     def is_from(self, values: Mapping[str, Any]) -> bool:
-        """Return whether it was read from exactly these values."""
+        """Return whether it was read from the same objects, and so is unchanged."""
         return self.values is values or self.values.keys() == values.keys() and all(
             self.values[key] is value for key, value in values.items())
 
     @property
     def in_space(self) -> bool:
-        """Whether it is a linkage of rods, which has no picture, page or robot model."""
+        """Whether the linkage is spatial; only planar ones have pictures and robot models."""
         return len(self.linkage.axes) > 2
 
     @property
     def first(self) -> InputSettings:
-        """The first input; most linkages have only one."""
+        """The settings of the first input; most linkages have only one."""
         return next(iter(self.inputs.values()))
 
     def scale_of(self, output: str) -> float:
-        """Return the factor of an output: the scale for a length, 1 for an angle."""
+        """Return the factor from the linkage to the scene: the scale for a length, else 1."""
         return 1.0 if self.linkage.is_angle(output) else self.scale
 
     def measured(self, output: str, value: float, near: float) -> Tuple[float, float]:
         """
-        Return the input for a measured output [rad or m], and d output / d input.
+        Return the input at which an output has a value [rad or m], and d output / d input.
 
-        Of several solutions it is the one that continues from `near`, or else the nearest; NaN
-        outside the reach or the user's sweep.
+        Of several solutions it is the one that continues from the input `near`, or else the
+        nearest. It is NaN if there is none in the reach and in the sweep that a user has set.
         """
         drive, own, unit = self.first, self.scale_of(self.first.input.name), self.scale_of(output)
         ends = drive.ends and (drive.ends[0] / own, drive.ends[1] / own)
@@ -125,7 +133,12 @@ class SceneMechanism:
 
     def from_source(self, drive: InputSettings, position: float, speed: Optional[float],
                     near: Optional[float]) -> Tuple[float, Optional[float]]:
-        """Convert a source's position and speed to an input's, continuous from `near`."""
+        """
+        Return an input and its speed, from those of its source joint [rad or m, per second].
+
+        If the source joint measures an output, the input continues from `near`, by default its
+        start, and is NaN if there is none. The speed is None if it is unknown.
+        """
         value = drive.ratio * position + drive.offset
         speed = None if speed is None else drive.ratio * speed
         if not drive.measures:
@@ -134,7 +147,7 @@ class SceneMechanism:
         return found, speed / rate if speed is not None and rate else None
 
     def to_source(self, drive: InputSettings, value: float, speed: float) -> Tuple[float, float]:
-        """Convert an input and its speed to its source's position and speed."""
+        """Return position and speed of an input's source joint, from those of the input."""
         if output := drive.measures:
             own, unit = self.scale_of(drive.input.name), self.scale_of(output)
             rate = float(self.linkage.joint_rates(value / own, [output])[output]) * unit / own
@@ -143,28 +156,28 @@ class SceneMechanism:
         return (value - drive.offset) / drive.ratio, speed / drive.ratio
 
     def efforts(self, values: Sequence[float]) -> Tuple[float, ...]:
-        """Return each input's effort that balances the loads at these values [N m or N]."""
+        """Return the inputs' efforts [N m or N] that balance the loads at inputs `values`."""
         units = [self.scale_of(name) for name in self.inputs]
         own = [value / unit for value, unit in zip(values, units)]
-        # The scale lengthens the levers of forces; moments do not depend on it.
+        # The scale lengthens the lever arms of forces; moments do not depend on it.
         loads = {name: load if isinstance(load, float) else tuple(
             self.scale * part for part in load) for name, load in self.loads.items()}
         found = self.linkage.effort(own if len(own) > 1 else own[0], loads)
         return tuple(float(effort) / unit for effort, unit in zip(found, units))
 
     def assembly(self) -> Assembly:
-        """Return all legs as one assembly."""
+        """Return the solver of all legs."""
         return Assembly(self.linkage, self.leg_pairs, self.mirrored, self.scale, self.reach)
 
     @property
     def tracer(self) -> str:
-        """The joint of the locus: the linkage's tracer if it is among `points`, else the last."""
+        """The joint that draws the locus: the linkage's tracer if in `points`, else their last."""
         return self.linkage.tracer if self.linkage.tracer in self.points else self.points[-1]
 
 
 def read_machine(name: str, own: Mapping[str, Any], old: Optional[SceneMechanism],
                  strict: bool) -> SceneMechanism:
-    """Read a mechanism from its own values; return the old one if they are unchanged."""
+    """Read a mechanism from its own values, or return `old` if they are unchanged."""
     if old and old.is_from(own):
         return old
     values = Values(own)
@@ -247,7 +260,7 @@ def _branches(name: str, design: Design, values: Values) -> Dict[str, int]:
 
 @cached(16, shared=True)
 def _built(design: Design, dimensions: tuple, branches: tuple) -> Mechanism:
-    """Build a linkage, cached by its dimensions."""
+    """Build a linkage, or return an equal one that is cached or in use."""
     own: Dict[str, Any] = {} if design.name in mechanisms.TYPES else {
         'joints': design.joints, 'tracer': design.tracer}
     return mechanisms.create(design.name, branches=dict(branches), **own, **dict(dimensions))
@@ -255,7 +268,7 @@ def _built(design: Design, dimensions: tuple, branches: tuple) -> Mechanism:
 
 def _legs(name: str, linkage: Mechanism, values: Values) -> Tuple[int, bool]:
     able = _can_have_more_legs(linkage)
-    # A parameter that cannot change has no slider.
+    # A parameter of which no other value is allowed is read-only, and so has no slider.
     pairs, mirrored = (field.about(read_only=not able) for field in (LEG_PAIRS, MIRRORED))
     pairs = values.take(f'{name}.leg_pairs', pairs, 1)
     mirrored = values.take(f'{name}.mirrored', mirrored, pairs > 1)

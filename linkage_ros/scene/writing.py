@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Write scenes as parameter files, for `load` and ROS. Needs PyYAML, no ROS."""
+"""Write scenes as parameter files, which `load` and ROS can read. Needs PyYAML, but no ROS."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .parameter_file import plain, TEXT
 
 
 def in_yaml(values: Mapping[str, Any]) -> str:
-    """Return the text of a parameter file with values by full parameter name."""
+    """Return the text of a parameter file; `values` are by full parameter name."""
     import yaml
 
     class Dumper(yaml.SafeDumper):
@@ -35,20 +35,17 @@ def in_yaml(values: Mapping[str, Any]) -> str:
     return '\n'.join(texts) + '\n'
 
 
+# Matches no text.
 NOTHING = re.compile(r'(?!)')
 
 
 def without_defaults(scene: Scene, always: re.Pattern = NOTHING) -> Dict[str, Any]:
     """
-    Return a scene's values by name, without those that equal their defaults.
+    Return the values that differ from their defaults, by full parameter name.
 
-    Values whose whole name matches `always` are always included.
-
-    Raises
-    ------
-    SceneError
-        If nodes could not start with them: a start outside its input's sweep or reach.
-
+    A value whose whole name matches `always` is included even if it is the default. Raises
+    SceneError if nodes could not start with these values: an input starts outside its sweep or
+    reach.
     """
     values = {parameter.name: parameter.value for parameter in scene.parameters}
     whole = dict(values)
