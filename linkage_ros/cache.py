@@ -12,8 +12,8 @@ A function of hashable arguments is decorated; an object with results of its own
     self._sources = Cache(read_source)    # self._sources[text] is read_source(text)
     self._found = Cache()                 # self._found.get_or_make(key, make) is make()
 
-A `make` that is a method of whatever has the cache is a cycle, which only the garbage collector
-frees; `get_or_make` with a lambda is none.
+A `make` that is a method of the cache's owner is a reference cycle, which only the garbage
+collector frees; `get_or_make` with a lambda avoids that.
 """
 
 from __future__ import annotations

@@ -57,7 +57,7 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P carriage O along B 0 1', 'O and B are not joints of one moving link'),
     ('P carriage O along A 1 1',
      'the lower end of the carriage must be less than its upper end'),
-    ('P block A 1 1', 'A is no joint of a block'),
+    ('P block A 1 1', 'A is not a joint of a block'),
     ('P slider A 1 O along A out', 'the joints that it is placed from must differ'),
     ('P inversor Q A 3 1', 'expected "NAME NAME NAME inversor POLE PIN LENGTH LENGTH"'),
     ('P R dyad A Q 1 1 left', 'expected "NAME dyad'),

@@ -220,7 +220,7 @@ class Builder:
         link = next((x.name for x in self.links
                      if x.kind == 'prismatic' and x.tip == joint and x.name in self._axes), None)
         if link is None:
-            raise ConstructionError(f'{joint} is no joint of a block')
+            raise ConstructionError(f'{joint} is not a joint of a block')
         offset = Complex(along, across)
         arm = planar.parallel(self._axes[link].vector * offset, self.points[joint].place)
         self._place(name, joint, arm, link, offset.length(), ())
@@ -559,7 +559,7 @@ class Builder:
     def _place(self, name: str, start: str, vector: Complex, link: str, length: Real,
                others: Tuple[str, ...], place: Optional[Complex] = None) -> None:
         """
-        Place a joint at the end of a bar from another; it stands on others as well.
+        Place a joint at the end of a bar from another; it depends on others, too.
 
         A place that is known in a better way is given.
         """

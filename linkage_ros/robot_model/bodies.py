@@ -162,7 +162,7 @@ class Robot:
         """Return the bodies of all mechanisms."""
         return [body for part in self.parts for body in part.bodies]
 
-    def check_names(self, whose: str) -> None:
+    def check_names(self, parameter: str) -> None:
         """Raise SceneError if two links or two joints have the same name."""
         for tag, several in (('joint', [part.joints for part in self.parts]),
                              ('link', [part.links for part in self.parts])):
@@ -172,8 +172,8 @@ class Robot:
                                  f'not be {self.root!r}')
             if len(names) < sum(map(len, several)):
                 (name, _), = Counter(chain(*several)).most_common(1)
-                raise SceneError(f'{whose} must have other names: the robot model would have two '
-                                 f'{tag}s {name}')
+                raise SceneError(f'{parameter} must have other names: the robot model would have '
+                                 f'two {tag}s {name}')
 
 
 def robot(machines: Iterable[SceneMechanism], frame_id: str,

@@ -89,7 +89,7 @@ def number(text: str) -> dict[str, Any]:
     """Return the `value` of arithmetic such as pi/2, and whether it is in rad (`turns`)."""
     formula = Formula(text)
     if formula.names:
-        raise Refused(f'{quoted(text)} is no number: there is no {listed(formula.names)}')
+        raise Refused(f'{quoted(text)} is not a number: {listed(formula.names)} is unknown')
     return {'value': float(formula.value({})), 'turns': bool({'pi', 'deg'} & formula.words.keys())}
 
 

@@ -104,8 +104,8 @@ export class Slider {
     this.unitShown = element('span', { className: 'unit' });
     this.row = element('div', { className: 'row', title },
       element('label', { htmlFor: id, textContent: label }), this.range, this.number, this.unitShown, this.reason.line);
-    this.asked = new Newest(async ([wanted, gesture]) => this.settle(
-      wanted, await request(wanted, gesture, this.accepted)));
+    this.asked = new Newest(async ([requested, gesture]) => this.settle(
+      requested, await request(requested, gesture, this.accepted)));
     this.range.oninput = () => this.slid();
     this.range.onchange = () => this.release();
     this.range.onkeydown = event => this.key(event);
@@ -165,9 +165,9 @@ export class Slider {
   }
 
   /** Show the result of a request: the requested value, another value, or a refusal. */
-  settle(wanted, answer) {
+  settle(requested, answer) {
     const refused = answer.reason && answer.value === undefined;
-    if (!refused) this.accepted = answer.value ?? wanted;
+    if (!refused) this.accepted = answer.value ?? requested;
     if (!this.mistyped) this.explain(refused ? `Refused: ${answer.reason}` : answer.reason, refused);
     if (!this.held && !this.asked.waiting) this.render();
   }

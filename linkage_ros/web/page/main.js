@@ -17,13 +17,13 @@ const at = id => document.getElementById(id);
 const [views, status, names, workshop, arrows, whole, notice] = [
   'views', 'status', 'names', 'workshop', 'arrows', 'whole', 'notice'].map(at);
 const naming = names.closest('label');
-/** State that is kept over a reload. */
-const kept = { shown: '', names: true, workshop: false, arrows: '', ...JSON.parse(sessionStorage.getItem('kept') ?? '{}') };
-let { shown } = kept;
+/** State that is saved over a reload. */
+const saved = { shown: '', names: true, workshop: false, arrows: '', ...JSON.parse(sessionStorage.getItem('saved') ?? '{}') };
+let { shown } = saved;
 let scheduled = false;
 let frames = 0;
 
-const keep = values => sessionStorage.setItem('kept', JSON.stringify(Object.assign(kept, values)));
+const save = values => sessionStorage.setItem('saved', JSON.stringify(Object.assign(saved, values)));
 
 const picture = new Picture(at('picture'));
 const hand = new Hand(picture, {
@@ -79,7 +79,7 @@ const connection = new Connection({
     at('empty').hidden = mechanisms.size > 0;
     say('');
     // The mechanism that was selected before a reload may be discovered later.
-    show(mechanisms.has(kept.shown) ? kept.shown : '');
+    show(mechanisms.has(saved.shown) ? saved.shown : '');
   },
 
   look({ number, mechanism, ...look }) {
@@ -108,7 +108,7 @@ const connection = new Connection({
         const marker = mechanism.markers.get(number);
         if (!marker) continue;
         marker.points = new Float32Array(buffer, from + 8, 3 * count);
-        if (marker.look.kind !== 'strip') mechanism.heard = now;
+        if (marker.look.kind !== 'strip') mechanism.lastMarkers = now;
       }
       from += 8 + 12 * count;
     }
@@ -139,29 +139,29 @@ function show(key) {
   views.replaceChildren(...labels.map(([value, textContent]) => {
     const button = element('button', { type: 'button', textContent, ariaPressed: value === key });
     button.onclick = () => {
-      keep({ shown: value });
+      save({ shown: value });
       show(value);
     };
     return button;
   }));
   const selected = [...mechanisms.values()].filter(mechanism => !key || mechanism.key === key);
-  for (const mechanism of selected) mechanism.arrows.kind = kept.arrows;
+  for (const mechanism of selected) mechanism.arrows.kind = saved.arrows;
   picture.show(selected);
   panel.show(selected, several && !key);
   naming.hidden = selected.length !== 1 || selected[0].legs > 1;
   draw();
 }
 
-/** Let what is chosen above the picture take effect, and a reload keep it. */
+/** Apply the options above the picture, and save them for a reload. */
 function choose() {
-  keep({ names: names.checked, workshop: workshop.checked, arrows: arrows.value });
-  picture.named = kept.names;
-  if (units.workshop !== kept.workshop) units.choose(kept.workshop);
-  for (const mechanism of mechanisms.values()) mechanism.arrows = { kind: kept.arrows, at: {} };
+  save({ names: names.checked, workshop: workshop.checked, arrows: arrows.value });
+  picture.named = saved.names;
+  if (units.workshop !== saved.workshop) units.choose(saved.workshop);
+  for (const mechanism of mechanisms.values()) mechanism.arrows = { kind: saved.arrows, at: {} };
   draw();
 }
 
-[names.checked, workshop.checked, arrows.value] = [kept.names, kept.workshop, kept.arrows];
+[names.checked, workshop.checked, arrows.value] = [saved.names, saved.workshop, saved.arrows];
 names.onchange = workshop.onchange = arrows.onchange = choose;
 choose();
 

@@ -8,7 +8,7 @@ import { History } from './history.js';
 export class Mechanism {
   constructor(described) {
     this.markers = new Map();
-    this.heard = performance.now();
+    this.lastMarkers = performance.now();
     /** Ranges and bars of dimensions, and fixed joints; empty until the viewer has answered. */
     this.tunable = { travel: {}, bars: {}, fixed: [] };
     /** The requested kind of arrows, and the received arrows by joint. */

@@ -50,8 +50,8 @@ class InputRow {
 
   step(way) {
     const { low, high, expected } = this.slider;
-    const wanted = expected + way * (this.turns ? STEP : (high - low) / STEPS_A_STROKE);
-    this.slider.offer(this.turns ? this.beside(wanted) : wanted);
+    const requested = expected + way * (this.turns ? STEP : (high - low) / STEPS_A_STROKE);
+    this.slider.offer(this.turns ? this.beside(requested) : requested);
   }
 
   show(input) {

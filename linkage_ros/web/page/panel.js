@@ -122,7 +122,7 @@ export class Panel {
   /** Show which mechanisms send no markers. */
   check(now) {
     for (const { mechanism, still } of this.sections.values()) {
-      const silent = now - mechanism.heard;
+      const silent = now - mechanism.lastMarkers;
       still.hidden = silent < STILL;
       still.textContent = `No markers for ${Math.round(silent / 1000)} s`;
     }
