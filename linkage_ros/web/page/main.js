@@ -17,13 +17,13 @@ const at = id => document.getElementById(id);
 const [views, status, names, workshop, arrows, whole, notice] = [
   'views', 'status', 'names', 'workshop', 'arrows', 'whole', 'notice'].map(at);
 const naming = names.closest('label');
-/** State that is saved over a reload. */
-const saved = { shown: '', names: true, workshop: false, arrows: '', ...JSON.parse(sessionStorage.getItem('saved') ?? '{}') };
-let { shown } = saved;
+/** What a reload keeps. */
+const kept = { shown: '', names: true, workshop: false, arrows: '', ...JSON.parse(sessionStorage.getItem('kept') ?? '{}') };
+let { shown } = kept;
 let scheduled = false;
 let frames = 0;
 
-const save = values => sessionStorage.setItem('saved', JSON.stringify(Object.assign(saved, values)));
+const keep = values => sessionStorage.setItem('kept', JSON.stringify(Object.assign(kept, values)));
 
 const picture = new Picture(at('picture'));
 const hand = new Hand(picture, {
@@ -78,8 +78,8 @@ const connection = new Connection({
     }
     at('empty').hidden = mechanisms.size > 0;
     say('');
-    // The mechanism that was selected before a reload may be discovered later.
-    show(mechanisms.has(saved.shown) ? saved.shown : '');
+    // What was shown before a reload may be found later.
+    show(mechanisms.has(kept.shown) ? kept.shown : '');
   },
 
   look({ number, mechanism, ...look }) {
@@ -139,13 +139,13 @@ function show(key) {
   views.replaceChildren(...labels.map(([value, textContent]) => {
     const button = element('button', { type: 'button', textContent, ariaPressed: value === key });
     button.onclick = () => {
-      save({ shown: value });
+      keep({ shown: value });
       show(value);
     };
     return button;
   }));
   const selected = [...mechanisms.values()].filter(mechanism => !key || mechanism.key === key);
-  for (const mechanism of selected) mechanism.arrows.kind = saved.arrows;
+  for (const mechanism of selected) mechanism.arrows.kind = kept.arrows;
   picture.show(selected);
   panel.show(selected, several && !key);
   naming.hidden = selected.length !== 1 || selected[0].legs > 1;
@@ -154,14 +154,14 @@ function show(key) {
 
 /** Apply the options above the picture, and save them for a reload. */
 function choose() {
-  save({ names: names.checked, workshop: workshop.checked, arrows: arrows.value });
-  picture.named = saved.names;
-  if (units.workshop !== saved.workshop) units.choose(saved.workshop);
-  for (const mechanism of mechanisms.values()) mechanism.arrows = { kind: saved.arrows, at: {} };
+  keep({ names: names.checked, workshop: workshop.checked, arrows: arrows.value });
+  picture.named = kept.names;
+  if (units.workshop !== kept.workshop) units.choose(kept.workshop);
+  for (const mechanism of mechanisms.values()) mechanism.arrows = { kind: kept.arrows, at: {} };
   draw();
 }
 
-[names.checked, workshop.checked, arrows.value] = [saved.names, saved.workshop, saved.arrows];
+[names.checked, workshop.checked, arrows.value] = [kept.names, kept.workshop, kept.arrows];
 names.onchange = workshop.onchange = arrows.onchange = choose;
 choose();
 

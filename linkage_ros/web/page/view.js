@@ -13,7 +13,7 @@ const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDo
 const middle = points => [0, 1].map(i => points.reduce((sum, at) => sum + at[i], 0) / points.length);
 
 export class View {
-  /** Calls `changed()`; ignores pointers while `busy()` returns that a joint is dragged. */
+  /** Calls `changed()`; leaves alone what `busy()` says that somebody else drags. */
   constructor(canvas, busy, changed) {
     Object.assign(this, { canvas, busy, changed, pointers: new Map(), ...WHOLE });
     canvas.addEventListener('pointerdown', event => this.press(event));
