@@ -285,7 +285,7 @@ def test_names_of_any_letters_are_texts(tmp_path):
 
 @pytest.mark.skipif(not shutil.which('avr-gcc'), reason='avr-gcc is not installed')
 def test_where_a_double_is_a_float_it_says_so(machines, tmp_path):
-    for single, said in ((False, 'generate the header with --float'), (True, '')):
+    for single, said in ((False, 'print the header again with --float'), (True, '')):
         file = tmp_path / 'lever.c'
         file.write_text(header.written(machines['lever'], (), single) + 'int main(void) { }\n')
         ended = subprocess.run(['avr-gcc', '-mmcu=atmega328p', '-std=c99', '-c', file, '-o',
@@ -352,9 +352,9 @@ def refusals(tmp_path_factory):
     (['parameter', 'e', '1e6'], 'it cannot be assembled'), (['parameter', 'e', '-3'], ''),
     (['parameter', 'x', '1'], "there is no parameter 'x'; allowed: a b e"),
     (['joint', 'left_flap', 'lever'], ''), (['joint', 'left_flap', 'rod'], ''),
-    (['twice', '', ''], "'slotted_lever_lever' (role 'lever') must be one of"),
+    (['twice', '', ''], "'slotted_lever_lever', role 'lever', is none of"),
     (['none', '', ''], "joint 'slotted_lever_lever' is missing"),
-    (['reduction', '', ''], 'must have neither mechanical_reduction'),
+    (['reduction', '', ''], 'must have no mechanical_reduction'),
     (['handle', 'elbow', ''], "handle 'elbow' belongs to no joint"),
     (['interface', 'effort', ''], 'need a position interface'),
     (['interface', 'temperature', ''], 'one interface in common')])

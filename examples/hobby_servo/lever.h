@@ -1,8 +1,8 @@
 /*
  * lever: slotted_lever, written by linkage_ros.
  * Lengths [m]: a = 0.02, b = 0.045, e = 0.
- * Input: crank [rad]. Angles [rad] are positive counterclockwise.
- * float: the error of joints is up to 1e-07 of the longest bar at 2001 poses over the reach, without its outermost hundredth.
+ * Input: crank [rad]. Angles [rad] count counterclockwise.
+ * float: joints are off by up to 1e-07 of the longest bar at 2001 poses over the reach, without its outermost hundredth.
  * C99 and C++17 without heap, lock or recursion; compile without -ffast-math, which drops the checks.
  * A call of the transmission takes at most 8 poses.
  */
@@ -23,7 +23,7 @@ static inline float lever_gated(float x, float margin, float tolerance)
     return margin >= -tolerance ? x : (float)NAN;
 }
 
-/* Places of the joints, and links relative to their parents. */
+/* Where the joints are, and each link to its parent. */
 typedef struct {
     float O_x, O_y;               /* [m] */
     float Q_x, Q_y;               /* [m] */
@@ -34,7 +34,7 @@ typedef struct {
     float slide_slide;            /* [m] */
 } lever_pose;
 
-/* Solve the pose. Returns 0 if joints cannot be assembled, which are then NaN. */
+/* Place the joints. Return 0 if not all can be assembled: NaN is what cannot. */
 static inline int lever_solve(float crank, lever_pose *p)
 {
     const float k7 = (-0.045f);
@@ -80,7 +80,7 @@ static inline int lever_solve(float crank, lever_pose *p)
         && isfinite(p->slide_slide);
 }
 
-/* The derivatives of the pose by crank. */
+/* Differentiate all of it by crank. */
 static inline void lever_rates(float crank, lever_pose *by_crank)
 {
     const float k10 = 0.02f;
@@ -122,9 +122,8 @@ static inline int lever_reaches(float crank)
     return isfinite(crank);
 }
 
-/* The status that a call returns, OK or a sum of the others. OUT_OF_REACH: the position is outside
-   the reach or the sweep. SINGULAR: a velocity or an effort would be infinite. NOT_KNOWN: a value is
-   NaN or infinite. */
+/* What a call returns: 0, or a sum of these. OUT_OF_REACH: the linkage cannot get there, or may
+   not. SINGULAR: it would take an infinite velocity or effort. NOT_KNOWN: a number is missing. */
 enum { LEVER_OK = 0, LEVER_OUT_OF_REACH = 1, LEVER_SINGULAR = 2, LEVER_NOT_KNOWN = 4 };
 enum { LEVER_ACTUATOR_LEVER_CRANK = 0 };
 enum { LEVER_JOINT_LEVER_LEVER = 0 };
@@ -133,12 +132,12 @@ typedef struct { float position[1], velocity[1], effort[1]; } lever_side;
 typedef lever_side lever_actuators;
 typedef lever_side lever_joints;
 
-/* A pose: positions of the actuators [0] and joints [1], their rates by each input, and the inputs'
-   efforts against the loads. */
+/* A pose: positions of the actuators [0] and joints [1], their rates by each input, and what the
+   inputs give against the loads. */
 typedef struct { float position[2][1], rate[2][1][1], load[1]; } lever_point;
 
-/* The state between calls: the last poses measured and commanded, and the last valid values of
-   actuators and joints. lever_begin initialises it. */
+/* What is remembered between calls: where the actuators were, where the joints were to be, and the
+   last valid values of both. lever_begin fills it. */
 typedef struct {
     lever_point point[2];
     float input[2][1];
@@ -221,7 +220,7 @@ static inline float lever_scale(int side, int i, int is_turn)
     return scale[side][i][is_turn];
 }
 
-/* Differences of positions from a pose, without whole turns; returns the largest, in sizes. */
+/* From a pose to positions, the shorter way; returns the largest, in sizes. */
 static inline float lever_gap(const float to[1], const lever_point *p, int side, float gap[1])
 {
     float most = 0.0f;
@@ -318,7 +317,7 @@ static inline int lever_reached(int side, int (*at)(const float *, lever_point *
     return left <= 4e-06f * steepest;
 }
 
-/* Whether inputs are within the sweeps of the scene. */
+/* Whether inputs are within the sweeps that are set. */
 static inline int lever_inside(const float q[1])
 {
     static const float end[1][2] = {  { (-INFINITY), (INFINITY) }  };
@@ -489,7 +488,7 @@ static inline int lever_from_angle_lever(const float position[1], float q[1], le
     return best < (INFINITY);
 }
 
-/* Samples of the inputs over their ranges for i = 1, 2, ...; their starts for 0. */
+/* Inputs all over their ways for i = 1, 2, ...; for 0 where they start. */
 static inline void lever_sample(long i, float q[1])
 {
     static const float way[1][4] = {  { 0.0f, (-3.1415927f), 6.2831855f, 0.41421357f }  };
@@ -500,7 +499,7 @@ static inline void lever_sample(long i, float q[1])
     }
 }
 
-/* Initialise the memory, and find a first pose; returns 0 if there is none. */
+/* Forget all that was, and find a pose to start from; returns 0 if there is none. */
 static inline int lever_begin(lever_memory *m)
 {
     static const lever_side none = { { 0.0f }, { 0.0f }, { 0.0f } };
@@ -530,7 +529,7 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
     if (status == LEVER_OK && !(side ? lever_from_joints(from->position, q, &found)
             : lever_from_actuators(from->position, q, &found)))
         status = LEVER_OUT_OF_REACH;
-    /* A command must be within the sweep, a measurement need not be. */
+    /* A command stays within the sweep that is set; a measurement is what it is. */
     if (status == LEVER_OK && side && !lever_inside(q))
         status = LEVER_OUT_OF_REACH;
     for (i = 0; status == LEVER_OK && i < 1; i++)
@@ -547,7 +546,7 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
         m->is_known[1] = 0;
     all = status;
 
-    /* Velocities at the requested pose, or else at the last one; a held position has none. */
+    /* Velocities at the pose that is asked for, or else where it is; what is held stands still. */
     at = &m->point[m->is_known[side] ? side : other];
     if (status == LEVER_NOT_KNOWN && (m->is_known[0] || m->is_known[1]))
         status = LEVER_OK;
@@ -564,7 +563,7 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
         held->velocity[i] = status == LEVER_OK ? y[i] : 0.0f;
     all |= status;
 
-    /* Efforts at the actuators' pose: input power is output power plus that of the loads. */
+    /* Efforts where the actuators are: power in is power out, but for what the loads take. */
     at = &m->point[m->is_known[0] ? 0 : 1];
     status = m->is_known[0] || m->is_known[1] ? LEVER_OK : LEVER_NOT_KNOWN;
     for (i = 0; status == LEVER_OK && i < 1; i++) {
@@ -584,21 +583,21 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
     return all | status;
 }
 
-/* Convert the actuators' positions, velocities and efforts to the joints'. Returns a status; values
-   that are not OK are held: positions and efforts at the last valid ones, velocities at zero. */
+/* From the actuators' positions, velocities and efforts to the joints'. Returns a status; what it
+   is not OK about is held: positions and efforts as they were last, velocities at zero. */
 static inline int lever_actuators_to_joints(lever_memory *m, const lever_actuators *from, lever_joints *to)
 {
     return lever_transmit(m, 0, from, to);
 }
 
-/* Convert the joints' values to the actuators'; of several solutions, to the nearest one. */
+/* The same from the joints to the actuators, which go to the answer nearest to where they are. */
 static inline int lever_joints_to_actuators(lever_memory *m, const lever_joints *from, lever_actuators *to)
 {
     return lever_transmit(m, 1, from, to);
 }
 
 /* The crank for lever [rad], nearest to `near`, whole turns included. Returns 0, and
-   leaves crank unchanged, if there is none. */
+   leaves crank alone, where there is none. */
 static inline int lever_crank_for_angle_lever(float value, float near, float *crank)
 {
     float q[1];

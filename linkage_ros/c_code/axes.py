@@ -122,7 +122,7 @@ def _chain(machine: SceneMechanism) -> List[str]:
 
     while len(chosen) < len(machine.inputs) and (candidates := [
             link for link in links if link.name not in chosen
-            and _are_independent(machine, [*chosen, link.name])]):
+            and _tell(machine, [*chosen, link.name])]):
         chosen.append(min(candidates, key=rank).name)
     try:
         machine.linkage.inverse(tuple(chosen))
@@ -131,7 +131,7 @@ def _chain(machine: SceneMechanism) -> List[str]:
         return list(machine.inputs)
 
 
-def _are_independent(machine: SceneMechanism, outputs: Sequence[str]) -> bool:
+def _tell(machine: SceneMechanism, outputs: Sequence[str]) -> bool:
     """Return whether outputs change independently of each other at the start."""
     pose = machine.linkage.posed((), (), tuple(outputs))
     rates = np.reshape(pose.over(*start(machine)), (-1, len(outputs)))

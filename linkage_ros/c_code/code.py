@@ -17,7 +17,7 @@ from ..formula.operations import OPERATIONS
 from ..formula.program import Dialect, Pose
 from ..linkage.mechanism import Mechanism
 
-# Operations with a truth value.
+# Expressions that are true or false.
 _CONDITIONS = ('less', 'less_equal')
 
 
@@ -75,7 +75,7 @@ class Code:
         return '\n'.join([head, '{', *body, *ends, '}', ''])
 
     def constant(self, node: Real, value: float) -> str:
-        """Return the code of an expression of dimensions: its value, or an element of `c`."""
+        """Return the code of an expression of dimensions, and its value as a constant."""
         if not self.is_open:
             return self.literal(value)
         code = f'c->k[{self._constants.setdefault(node, len(self._constants))}]'
@@ -93,8 +93,8 @@ class Code:
             '{', f'    return margin >= -tolerance ? x : ({number})NAN;', '}', ''])
 
     def struct(self) -> str:
-        """Return the struct of constants; call it after all functions have been written."""
-        return '\n'.join(['/* Constants that depend on the dimensions. */', 'typedef struct {',
+        """Return the struct of constants; it is complete once all functions are written."""
+        return '\n'.join(['/* What follows from the dimensions. */', 'typedef struct {',
                           f'    double k[{max(len(self._constants), 1)}];', '    int is_own;',
                           f'}} {self.name}_linkage;', ''])
 
@@ -102,7 +102,7 @@ class Code:
         """
         Return the function that fills the struct of constants from dimensions.
 
-        `checks` are pairs: an expression that must be positive, and the error message.
+        `checks` are pairs of an expression that has to be above zero and of what is said else.
         """
         names = {name: i for i, name in enumerate(self.linkage.dimensions)}
         number: Dict[Real, int] = {}
@@ -134,7 +134,7 @@ class Code:
                           for i, value in enumerate(self.linkage.dimensions.values())) or '1'
         fills = [f'    c->k[{i}] = d{number[node]};' for node, i in self._constants.items()]
         return '\n'.join([
-            '/* Set the dimensions; returns 0, or an error message. */',
+            '/* Take dimensions; returns 0, or what is wrong with them. */',
             f'static inline const char *{self.name}_set({self.name}_linkage *c, '
             'const double *dimension)', '{',
             *body, *refusals, *fills, f'    c->is_own = {own};',

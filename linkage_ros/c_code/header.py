@@ -36,7 +36,7 @@ def written(machine: SceneMechanism, outputs: Sequence[str] = (), single: bool =
     machine : SceneMechanism
         Mechanism of a scene; lengths include its scale, and only its first leg is written.
     outputs : sequence of str
-        Outputs with an inverse, named as for `input_for`.
+        Outputs, as for `input_for`, with an inverse each.
     single : bool
         Whether it computes with float instead of double.
     joints : sequence of str
@@ -56,7 +56,7 @@ def opened(machine: SceneMechanism, joints: Sequence[str] = ()) -> str:
     sides = Sides(machine, joints, is_open=True)
     text = sides.text()
     names = ', '.join(sides.linkage.dimensions) or 'none'
-    return guarded(sides, [f'Changeable dimensions [m]: {names}.'], [
+    return guarded(sides, [f'Dimensions [m] that may be given: {names}.'], [
         sides.code.helpers(), sides.code.struct(), sides.code.setter(list(sides.checks())), text])
 
 
@@ -68,8 +68,8 @@ def guarded(sides: Sides, about: Sequence[str], parts: Sequence[str]) -> str:
              'C99 and C++17 without heap, lock or recursion; compile without -ffast-math, which '
              'drops the checks.', f'A call of the transmission takes at most {sides.poses} poses.']
     check = '' if single else (
-        '\n#if DBL_MANT_DIG < 53\n#error "double is a float on this machine: generate the header '
-        'with --float"\n#endif\n')
+        '\n#if DBL_MANT_DIG < 53\n#error "double is a float on this machine: print the header '
+        'again with --float"\n#endif\n')
     return '\n'.join([
         '/*', *(f' * {line}' for line in lines), ' */',
         f'#ifndef {guard}\n#define {guard}\n\n#include <float.h>\n#include <math.h>\n{check}',
@@ -111,7 +111,7 @@ class _Header:
         inputs = ', '.join(f'{input_.name} [{input_.unit}]' for input_ in linkage.inputs)
         scale = f', times {self.machine.scale:.9g}' if self.machine.scale != 1.0 else ''
         lines = [f'Lengths [m]{scale}: {lengths}.',
-                 f'Input: {inputs}. Angles [rad] are positive counterclockwise.']
+                 f'Input: {inputs}. Angles [rad] count counterclockwise.']
         return lines + [self._error()] if self.number == 'float' else lines
 
     @property
@@ -134,7 +134,7 @@ class _Header:
             turns = self.linkage.is_angle(name)
             what = f'/* to {links[name].parent} [rad] */' if turns else '/* [m] */'
             lines.append(f'    {self.number} {field(self.linkage, name)};'.ljust(34) + what)
-        return '\n'.join(['/* Places of the joints, and links relative to their parents. */',
+        return '\n'.join(['/* Where the joints are, and each link to its parent. */',
                           'typedef struct {', *lines, f'}} {self.name}_pose;', ''])
 
     def _function(self, head: str, pose: Pose, ending: Callable[[List[str]], List[str]],
@@ -158,7 +158,7 @@ class _Header:
                 f'isfinite(p->{field})' for field in self._fields) + ';']
 
         return self._function(
-            '/* Solve the pose. Returns 0 if joints cannot be assembled, which are then NaN. */\n'
+            '/* Place the joints. Return 0 if not all can be assembled: NaN is what cannot. */\n'
             f'static inline int {n}_solve({self._arguments()}, {n}_pose *p)', pose, ending)
 
     def _rates(self) -> str:
@@ -172,7 +172,7 @@ class _Header:
                     for size in [self.machine.scale_of(output)]]
 
         return self._function(
-            f'/* The derivatives of the pose by {" and by ".join(self.inputs)}. */\n'
+            f'/* Differentiate all of it by {" and by ".join(self.inputs)}. */\n'
             f'static inline void {self.name}_rates({self._arguments()}, {places})',
             linkage.posed((), (), names), ending)
 
@@ -215,7 +215,7 @@ class _Header:
             ['value'] if n == 1 else [f'value[{i}]' for i in range(n)]) + beside)
         return '\n'.join([
             f'/* The {what} for {said}, nearest to `near`, whole turns included. Returns 0, and',
-            f'   leaves {what} unchanged, if there is none. */',
+            f'   leaves {what} alone, where there is none. */',
             f'static inline int {self.name}_{what}_for_{tag}({value}, {near}, {put})', '{',
             f'    {number} q[{n}];', f'    {self.name}_point p;',
             *(f'    q[{i}] = {self._times(code, 1.0 / units[i])};'
@@ -228,12 +228,12 @@ class _Header:
         """Describe the error of single precision over the reach."""
         linkage = self.linkage
         if len(self.inputs) > 1:
-            return 'float: the error of joints is not measured for several inputs.'
+            return 'float: how far joints are off was not measured, as there are several inputs.'
         (low, high), *_ = linkage.reach()
         edge = 0.0 if linkage.inputs[0].is_whole([(low, high)]) else 0.01 * (high - low)
         theta = np.linspace(low + edge, high - edge, SAMPLED).astype(np.float32)
         pose = linkage.posed(linkage.points, ())
         exact = pose.over(theta.astype(float))
         worst = np.nanmax(np.abs(pose.searched(theta) - exact)) / linkage.longest
-        return (f'float: the error of joints is up to {worst:.1g} of the longest bar at {SAMPLED} '
+        return (f'float: joints are off by up to {worst:.1g} of the longest bar at {SAMPLED} '
                 'poses over the reach, without its outermost hundredth.')

@@ -22,11 +22,11 @@ from ..linkage.builder import in_metres
 from ..linkage.inverse_linkage import InverseLinkage
 from ..scene import SceneMechanism
 
-# In double and in single precision: the relative size of a singular Jacobian, in a conversion and
-# in a search; the tolerances of a search and of a sweep; the error at which a search ends.
+# In double and in single precision: below which part of its size a Jacobian is singular, and in a
+# search; what a search may miss, an input may be beside its sweep, and what is near enough.
 LIMITS = {'double': (1e-6, 1e-12, 1e-13, 1e-9, 1e-14),
           'float': (1e-3, 1e-5, 4e-6, 1e-5, 2e-6)}
-# Most poses after a closed form, and of a search; its longest step [rad, sizes] and smallest part.
+# Poses from a closed form and of a search, its longest step [rad, sizes] and the smallest part.
 CLOSED, SEARCHED, LONGEST, FINEST = 4, 64, 0.5, 2.0 ** -12
 # Samples for the first pose of a search.
 SAMPLES = 4096
@@ -50,7 +50,7 @@ class Sides:
         self.linkage = open_linkage(machine.linkage) if is_open else machine.linkage
         self.code = Code(machine.name, self.linkage, single, is_open)
         self.sizes = [input_.size for input_ in machine.linkage.inputs]
-        # The two sides of a point, by the tag of their function.
+        # Pairs of what stands in a point, and the tag of their function.
         self.pairs = {'': (actuators(machine), joints(machine, names))}
         for group in outputs:
             own = [axis(machine, output) for output in group]
@@ -260,9 +260,7 @@ class Sides:
             yield bar.length, f'the bar {bar.first}-{bar.second} must be longer than zero'
         for name, height in built.triangles.items():
             yield (abs(height) + real(1.0),
-                   f'no triangle has the sides at {name}: each must be shorter than the sum of '
-                   'the others')
+                   f'no triangle has the sides at {name}: each must be shorter than the others')
         for input_ in built.inputs:
             if not input_.turns:
-                yield (real(input_.high) - input_.low,
-                       f'the lower end of the {input_.name} must be less than its upper end')
+                yield real(input_.high) - input_.low, f'the {input_.name} must have a way to go'

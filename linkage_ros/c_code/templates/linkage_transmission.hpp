@@ -19,7 +19,7 @@
 
 namespace @namespace@
 {
-/// The name of an actuator or a joint in the scene, and its role in the linkage.
+/// What an actuator or a joint is called in the scene, and its part in the linkage.
 struct Axis { const char * name, * role; };
 
 /// A dimension [m] that a parameter of the transmission may replace.
@@ -44,18 +44,17 @@ public:
     for (const auto & info : infos) {
       const std::size_t i = place(axes, info.name, info.role);
       if (i == size || !names[i].empty()) {
-        throw Exception(what + " '" + info.name + "' (role '" + info.role + "') must be one of" + allowed +
-          ", each once");
+        throw Exception(what + " '" + info.name + "', role '" + info.role + "', is none of" + allowed);
       }
       if (info.mechanical_reduction != 1.0 || info.offset != 0.0) {
-        throw Exception(what + " '" + info.name + "' must have neither mechanical_reduction nor offset: "
+        throw Exception(what + " '" + info.name + "' must have no mechanical_reduction and no offset: "
           "the scene has them");
       }
       names[i] = info.name;
     }
     for (std::size_t i = 0; i < size; ++i) {
       if (names[i].empty()) {
-        throw Exception(what + " '" + axes[i].name + "' is missing; required:" + allowed);
+        throw Exception(what + " '" + axes[i].name + "' is missing; needed are" + allowed);
       }
     }
     static const std::array<std::string, 5> kinds{"position", "velocity", "effort", "torque", "force"};
@@ -65,7 +64,7 @@ public:
       const auto kind = static_cast<std::size_t>(
         std::find(kinds.begin(), kinds.end(), handle.get_interface_name()) - kinds.begin());
       if (i == size) {
-        throw Exception("handle '" + handle.get_prefix_name() + "' belongs to no " + what + "; allowed:" + allowed);
+        throw Exception("handle '" + handle.get_prefix_name() + "' belongs to no " + what + " of" + allowed);
       }
       if (handle && kind < kinds.size()) {
         handles_[std::min<std::size_t>(kind, 2)][i].emplace(handle);
@@ -73,7 +72,7 @@ public:
     }
   }
 
-  /// Whether all axes have an interface.
+  /// Whether all of them have an interface.
   bool have(std::size_t kind) const
   {
     const auto & own = handles_[kind];
@@ -113,14 +112,14 @@ private:
   std::array<std::array<std::optional<Handle>, size>, 3> handles_;
 };
 
-/// A linkage between actuators and joints; Code is its C code by linkage_ros.
+/// A linkage between actuators and joints; Code is what linkage_ros wrote of it in C.
 template <class Code>
 class LinkageTransmission : public transmission_interface::Transmission
 {
 public:
   explicit LinkageTransmission(const hardware_interface::TransmissionInfo & info) : info_(info) {}
 
-  /// Read the parameters, and find handles by role or name; throws Exception with the reason.
+  /// Take the parameters, and handles by role or name; throws, in words, for what cannot be.
   void configure(
     const std::vector<transmission_interface::JointHandle> & joint_handles,
     const std::vector<transmission_interface::ActuatorHandle> & actuator_handles) override
@@ -148,7 +147,7 @@ public:
 
   std::size_t num_joints() const override { return Code::size; }
 
-  /// The status of the last call: 0, or a sum of the bits in the header.
+  /// What the last call said of its values: 0, or a sum of the bits in the header.
   int status() const { return status_; }
 
 private:

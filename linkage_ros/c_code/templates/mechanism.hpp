@@ -9,7 +9,7 @@
 
 namespace @namespace@
 {
-/// The C code of the mechanism @name@ for LinkageTransmission.
+/// The C of the mechanism @name@, as LinkageTransmission wants it.
 struct @class@Code
 {
   using Linkage = @name@_linkage;

@@ -1,6 +1,5 @@
-/* The status that a call returns, OK or a sum of the others. OUT_OF_REACH: the position is outside
-   the reach or the sweep. SINGULAR: a velocity or an effort would be infinite. NOT_KNOWN: a value is
-   NaN or infinite. */
+/* What a call returns: 0, or a sum of these. OUT_OF_REACH: the linkage cannot get there, or may
+   not. SINGULAR: it would take an infinite velocity or effort. NOT_KNOWN: a number is missing. */
 enum { @N@_OK = 0, @N@_OUT_OF_REACH = 1, @N@_SINGULAR = 2, @N@_NOT_KNOWN = 4 };
 @enums@
 /* @about@. */
@@ -8,12 +7,12 @@ typedef struct { @number@ position[@n@], velocity[@n@], effort[@n@]; } @name@_si
 typedef @name@_side @name@_actuators;
 typedef @name@_side @name@_joints;
 
-/* A pose: positions of the actuators [0] and joints [1], their rates by each input, and the inputs'
-   efforts against the loads. */
+/* A pose: positions of the actuators [0] and joints [1], their rates by each input, and what the
+   inputs give against the loads. */
 typedef struct { @number@ position[2][@n@], rate[2][@n@][@n@], load[@n@]; } @name@_point;
 
-/* The state between calls: the last poses measured and commanded, and the last valid values of
-   actuators and joints. @name@_begin initialises it. */
+/* What is remembered between calls: where the actuators were, where the joints were to be, and the
+   last valid values of both. @name@_begin fills it. */
 typedef struct {
     @name@_point point[2];
     @number@ input[2][@n@];
@@ -36,7 +35,7 @@ static inline @number@ @name@_scale(int side, int i, int is_turn)
     return scale[side][i][is_turn];
 }
 
-/* Differences of positions from a pose, without whole turns; returns the largest, in sizes. */
+/* From a pose to positions, the shorter way; returns the largest, in sizes. */
 static inline @number@ @name@_gap(const @number@ to[@n@], const @name@_point *p, int side, @number@ gap[@n@])
 {
     @number@ most = @zero@;
@@ -133,7 +132,7 @@ static inline int @name@_reached(@given@int side, int (*at)(@types@const @number
     return left <= @close@ * steepest;
 }
 
-/* Whether inputs are within the sweeps of the scene. */
+/* Whether inputs are within the sweeps that are set. */
 static inline int @name@_inside(const @number@ q[@n@])
 {
     static const @number@ end[@n@][2] = { @ends@ };
@@ -145,7 +144,7 @@ static inline int @name@_inside(const @number@ q[@n@])
 }
 
 @inverses@
-/* Samples of the inputs over their ranges for i = 1, 2, ...; their starts for 0. */
+/* Inputs all over their ways for i = 1, 2, ...; for 0 where they start. */
 static inline void @name@_sample(long i, @number@ q[@n@])
 {
     static const @number@ way[@n@][4] = { @ways@ };
@@ -156,7 +155,7 @@ static inline void @name@_sample(long i, @number@ q[@n@])
     }
 }
 
-/* Initialise the memory, and find a first pose; returns 0 if there is none. */
+/* Forget all that was, and find a pose to start from; returns 0 if there is none. */
 static inline int @name@_begin(@given@@name@_memory *m)
 {
     static const @name@_side none = { { @zero@ }, { @zero@ }, { @zero@ } };
@@ -186,7 +185,7 @@ static inline int @name@_transmit(@given@@name@_memory *m, int side, const @name
     if (status == @N@_OK && !(side ? @name@_from_joints(@pass@from->position, q, &found)
             : @name@_from_actuators(@pass@from->position, q, &found)))
         status = @N@_OUT_OF_REACH;
-    /* A command must be within the sweep, a measurement need not be. */
+    /* A command stays within the sweep that is set; a measurement is what it is. */
     if (status == @N@_OK && side && !@name@_inside(q))
         status = @N@_OUT_OF_REACH;
     for (i = 0; status == @N@_OK && i < @n@; i++)
@@ -203,7 +202,7 @@ static inline int @name@_transmit(@given@@name@_memory *m, int side, const @name
         m->is_known[1] = 0;
     all = status;
 
-    /* Velocities at the requested pose, or else at the last one; a held position has none. */
+    /* Velocities at the pose that is asked for, or else where it is; what is held stands still. */
     at = &m->point[m->is_known[side] ? side : other];
     if (status == @N@_NOT_KNOWN && (m->is_known[0] || m->is_known[1]))
         status = @N@_OK;
@@ -220,7 +219,7 @@ static inline int @name@_transmit(@given@@name@_memory *m, int side, const @name
         held->velocity[i] = status == @N@_OK ? y[i] : @zero@;
     all |= status;
 
-    /* Efforts at the actuators' pose: input power is output power plus that of the loads. */
+    /* Efforts where the actuators are: power in is power out, but for what the loads take. */
     at = &m->point[m->is_known[0] ? 0 : 1];
     status = m->is_known[0] || m->is_known[1] ? @N@_OK : @N@_NOT_KNOWN;
     for (i = 0; status == @N@_OK && i < @n@; i++) {
@@ -240,14 +239,14 @@ static inline int @name@_transmit(@given@@name@_memory *m, int side, const @name
     return all | status;
 }
 
-/* Convert the actuators' positions, velocities and efforts to the joints'. Returns a status; values
-   that are not OK are held: positions and efforts at the last valid ones, velocities at zero. */
+/* From the actuators' positions, velocities and efforts to the joints'. Returns a status; what it
+   is not OK about is held: positions and efforts as they were last, velocities at zero. */
 static inline int @name@_actuators_to_joints(@given@@name@_memory *m, const @name@_actuators *from, @name@_joints *to)
 {
     return @name@_transmit(@pass@m, 0, from, to);
 }
 
-/* Convert the joints' values to the actuators'; of several solutions, to the nearest one. */
+/* The same from the joints to the actuators, which go to the answer nearest to where they are. */
 static inline int @name@_joints_to_actuators(@given@@name@_memory *m, const @name@_joints *from, @name@_actuators *to)
 {
     return @name@_transmit(@pass@m, 1, from, to);
