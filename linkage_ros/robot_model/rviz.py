@@ -31,15 +31,15 @@ def adapted(config: dict, machines: Mapping[str, SceneMechanism], frame_id: str,
     Parameters
     ----------
     config : dict
-        A configuration with one group of displays for each mechanism, with its name.
+        A configuration with one group of displays a mechanism, which bears its name.
     machines : mapping
-        The displayed mechanisms, by name; the camera sees all of them.
+        The mechanisms to be shown, by name; the camera sees them all.
     frame_id : str
         The frame of their poses.
     namespace : str
         Namespace of their topics; empty: none.
     robot_model : bool
-        Whether to enable the displays that need a robot_state_publisher.
+        Whether to show what needs a robot_state_publisher as well.
     frame_prefix : str
         Prefix of the robot_state_publishers' frames.
 
