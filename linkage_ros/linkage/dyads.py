@@ -186,11 +186,11 @@ class Dyads:
         """Return the approximate position of a joint's motor."""
         return 0.0
 
-    def alike(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
+    def special_line(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
         """Return a more specific line than `dyad` for two bars, or None."""
         return None
 
-    def said(self, value: float) -> str:
+    def length_text(self, value: float) -> str:
         """Return a length as a line has it."""
         return short(value, 1e-15 * self.size)
 
@@ -215,16 +215,16 @@ class Dyads:
         self.lines.append(f'{name} {line}')
         return name
 
-    def known(self, body: str, place: complex) -> Optional[str]:
+    def joint_at(self, body: str, place: complex) -> Optional[str]:
         """Return the joint at a place on a body, or None."""
         return next((name for name, at in self.on[body].items()
                      if abs(at - place) < self.near), None)
 
     def fixed(self, body: str, place: complex) -> Pin:
         """Return the joint at a place on a placed body; add one if there is none."""
-        if name := self.known(body, place):
+        if name := self.joint_at(body, place):
             return name, self.on[body][name]
-        text, on, part = self.said, self.on[body], self.parts[body]
+        text, on, part = self.length_text, self.on[body], self.parts[body]
         # The best bar to place it from is collinear with it and near; else the one with which it
         # makes the least flat triangle.
         bars = [(math.inf if abs(seen.imag * (end - start)) < self.near and abs(seen) < BESIDE
@@ -297,7 +297,7 @@ class Dyads:
         """Yield unplaced bodies that have a joint and share an unplaced pin with a body."""
         return ((rod, pin) for pin in self.pins if body in pin for rod in pin
                 if rod != body and rod not in self.parts and self.on[rod]
-                and not self.known(rod, pin[rod]))
+                and not self.joint_at(rod, pin[rod]))
 
     def _crank(self, hinge: Hinge, way: int) -> bool:
         """Place the body that a motor turns on a placed one."""
@@ -323,7 +323,7 @@ class Dyads:
             zero, start = quarters % 2 * ' up', 0.0
             place = centred + (place - centred) * (1.0 if quarters < 2 else -1.0)
         number, geared = self.drive('crank', hinge.joint, sign * hinge.sign, start)
-        name = self.name(place, body, f'crank {centre} {self.said(abs(place - centred))}'
+        name = self.name(place, body, f'crank {centre} {self.length_text(abs(place - centred))}'
                          f'{zero}{geared}')
         self.on[body].setdefault(centre, centred)
         return self.hang(body, centre, name, f'crank{number}')
@@ -353,7 +353,7 @@ class Dyads:
         low, high = (sign * self.position(slide.joint) + end for end in (
             -self.farthest, self.farthest))
         name = self.name(place, body, f'carriage {origin} along {towards} '
-                         f'{self.said(low)} {self.said(high)}{geared}')
+                         f'{self.length_text(low)} {self.length_text(high)}{geared}')
         return self.place(body, Part(f'carriage{number}', name, slide.axes[1 - way] * on,
                                      slide.joint, start))
 
@@ -377,7 +377,7 @@ class Dyads:
             side = self._side(foot, self.place_in_pose(bar, at),
                               self.place_in_pose(bar, pin[bar]))
             name = self.name(pin[bar], bar, f'cylinder {base} {pivot} '
-                             f'{self.said(abs(pin[bar] - at))} {side}{geared}')
+                             f'{self.length_text(abs(pin[bar] - at))} {side}{geared}')
             axis = sign * slide.axes[1 - way]
             return self.place(barrel, Part(f'barrel{number}', base, sign * slide.axes[way])) \
                 and self.place(rod, Part(f'cylinder{number}', name, axis, slide.joint, start)) \
@@ -393,9 +393,9 @@ class Dyads:
             if abs(ends[0] - ends[1]) < self.near:
                 raise ValueError(f'{first} and {second} are folded onto each other')
             side = self._side(*ends, self.place_in_pose(first, pin[first]))
-            line = self.alike(pin[first], pin[second], one, two) or (
-                f'dyad {one[0]} {two[0]} {self.said(abs(pin[first] - one[1]))} '
-                f'{self.said(abs(pin[second] - two[1]))} {side}')
+            line = self.special_line(pin[first], pin[second], one, two) or (
+                f'dyad {one[0]} {two[0]} {self.length_text(abs(pin[first] - one[1]))} '
+                f'{self.length_text(abs(pin[second] - two[1]))} {side}')
             name = self.name(pin[first], first, line)
             return self.hang(first, one[0], name) and self.hang(second, two[0], name)
         return False
@@ -412,7 +412,7 @@ class Dyads:
             half = 'out' if (self.direction_in_pose(rod, pin[rod] - at)
                              / self.direction_in_pose(base, along)).real > 0.0 else 'in'
             number = self.number('slider', 'yoke')
-            name = self.name(pin[rod], rod, f'slider {joint} {self.said(length)} {start} '
+            name = self.name(pin[rod], rod, f'slider {joint} {self.length_text(length)} {start} '
                              f'along {towards} {half}')
             on_block = slide.axes[1 - way] * (along / axis)
             return self.hang(rod, joint, name) and self.place(
@@ -434,8 +434,8 @@ class Dyads:
                          - ((start - slide.origins[way]) / axis).imag)
         number = self.number('slot')
         name = self.name(start + length * sign * axis, lever,
-                         f'slot {pivot} {pin} {self.said(offset)} out '
-                         f'{self.said(length)}')
+                         f'slot {pivot} {pin} {self.length_text(offset)} out '
+                         f'{self.length_text(length)}')
         return self.hang(lever, pivot, name, f'lever{number}') and self.place(
             block, Part(f'slide{number}', pin, sign * across, slide.joint, start))
 

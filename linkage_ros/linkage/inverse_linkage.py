@@ -374,7 +374,7 @@ class _Sketch(Dyads):
         """Return a direction on a body, in the coordinates of the pose."""
         return (self._at[body][1] if body in self._at else self._turns[body]) * along
 
-    def said(self, value: float) -> str:
+    def length_text(self, value: float) -> str:
         """Return a length with all its digits."""
         return repr(float(value) + 0.0)
 
