@@ -49,10 +49,10 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P crank A 1', 'joint A must be on the ground'),
     ('P crank O 1 down', 'expected "NAME crank CENTRE LENGTH [up] [zero JOINT] [geared'),
     ('P crank O 1 zero B', 'O and B are not joints of one moving link'),
-    ('P crank O 1 geared gear 2 0', 'it cannot be geared to gear; there are: crank'),
+    ('P crank O 1 geared gear 2 0', 'it cannot be geared to gear; allowed: crank'),
     ('P crank O 1 geared crank 2deg 0', "'2deg' is in degrees, but RATIO is not an angle"),
     ('P cylinder O A 1 left geared crank 2 0',
-     'it cannot be geared to crank; there are: none'),
+     'it cannot be geared to crank; allowed: none'),
     ('P carriage O Q 0 1', 'expected "NAME carriage ORIGIN along TOWARDS DISTANCE DISTANCE'),
     ('P carriage O along B 0 1', 'O and B are not joints of one moving link'),
     ('P carriage O along A 1 1',
@@ -67,10 +67,10 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P.x ground 0 0', "'P.x' cannot name a joint"),
     ('line ground 0 0', "'line' cannot name a joint"),
     ('P ground 0 zz', 'dimension zz has no value; given: g, m, b, c'),
-    ('P ground 0 g*', "'g*' is no number, dimension or arithmetic on them"),
-    ('P ground 0 g.real', "'g.real' is no number, dimension or arithmetic on them"),
-    ('P ground 0 g**2', "'g**2' is no number"),
-    ('P ground 0 max(g)', "'max(g)' is no number"),
+    ('P ground 0 g*', "'g*' is not a number, dimension or arithmetic on them"),
+    ('P ground 0 g.real', "'g.real' is not a number, dimension or arithmetic on them"),
+    ('P ground 0 g**2', "'g**2' is not a number"),
+    ('P ground 0 max(g)', "'max(g)' is not a number"),
     ('P ground 0 True', 'dimension True has no value; given: g, m, b, c'),
     ('P ground 0 1/0', 'divides by zero'),
     ('P ground 0 1e999', 'too large'),
@@ -79,13 +79,13 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P S P inversor Q A 3 1', 'joint P is placed already'),
     ('P Q S inversor Q A 3 1', 'joint Q is placed already'),
     ('P S T inversor P A 3 1', 'joint P is not placed before'),
-    ('P ground 0, 0', "'0,' is no number"),
+    ('P ground 0, 0', "'0,' is not a number"),
     ('P ground 0, 0', 'numbers are separated by spaces, without commas'),
     ('P ground 0,0', 'numbers are separated by spaces, without commas'),
     ('P ground 2 * m 0', 'arithmetic has no spaces: 2*r, not 2 * r'),
     ('P ground 2 *m', 'arithmetic has no spaces'),
     ('P ground max(m, g) 0', 'arithmetic has no spaces'),
-    ('P ground 0 sqrt(m-g', "'sqrt(m-g' is no number"),
+    ('P ground 0 sqrt(m-g', "'sqrt(m-g' is not a number"),
     ('P ground 0 sqrt(m-g)', "'sqrt(m-g)' is not finite"),
     ('P ground 0 sqrt(1-2)', "'sqrt(1-2)' is not real: a number is 0 or between 1e-70 and 1e70"),
     ('P ground 0 m/(g-4)', 'is not finite'),
@@ -123,7 +123,7 @@ def test_joints_at_the_same_place_have_no_direction(line):
 
 
 def test_a_name_that_calls_python_is_only_a_name():
-    with pytest.raises(ValueError, match='is no number, dimension or arithmetic on them'):
+    with pytest.raises(ValueError, match='is not a number, dimension or arithmetic on them'):
         made('P ground __import__("os") 0')
     with pytest.raises(ValueError, match='dimension exit has no value'):
         made('P ground exit 0')

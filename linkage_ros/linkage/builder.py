@@ -237,7 +237,7 @@ class Builder:
             other, driving = self.driven.get(geared.input, (None, None))
             if other is None or driving is None or other.turns != input_.turns:
                 alike = [name for name, (x, _) in self.driven.items() if x.turns == input_.turns]
-                raise ConstructionError(f'it cannot be geared to {geared.input}; there are: '
+                raise ConstructionError(f'it cannot be geared to {geared.input}; allowed: '
                                         f'{", ".join(alike) or "none"}')
             value = geared.ratio * driving + geared.offset
         self.driven[input_.name] = input_, value
