@@ -92,7 +92,7 @@ def evaluate(node: Real, dimensions: Mapping, known: dict) -> Any:
 
 
 def _step(node: Real) -> _Step:
-    """Return an expression of dimensions with its function, None of a leaf, and operands."""
+    """Return an expression of dimensions, its function (None for a leaf) and its operands."""
     return node, OPERATIONS[node.op].numpy if node.operands else None, node.operands
 
 

@@ -441,7 +441,7 @@ def parallel(bar: Complex, place: Complex) -> Complex:
 
 
 def with_velocity(place: Complex, start: Complex, bar: Complex) -> Complex:
-    """Return a place with the velocity of the end of a bar of constant length from a start."""
+    """Return a place with the velocity of the end of a bar of constant length on `start`."""
     turning = spin(bar)
     return Complex(
         with_rate(place.x, start.x, *turning.of,

@@ -236,7 +236,7 @@ class Floor:
         lowest = np.nan_to_num(feet[:-1, :, 1], nan=np.inf).argmin(axis=1)
         steps = np.diff(feet[:, :, 0], axis=0)[np.arange(len(lowest)), lowest]
         self._way = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
-        # After a turn the marks coincide with former marks; a single foot returns them itself.
+        # After a turn, marks are at the places of other marks; a single foot moves them back.
         turn, stride = abs(self._way[-1]), np.ptp(self._way) or 1.0
         self.spacing = turn / self.MARKS if turn > 0.1 * stride else 0.5 * stride
         self._tracer = tracer
