@@ -290,13 +290,13 @@ class _Tree:
             self._add_shapes(side, GROUND, ground)
         yield ground
         if self._shared:
-            yield self._with_hub(self._moving('', 1.0, self._shared))
+            yield self._with_hub(self._hung('', 1.0, self._shared))
         for prefix, leg in self._assembly.legs.items():
             ends: Counter[str] = Counter()
             self._add_points(prefix, leg.side, GROUND, ground, self._frames[GROUND], ends)
             for link in self._links:
                 body = (self._lagging(prefix, leg, link) if link is self._shared
-                        else self._moving(prefix, leg.side, link))
+                        else self._hung(prefix, leg.side, link))
                 self._add_pieces(leg.side, link, body)
                 carried = [point for point in self._frames[link.name] if point != link.joint]
                 self._add_points(prefix, leg.side, link.name, body, carried, ends)
@@ -307,8 +307,8 @@ class _Tree:
         return Body(self._name(prefix, crank.name), self._name('', crank.name),
                     (0.0, 0.0, 0.0, 0.0, 0.0, -leg.lag))
 
-    def _moving(self, prefix, side, link) -> Body:
-        """Return a body that moves on its parent; in a mirrored leg, in the opposite direction."""
+    def _hung(self, prefix, side, link) -> Body:
+        """Return a body that moves on its parent; in a mirrored leg the other way round."""
         prismatic, mirrored = link.kind == 'prismatic', side < 0.0
         zero = math.pi - link.zero if mirrored and link.parent == GROUND else link.zero
         travel = self._travels.get(link.name)
@@ -317,22 +317,21 @@ class _Tree:
         if travel and prismatic:
             travel = self._machine.scale * travel[0], self._machine.scale * travel[1]
         x, y = self._place(side, link.parent, link.joint)
-        published = self._machine.joints[prefix + link.name]
+        called = self._machine.joints[prefix + link.name]
         # The link's position at a published value of zero.
-        back = -published.sign * published.offset
+        back = -called.sign * called.offset
         if prismatic:
             x, y = x + side * back * math.cos(zero), y + side * back * math.sin(zero)
         else:
             zero += back
         if travel:
-            travel = published.travel(travel)
-        joint = Joint(published.name, link.kind,
-                      published.sign * (side if prismatic else 1.0), travel)
+            travel = called.travel(travel)
+        joint = Joint(called.name, link.kind, called.sign * (side if prismatic else 1.0), travel)
         return Body(self._name(prefix, link.name), self._name(prefix, link.parent),
                     (x, y, 0.0, 0.0, 0.0, zero), joint)
 
     def _add_pieces(self, side, link, body):
-        """Add a link's bars as rods, and its guides, blocks, barrels and rods."""
+        """Add bars as rods, and what slides on a link or is the slide."""
         frame = self._frames[link.name]
         for first, second in self._bars:
             if first in frame and second in frame:
@@ -348,7 +347,7 @@ class _Tree:
         """Add guides, blocks, barrels and the rods in them."""
         for shape in self._shapes:
             if shape.start.link == link:
-                start, end = (self._placed(side, link, spot[1:]) for spot in shape[2:])
+                start, end = (self._seen(side, link, spot[1:]) for spot in shape[2:])
                 drawn, thickness = {shapes.GUIDE: (BOX, GUIDE), shapes.BLOCK: (BOX, BLOCK),
                                     shapes.BARREL: (ROD, BARREL), shapes.ROD: (ROD, BAR)
                                     }[shape.kind]
@@ -359,7 +358,7 @@ class _Tree:
                                              end))
 
     def _add_points(self, prefix, side, link, body, points, ends):
-        """Add joints of a link, including those where it was cut off."""
+        """Add joints of a link, including those that it was cut off."""
         for point in points:
             name = met = f'{self._machine.name}_{prefix}{point}'
             ends[point] += 1
@@ -379,11 +378,11 @@ class _Tree:
         return f'{self._machine.name}_{"" if name == GROUND else prefix}{name}_link'
 
     def _place(self, side, link, point):
-        """Return x, y [m] of a joint of a link."""
-        return self._placed(side, link, self._frames[link][point])
+        """Return x, y [m] of a point of a link; the ground is mirrored in y, a link in its bar."""
+        return self._seen(side, link, self._frames[link][point])
 
-    def _placed(self, side, link, place):
-        """Return x, y [m] of a place on a link; the ground is mirrored in y, a link in its bar."""
+    def _seen(self, side, link, place):
+        """Return x, y [m] of a place on a link."""
         x, y = (self._machine.scale * value for value in place)
         return (side * x, y) if link == GROUND else (x, side * y)
 
@@ -399,12 +398,12 @@ def _input_travels(machine, assembly) -> Dict[str, Optional[Travel]]:
             continue
         low, high = min(lo for lo, _ in arcs), max(hi for _, hi in arcs)
         sweep = machine.inputs[input_.name].sweep if input_.turns else None
-        # The limits of a crank are in the same turn as its sweep.
+        # A crank's angle is in the turn of its sweep.
         turns = math.tau * math.floor((sweep[1] - low) / math.tau) if sweep else 0.0
         found[input_.name] = low + turns, high + turns
     return found
 
 
 def numbers(*values: float) -> str:
-    """Return numbers with all their digits, and 0.0 for -0.0."""
+    """Return numbers with all their digits; adding zero makes -0.0 plain."""
     return ' '.join(repr(float(value) + 0.0) for value in values)

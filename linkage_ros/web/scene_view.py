@@ -341,12 +341,12 @@ class SceneView:
         marked = tuple((key, tuple(sorted(
             (_joined(info.node_namespace, info.node_name), bytes(info.endpoint_gid))
             for info in node.get_publishers_info_by_topic(f'{key}{MARKERS}')))) for key in keys)
-        inputs = {owner: self._input_topics(owner) for _, owners in marked for owner, _ in owners}
+        heard = {owner: self._heard_by(owner) for _, owners in marked for owner, _ in owners}
         nodes = tuple(sorted(name[:-len(LIST)] for name, types in services
                              if name.endswith(LIST) and LIST_TYPE in types))
-        return tuple(shown for shown in marked if shown[1]), nodes, inputs
+        return tuple(shown for shown in marked if shown[1]), nodes, heard
 
-    def _input_topics(self, name: str) -> list[str]:
+    def _heard_by(self, name: str) -> list[str]:
         """Return the topics from which a node receives its inputs."""
         space, own = name.rsplit('/', 1)
         with suppress(NodeNameNonExistentError):

@@ -59,7 +59,7 @@ class Section {
 
 /** All displayed sections. */
 export class Panel {
-  /** Calls `light`, and `say` with the reason why a joint cannot be dragged. */
+  /** Calls `light`, and `say` with the reason why a joint is not dragged. */
   constructor(place, connection, light, say) {
     Object.assign(this, { place, connection, light, say });
     this.sections = new Map();
