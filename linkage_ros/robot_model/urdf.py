@@ -57,7 +57,7 @@ def _part(part: Part) -> str:
 
 
 def _joint(body: Body) -> str:
-    """Return the joint between a body and its parent."""
+    """Return the joint that a body hangs on."""
     joint = body.joint
     name, kind = (joint.name, joint.kind) if joint else (f'{body.name}_fixed', 'fixed')
     if joint and kind == 'revolute' and not joint.travel:
@@ -76,8 +76,8 @@ def _joint(body: Body) -> str:
 
 
 def _link(name: str, pieces: Iterable[Piece]) -> str:
-    """Return a link with its visual pieces."""
-    visuals = ''.join([f"""\
+    """Return a link, and what is seen of it."""
+    seen = ''.join([f"""\
     <visual>
 {_origin('      ', piece.pose)}\
       <geometry>
@@ -87,9 +87,7 @@ def _link(name: str, pieces: Iterable[Piece]) -> str:
       <material name="{piece.colour}" />
     </visual>
 """ for piece in pieces])
-    if not visuals:
-        return f'  <link name="{name}" />\n'
-    return f'  <link name="{name}">\n{visuals}  </link>\n'
+    return f'  <link name="{name}">\n{seen}  </link>\n' if seen else f'  <link name="{name}" />\n'
 
 
 def _origin(indent: str, pose: Sequence[float]) -> str:
