@@ -149,7 +149,7 @@ class Builder:
         link = called or self._numbered('crank')
         turning = self.drive(Input(link, ANGLE), geared)
         if zero is None:
-            self._on_ground(centre, '; or its zero is towards a joint of its link')
+            self._on_ground(centre, ' unless the line has zero and a joint of its link')
             parent, along = GROUND, Complex(0.0, 1.0) if up else Complex(1.0, 0.0)
             start = real(pi / 2 if up else 0.0)
             if self.mirrors:
