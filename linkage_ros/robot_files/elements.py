@@ -6,13 +6,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Dict, Iterable, Optional, Tuple
+from typing import Any, Dict, Iterable, Optional, Sequence, Tuple, Union
 import xml.etree.ElementTree as ElementTree
 from xml.parsers import expat
 
 import numpy as np
 
-from .robot import FARTHEST
+from .robot import FARTHEST, FIXED, Robot
 from ..command import RequestError
 
 Element = ElementTree.Element
@@ -61,12 +61,20 @@ def text(part: Element, tag: str, otherwise: str = '') -> str:
     return (part.findtext(tag) or otherwise).strip()
 
 
-def numbers(said: str, count: int = 3) -> np.ndarray:
+def numbers(said: Union[str, Sequence[Any]], count: int = 3) -> np.ndarray:
     """Return so many numbers; raise ValueError if they are others."""
-    found = np.array(said.split(), float)
-    if len(found) != count or not np.all(np.abs(found) < FARTHEST):
+    found = np.array(said.split() if isinstance(said, str) else said, float)
+    if found.shape != (count,) or not np.all(np.abs(found) < FARTHEST):
         raise ValueError(f'{said!r} must be {count} numbers within {FARTHEST:g}')
     return found
+
+
+def weld(robot: Robot, plugins: Iterable[Element]) -> None:
+    """Fix the links of Gazebo's DetachableJoint to each other, if plugins are one."""
+    for plugin in plugins:
+        if 'detachable' in f'{plugin.get("name")} {plugin.get("filename")}'.lower():
+            one, other = (text(plugin, tag) for tag in ('parent_link', 'child_link'))
+            robot.join(f'{one}={other}', FIXED, (one, other), robot.frames[one])
 
 
 def origin(part: Optional[Element]) -> np.ndarray:

@@ -149,7 +149,7 @@ def _with_balls(robot: Robot, joints: List[Joint]) -> List[Joint]:
         if bodies[0] != bodies[1] and np.linalg.norm(places[0] - places[1]) < TOGETHER \
                 and (BALL in (own[0].kind, own[1].kind)
                      or np.linalg.norm(np.cross(*axes)) > ASKEW):
-            ball = Joint(f'{own[0].name}+{own[1].name}', BALL, bodies, places, axes[0],
+            ball = Joint(f'{own[0].name}+{own[1].name}', BALL, bodies, places, own[0].axes,
                          parts=tuple(own))
             joints, on[body] = [*(joint for joint in joints if joint not in own), ball], []
             for end in bodies:
@@ -206,9 +206,9 @@ def flat(robot: Robot, group: Group, drives: Sequence[str]) -> Loop:
             across[joint.name] = abs(first[2] - second[2])
         axis = seen[:3, :3] @ joint.axis
         found.append(replace(
-            joint, places=(complex(*first[:2]), complex(*second[:2])),
-            axis=complex(*axis[:2]) / abs(complex(*axis[:2])) if joint.kind == SLIDE
-            else float(np.sign(axis[2]))))
+            joint, places=(complex(*first[:2]), complex(*second[:2])), axes=[
+                complex(*axis[:2]) / abs(complex(*axis[:2])) if joint.kind == SLIDE
+                else float(np.sign(axis[2]))]))
     places = [place for joint in found for place in joint.places]
     size = max(abs(place - other) for place in places for other in places)
     if size < TOGETHER:

@@ -89,6 +89,5 @@ def _tie(robot: Robot, model: Any, i: int, bodies: Any, names: Any) -> None:
         if mj.mjtObj(model.eq_objtype[i]) == mj.mjtObj.mjOBJ_SITE:
             frames = [at(model.site_pos[end], turned_by(model.site_quat[end])) for end in ends]
             ends = model.site_bodyid[ends]
-        first, second = (robot.frames[bodies[end]] @ frame for end, frame in zip(ends, frames))
-        robot.join(model.equality(i).name or f'equality{i}', FIXED if welds else BALL,
-                   (bodies[ends[0]], bodies[ends[1]]), first, other=second)
+        robot.close(model.equality(i).name or f'equality{i}', FIXED if welds else BALL,
+                    (bodies[ends[0]], bodies[ends[1]]), frames)

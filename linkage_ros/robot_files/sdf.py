@@ -13,8 +13,8 @@ from xml.etree.ElementTree import SubElement
 
 import numpy as np
 
-from .elements import at, attribute, Element, numbers, once, parse, pose, text, turned_by
-from .robot import FIXED, HINGE, Robot, UNIVERSAL
+from .elements import at, attribute, Element, numbers, once, parse, pose, text, turned_by, weld
+from .robot import HINGE, KINDS, Robot, UNIVERSAL
 from ..command import RequestError
 
 
@@ -99,9 +99,7 @@ class _Model:
                 if 'state' not in kind:
                     robot.driven += [(one.text or '').strip()
                                      for one in plugin.findall('joint_name')]
-                if 'detachable' in kind:
-                    one, other = (text(plugin, tag) for tag in ('parent_link', 'child_link'))
-                    robot.join(f'{one}={other}', FIXED, (one, other), self.frame(one))
+            weld(robot, model.findall('plugin'))
         return robot
 
     def named(self, where: str, name: str, is_model: bool = False) -> str:
@@ -142,11 +140,9 @@ class _Model:
                            'which is not read: give it a pose of its own')
 
     def _join(self, robot: Robot, name: str, part: Element, ends: Tuple[str, str]) -> None:
-        kind = {'universal': UNIVERSAL, 'revolute2': UNIVERSAL, 'ball': 'ball'}.get(
-            part.get('type', ''), part.get('type', ''))
-        second = None
-        if kind == UNIVERSAL:
-            second = self.frame(name)[:3, :3] @ self._axis(name, part.find('axis2'))
+        kind, second = part.get('type', ''), None
+        if KINDS.get(kind, kind) == UNIVERSAL:
+            second = self._axis(name, part.find('axis2'))
         robot.join(name, kind, ends, self.frame(name), self._axis(name, part.find('axis')), None,
                    0.0, [text(part, f'axis/limit/{end}') for end in ('lower', 'upper')], second)
         mimic = part.find('axis/mimic')

@@ -85,7 +85,8 @@ def trees(robot: Robot) -> Tuple[Dict[str, Tuple[str, Joint]], List[Joint]]:
         if start != robot.root and start not in found:
             # A body that is only held by what closes loops.
             place = robot.frames[start][:3, 3]
-            found[start] = robot.root, Joint('', FREE, (robot.root, start), (place, place), place)
+            found[start] = robot.root, Joint('', FREE, (robot.root, start), (place, place),
+                                             (place, place))
         row = [start]
         for body in row:
             for other, joint in near[body]:
