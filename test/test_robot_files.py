@@ -355,6 +355,23 @@ def test_what_is_missing_is_said_in_one_sentence(capsys, tmp_path):
         capsys, ROBOTS / 'five_bar.urdf', '--loops', loops)
 
 
+PIN = '{pin_loops: [{parent: coupler, child: rocker, %s: [0.3, 0, 0]}], actuated_joints: [motor]}'
+
+
+@pytest.mark.parametrize('text, why', [
+    (PIN % 'parent_xzy', "pin_loops[0] has no key 'parent_xzy'; allowed: name, parent, child, "
+     'parent_xyz, child_xyz, axis; did you mean parent_xyz?'),
+    (PIN.replace('actuated', 'actated') % 'parent_xyz', "the file has no key 'actated_joints'; "
+     'allowed: closures, .*; did you mean actuated_joints?'),
+    ('{closures: [{link_a: coupler, link_b: rocker, 7: 8}]}', 'closures[0] has no key 7; '
+     'allowed: link_a, link_b, point, axis\n')])
+def test_an_unknown_key_of_a_file_of_loops_is_refused(capsys, tmp_path, text, why):
+    loops = tmp_path / 'loops.yaml'
+    loops.write_text(text)
+    said = refused(capsys, ROBOTS / 'four_bar.urdf', '--loops', loops)
+    assert re.search(re.escape(why).replace(r'\.\*', '.*'), said)
+
+
 def test_rods_that_hold_each_other_are_named(capsys, tmp_path):
     pins = {'1': '0 0 0', '2': '1 0 0', '3': '0.4 1 0'}
     eyes = {'1': '0.3 0.3 0', '2': '0.8 0.35 0', '3': '0.5 0.7 0'}

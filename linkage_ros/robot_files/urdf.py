@@ -13,16 +13,22 @@ kinematic loops (`gazebo`); onshape-to-robot's documentation (`closing_`); examp
 from __future__ import annotations
 
 import re
-from typing import Any, Dict, List, Mapping, Tuple
+from typing import Any, Dict, Iterable, List, Mapping, Sequence, Tuple
 
 import numpy as np
 
 from .elements import at, attribute, Element, numbers, once, origin, pose, text, weld
 from .robot import BALL, FIXED, HINGE, KINDS, Robot, UNIVERSAL
 from ..command import RequestError
+from ..words import listed, meant, quoted
 
-# What a file of loops has one of.
-LOOPS = ('closures', 'closed_loop', 'pin_loops', 'ball_loops')
+_ENDS = ('name', 'parent', 'child', 'parent_xyz', 'child_xyz', 'axis')
+# What a file of loops has one of, and the keys of each loop.
+LOOPS = {'closures': ('link_a', 'link_b', 'point', 'axis'), 'closed_loop': (),
+         'pin_loops': _ENDS, 'ball_loops': _ENDS}
+# What else it may have; the last two tell nothing of loops.
+_KEYS = (*LOOPS, 'type', 'joint_name', 'joint_type', 'ball_upgrades', 'independent', 'name_mot',
+         'actuated_joints', 'dependent', 'ball_limit_deg')
 _CLOSING = re.compile(r'(?P<name>.*closing_.+)_1')
 _NOWHERE = np.eye(4)
 
@@ -151,7 +157,11 @@ class Reader:
         weld(self.robot, self._root.findall('gazebo/plugin'))
 
     def of_file(self, loops: Mapping[str, Any]) -> None:
-        """Add the loops of another file."""
+        """Add the loops of another file; raise RequestError for a key that is not known."""
+        _check_keys('the file', loops, _KEYS)
+        for key, allowed in LOOPS.items():
+            for i, cut in enumerate(loops.get(key, ()) if allowed else ()):
+                _check_keys(f'{key}[{i}]', cut, allowed)
         for i, cut in enumerate(loops.get('closures', ())):
             point = at(numbers(cut['point']))
             self.robot.join(f'closures[{i}]', HINGE, (cut['link_a'], cut['link_b']), point,
@@ -187,3 +197,10 @@ class Reader:
         else:
             joint.kind = KINDS.get(kind.lower(), kind)
             joint.position, joint.limits = None, None
+
+
+def _check_keys(where: str, given: Iterable[Any], allowed: Sequence[str]) -> None:
+    for key in given:
+        if key not in allowed:
+            raise RequestError(f'{where} has no key {quoted(key)}; allowed: '
+                               f'{listed(allowed, 200)}{meant(key, allowed)}')
