@@ -830,8 +830,13 @@ def robot_of(linkage, values):
     return robot
 
 
-def check_comes_back(linkage, values, robot, steps):
-    """Check that the scene of a linkage's robot moves as the linkage does, by steps of inputs."""
+def check_comes_back(linkage, values, robot, steps, zeros=None):
+    """
+    Check that the scene of a linkage's robot moves as the linkage does, by steps of inputs.
+
+    `zeros` are positions of the robot's joints before a step, if they are not 0.
+    """
+    zeros = Counter(zeros or {})
     given, said = command.described(robot)
     for count, worst in checked('\n'.join(said)):
         assert count >= 200 and worst < 1e-6
@@ -839,13 +844,15 @@ def check_comes_back(linkage, values, robot, steps):
     was, moved = linkage.joint_angles(values), 0
     for step in steps:
         now = linkage.joint_angles(np.add(values, step))
-        motors = dict(zip((each.name for each in linkage.inputs), np.ravel(step)))
+        motors = {each.name: zeros[each.name] + change
+                  for each, change in zip(linkage.inputs, np.ravel(step))}
         found = {}
         for machine in machines:
             found.update(published(machine, **{drive.source: motors[drive.source]
                                                for drive in machine.inputs.values()}))
         for link in linkage.links:
-            apart = found.get(link.name, math.nan) - (now[link.name] - was[link.name])
+            apart = found.get(link.name, math.nan) - zeros[link.name] - (
+                now[link.name] - was[link.name])
             if not math.isnan(apart) and link.name not in motors:
                 size = linkage.longest if link.kind == 'prismatic' else 1.0
                 apart = apart if link.kind == 'prismatic' else math.remainder(apart, math.tau)

@@ -99,7 +99,11 @@ class Drawing(Dyads):
         link, hangs, along, slide, _ = self.parts[body]
         if hangs != pin or slide:
             # A triangle on its link shows how that turns against the one that the pin is on.
-            start, (other, end) = self.on[body][pin], self.other(body, pin)
+            try:
+                start, (other, end) = self.on[body][pin], self.other(body, pin)
+            except ValueError:
+                # On a block, or a barrel, no word can place a second joint.
+                return None
             along, side = (end - start) * complex(0.5, 0.75 ** 0.5), self.said(abs(end - start))
             tip = self.name(start + along, body, f'dyad {pin} {other} {side} {side} left')
             link = bar_name(pin, tip)

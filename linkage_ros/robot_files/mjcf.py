@@ -84,10 +84,11 @@ def _tie(robot: Robot, model: Any, i: int, bodies: Any, names: Any) -> None:
         robot.follow(names[ends[0]], names[ends[1]], given[1], given[0] + one - given[1] * other)
     if kind in ('connect', 'weld'):
         welds = kind == 'weld'
-        own, other = (given[3:6], given[:3]) if welds else (given[:3], given[3:6])
-        frames = [at(own, turned_by(given[6:10] if welds else (1.0, 0.0, 0.0, 0.0))), at(other)]
         if mj.mjtObj(model.eq_objtype[i]) == mj.mjtObj.mjOBJ_SITE:
             frames = [at(model.site_pos[end], turned_by(model.site_quat[end])) for end in ends]
             ends = model.site_bodyid[ends]
+        else:
+            own, other = (given[3:6], given[:3]) if welds else (given[:3], given[3:6])
+            frames = [at(own, turned_by(given[6:10]) if welds else np.eye(3)), at(other)]
         robot.close(model.equality(i).name or f'equality{i}', FIXED if welds else BALL,
                     (bodies[ends[0]], bodies[ends[1]]), frames)
