@@ -179,7 +179,7 @@ class _Tracker:
         self._movers = []
         for name in driven:
             source, ratio, offset = robot.source(name)
-            self._movers.append((sources.index(source), ratio, offset, *component.column(name)))
+            self._movers.append((sources.index(source), ratio, offset, component.index(name)))
 
     def track(self, start: np.ndarray, targets: np.ndarray) -> Track:
         """Return poses on straight paths of the motors, each closed from the one before."""
@@ -215,9 +215,9 @@ class _Tracker:
                   halvings: int) -> Tuple[Poses, np.ndarray]:
         """Return poses with the motors moved on, and which of them are closed."""
         component, step = self._component, drift.copy()
-        for i, ratio, offset, element, column, sign, zero in self._movers:
-            step[:, column] = sign * (ratio * after[:, i] + offset - zero) \
-                - poses.positions[:, element]
+        for i, ratio, offset, index in self._movers:
+            column, change = component.step_to(poses, index, ratio * after[:, i] + offset)
+            step[:, column] = change
         new = component.closed(component.stepped(poses, step), self._still, 8)
         fine = (np.max(np.abs(component.errors(new)[0] - self._base), axis=1)
                 < (CLOSED + 10.0 * self._slack) * component.size) & (

@@ -11,8 +11,8 @@ from typing import Dict, Iterable, List, Mapping, NamedTuple, Tuple
 
 import numpy as np
 
-from .robot import FIXED, HINGE, Robot
-from .spatial import Component, components, displaced, Poses, trees, turned
+from .robot import FIXED, Robot, SLIDE
+from .spatial import Component, components, displaced, displacements, Poses, screws, trees
 from ..command import RequestError
 from ..words import listed
 
@@ -43,11 +43,10 @@ def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
     for body, (_, joint) in trees(robot)[0].items():
         if joint.name in values and joint.position is not None:
             change = (values[joint.name] - joint.position) * (
-                1.0 if joint.bodies[1] == body else -1.0) * joint.axis
-            moves[body] = turned(change[None], joint.places[0])[0] if joint.kind == HINGE \
-                else np.eye(4)
-            if joint.kind != HINGE:
-                moves[body][:3, 3] = change
+                1.0 if joint.bodies[1] == body else -1.0)
+            slides = joint.kind == SLIDE
+            moves[body] = displacements(
+                screws(joint.axis, joint.places[0], slides), np.array(change), slides)
             del positions[joint.name]
     for name in values:
         if name in positions:

@@ -22,7 +22,7 @@ from ..command import RequestError
 # A pose moves by no more than this in a step [rad, or parts of the size].
 STRIDE = 0.5
 # After a step this small [rad, or of the size] the next is rounding: steps square.
-STILL = 1e-10
+STILL = 1e-8
 # Bodies in loops that are closed together.
 MOST = 100
 # Hinges nearer to each other [m] cross in a point.
@@ -32,20 +32,14 @@ _TREE = {FIXED: 0, SLIDE: 1, FREE: 2, BALL: 3, HINGE: 4}
 
 
 class Element(NamedTuple):
-    """A joint: rotation about or motion along an axis, or a ball with three rotations."""
+    """A joint: rotation about an axis, motion along it, or the three rotations of a ball."""
 
     joint: Joint
     kind: str
-    sign: float
     place: np.ndarray
     axis: np.ndarray
     parent: int
     body: str
-
-    @property
-    def columns(self) -> int:
-        """How many numbers move it."""
-        return 3 if self.kind == BALL else 1
 
 
 class Poses(NamedTuple):
@@ -146,14 +140,15 @@ class Component:
 
     """
 
-    def __init__(self, robot: Robot, found: Dict[str, Tuple[str, Joint]], bodies: set,
+    def __init__(self, robot: Robot, found: Dict[str, Tuple[str, Joint]], bodies: Set[str],
                  cuts: Sequence[Joint]):
         self._elements: List[Element] = []
         self._cuts = cuts
+        # The last element that moves each body.
         self._on: Dict[str, int] = {}
         for body in found:
             if body in bodies:
-                self._add(found, body, bodies)
+                self._add(found, body)
         own = {found[body][1] for body in bodies} | {*cuts}
         self.joints = [joint for joint in robot.joints if joint in own]
         places = np.array([place for joint in self.joints for place in joint.places])
@@ -162,50 +157,42 @@ class Component:
         for i, each in enumerate(self._elements):
             self._above[i] = self._above[each.parent]
             self._above[i, i] = True
-        counts = [each.columns for each in self._elements]
-        self._column = np.repeat(np.arange(len(counts)), counts)
-        self._first = np.cumsum([0, *counts])[:-1]
         self._is_ball, self._slides = (np.array(
             [each.kind == kind for each in self._elements], bool) for kind in (BALL, SLIDE))
+        counts = np.where(self._is_ball, 3, 1)
+        self._column = np.repeat(np.arange(len(counts)), counts)
+        self._first = np.cumsum([0, *counts])[:-1]
+        self._balls = self._first[self._is_ball, None] + np.arange(3)
         self._are_balls = np.array([each.kind == BALL or any(
             np.linalg.norm(each.place - other.place) < TOGETHER
             and np.linalg.norm(np.cross(each.axis, other.axis)) > 0.1
             for other in self._elements if HINGE == each.kind == other.kind)
             for each in self._elements], bool)
-        self._place, self._axis = (np.array([getattr(each, key) for each in self._elements]
-                                            ).reshape(-1, 3) for key in ('place', 'axis'))
-        self._parents = np.array([each.parent for each in self._elements], int)
-        self._ways = np.where(self._is_ball[self._column, None], np.eye(3)[
-            (np.arange(len(self._column)) - self._first[self._column]) % 3],
-            self._axis[self._column])
-        self.unit = np.where(self._slides[self._column], self.size, 1.0)
-        self._cut_ends = [[self._end(found, body) for body in cut.bodies] for cut in self._cuts]
+        self._places = np.array([each.place for each in self._elements]).reshape(-1, 3)
+        axes = np.array([self._elements[i].axis for i in self._column]).reshape(-1, 3)
+        axes[self._balls] = np.eye(3)
+        slides = self._slides[self._column]
+        self._screws = screws(axes, self._places[self._column], slides)
+        self._parents = np.array([self._elements[i].parent for i in self._column], int)
+        self.unit = np.where(slides, self.size, 1.0)
+        self._cut_ends = [[self._last(found, body) for body in cut.bodies] for cut in self._cuts]
         self._equations()
 
-    def _end(self, found: Dict[str, Tuple[str, Joint]], body: str) -> int:
+    def _last(self, found: Dict[str, Tuple[str, Joint]], body: str) -> int:
         """Return the last element that moves a body."""
         while body in found and body not in self._on:
             body = found[body][0]
         return self._on.get(body, -1)
 
-    def _add(self, found: Dict[str, Tuple[str, Joint]], body: str, bodies: set) -> None:
+    def _add(self, found: Dict[str, Tuple[str, Joint]], body: str) -> None:
+        """Add the elements that move a body; those of its base are there."""
         base, joint = found[body]
-        while base in found and base not in self._on:
-            if base in bodies:
-                self._add(found, base, bodies)
-                break
-            base = found[base][0]
-        parent = self._on.get(base, -1)
-        if body in self._on:
-            return
-        forward = joint.bodies[1] == body
-        sign = 1.0 if forward else -1.0
-        place, axis = joint.places[not forward], joint.axes[not forward]
-        parts = {HINGE: [(HINGE, axis)], SLIDE: [(SLIDE, axis)], BALL: [(BALL, axis)],
-                 FREE: [*((SLIDE, each) for each in np.eye(3)), (BALL, axis)]}
-        for kind, way in parts.get(joint.kind, []):
-            self._elements.append(Element(joint, kind, sign, place, np.asarray(way), parent,
-                                          body))
+        parent, forward = self._last(found, base), joint.bodies[1] == body
+        place = joint.places[not forward]
+        axis = joint.axes[not forward] * (1.0 if forward else -1.0)
+        parts = {FIXED: [], FREE: [*((SLIDE, each) for each in np.eye(3)), (BALL, axis)]}
+        for kind, way in parts.get(joint.kind, [(joint.kind, axis)]):
+            self._elements.append(Element(joint, kind, place, way, parent, body))
             parent = len(self._elements) - 1
         self._on[body] = parent
 
@@ -221,7 +208,8 @@ class Component:
                 ways += [np.array([turn[:, k] for turn in cut.turns]) for k in range(3)]
             points += [np.array(cut.places) + self.size * way for way in ways]
             ends += [end] * len(ways)
-        self._ends, self._points = np.array(ends, int).reshape(-1, 2), np.array(points)
+        self._ends = np.array(ends, int).reshape(-1, 2)
+        self._points = np.concatenate([points, np.ones((len(ends), 2, 1))], axis=2)
         above = self._above[self._ends][..., self._column]
         self._signed = above * np.array([[1.0], [-1.0]])
 
@@ -250,19 +238,23 @@ class Component:
         """Return a step of joints by some part [rad, or of the size], within their limits."""
         step = np.zeros(len(self._column))
         for name in names:
-            i, column, sign, start = self.column(name)
-            low, high = self._elements[i].joint.limits or (-math.inf, math.inf)
+            i = self.index(name)
+            joint, column = self._elements[i].joint, self._first[i]
+            (low, high), start = joint.limits or (-math.inf, math.inf), joint.position or 0.0
             change = part * self.unit[column]
             if not low <= start + change <= high:
                 change = abs(change) if start < low else -abs(change) if start > high else -change
-            step[column] = sign * change
+            step[column] = change
         return step
 
-    def column(self, name: str) -> Tuple[int, int, float, float]:
-        """Return the element and the column of a joint, its sign in these, and its position."""
-        i = next(i for i, each in enumerate(self._elements) if each.joint.name == name)
-        each = self._elements[i]
-        return i, int(np.searchsorted(self._column, i)), each.sign, each.joint.position or 0.0
+    def index(self, name: str) -> int:
+        """Return the place of a joint among positions."""
+        return next(i for i, each in enumerate(self._elements) if each.joint.name == name)
+
+    def step_to(self, poses: Poses, index: int, positions: np.ndarray) -> Tuple[int, np.ndarray]:
+        """Return the column of a joint of one degree of freedom, and its steps to positions."""
+        start = self._elements[index].joint.position or 0.0
+        return int(self._first[index]), positions - start - poses.positions[:, index]
 
     def step_between(self, one: Poses, other: Poses) -> np.ndarray:
         """Return by how much each column is farther in other poses; what turns in three is not."""
@@ -297,36 +289,28 @@ class Component:
 
     def stepped(self, poses: Poses, step: np.ndarray) -> Poses:
         """Return poses with a step of the columns [rad or m] more."""
-        positions, balls = poses.positions.copy(), self._is_ball
-        positions[:, ~balls] += step[:, self._first[~balls]]
-        angle = np.where(self._slides, 0.0, positions)
-        moved = turned(angle[..., None] * self._axis, self._place)
-        moved[..., :3, 3] += (positions - angle)[..., None] * self._axis
-        own = step[:, self._first[balls, None] + np.arange(3)]
-        moved[:, balls] = turned(own, self._place[balls]) @ poses.moved[:, balls]
+        positions = poses.positions + np.where(self._is_ball, 0.0, step[:, self._first])
+        moved = displacements(self._screws[self._first], positions, self._slides)
+        if len(self._balls):
+            turn = step[:, self._balls]
+            angle = np.linalg.norm(turn, axis=-1)
+            axes = turn / np.where(angle, angle, 1.0)[..., None]
+            moved[:, self._is_ball] = displacements(
+                screws(axes, self._places[self._is_ball]), angle) @ poses.moved[:, self._is_ball]
         return Poses(positions, moved)
-
-    def _twists(self, frames: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Return how each column turns, and moves the origin: (poses, columns, 3) each."""
-        base = frames[:, self._parents[self._column]]
-        axes = np.einsum('pcij,cj->pci', base[..., :3, :3], self._ways)
-        place = np.einsum('pcij,cj->pci', base[..., :3, :3], self._place[self._column]) \
-            + base[..., :3, 3]
-        slides = self._slides[self._column][:, None]
-        return np.where(slides, 0.0, axes), np.where(slides, axes, _cross(place, axes))
 
     def errors(self, poses: Poses, slopes: bool = False) -> Tuple[np.ndarray, np.ndarray]:
         """Return what is open in each pose [m], and its derivatives by the columns."""
         frames = self._frames(poses)
-        own, count = frames[:, self._ends], len(frames)
-        seen = np.einsum('prsij,rsj->prsi', own[..., :3, :3], self._points) + own[..., :3, 3]
-        error = (seen[:, :, 0] - seen[:, :, 1]).reshape(count, -1)
+        seen = (frames[:, self._ends] @ self._points[..., None])[..., 0]
+        error = (seen[:, :, 0] - seen[:, :, 1])[..., :3].reshape(len(frames), -1)
         if not slopes:
             return error, np.zeros(0)
-        turns, moves = self._twists(frames)
-        rates = _cross(turns[:, None, None], seen[:, :, :, None]) + moves[:, None, None]
+        inverse = np.linalg.inv(frames)
+        twists = frames[:, self._parents] @ self._screws @ inverse[:, self._parents]
+        rates = np.einsum('pcij,prsj->prsci', twists[..., :3, :], seen)
         slope = np.einsum('prsci,rsc->pric', rates, self._signed)
-        return error, slope.reshape(count, -1, len(self._column)) * self.unit
+        return error, slope.reshape(*error.shape, -1) * self.unit
 
     def closed(self, poses: Poses, still: np.ndarray, count: int = 12,
                home: Optional[np.ndarray] = None, firm: float = 0.0, soft: float = 1e-14
@@ -433,7 +417,7 @@ class Component:
 
     def read(self, poses: Poses) -> Dict[str, np.ndarray]:
         """Return the positions of named joints [rad or m]; those of cuts are wrapped."""
-        found = {each.joint.name: each.sign * poses.positions[:, i] + each.joint.position
+        found = {each.joint.name: poses.positions[:, i] + each.joint.position
                  for i, each in enumerate(self._elements) if each.joint.position is not None}
         frames = self._frames(poses)
         for cut, (first, second) in zip(self._cuts, self._cut_ends):
@@ -446,21 +430,16 @@ class Component:
         return found
 
 
-def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    x, y, z = one[..., 0], one[..., 1], one[..., 2]
-    a, b, c = other[..., 0], other[..., 1], other[..., 2]
-    return np.stack([y * c - z * b, z * a - x * c, x * b - y * a], axis=-1)
-
-
-def turned(turn: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Return displacements that turn by vectors (..., 3) about places."""
-    angle = np.linalg.norm(turn, axis=-1)
-    x, y, z = np.moveaxis(turn / np.where(angle, angle, 1.0)[..., None], -1, 0)
-    zero, (sin, cos) = np.zeros_like(x), (
-        function(angle)[..., None, None] for function in (np.sin, np.cos))
-    skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
-    made = np.zeros((*x.shape, 4, 4))
-    made[..., :3, :3] = np.eye(3) + sin * skew + (1.0 - cos) * skew @ skew
-    made[..., :3, 3] = place - np.einsum('...ij,...j->...i', made[..., :3, :3], place)
-    made[..., 3, 3] = 1.0
+def screws(axes: np.ndarray, places: np.ndarray, slides: Any = False) -> np.ndarray:
+    """Return the velocities (..., 4, 4) of unit motions about axes at places, or along them."""
+    made = np.zeros((*axes.shape[:-1], 4, 4))
+    slides = np.asarray(slides)[..., None]
+    made[..., :3, :3] = np.where(slides[..., None], 0.0, np.cross(np.eye(3), axes[..., None, :]))
+    made[..., :3, 3] = np.where(slides, axes, np.cross(places, axes))
     return made
+
+
+def displacements(screw: np.ndarray, by: np.ndarray, slides: Any = False) -> np.ndarray:
+    """Return displacements by positions [rad or m] of screws: their exponentials."""
+    sine, less = np.where(slides, by, np.sin(by)), 1.0 - np.cos(by)
+    return np.eye(4) + sine[..., None, None] * screw + less[..., None, None] * (screw @ screw)
