@@ -31,37 +31,8 @@ LITTLE = 1e-3
 LEAP, HALVINGS = 0.35, 6
 
 
-class Found(NamedTuple):
-    """
-    What a check has found: in how many poses, between which positions, the worst difference.
-
-    Attributes
-    ----------
-    ranges : list of (str, float, float)
-        Each motor, and between which positions it was moved.
-    worst, joint : float, str
-        The worst difference [rad, or of the size], and of which joint.
-    wrong : str
-        Why the scene is not the robot's, if it is not.
-    beyond : str
-        What was not reached.
-
-    """
-
-    poses: int
-    ranges: List[Tuple[str, float, float]]
-    worst: float
-    joint: str
-    wrong: str
-    beyond: str
-
-    def said(self, name: str) -> str:
-        """Return the report on a mechanism without differences."""
-        moved = ', '.join(f'{source} from {low:.4g} to {high:.4g}'
-                          for source, low, high in self.ranges)
-        beyond = f'; not beyond {self.beyond}' if self.beyond else ''
-        return (f'Checked: {name}: in {self.poses} poses of the robot, its loops closed in space, '
-                f'{moved}, the worst difference is {self.worst:.0e}, of {self.joint}{beyond}.')
+class Difference(ValueError):
+    """How a mechanism differs from its robot, or why it could not be compared."""
 
 
 class Track(NamedTuple):
@@ -75,9 +46,9 @@ class Track(NamedTuple):
 
 
 def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
-             ends: Mapping[str, Tuple[float, float]], slack: float) -> Found:
+             ends: Mapping[str, Tuple[float, float]], slack: float) -> str:
     """
-    Compare what a mechanism publishes with the joints of its robot.
+    Compare what a mechanism publishes with the joints of its robot, and report on it.
 
     Parameters
     ----------
@@ -92,6 +63,11 @@ def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
     slack : float
         What the file leaves open for good, of the size.
 
+    Raises
+    ------
+    Difference
+        If they differ, or if fewer than FEWEST poses could be compared.
+
     """
     component = next(each for each in components(replace(robot, driven=[*driven]))
                      if {*driven} & {joint.name for joint in each.joints})
@@ -101,7 +77,7 @@ def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
         low, high = targets
         targets = np.random.default_rng(1).uniform(low, high, (PATHS, len(ends)))
     tracker = _Tracker(robot, component, driven, [*ends], slack)
-    count, worst, joint, beyond = 0, 0.0, '', ''
+    count, beyond = 0, ''
     for _ in range(3):
         targets = targets[np.max(np.abs(targets - start), axis=1) > 1e-9]
         if not len(targets):
@@ -110,39 +86,39 @@ def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
         apart, names = _differences(machine, component, [*ends], track)
         allowed = (EXACT + 30.0 * slack) / np.maximum(track.margin, 1e-4)
         good = np.logical_and.accumulate(track.alive & (apart <= allowed), axis=1)
-        first = np.minimum(good.sum(axis=1), good.shape[1] - 1)
-        paths = np.arange(len(good))
+        paths, first = np.arange(len(good)), np.minimum(good.sum(axis=1), good.shape[1] - 1)
         # Past a change point a robot may go on in two ways.
         near = np.minimum.accumulate(track.volume, axis=1)[paths, first] < CHANGE * np.max(
             track.volume[track.alive], initial=0.0)
         for i in paths[track.alive[paths, first] & ~good[paths, first] & ~near]:
             if np.max(track.margin[track.alive]) < FLAT:
-                return Found(0, [], 0.0, '', 'it could not be checked: its loops are at a dead '
-                             'point wherever its motors are', '')
-            where = ', '.join(f'{source} at {value:.4g}' for source, value in zip(
-                ends, track.motors[i, first[i]]))
-            off = apart[i, first[i]]
-            return Found(count, [], float(off), '', f'with {where} ' + (
+                raise Difference('it could not be checked: its loops are at a dead point wherever '
+                                 'its motors are')
+            at, off = (i, first[i]), apart[i, first[i]]
+            where = ', '.join(f'{source} at {value:.4g}'
+                              for source, value in zip(ends, track.motors[at]))
+            raise Difference(f'with {where} ' + (
                 'it has no pose, where the loops of the robot are closed' if math.isnan(off)
-                else f'{names[i][first[i]]} is off by {off:.2g}'), '')
+                else f'{names[at]} is off by {off:.2g}'))
         count = int(good.sum())
-        if count:
-            worst, i, j = max((float(apart[i, j]), i, j) for i, j in np.argwhere(good))
-            joint, reached = names[i][j], track.motors[good]
         if not good[paths, first].all():
-            beyond = 'a change point' if (track.alive & ~good).any() else 'where its loops end'
+            beyond = '; not beyond ' + (
+                'a change point' if (track.alive & ~good).any() else 'where its loops end')
         if count >= FEWEST:
-            ranges = [(source, float(low), float(high)) for source, low, high in zip(
-                ends, reached.min(axis=0), reached.max(axis=0))]
-            return Found(count, ranges, worst, joint, '', beyond)
+            worst = np.unravel_index(np.argmax(np.where(good, apart, -1.0)), good.shape)
+            reached = track.motors[good].T
+            moved = ', '.join(f'{source} from {values.min():.4g} to {values.max():.4g}'
+                              for source, values in zip(ends, reached))
+            return (f'Checked: {machine.name}: in {count} poses of the robot, its loops closed in '
+                    f'space, {moved}, the worst difference is {apart[worst]:.0e}, of '
+                    f'{names[worst]}{beyond}.')
         share = good.sum(axis=1) / good.shape[1]
         targets = start + (targets - start) * share[:, None]
-    return Found(count, [], worst, joint, f'it could not be checked in more than {count} poses',
-                 beyond)
+    raise Difference(f'it could not be checked in more than {count} poses')
 
 
 def _differences(machine: scene.SceneMechanism, component: Component, sources: List[str],
-                 track: Track) -> Tuple[np.ndarray, List[List[str]]]:
+                 track: Track) -> Tuple[np.ndarray, np.ndarray]:
     """Return the worst difference in each pose, and of which joint."""
     values = [drive.ratio * track.motors[..., sources.index(drive.source)] + drive.offset
               for drive in machine.inputs.values()]
@@ -160,13 +136,10 @@ def _differences(machine: scene.SceneMechanism, component: Component, sources: L
             off = called.of(angles[link]) - track.joints[called.name]
             apart[called.name] = np.abs(off) / component.size if called.name in slides else np.abs(
                 off - math.tau * np.round(off / math.tau))
-    if not apart:
-        return np.full(track.alive.shape, math.nan), [[''] * track.alive.shape[1]] * len(
-            track.alive)
-    every, order = np.array([*apart.values()]), [*apart]
+    apart = apart or {'': np.full(track.alive.shape, math.nan)}
+    every = np.array([*apart.values()])
     worst = np.argmax(np.where(np.isnan(every), math.inf, every), axis=0)
-    return (np.take_along_axis(every, worst[None], axis=0)[0],
-            [[order[i] for i in row] for row in worst])
+    return np.take_along_axis(every, worst[None], axis=0)[0], np.array([*apart])[worst]
 
 
 class _Tracker:

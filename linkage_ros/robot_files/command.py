@@ -104,7 +104,8 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str]]:
             except (ArithmeticError, ValueError) as error:
                 if group.why:
                     continue
-                reason = error if WRONG in str(error) else fault or error
+                reason = f'{WRONG}: {error}' if isinstance(error, check.Difference) else (
+                    fault or error)
                 bodies = error.bodies if isinstance(error, _NotPlaced) else _bodies(left)
                 said.append(f'Left out: {", ".join(bodies)}: {reason}.')
             done = {joint.name for joint in part.joints}
@@ -221,12 +222,10 @@ def _checked(robot: Robot, drawing: Drawing, others: Sequence[str]
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if _apart(machine.linkage, drawing) > drawing.allowed:
         raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
-    found = check.compared(robot, machine, [joint.name for joint in drawing.moved_by],
-                           _ends(drawing), loop.lean + loop.gap / loop.size)
-    if found.wrong:
-        raise ValueError(f'{WRONG}: {found.wrong}')
+    report = check.compared(robot, machine, [joint.name for joint in drawing.moved_by],
+                            _ends(drawing), loop.lean + loop.gap / loop.size)
     said = [f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.'] if drawing.left else []
-    said.append(found.said(name))
+    said.append(report)
     said += [f'{joint} has its ends {gap:.2g} m apart along its axis, on which no angle depends.'
              for joint, gap in loop.across.items()]
     published = {called.name for called in machine.joints.values() if called.published}

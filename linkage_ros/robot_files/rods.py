@@ -201,12 +201,9 @@ def described(robot: Robot, group: Group, others: Sequence[str]
     given = {f'{name}.{key}': value for key, value in found.parameters(lines)}
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     ends = _ranges(machine, found)
-    compared = check.compared(robot, machine, [joint.name for joint in found.inputs.values()],
-                              ends, 0.0)
-    if compared.wrong:
-        raise ValueError(compared.wrong)
-    said.append(compared.said(name))
-    return name, given, said + [*_corners(machine, found)]
+    report = check.compared(robot, machine, [joint.name for joint in found.inputs.values()],
+                            ends, 0.0)
+    return name, given, [*said, report, *_corners(machine, found)]
 
 
 def _lines(found: Rods) -> Tuple[List[str], List[str]]:

@@ -190,8 +190,9 @@ class Component:
         parent, forward = self._last(found, base), joint.bodies[1] == body
         place = joint.places[not forward]
         axis = joint.axes[not forward] * (1.0 if forward else -1.0)
-        parts = {FIXED: [], FREE: [*((SLIDE, each) for each in np.eye(3)), (BALL, axis)]}
-        for kind, way in parts.get(joint.kind, [(joint.kind, axis)]):
+        parts = {kind: [(kind, axis)] for kind in (HINGE, SLIDE, BALL)}
+        parts[FREE] = [*((SLIDE, each) for each in np.eye(3)), (BALL, axis)]
+        for kind, way in parts.get(joint.kind, ()):
             self._elements.append(Element(joint, kind, place, way, parent, body))
             parent = len(self._elements) - 1
         self._on[body] = parent
