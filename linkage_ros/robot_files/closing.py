@@ -38,20 +38,18 @@ def check_names(robot: Robot, names: Iterable[str]) -> None:
 
 def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
     """Return a robot with some joints moved; raise RequestError for an unknown joint."""
-    positions, moves = robot.positions, {}
     check_names(robot, values)
-    for body, (_, joint) in trees(robot)[0].items():
+    tree, moves = trees(robot)[0], {}
+    for name in values.keys() - {joint.name for _, joint in tree.values()}:
+        raise RequestError(f'{name} closes a loop, so that other joints say where it is')
+    for body, (_, joint) in tree.items():
         if joint.name in values and joint.position is not None:
-            change = (values[joint.name] - joint.position) * (
-                1.0 if joint.bodies[1] == body else -1.0)
+            change = values[joint.name] - joint.position
             slides = joint.kind == SLIDE
             moves[body] = displacements(
-                screws(joint.axis, joint.places[0], slides), np.array(change), slides)
-            del positions[joint.name]
-    for name in values:
-        if name in positions:
-            raise RequestError(f'{name} closes a loop, so that other joints say where it is')
-    return robot.displaced(displaced(robot, moves), values)
+                screws(joint.axis, joint.places[0], slides),
+                np.array(change if joint.bodies[1] == body else -change), slides)
+    return displaced(robot, moves, values)
 
 
 def held(robot: Robot, values: Mapping[str, float]) -> Robot:
@@ -69,8 +67,7 @@ def _with_followers(robot: Robot) -> Robot:
         if joint.name in robot.follows and joint.position is not None:
             source, ratio, offset = robot.source(joint.name)
             late[joint.name] = ratio * positions[source] + offset
-    return posed(robot, late) if any(
-        abs(value - positions[name]) > 0.0 for name, value in late.items()) else robot
+    return posed(robot, late)
 
 
 class Closed(NamedTuple):
@@ -100,33 +97,30 @@ class Closed(NamedTuple):
 def closed(robot: Robot) -> Closed:
     """Return a robot with closed loops; motors stay at their positions if possible."""
     robot = _with_followers(robot)
+    made = Closed(robot, [], {}, [], {})
     moves: Dict[str, np.ndarray] = {}
     positions: Dict[str, float] = {}
-    said: List[str] = []
-    why: Dict[str, str] = {}
-    stiff: List[str] = []
-    faults: Dict[str, str] = {}
     for component in components(robot):
-        names = [name for name in component.positions if name in robot.driven]
+        names, followers = ([name for name in component.positions if name in several]
+                            for several in (robot.driven, robot.follows))
         try:
-            poses, moved = nearest(component, names, [
-                name for name in component.positions if name in robot.follows])
+            poses, moved = nearest(component, names, followers)
         except ValueError as error:
-            why.update((joint.name, str(error)) for joint in component.joints)
+            made.open_ones.update((joint.name, str(error)) for joint in component.joints)
             continue
         if component.gap(poses)[0] < CLOSED:
-            stiff += component.immobile(poses)
-            fault = _fault(component, poses, names, stiff)
-            faults.update((joint.name, fault) for joint in component.joints if fault)
+            made.stiff.extend(component.immobile(poses))
+            if fault := _fault(component, poses, names, followers, made.stiff):
+                made.faults.update((joint.name, fault) for joint in component.joints)
         moves.update(component.moves(poses))
         positions.update((name, float(value[0])) for name, value in component.read(poses).items())
-        if moved:
-            said.append(moved)
-    return Closed(robot.displaced(displaced(robot, moves), positions), said, why, stiff, faults)
+        made.said.extend([moved] * bool(moved))
+    return made._replace(robot=displaced(robot, moves, positions))
 
 
-def _fault(component: Component, poses: Poses, motors: List[str], stiff: List[str]) -> str:
-    """Return why motors do not tell a pose, if they do not."""
+def _fault(component: Component, poses: Poses, motors: List[str], followers: List[str],
+           stiff: List[str]) -> str:
+    """Return why motors, with what follows them, do not determine a pose, if they do not."""
     if {*component.positions} <= {*stiff}:
         return 'it cannot move, as its joints hold each other'
     ways = component.free_ways(poses, component.held([]))[:, component.held(motors)]
@@ -134,7 +128,7 @@ def _fault(component: Component, poses: Poses, motors: List[str], stiff: List[st
     if count < len(motors):
         return (f'{listed(motors)} drive it, and hold each other, as {count} of them tell where '
                 'all is: name these by --driven')
-    loose, count = component.loose(poses, motors) if motors else ([], 0)
+    loose, count = component.loose(poses, motors + followers) if motors else ([], 0)
     return f'not driven: {count} of {listed(loose)} must be moved, named by --driven, or held, ' \
         'named by --hold' if count else ''
 

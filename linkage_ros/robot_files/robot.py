@@ -5,9 +5,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 import re
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -148,19 +148,3 @@ class Robot:
         if name not in self.positions:
             raise ValueError(f'{passed[-1]} follows {name!r}, which is no joint')
         return name, ratio, offset
-
-    def displaced(self, moved: Mapping[str, np.ndarray], positions: Mapping[str, float]
-                  ) -> 'Robot':
-        """Return it with each body displaced, and joints where they are then."""
-        joints = []
-        for joint in self.joints:
-            ends = [moved[body] for body in joint.bodies]
-            joints.append(replace(
-                joint, places=tuple(end[:3, :3] @ place + end[:3, 3]
-                                    for end, place in zip(ends, joint.places)),
-                axes=tuple(end[:3, :3] @ axis for end, axis in zip(ends, joint.axes)),
-                turns=tuple(end[:3, :3] @ turn for end, turn in zip(ends, joint.turns)),
-                position=positions.get(joint.name, joint.position)
-                if joint.position is not None else None))
-        return replace(self, joints=joints,
-                       frames={body: moved[body] @ frame for body, frame in self.frames.items()})

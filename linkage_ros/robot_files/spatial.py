@@ -11,6 +11,7 @@ has it: a product of screws along a tree of joints; joints that are not in the t
 
 from __future__ import annotations
 
+from dataclasses import replace
 import math
 from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
 
@@ -90,12 +91,24 @@ def trees(robot: Robot) -> Tuple[Dict[str, Tuple[str, Joint]], List[Joint]]:
     return found, cuts
 
 
-def displaced(robot: Robot, moves: Mapping[str, np.ndarray]) -> Dict[str, np.ndarray]:
-    """Return how each body is displaced where the joints that bodies hang on displace some."""
-    made = {robot.root: np.eye(4)}
+def displaced(robot: Robot, moves: Mapping[str, np.ndarray], positions: Mapping[str, float]
+              ) -> Robot:
+    """Return a robot with some bodies displaced on their bases, and joints where they are then."""
+    moved = {robot.root: np.eye(4)}
     for body, (base, _) in trees(robot)[0].items():
-        made[body] = made[base] @ moves[body] if body in moves else made[base]
-    return made
+        moved[body] = moved[base] @ moves[body] if body in moves else moved[base]
+    joints = []
+    for joint in robot.joints:
+        ends = [moved[body] for body in joint.bodies]
+        joints.append(replace(
+            joint, places=tuple(end[:3, :3] @ place + end[:3, 3]
+                                for end, place in zip(ends, joint.places)),
+            axes=tuple(end[:3, :3] @ axis for end, axis in zip(ends, joint.axes)),
+            turns=tuple(end[:3, :3] @ turn for end, turn in zip(ends, joint.turns)),
+            position=positions.get(joint.name, joint.position)
+            if joint.position is not None else None))
+    return replace(robot, joints=joints, frames={
+        body: moved[body] @ frame for body, frame in robot.frames.items()})
 
 
 def blocks(found: Mapping[str, Tuple[str, Joint]], cuts: Sequence[Joint]
