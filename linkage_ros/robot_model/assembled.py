@@ -158,14 +158,14 @@ def _slots(machine: SceneMechanism, bodies: Sequence[Body], positions: Dict[str,
 
 def weight(pieces: Sequence[Piece], density: float) -> Weight:
     """Return the common weight of pieces of a density [kg/m^3]; zero without pieces."""
-    masses = np.array([density * _volume(piece) for piece in pieces])
+    solids = np.array([_solid(piece) for piece in pieces]).reshape(-1, 3)
+    masses = density * solids[:, 0]
     mass = float(masses.sum())
     if not mass:
         return Weight(0.0, (0.0, 0.0), (0.0,) * 4)
     x, y = masses @ [piece.pose[:2] for piece in pieces] / mass
     moments = np.zeros(4)
-    for own, piece in zip(masses, pieces):
-        along, across = (own * each for each in _gyration(piece))
+    for own, (along, across), piece in zip(masses, masses[:, None] * solids[:, 1:], pieces):
         u, v, *_, angle = piece.pose
         u, v, c, s = u - x, v - y, math.cos(angle), math.sin(angle)
         moments += (along * c * c + across * s * s + own * v * v,
@@ -174,14 +174,10 @@ def weight(pieces: Sequence[Piece], density: float) -> Weight:
     return Weight(mass, (float(x), float(y)), moments.tolist())
 
 
-def _volume(piece: Piece) -> float:
-    thickness, length = piece.thickness, piece.length
-    return {ROD: math.pi * thickness ** 2 * length, BOX: thickness ** 2 * length,
-            BALL: 4.0 / 3.0 * math.pi * thickness ** 3}[piece.shape]
-
-
-def _gyration(piece: Piece) -> Tuple[float, float]:
-    """Return the squares of the radii of gyration [m^2] about a piece's length and across it."""
+def _solid(piece: Piece) -> Tuple[float, float, float]:
+    """Return the volume [m^3], and the squares of radii of gyration about and across it [m^2]."""
     thick, long = piece.thickness ** 2, piece.length ** 2 / 12.0
-    return {ROD: (0.5 * thick, 0.25 * thick + long), BOX: (thick / 6.0, thick / 12.0 + long),
-            BALL: (0.4 * thick, 0.4 * thick)}[piece.shape]
+    return {ROD: (math.pi * thick * piece.length, 0.5 * thick, 0.25 * thick + long),
+            BOX: (thick * piece.length, thick / 6.0, thick / 12.0 + long),
+            BALL: (4.0 / 3.0 * math.pi * piece.thickness ** 3, 0.4 * thick, 0.4 * thick)
+            }[piece.shape]

@@ -10,17 +10,18 @@ from typing import Any, Dict, Iterable, Mapping, Tuple
 
 import numpy as np
 
+from .shapes import input_values
 from ..robot_files.elements import pose
 from ..scene import SceneMechanism
 
 GROUP = 'rviz_common/Group'
 NEEDS_TRANSFORMS = ('rviz_default_plugins/RobotModel', 'rviz_default_plugins/TF')
-
-
 # Distance of a camera with a view of 45 degrees that shows a ball of radius 1 with a margin.
 AWAY = 1.1 / math.sin(math.radians(22.5))
 # Downward angle [rad] of the camera on an upright plane, and on a flat one.
 DOWN, STEEPEST = 0.15, 1.56
+# Values of one input by which it is found where a mechanism reaches; of several, their share.
+SAMPLES = 25
 
 
 def adapted(config: dict, machines: Mapping[str, SceneMechanism], frame_id: str,
@@ -81,11 +82,8 @@ def _camera(machines: Iterable[SceneMechanism]) -> Dict[str, Any]:
 
 def _seen(machine: SceneMechanism) -> Tuple[np.ndarray, np.ndarray]:
     """Return points that a mechanism's joints come to [m], (n, 3), and its plane's normal."""
-    values = [np.concatenate([np.linspace(low, high, 25) for low, high in (
-        [drive.ends] if drive.ends else drive.reach)]) / machine.scale_of(name)
-        for name, drive in machine.inputs.items()]
-    grid = np.meshgrid(*(own[::len(values)] for own in values))
-    found = machine.linkage.solve(grid if len(grid) > 1 else grid[0], machine.points)
+    values = input_values(machine, -(-SAMPLES // len(machine.inputs)))
+    found = machine.linkage.solve(values, machine.points)
     places = machine.scale * np.concatenate([place.reshape(-1, 2) for place in found.values()])
     places = places[np.isfinite(places).all(axis=1)]
     if machine.mirrored:
