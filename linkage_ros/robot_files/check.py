@@ -149,10 +149,9 @@ class _Tracker:
                  sources: List[str], slack: float):
         self._component, self._slack = component, slack
         self._still = component.held(driven)
-        self._movers = []
-        for name in driven:
-            source, ratio, offset = robot.source(name)
-            self._movers.append((sources.index(source), ratio, offset, component.index(name)))
+        # The source of each joint that drives, its ratio and its offset.
+        self._movers = {name: (sources.index(source), ratio, offset) for name in driven
+                        for source, ratio, offset in [robot.source(name)]}
 
     def track(self, start: np.ndarray, targets: np.ndarray) -> Track:
         """Return poses on straight paths of the motors, each closed from the one before."""
@@ -187,10 +186,10 @@ class _Tracker:
     def _advanced(self, poses: Poses, before: np.ndarray, after: np.ndarray, drift: np.ndarray,
                   halvings: int) -> Tuple[Poses, np.ndarray]:
         """Return poses with the motors moved on, and which of them are closed."""
-        component, step = self._component, drift.copy()
-        for i, ratio, offset, index in self._movers:
-            column, change = component.step_to(poses, index, ratio * after[:, i] + offset)
-            step[:, column] = change
+        component = self._component
+        step = component.aimed(poses, drift, {
+            name: ratio * after[:, i] + offset
+            for name, (i, ratio, offset) in self._movers.items()})
         new = component.closed(component.stepped(poses, step), self._still, 8)
         fine = (np.max(np.abs(component.errors(new)[0] - self._base), axis=1)
                 < (CLOSED + 10.0 * self._slack) * component.size) & (

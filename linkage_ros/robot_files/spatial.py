@@ -170,6 +170,10 @@ class Component:
         for i, each in enumerate(self._elements):
             self._above[i] = self._above[each.parent]
             self._above[i, i] = True
+        joints = [each.joint for each in self._elements]
+        self._names = [joint.name for joint in joints]
+        self._named = np.array([joint.position is not None for joint in joints], bool)
+        self._starts = np.array([joint.position or 0.0 for joint in joints])
         self._is_ball, self._slides = (np.array(
             [each.kind == kind for each in self._elements], bool) for kind in (BALL, SLIDE))
         counts = np.where(self._is_ball, 3, 1)
@@ -240,35 +244,33 @@ class Component:
 
     def held(self, names: Sequence[str]) -> np.ndarray:
         """Return which columns are of the joints that are named."""
-        return np.array([self._elements[i].joint.name in names for i in self._column], bool)
+        return np.array([self._names[i] in names for i in self._column], bool)
 
     def most_moved(self, ways: np.ndarray) -> List[str]:
         """Return the joint with a name that some ways move the most."""
-        sizes = np.linalg.norm(ways, axis=0) * [
-            self._elements[i].joint.position is not None for i in self._column]
-        return [self._elements[self._column[int(np.argmax(sizes))]].joint.name]
+        sizes = np.linalg.norm(ways, axis=0) * self._named[self._column]
+        return [self._names[self._column[int(np.argmax(sizes))]]]
 
     def towards_limits(self, names: Sequence[str], part: float) -> np.ndarray:
         """Return a step of joints by some part [rad, or of the size], within their limits."""
         step = np.zeros(len(self._column))
-        for name in names:
-            i = self.index(name)
-            joint, column = self._elements[i].joint, self._first[i]
-            (low, high), start = joint.limits or (-math.inf, math.inf), joint.position or 0.0
+        for i in map(self._names.index, names):
+            low, high = self._elements[i].joint.limits or (-math.inf, math.inf)
+            column, start = self._first[i], self._starts[i]
             change = part * self.unit[column]
             if not low <= start + change <= high:
                 change = abs(change) if start < low else -abs(change) if start > high else -change
             step[column] = change
         return step
 
-    def index(self, name: str) -> int:
-        """Return the place of a joint among positions."""
-        return next(i for i, each in enumerate(self._elements) if each.joint.name == name)
-
-    def step_to(self, poses: Poses, index: int, positions: np.ndarray) -> Tuple[int, np.ndarray]:
-        """Return the column of a joint of one degree of freedom, and its steps to positions."""
-        start = self._elements[index].joint.position or 0.0
-        return int(self._first[index]), positions - start - poses.positions[:, index]
+    def aimed(self, poses: Poses, step: np.ndarray, positions: Mapping[str, np.ndarray]
+              ) -> np.ndarray:
+        """Return a step of poses that leads some joints to positions."""
+        step = step.copy()
+        for name, values in positions.items():
+            i = self._names.index(name)
+            step[:, self._first[i]] = values - self._starts[i] - poses.positions[:, i]
+        return step
 
     def step_between(self, one: Poses, other: Poses) -> np.ndarray:
         """Return by how much each column is farther in other poses; what turns in three is not."""
@@ -401,17 +403,16 @@ class Component:
         ways = self.free_ways(poses, self.held(motors))
         # What a rod on balls spins on does not count.
         ways = ways * ~self._are_balls[self._column]
-        names = [each.joint.name for each, moves in zip(self._elements, self.free(ways))
-                 if moves and each.joint.position is not None]
+        names = [self._names[i] for i in np.flatnonzero(self.free(ways) & self._named)]
         return names, int(np.linalg.matrix_rank(ways, 1e-6)) if names else 0
 
     def farthest_apart(self, two: Poses, determined: Any) -> Tuple[str, float, float]:
         """Return the joint with the largest difference between two poses, and both positions."""
-        apart = np.abs(self.away(two.positions[:1] - two.positions[1:]))[0] * determined
-        apart *= [each.joint.position is not None for each in self._elements]
+        apart = np.abs(self.away(two.positions[:1] - two.positions[1:]))[0]
+        apart = apart * determined * self._named
         if not apart.any():
             return '', 0.0, 0.0
-        name = self._elements[int(np.argmax(apart))].joint.name
+        name = self._names[int(np.argmax(apart))]
         first, second = self.read(two)[name]
         return name, float(first), float(second)
 
@@ -426,13 +427,12 @@ class Component:
             step = ways.T @ rng.normal(size=len(ways))
             step *= 0.1 / max(np.max(np.abs(step), initial=0.0), 0.1)
             poses = self.closed(self.stepped(poses, step[None] * self.unit), still)
-        return [each.joint.name for each, moves in zip(self._elements, moved)
-                if each.joint.position is not None and not moves]
+        return [self._names[i] for i in np.flatnonzero(self._named & ~moved)]
 
     def read(self, poses: Poses) -> Dict[str, np.ndarray]:
         """Return the positions of named joints [rad or m]; those of cuts are wrapped."""
-        found = {each.joint.name: poses.positions[:, i] + each.joint.position
-                 for i, each in enumerate(self._elements) if each.joint.position is not None}
+        found = {self._names[i]: poses.positions[:, i] + self._starts[i]
+                 for i in np.flatnonzero(self._named)}
         frames = self._frames(poses)
         for cut, (first, second) in zip(self._cuts, self._cut_ends):
             if cut.position is not None and cut.kind == HINGE:
