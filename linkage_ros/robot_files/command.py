@@ -271,7 +271,7 @@ def _ends(drawing: Drawing) -> Dict[str, Tuple[float, float]]:
     """Return between which positions each source moves in a check."""
     found: Dict[str, Tuple[float, float]] = {}
     if joint := drawing.measured:
-        start = joint.position or 0.0
+        start = joint.start
         return {joint.name: joint.limits or (start - 0.5 * math.pi, start + 0.5 * math.pi)}
     for drive in drawing.drives:
         around = math.pi if drive.name[:5] == 'crank' else 0.5 * drawing.loop.size
@@ -300,7 +300,7 @@ def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
     def zero_of(joint: Joint, link: str, sign: float, angle: float) -> float:
         if links[link].kind != 'prismatic':
             angle = math.remainder(angle - float(np.asarray(links[link].zero)), math.tau)
-        return float(short((joint.position or 0.0) - sign * angle))
+        return float(short(joint.start - sign * angle))
 
     for drive in drawing.drives:
         source, ratio, offset = drive.source, drive.ratio, float(short(drive.offset))

@@ -54,10 +54,10 @@ class Drawing(Dyads):
                 pins.append({body: place for each in (*same, pin)
                              for body, place in each.items()})
         moved: List[Motor] = [
-            Slide(joint.bodies, (joint.places[1] - joint.axis * (joint.position or 0.0),
+            Slide(joint.bodies, (joint.places[1] - joint.axis * joint.start,
                                  joint.places[1]), (joint.axis, joint.axis), joint)
             if joint.kind == SLIDE else
-            Hinge(joint.bodies, joint.places, joint.axis, -joint.axis * (joint.position or 0.0),
+            Hinge(joint.bodies, joint.places, joint.axis, -joint.axis * joint.start,
                   joint) for joint in loop.joints]
         super().__init__(
             loop.ground, [body for joint in loop.joints for body in joint.bodies], pins,
@@ -128,7 +128,7 @@ class Drawing(Dyads):
 
     def position(self, joint: Joint) -> float:
         """Return the position of a joint's motor in the file."""
-        return joint.position or 0.0
+        return joint.start
 
     def alike(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
         """Return what a line says of bars like those from a corner: they pass their flat poses."""

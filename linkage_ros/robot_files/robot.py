@@ -59,6 +59,11 @@ class Joint:
         return self.axes[0]
 
     @property
+    def start(self) -> float:
+        """Return the position in the file [rad or m], 0 for a joint without one."""
+        return self.position or 0.0
+
+    @property
     def hinges(self) -> List['Joint']:
         """Return the hinges that it is made of, or itself."""
         return [one for part in self.parts for one in part.hinges] or [self]

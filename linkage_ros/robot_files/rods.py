@@ -35,7 +35,6 @@ _SIDE = 7
 class Link(NamedTuple):
     """A link on a joint, its parent, and its axis, which may be the other way round."""
 
-    name: str
     parent: str
     joint: Joint
     axis: np.ndarray
@@ -59,8 +58,9 @@ class Rods:
         self._driven = {*robot.driven}
         self.links: Dict[str, Link] = {}
         self.rods: List[str] = []
-        # The joint that drives an input, by the input's name.
+        # The joint that drives each input, and the input's value in the pose of the robot.
         self.inputs: Dict[str, Joint] = {}
+        self.zeros: Dict[str, float] = {}
         self._names: Set[str] = {*FORMS, 'ground', 'at', 'axis', 'within', 'length'}
         rods = {body: tuple(held) for body, held in _on_bodies(group.joints).items()
                 if body != ground and [joint.kind for joint in held] == [BALL, BALL]}
@@ -104,12 +104,12 @@ class Rods:
         if joint.kind not in (HINGE, SLIDE):
             raise ValueError(f'{joint.name} is a joint of type {joint.kind} and no end of a rod')
         name = self._bodies[body] = self._named(joint)
-        self.links[name] = Link(name, self._bodies[base], joint,
+        self.links[name] = Link(self._bodies[base], joint,
                                 -joint.axis if backwards else joint.axis, joint.places[backwards])
         if joint.name in self._driven:
             if joint.kind != HINGE:
                 raise ValueError(f'{joint.name} drives, and is no hinge and no cylinder')
-            self.inputs[name] = joint
+            self.inputs[name], self.zeros[name] = joint, 0.0
 
     def _end(self, joint: Joint, body: str) -> str:
         """Return the other end of a ball of a rod: its link and place."""
@@ -133,7 +133,7 @@ class Rods:
         name = self._named(half)
         self.rods.append(f'{name} cylinder ' + ' '.join(
             self._end(ball, body) for ball, body in zip(balls, half.bodies)))
-        self.inputs[name] = half
+        self.inputs[name], self.zeros[name] = half, float(np.linalg.norm(way))
 
     def lines(self, limits: Mapping[str, Tuple[float, float]] = {}) -> List[str]:
         """Return the lines, with limits for some other than the file's."""
@@ -162,22 +162,14 @@ class Rods:
         yield 'frame_id', self.frame_id
         for name, joint in self.inputs.items():
             yield f'{name}.source', joint.name
-            yield f'{name}.offset', self._zero(name) - (joint.position or 0.0)
-            yield f'{name}.start', self._zero(name)
+            yield f'{name}.offset', self.zeros[name] - joint.start
+            yield f'{name}.start', self.zeros[name]
         yield 'joint_names', [
-            f'{link.name}={quoted_name(link.joint.name)}' + (
-                f'{position:+}' if (position := float(short(link.joint.position or 0.0))) else '')
-            for link in self.links.values() if link.name not in self.inputs
+            f'{name}={quoted_name(link.joint.name)}' + (
+                f'{position:+}' if (position := float(short(link.joint.start))) else '')
+            for name, link in self.links.items() if name not in self.inputs
             and link.joint.position is not None]
         yield 'only_named', True
-
-    def _zero(self, name: str) -> float:
-        """Return an input's value in the robot's pose: 0 for an angle, the length for a length."""
-        line = next((line for line in self.rods if line.startswith(f'{name} cylinder ')), None)
-        if line is None:
-            return 0.0
-        words = line.split()
-        return math.dist(map(float, words[3:6]), map(float, words[7:10]))
 
 
 def _on_bodies(joints: Sequence[Joint]) -> Dict[str, List[Joint]]:
@@ -217,7 +209,7 @@ def _lines(found: Rods) -> Tuple[List[str], List[str]]:
             raise
         said = ', '.join(f'{name} from {low + zero:.4g} to {high + zero:.4g}'
                          for name, (low, high) in error.limits.items()
-                         for zero in [found.links[name].joint.position or 0.0])
+                         for zero in [found.links[name].joint.start])
         return found.lines(limits=error.limits), [
             f'Limits: inside those of the file, or without any, there may be a second pose; these '
             f'are the largest shown to have one at most: {said}.']
@@ -248,7 +240,7 @@ def _corners(machine: scene.SceneMechanism, found: Rods) -> Iterator[str]:
     for held in machine.linkage.windows():
         names = [line.names[0] for line in held.lines]
         inverse = machine.linkage.driven_by(*names)
-        zeros = [found.links[name].joint.position or 0.0 for name in names]
+        zeros = [found.links[name].joint.start for name in names]
         for corner in product(*held.limits):
             motors = inverse.joint_angles(corner, [*found.inputs])
             where = ', '.join(f'{found.links[name].joint.name} at {value + zero:.4g}'

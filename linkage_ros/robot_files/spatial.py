@@ -173,7 +173,7 @@ class Component:
         joints = [each.joint for each in self._elements]
         self._names = [joint.name for joint in joints]
         self._named = np.array([joint.position is not None for joint in joints], bool)
-        self._starts = np.array([joint.position or 0.0 for joint in joints])
+        self._starts = np.array([joint.start for joint in joints])
         self._is_ball, self._slides = (np.array(
             [each.kind == kind for each in self._elements], bool) for kind in (BALL, SLIDE))
         counts = np.where(self._is_ball, 3, 1)
