@@ -9,9 +9,13 @@ from cmath import phase
 import math
 from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
+import numpy as np
+
 from .loops import Loop, ROUNDING
 from .robot import Joint, Robot, SLIDE
+from .. import mechanisms
 from ..linkage.dyads import bar_name, Dyads, Hinge, Motor, Pin, short, Slide
+from ..linkage.mechanism import Mechanism
 
 
 class Source(NamedTuple):
@@ -79,6 +83,46 @@ class Drawing(Dyads):
     def places(self) -> Iterator[Pin]:
         """Where each joint of the lines is in the pose of the file, on each body that has it."""
         return (pin for body in self.parts for pin in self.on[body].items())
+
+    @property
+    def linkage(self) -> Mechanism:
+        """The linkage of the lines."""
+        return mechanisms.create('custom', joints=self.lines)
+
+    def apart(self, linkage: Mechanism, *names: str) -> float:
+        """Return how far joints are from the pose of the file, as a part of the linkage's size."""
+        values = [drive.value for drive in self.drives]
+        places = linkage.solve(values if len(values) > 1 else values[0])
+        return float(np.max([abs(complex(*places[name]) - place) for name, place in self.places
+                             if name in (names or places)])) / self.loop.size
+
+    @property
+    def ends(self) -> Dict[str, Tuple[float, float]]:
+        """Between which positions each source moves in a check."""
+        if joint := self.measured:
+            start = joint.start
+            return {joint.name: joint.limits or (start - 0.5 * math.pi, start + 0.5 * math.pi)}
+        found: Dict[str, Tuple[float, float]] = {}
+        for drive in self.drives:
+            around = math.pi if drive.name[:5] == 'crank' else 0.5 * self.loop.size
+            low, high = drive.value - around, drive.value + around
+            if drive.ends:
+                low, high = max(drive.ends[0], low - around), min(drive.ends[1], high + around)
+                low, high = (low, high) if low < high else drive.ends
+            low, high = sorted((end - drive.offset) / drive.ratio for end in (low, high))
+            found[drive.source] = low, high
+        return found
+
+    @property
+    def holders(self) -> List[Joint]:
+        """The joints of bodies that are left."""
+        return [joint for joint in self.loop.joints if {*joint.bodies} & {*self.left}]
+
+    @property
+    def freedom(self) -> int:
+        """In how many ways bodies that are left can move."""
+        return 3 * len(self.left) - 2 * len(self.holders) - sum(
+            joint in self.driven for joint in self.holders)
 
     def measured_by(self, joint: Joint) -> Optional[Tuple[str, float, float]]:
         """Return the link whose angle is a joint's position, with sign and position, if any."""
