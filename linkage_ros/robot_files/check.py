@@ -12,19 +12,15 @@ from typing import Dict, List, Mapping, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from .robot import Robot, SLIDE
-from .spatial import Component, components, Poses
+from .spatial import CLOSED, Component, components, DEAD, Poses
 from .. import scene
 
 # Motors are moved on so many paths, in all to so many poses; fewer than some are no check.
 PATHS, POSES, FEWEST = 12, 240, 200
 # By what numbers may differ [rad, or of the size], where the file's axes are exact.
 EXACT = 1e-9
-# Loops open by less, of their size, are closed.
-CLOSED = 1e-10
 # Of the usual stiffness of its loops, what a pose next to a change point has.
 CHANGE = 0.25
-# Loops that are no stiffer than this, of their size, cannot be closed to all digits.
-FLAT = 1e-6
 # A first step, as a part of one.
 LITTLE = 1e-3
 # A step that turns joints by more [rad] is made in smaller ones, so many times halved.
@@ -91,7 +87,7 @@ def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
         near = np.minimum.accumulate(track.volume, axis=1)[paths, first] < CHANGE * np.max(
             track.volume[track.alive], initial=0.0)
         for i in paths[track.alive[paths, first] & ~good[paths, first] & ~near]:
-            if np.max(track.margin[track.alive]) < FLAT:
+            if np.max(track.margin[track.alive]) < DEAD:
                 raise Difference('it could not be checked: its loops are at a dead point wherever '
                                  'its motors are')
             at, off = (i, first[i]), apart[i, first[i]]

@@ -12,20 +12,29 @@ from typing import Dict, Iterable, List, Mapping, NamedTuple, Tuple
 import numpy as np
 
 from .robot import FIXED, Robot, SLIDE
-from .spatial import Component, components, displaced, displacements, Poses, screws, trees
+from .spatial import (
+    CLOSED,
+    Component,
+    components,
+    DEAD,
+    displaced,
+    displacements,
+    Poses,
+    screws,
+    trees,
+)
 from ..command import RequestError
 from ..words import listed
 
 # What is open by less, of the size of its loops, is rounding, and closed from where it is: files
 # have angles such as 1.5708.
 NEAR = 1e-4
-# Other poses are looked for from so many starts; what is open by less is closed [of the size].
-STARTS, CLOSED = 24, 1e-10
+# Other poses are looked for from so many starts.
+STARTS = 24
 # A pose that is farther by less than this factor, and this [rad], is as near.
 ALIKE, ALIKE_LENGTH, DISTINCT = 1.2, 1e-3, 1e-3
-# Loops that are less stiff, of their size, are at a dead point, from which motors step aside by
-# this [rad, or of the size].
-FOLDED, ASIDE = 1e-6, 0.1
+# From a dead point motors step aside by this [rad, or of the size].
+ASIDE = 0.1
 
 
 def check_names(robot: Robot, names: Iterable[str]) -> None:
@@ -184,7 +193,7 @@ def nearest(component: Component, names: List[str], followers: List[str]) -> Tup
     poses = component.closed(start, still, soft=1e-7)
     if gap < NEAR and component.gap(poses)[0] <= max(CLOSED, gap) \
             and np.linalg.norm(component.away(poses.positions)) < 1e3 * max(gap, CLOSED):
-        _check_unfolded(component, poses, names, max(FOLDED, 3.0 * math.sqrt(gap)))
+        _check_unfolded(component, poses, names, max(DEAD, 3.0 * math.sqrt(gap)))
         return poses, ''
     # Where they must, joints that follow others move as well, and then motors.
     found, held_now = start, names

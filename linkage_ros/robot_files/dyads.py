@@ -11,10 +11,10 @@ from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .loops import Loop, ROUNDING
+from .loops import Loop
 from .robot import Joint, Robot, SLIDE
 from .. import mechanisms
-from ..linkage.dyads import bar_name, Dyads, Hinge, Motor, Pin, short, Slide
+from ..linkage.dyads import bar_name, Dyads, Hinge, Motor, Pin, ROUNDING, short, Slide
 from ..linkage.mechanism import Mechanism
 
 

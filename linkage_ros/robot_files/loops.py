@@ -11,18 +11,15 @@ from typing import Collection, Dict, List, Mapping, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from .robot import BALL, FIXED, HINGE, Joint, Robot, SLIDE
-from .spatial import blocks, top, trees
+from .spatial import blocks, TOGETHER, top, trees
+from ..linkage.dyads import ROUNDING
 
 # What joints of a planar loop may be.
 FLAT = (HINGE, SLIDE, BALL)
 # Axes that differ by more [rad] are not parallel: files have angles such as 1.5708.
 ASKEW = 1e-4
-# Hinges nearer to each other [m] cross in a point; the ends of a loop [m] are in one plane.
-TOGETHER = 1e-6
 # Loops that stay open by more, of their size, are not closed.
 OPEN = 1e-5
-# Of the size of a linkage, what is rounding.
-ROUNDING = 1e-12
 
 
 class Loop(NamedTuple):
@@ -213,17 +210,13 @@ def flat(robot: Robot, group: Group, drives: Sequence[str]) -> Loop:
     size = max(abs(place - other) for place in places for other in places)
     if size < TOGETHER:
         raise ValueError('all its joints are at one place')
-    gap = max(_gap(joint) for joint in found)
+    gaps = ((joint.places[1] - joint.places[0], joint) for joint in found)
+    gap = max(abs((apart / joint.axis).imag if joint.kind == SLIDE else apart)
+              for apart, joint in gaps)
     if gap > OPEN * size:
         raise ValueError(f'its loops cannot be closed: they stay open by {gap:.3g} m')
     return Loop(ground, frame_id, frame, found, size, gap, lean if lean > 1e-12 else 0.0,
                 across)
-
-
-def _gap(joint: Joint) -> float:
-    """Return by how much [m] a joint is open."""
-    apart = joint.places[1] - joint.places[0]
-    return abs((apart / joint.axis).imag if joint.kind == SLIDE else apart)
 
 
 def _check_rods(ground: str, joints: Sequence[Joint]) -> None:

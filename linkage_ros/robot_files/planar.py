@@ -15,6 +15,7 @@ from . import check, loops, model
 from .dyads import Drawing, short, Source
 from .robot import Joint, plain, Robot
 from .. import scene
+from ..linkage.dyads import ROUNDING
 from ..scene.joint_names import quoted_name
 
 # Of more joints no pairs are tried as motors.
@@ -127,7 +128,7 @@ def _sweep(drive: Source, read: scene.InputSettings) -> Optional[Tuple[float, fl
         turns = math.tau * math.floor((drive.value - start) / math.tau) * read.input.turns
         if start + turns <= drive.value <= end + turns:
             # An end that is a dead point is not quite reached.
-            edge = loops.ROUNDING * (end - start)
+            edge = ROUNDING * (end - start)
             low, high = max(low, start + turns + edge), min(high, end + turns - edge)
     return (low, high) if low + 1e-6 * read.input.size < high else None
 

@@ -28,6 +28,10 @@ STILL = 1e-8
 MOST = 100
 # Hinges nearer to each other [m] cross in a point.
 TOGETHER = 1e-6
+# Loops open by less, of their size, are closed.
+CLOSED = 1e-10
+# Loops that are less stiff, of their size, are at a dead point.
+DEAD = 1e-6
 # In which order joints are taken into the tree, so that hinges and balls are left to close it.
 _TREE = {FIXED: 0, SLIDE: 1, FREE: 2, BALL: 3, HINGE: 4}
 
@@ -437,10 +441,10 @@ class Component:
         for cut, (first, second) in zip(self._cuts, self._cut_ends):
             if cut.position is not None and cut.kind == HINGE:
                 turned = frames[:, first, :3, :3].swapaxes(1, 2) @ frames[:, second, :3, :3]
-                skew = np.stack([turned[:, 2, 1] - turned[:, 1, 2], turned[:, 0, 2] - turned[
-                    :, 2, 0], turned[:, 1, 0] - turned[:, 0, 1]], axis=1)
+                across = np.cross(cut.axis, np.eye(3)[np.argmin(np.abs(cut.axis))])
+                ahead = turned @ across
                 found[cut.name] = cut.position + np.arctan2(
-                    0.5 * skew @ cut.axes[0], 0.5 * (np.einsum('pii->p', turned) - 1.0))
+                    np.cross(across, ahead) @ cut.axis, ahead @ across)
         return found
 
 

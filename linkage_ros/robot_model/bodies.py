@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
 import math
-from typing import Dict, Iterable, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 from . import shapes
 from .. import palette
@@ -210,27 +210,19 @@ def together(robots: Sequence[Robot]) -> Robot:
     roots = {robot.root for robot in robots}
     above = {name: robot.root for robot in robots for part in robot.parts
              for name in roots.intersection(part.links)}
-
-    def depth(frame: str) -> int:
-        return 1 + depth(above[frame]) if frame in above else 0
-
-    root = _root(robots, above)
-    made = Robot('linkages', root, [part for robot in sorted(
-        robots, key=lambda robot: depth(robot.root)) for part in robot.parts])
-    made.check_names('mechanisms')
-    return made
-
-
-def _root(robots: Sequence[Robot], above: Mapping[str, str]) -> str:
-    """Return the common root link of all models; `above` maps a link to its model's root."""
-    frames = list(dict.fromkeys(robot.root for robot in robots))
-    for _ in list(frames):
-        frames = [above.get(frame, frame) for frame in frames]
-    tops = dict.fromkeys(frames)
-    if len(tops) > 1 or frames[0] in above:
+    # From each root link those on which it is, up to the last.
+    lines = {robot.root: [robot.root] for robot in robots}
+    for line in lines.values():
+        while len(line) <= len(roots) and line[-1] in above:
+            line.append(above[line[-1]])
+    root, *more = tops = dict.fromkeys(line[-1] for line in lines.values())
+    if more or root in above:
         raise SceneError('frame_id must be the same for all mechanisms of one robot model, or a '
                          f'link of another one of them, not {listed(tops, 120)}')
-    return frames[0]
+    made = Robot('linkages', root, [part for robot in sorted(
+        robots, key=lambda robot: len(lines[robot.root])) for part in robot.parts])
+    made.check_names('mechanisms')
+    return made
 
 
 def _robot(machine: SceneMechanism, frame_id: str, width: Optional[float]) -> Robot:
