@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Comparison of a scene's mechanism with its robot, whose loops are closed in space."""
+"""Comparison of a mechanism with its robot, whose loops are closed in space."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from .robot import Robot, SLIDE
 from .spatial import CLOSED, Component, components, DEAD, Poses
 from .. import scene
 
-# Motors are moved on so many paths, in all to so many poses; fewer than some are no check.
+# Number of paths of several motors, of poses on all paths, and of poses that a check needs.
 PATHS, POSES, FEWEST = 12, 240, 200
-# By what numbers may differ [rad, or of the size], where the file's axes are exact.
+# Allowed difference [rad, or of the size] for exact axes in the file.
 EXACT = 1e-9
-# Of the usual stiffness of its loops, what a pose next to a change point has.
+# Stiffness next to a change point, as a part of the largest.
 CHANGE = 0.25
-# A first step, as a part of one.
+# The first step, as a part of the others.
 LITTLE = 1e-3
-# A step that turns joints by more [rad] is made in smaller ones, so many times halved.
+# A step that turns joints by more [rad] is halved, at most so many times.
 LEAP, HALVINGS = 0.35, 6
 
 
@@ -32,7 +32,7 @@ class Difference(ValueError):
 
 
 class Track(NamedTuple):
-    """Poses along paths: where motors and joints are, which are closed, how stiff they are."""
+    """Poses along paths: positions of motors and joints, which are closed, and their stiffness."""
 
     motors: np.ndarray
     joints: Dict[str, np.ndarray]
@@ -83,7 +83,7 @@ def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
         allowed = (EXACT + 30.0 * slack) / np.maximum(track.margin, 1e-4)
         good = np.logical_and.accumulate(track.alive & (apart <= allowed), axis=1)
         paths, first = np.arange(len(good)), np.minimum(good.sum(axis=1), good.shape[1] - 1)
-        # Past a change point a robot may go on in two ways.
+        # Past a change point a robot can continue in two ways.
         near = np.minimum.accumulate(track.volume, axis=1)[paths, first] < CHANGE * np.max(
             track.volume[track.alive], initial=0.0)
         for i in paths[track.alive[paths, first] & ~good[paths, first] & ~near]:
@@ -115,7 +115,7 @@ def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
 
 def _differences(machine: scene.SceneMechanism, component: Component, sources: List[str],
                  track: Track) -> Tuple[np.ndarray, np.ndarray]:
-    """Return the worst difference in each pose, and of which joint."""
+    """Return the largest difference in each pose [rad, or of the size], and its joint."""
     values = [drive.ratio * track.motors[..., sources.index(drive.source)] + drive.offset
               for drive in machine.inputs.values()]
     if output := machine.first.measures:
@@ -139,29 +139,29 @@ def _differences(machine: scene.SceneMechanism, component: Component, sources: L
 
 
 class _Tracker:
-    """Closes the loops of a component at other motor positions, step by step."""
+    """Moves the motors of a component along paths, and closes its loops."""
 
     def __init__(self, robot: Robot, component: Component, driven: Sequence[str],
                  sources: List[str], slack: float):
         self._component, self._slack = component, slack
-        self._still = component.held(driven)
-        # The source of each joint that drives, its ratio and its offset.
+        self._still = component.columns_of(driven)
+        # For each driven joint its source, ratio and offset.
         self._movers = {name: (sources.index(source), ratio, offset) for name in driven
                         for source, ratio, offset in [robot.source(name)]}
 
     def track(self, start: np.ndarray, targets: np.ndarray) -> Track:
         """Return poses on straight paths of the motors, each closed from the one before."""
-        component, still, count = self._component, self._still, len(targets)
+        component, fixed, count = self._component, self._still, len(targets)
         steps = -(-POSES // count)
-        poses = component.closed(component.at_start(count), still)
+        poses = component.closed(component.at_start(count), fixed)
         self._base = component.errors(poses)[0][0]
-        nullity = component.nullity(still)
+        nullity = component.nullity(fixed)
         motors = start + (targets - start)[:, None] * (np.arange(steps + 1) / steps)[:, None]
         alive = np.zeros((count, steps), bool)
         margin, volume = np.ones((2, count, steps))
         joints: Dict[str, np.ndarray] = {}
-        drift, going = np.zeros((count, len(still))), np.arange(count)
-        # A little way tells which way joints go, so that the first step keeps to its branch.
+        drift, going = np.zeros((count, len(fixed))), np.arange(count)
+        # A small step gives the directions of joints, which keep the first step on its branch.
         little = motors[:, 0] + LITTLE * (motors[:, 1] - motors[:, 0])
         ahead, fine = self._advanced(poses, motors[:, 0], little, drift, 0)
         drift[fine] = component.step_between(poses, ahead)[fine] / LITTLE
@@ -174,14 +174,14 @@ class _Tracker:
             if not len(going):
                 break
             alive[going, k] = True
-            margin[going, k], volume[going, k] = component.stiffness(poses, still, nullity)
+            margin[going, k], volume[going, k] = component.stiffness(poses, fixed, nullity)
             for name, values in component.read(poses).items():
                 joints.setdefault(name, np.full(alive.shape, math.nan))[going, k] = values
         return Track(motors[:, 1:], joints, alive, margin, volume)
 
     def _advanced(self, poses: Poses, before: np.ndarray, after: np.ndarray, drift: np.ndarray,
                   halvings: int) -> Tuple[Poses, np.ndarray]:
-        """Return poses with the motors moved on, and which of them are closed."""
+        """Return poses with the motors moved, and which of them are closed."""
         component = self._component
         step = component.aimed(poses, drift, {
             name: ratio * after[:, i] + offset

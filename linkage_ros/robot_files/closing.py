@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A robot in the closed pose nearest to that of its file."""
+"""The closed pose of a robot that is nearest to the pose in its file."""
 
 from __future__ import annotations
 
@@ -26,19 +26,20 @@ from .spatial import (
 from ..command import RequestError
 from ..words import listed
 
-# What is open by less, of the size of its loops, is rounding, and closed from where it is: files
-# have angles such as 1.5708.
+# A gap that is smaller, of the size of its loops, is rounding: files have angles such as 1.5708.
+# Such loops are closed without a search.
 NEAR = 1e-4
-# Other poses are looked for from so many starts.
+# Number of random starts of a search for closed poses.
 STARTS = 24
-# A pose that is farther by less than this factor, and this [rad], is as near.
+# Two poses are equally near if their distances differ by less than this factor and this [rad];
+# they are different if a joint differs by this [rad].
 ALIKE, ALIKE_LENGTH, DISTINCT = 1.2, 1e-3, 1e-3
-# From a dead point motors step aside by this [rad, or of the size].
+# A step of motors away from a dead point [rad, or of the size].
 ASIDE = 0.1
 
 
 def check_names(robot: Robot, names: Iterable[str]) -> None:
-    """Raise RequestError for a name without a joint of one degree of freedom."""
+    """Raise RequestError for a name that no joint of one degree of freedom has."""
     for name in names:
         if name not in robot.positions:
             raise RequestError(f'there is no joint {name!r}; allowed: '
@@ -85,26 +86,26 @@ class Closed(NamedTuple):
 
     Attributes
     ----------
-    said : list of str
-        What is to be said of it.
-    open_ones : dict
-        Why joints stay open, by their names.
-    stiff : list of str
+    report : list of str
+        Which motors had to move.
+    open_loops : dict
+        For each joint whose loops cannot be closed, the reason.
+    immobile : list of str
         Joints that cannot move.
     faults : dict
-        What is wrong with the motors of joints' loops, by the joints' names.
+        For each joint whose loops the motors do not determine, the reason.
 
     """
 
     robot: Robot
-    said: List[str]
-    open_ones: Dict[str, str]
-    stiff: List[str]
+    report: List[str]
+    open_loops: Dict[str, str]
+    immobile: List[str]
     faults: Dict[str, str]
 
 
 def closed(robot: Robot) -> Closed:
-    """Return a robot with closed loops; motors stay at their positions if possible."""
+    """Close the loops of a robot; its motors keep their positions if possible."""
     robot = _with_followers(robot)
     made = Closed(robot, [], {}, [], {})
     moves: Dict[str, np.ndarray] = {}
@@ -115,24 +116,24 @@ def closed(robot: Robot) -> Closed:
         try:
             poses, moved = nearest(component, names, followers)
         except ValueError as error:
-            made.open_ones.update((joint.name, str(error)) for joint in component.joints)
+            made.open_loops.update((joint.name, str(error)) for joint in component.joints)
             continue
         if component.gap(poses)[0] < CLOSED:
-            made.stiff.extend(component.immobile(poses))
-            if fault := _fault(component, poses, names, followers, made.stiff):
+            made.immobile.extend(component.immobile(poses))
+            if fault := _fault(component, poses, names, followers, made.immobile):
                 made.faults.update((joint.name, fault) for joint in component.joints)
         moves.update(component.moves(poses))
         positions.update((name, float(value[0])) for name, value in component.read(poses).items())
-        made.said.extend([moved] * bool(moved))
+        made.report.extend([moved] * bool(moved))
     return made._replace(robot=displaced(robot, moves, positions))
 
 
 def _fault(component: Component, poses: Poses, motors: List[str], followers: List[str],
-           stiff: List[str]) -> str:
-    """Return why motors, with what follows them, do not determine a pose, if they do not."""
-    if {*component.positions} <= {*stiff}:
+           immobile: List[str]) -> str:
+    """Return why motors and their followers do not determine a pose; empty if they do."""
+    if {*component.positions} <= {*immobile}:
         return 'it cannot move, as its joints hold each other'
-    ways = component.free_ways(poses, component.held([]))[:, component.held(motors)]
+    ways = component.free_ways(poses, component.columns_of([]))[:, component.columns_of(motors)]
     count = int(np.linalg.matrix_rank(ways, 1e-6)) if ways.size else 0
     if count < len(motors):
         return (f'{listed(motors)} drive it, and hold each other, as {count} of them tell where '
@@ -143,29 +144,29 @@ def _fault(component: Component, poses: Poses, motors: List[str], followers: Lis
 
 
 def _check_unfolded(component: Component, poses: Poses, motors: List[str], least: float) -> None:
-    """Raise ValueError if bars lie in line, so that a pose can be left in two ways."""
+    """Raise ValueError at a dead point, which a linkage can leave in two ways."""
     if not motors:
-        # Some joint shall move it, but not one that just this pose stops.
-        ways = component.free_ways(poses, component.held([]), least)
-        if len(ways) <= component.nullity(component.held([])):
+        # Without motors, drive a joint that this pose does not stop.
+        ways = component.free_ways(poses, component.columns_of([]), least)
+        if len(ways) <= component.nullity(component.columns_of([])):
             return
         motors = component.most_moved(ways)
-    still = component.held(motors)
-    ways = component.free_ways(poses, still, least)
-    for way in ways if len(ways) > component.nullity(still) else ():
+    fixed = component.columns_of(motors)
+    ways = component.free_ways(poses, fixed, least)
+    for way in ways if len(ways) > component.nullity(fixed) else ():
         aside = ASIDE * component.unit * way[None]
-        back = component.closed(component.stepped(poses, aside), still, 40)
+        back = component.closed(component.stepped(poses, aside), fixed, 40)
         if np.max(np.abs(component.away(back.positions - poses.positions))) < 0.3 * ASIDE:
             _refuse_fold(component, poses, motors, 3.0 * aside)
 
 
 def _refuse_fold(component: Component, poses: Poses, motors: List[str], aside: np.ndarray) -> None:
-    """Raise ValueError with both poses if a pose with bars in line has two neighbours."""
-    still, ends = component.held(motors), True
+    """Raise ValueError with both neighbouring poses of a dead point, if there are two."""
+    fixed, ends = component.columns_of(motors), True
     for ahead in (ASIDE, -ASIDE):
         step = component.towards_limits(motors, ahead)
         both = Poses(*map(np.concatenate, zip(*(component.closed(
-            component.stepped(poses, step + side), still, 40) for side in (aside, -aside)))))
+            component.stepped(poses, step + side), fixed, 40) for side in (aside, -aside)))))
         name, first, second = component.farthest_apart(both, 1.0)
         is_closed = np.max(component.gap(both)) < CLOSED
         ends = ends and not is_closed
@@ -182,31 +183,31 @@ def _refuse_fold(component: Component, poses: Poses, motors: List[str], aside: n
 
 def nearest(component: Component, names: List[str], followers: List[str]) -> Tuple[Poses, str]:
     """
-    Return the closed pose that is nearest to the file's, and what is to be said of it.
+    Return the closed pose that is nearest to the file's, and a report if motors had to move.
 
-    Motors that are named stay where they are, if the loops can be closed so, and so do joints
-    that follow others. Raises ValueError if two poses are as near.
+    Motors and followers keep their positions if the loops can be closed so. Raises ValueError if
+    two poses are equally near.
     """
-    start, still = component.at_start(), component.held(names)
+    start, fixed = component.at_start(), component.columns_of(names)
     gap = float(component.gap(start)[0])
-    # Axes that lean a little are no reason to go far where nothing drives.
-    poses = component.closed(start, still, soft=1e-7)
+    # Slightly inclined axes must not move undriven joints far.
+    poses = component.closed(start, fixed, soft=1e-7)
     if gap < NEAR and component.gap(poses)[0] <= max(CLOSED, gap) \
             and np.linalg.norm(component.away(poses.positions)) < 1e3 * max(gap, CLOSED):
         _check_unfolded(component, poses, names, max(DEAD, 3.0 * math.sqrt(gap)))
         return poses, ''
-    # Where they must, joints that follow others move as well, and then motors.
+    # If the loops cannot be closed otherwise, followers move, and then motors.
     found, held_now = start, names
     open_by = math.inf
     for kept in [names + followers] * bool(followers) + [names] + [[]] * bool(names):
-        other, less = _closed_ones(component, component.held(kept))
+        other, less = _closed_ones(component, component.columns_of(kept))
         if less < 0.9 * open_by:
             found, open_by, held_now = other, less, kept
         if open_by < CLOSED:
             break
     said = '' if held_now or not names else \
         f'{", ".join(names)} moved: their loops cannot be closed where the file has them.'
-    determined = ~component.free(component.free_ways(found, component.held(held_now))) \
+    determined = ~component.free(component.free_ways(found, component.columns_of(held_now))) \
         if held_now else 1.0
     away = np.linalg.norm(component.away(found.positions) * determined, axis=1)
     nearest_one = int(np.argmin(away))
@@ -214,7 +215,7 @@ def nearest(component: Component, names: List[str], followers: List[str]) -> Tup
         two = found.some(np.array([nearest_one, i]))
         name, first, second = component.farthest_apart(two, determined)
         if abs(first - second) > DISTINCT:
-            # Where motors had to move, they are part of the choice.
+            # Motors that had to move are part of the choice.
             chosen = [name, *(motor for motor in names if not held_now and motor != name)]
             ends = [' '.join(f'{each}={component.read(two)[each][k]:.3g}' for each in chosen)
                     for k in (0, 1)]
@@ -223,17 +224,16 @@ def nearest(component: Component, names: List[str], followers: List[str]) -> Tup
     return found.some(np.array([nearest_one])), said
 
 
-def _closed_ones(component: Component, still: np.ndarray) -> Tuple[Poses, float]:
-    """Return poses that are closed as far as can be, and how far they are open, of the size."""
-    columns = len(still)
+def _closed_ones(component: Component, fixed: np.ndarray) -> Tuple[Poses, float]:
+    """Return the poses with the smallest gap, and this gap as a part of the size."""
+    columns = len(fixed)
     count = max(2, min(STARTS, 400_000 // max(columns, 1) ** 2))
     rng = np.random.default_rng(0)
-    spread = np.linspace(0.0, 2.0, count)[:, None] * ~still
-    home = np.zeros(columns)
+    spread = np.linspace(0.0, 2.0, count)[:, None] * ~fixed
     poses = component.stepped(component.at_start(count), component.unit * spread * rng.uniform(
         -1.0, 1.0, (count, columns)))
-    poses = component.closed(poses, still, 40, home, 1e-2)
-    poses = component.closed(poses, still, 12)
+    poses = component.closed(poses, fixed, 40, 1e-2)
+    poses = component.closed(poses, fixed, 12)
     poses = component.wrapped(poses)
     gaps = component.gap(poses)
     return poses.some(np.flatnonzero(gaps <= 1.001 * gaps.min() + CLOSED)), float(gaps.min())

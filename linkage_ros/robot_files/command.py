@@ -20,7 +20,7 @@ from ..words import elided
 
 NAME = 'from_robot'
 NEEDS = 'pip install pyyaml, and mujoco for MJCF'
-# What is said of a mechanism that is not its robot's, or could not be held against it.
+# The report on a mechanism that differs from its robot, or could not be compared.
 WRONG = 'held against the robot'
 
 
@@ -49,7 +49,7 @@ def show(args: Optional[List[str]]) -> None:
         robot = closing.posed(robot, _values(asked.pose))
         robot = closing.held(robot, {**robot.held, **_values(asked.hold)})
         given, said = described(robot)
-    # Names in the file are the file's: what is no letter in them could end a comment.
+    # Unprintable characters in names of the file could end a comment.
     head = [elided(line, 10 ** 6) for line in (
         f'From {asked.file}. All its joints on /joint_states, and its model:', _launch(asked),
         *said)]
@@ -61,7 +61,7 @@ def show(args: Optional[List[str]]) -> None:
 
 
 def _launch(asked: Any) -> str:
-    """Return the line that brings up the robot with its scene."""
+    """Return the command that launches the robot with its scene."""
     said = {'robot': asked.file, 'scene': 'SCENE.yaml', 'loops': asked.loops or '',
             'hold': ' '.join(asked.hold)}
     return 'ros2 launch linkage_ros robot.launch.py ' + ' '.join(
@@ -69,19 +69,19 @@ def _launch(asked: Any) -> str:
 
 
 def described(robot: Robot) -> Tuple[Dict[str, Any], List[str]]:
-    """Return the parameters of a robot's scene, and reports on omissions and checks."""
+    """Return the parameters of a robot's scene, and the report on omissions and checks."""
     given: Dict[str, Any] = {'mechanisms': []}
     closed = closing.closed(robot)
-    robot, said = closed.robot, closed.said
+    robot, said = closed.robot, closed.report
 
     def add(name: str, parameters: Mapping[str, Any], more: Sequence[str]) -> None:
         given['mechanisms'].append(name)
         given.update(parameters)
         said.extend(more)
 
-    for group in loops.groups(robot, closed.stiff):
+    for group in loops.groups(robot, closed.immobile):
         open_one, fault = (_first(reasons, group.joints) for reasons in (
-            closed.open_ones, closed.faults))
+            closed.open_loops, closed.faults))
         left = group.joints
         for part in (group.parts if group.why else [group]) if not open_one else ():
             try:

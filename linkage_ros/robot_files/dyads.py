@@ -71,17 +71,17 @@ class Drawing(Dyads):
 
     @property
     def moved_by(self) -> List[Joint]:
-        """Return the joints that move it: where its motor is between moving links, that."""
+        """Return the motors: the one between two moving links, if there is one."""
         return [self.measured] if self.measured else self.driven
 
     @property
     def allowed(self) -> float:
-        """How far a pose may be from the file's, of the size: rounding, or some of its gap."""
+        """Allowed distance of a pose from the file's, of the size."""
         return max(ROUNDING, 30.0 * self.loop.gap / self.loop.size + self.loop.lean)
 
     @property
     def places(self) -> Iterator[Pin]:
-        """Where each joint of the lines is in the pose of the file, on each body that has it."""
+        """The places of the lines' joints in the pose of the file, on each of their bodies."""
         return (pin for body in self.parts for pin in self.on[body].items())
 
     @property
@@ -90,7 +90,7 @@ class Drawing(Dyads):
         return mechanisms.create('custom', joints=self.lines)
 
     def apart(self, linkage: Mechanism, *names: str) -> float:
-        """Return how far joints are from the pose of the file, as a part of the linkage's size."""
+        """Return the largest distance of joints from the file's pose, of the linkage's size."""
         values = [drive.value for drive in self.drives]
         places = linkage.solve(values if len(values) > 1 else values[0])
         return float(np.max([abs(complex(*places[name]) - place) for name, place in self.places
@@ -98,7 +98,7 @@ class Drawing(Dyads):
 
     @property
     def ends(self) -> Dict[str, Tuple[float, float]]:
-        """Between which positions each source moves in a check."""
+        """The range of each source in a check [rad or m]."""
         if joint := self.measured:
             start = joint.start
             return {joint.name: joint.limits or (start - 0.5 * math.pi, start + 0.5 * math.pi)}
@@ -120,7 +120,7 @@ class Drawing(Dyads):
 
     @property
     def freedom(self) -> int:
-        """In how many ways bodies that are left can move."""
+        """The degrees of freedom of the bodies that are left."""
         return 3 * len(self.left) - 2 * len(self.holders) - sum(
             joint in self.driven for joint in self.holders)
 
@@ -142,11 +142,11 @@ class Drawing(Dyads):
             return None
         link, hangs, along, slide, _ = self.parts[body]
         if hangs != pin or slide:
-            # A triangle on its link shows how that turns against the one that the pin is on.
+            # The angle of a triangle on this link is the angle between the two links.
             try:
                 start, (other, end) = self.on[body][pin], self.other(body, pin)
             except ValueError:
-                # On a block, or a barrel, no word can place a second joint.
+                # No word places a second joint on this block or barrel.
                 return None
             along, side = (end - start) * complex(0.5, 0.75 ** 0.5), self.said(abs(end - start))
             tip = self.name(start + along, body, f'dyad {pin} {other} {side} {side} left')
@@ -175,7 +175,7 @@ class Drawing(Dyads):
         return joint.start
 
     def alike(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
-        """Return what a line says of bars like those from a corner: they pass their flat poses."""
+        """Return the start of a line for bars that mirror others, and so pass dead points."""
         (first, start), (second, end) = one, two
         for corner, at in self.places:
             links = [{body for body in self.parts

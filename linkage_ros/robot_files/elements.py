@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What robot descriptions in XML share: elements, numbers and poses in them."""
+"""Elements, numbers and poses in robot descriptions in XML."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Element = ElementTree.Element
 
 
 def parse(path: str) -> Element:
-    """Return the root element of a file, all names without their namespace's prefix."""
+    """Return the root element of a file; names lose the prefix of their namespace."""
     builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
     has_xacro = False
 
@@ -42,7 +42,7 @@ def parse(path: str) -> Element:
 
 
 def once(parts: Iterable[Tuple[str, Element]]) -> Dict[str, Element]:
-    """Return parts by name; raise RequestError if two have one name, or one child."""
+    """Return parts by name; raise RequestError if two have the same name."""
     found: Dict[str, Element] = {}
     for name, part in parts:
         if found.setdefault(name, part) is not part:
@@ -62,7 +62,7 @@ def text(part: Element, tag: str, otherwise: str = '') -> str:
 
 
 def numbers(said: Union[str, Sequence[Any]], count: int = 3) -> np.ndarray:
-    """Return so many numbers; raise ValueError if they are others."""
+    """Return the numbers of a text or a list; raise ValueError if they are not `count`."""
     found = np.array(said.split() if isinstance(said, str) else said, float)
     if found.shape != (count,) or not np.all(np.abs(found) < FARTHEST):
         raise ValueError(f'{said!r} must be {count} numbers within {FARTHEST:g}')

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The closed loops of a robot, each linkage in its plane, and closed."""
+"""The planar loops of a robot, each in its plane."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from .robot import BALL, FIXED, HINGE, Joint, Robot, SLIDE
 from .spatial import blocks, TOGETHER, top, trees
 from ..linkage.dyads import ROUNDING
 
-# What joints of a planar loop may be.
+# Kinds of joints in planar loops.
 FLAT = (HINGE, SLIDE, BALL)
-# Axes that differ by more [rad] are not parallel: files have angles such as 1.5708.
+# Axes that differ by less [rad] are parallel: files have angles such as 1.5708.
 ASKEW = 1e-4
-# Loops that stay open by more, of their size, are not closed.
+# Loops with a larger gap, of their size, cannot be closed.
 OPEN = 1e-5
 
 
@@ -46,7 +46,7 @@ class Loop(NamedTuple):
 
 
 class Group(NamedTuple):
-    """Joints of loops that share bars, their ground, its name in the file; why not planar."""
+    """Joints of loops that share bars, their ground and its frame; why they are not planar."""
 
     ground: str
     frame_id: str
@@ -55,32 +55,32 @@ class Group(NamedTuple):
     parts: List['Group']
 
 
-def groups(robot: Robot, stiff: Collection[str] = ()) -> List[Group]:
+def groups(robot: Robot, immobile: Collection[str] = ()) -> List[Group]:
     """
-    Return the loops of a robot; where they are not planar, those parts of them that are.
+    Return the loops of a robot, with the planar parts of those that are not planar.
 
-    Joints that are `stiff` never move: where they are all that is not planar, they are rigid.
+    Joints that are `immobile` count as rigid where only they are not planar.
     """
     home = _merged(robot, {body: body for body in robot.frames}, [
         joint for joint in robot.joints if joint.kind == FIXED])
     found = _blocks(robot, home, _with_balls(robot, _on(home, robot.joints)))
-    return [group if not group.why else group._replace(parts=_parts(robot, home, group, stiff))
+    return [group if not group.why else group._replace(parts=_parts(robot, home, group, immobile))
             for group in found]
 
 
-def _parts(robot: Robot, home: Dict[str, str], group: Group, stiff: Collection[str]
+def _parts(robot: Robot, home: Dict[str, str], group: Group, immobile: Collection[str]
            ) -> List[Group]:
     """Return the planar parts of loops that are not planar as a whole."""
     names = {joint.name for joint in group.joints if joint.position is not None}
-    if names & {*robot.driven} <= {*stiff}:
-        stiff = ()
+    if names & {*robot.driven} <= {*immobile}:
+        immobile = ()
     parts: List[Group] = []
     for joint in sorted(group.joints, key=lambda joint: joint.name not in robot.driven):
         if joint.kind != HINGE or any(joint.name == one.name for part in parts
                                       for one in part.joints):
             continue
         left = [one for one in group.joints if not any(one in part.joints for part in parts)]
-        rigid = [one for one in left if one.name in stiff and _lean(one, joint.axis) > ASKEW]
+        rigid = [one for one in left if one.name in immobile and _lean(one, joint.axis) > ASKEW]
         here = _merged(robot, home, rigid)
         parts += [part for part in _blocks(robot, here, _on(here, [
             one for one in left if one.kind in FLAT and _lean(one, joint.axis) < ASKEW]))
@@ -89,7 +89,7 @@ def _parts(robot: Robot, home: Dict[str, str], group: Group, stiff: Collection[s
 
 
 def _blocks(robot: Robot, home: Mapping[str, str], joints: Sequence[Joint]) -> List[Group]:
-    """Return loops that share bars between bodies that have become one."""
+    """Return the loops of merged bodies, those that share bars together."""
     found, cuts = trees(replace(robot, root=home[robot.root], joints=[*joints], frames={
         body: robot.frames[body] for body in home.values()}))
     ranks = {body: i for i, body in enumerate((home[robot.root], *found))}
@@ -176,7 +176,7 @@ def check_planar(ground: str, joints: Sequence[Joint], drives: Sequence[str] = (
 
 
 def _lean(joint: Joint, normal: np.ndarray) -> float:
-    """Return by how much a joint's axes are not as they are in a plane [rad]."""
+    """Return the inclination of a joint's axes against those of a plane [rad]."""
     if joint.kind == SLIDE:
         return float(abs(joint.axis @ normal))
     return float(max(np.linalg.norm(np.cross(axis, normal)) for axis in joint.axes)) \

@@ -31,7 +31,7 @@ def read(path: str) -> Robot:
         if not joints.size:
             robot.join(body, FIXED, (above, body), robot.frames[body])
         for j in joints:
-            # Between several joints of one body there are bodies without a name.
+            # Several joints of one body have bodies without a name between them.
             below = body if j == joints[-1] else f'{body}/{names[j]}'
             robot.frames.setdefault(below, robot.frames[body])
             kind = mj.mjtJoint(model.jnt_type[j]).name[6:].lower()
@@ -57,7 +57,7 @@ def _compiled(path: str) -> Any:
     """Return a model without meshes, whose files may be missing."""
     import mujoco as mj
 
-    # What it warns of, and writes to a file, is dynamics.
+    # Warnings, which MuJoCo writes to a file, concern dynamics.
     mj.set_mju_user_warning(lambda text: None)
     spec = mj.MjSpec.from_file(path)
     for geom in spec.geoms:

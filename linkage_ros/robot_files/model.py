@@ -41,7 +41,7 @@ def urdf(robot: Robot) -> str:
         home = robot.frames[body].copy()
         forward = joint.bodies[1] == body
         if moves:
-            # A URDF has a joint where its child's frame is.
+            # In URDF the frame of a joint is that of its child.
             home[:3, 3] = joint.places[not forward]
         names = (f'{body}/joint', body) if moves and not np.array_equal(
             home, robot.frames[body]) else (body,)

@@ -18,7 +18,7 @@ from .. import scene
 from ..linkage.dyads import ROUNDING
 from ..scene.joint_names import quoted_name
 
-# Of more joints no pairs are tried as motors.
+# The most joints of which pairs are tried as motors.
 MANY = 30
 _OTHER = {'left': 'right', 'right': 'left', 'out': 'in', 'in': 'out'}
 
@@ -34,7 +34,7 @@ class NotPlaced(ValueError):
 def described(robot: Robot, group: loops.Group, others: Sequence[str]
               ) -> Tuple[str, Dict[str, Any], List[str]]:
     """
-    Return a mechanism's name, its parameters, and what is to be said of it.
+    Return a mechanism's name, its parameters, and its report.
 
     Raises ValueError for loops that are no dyads, or whose poses are others than the robot's.
     """
@@ -70,7 +70,7 @@ def described(robot: Robot, group: loops.Group, others: Sequence[str]
 
 
 def _drawn(robot: Robot, group: loops.Group) -> Drawing:
-    """Return the lines of a group of loops, with the drives that place the most of it."""
+    """Return the lines of loops, with the inputs that place the most bodies."""
     names = [joint.name for joint in group.joints if joint.position is not None]
     motors = [name for name in names if name in robot.driven]
     tries: List[Sequence[str]] = [motors, [name for name in names
@@ -87,7 +87,7 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
     best = min(drawings, key=lambda drawing: len(drawing.left))
     if best.left and len(motors) == 1 and all(
             group.ground not in joint.bodies for joint in group.joints if joint.name == motors[0]):
-        # A motor between two moving links is measured by what moves instead, a link on the ground.
+        # A link on the ground drives, and the motor between two moving links measures it.
         for joint in group.joints:
             if group.ground in joint.bodies and joint.position is not None:
                 other = Drawing(robot, loops.flat(robot, group, [joint.name]), [joint.name])
@@ -99,7 +99,7 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
     if not best.drives:
         raise NotPlaced(best) if best.left else ValueError('no motor moves it')
     for i, line in enumerate(best.lines):
-        # At a change point the side seen in this pose is not always the one to be written.
+        # At a change point the side in this pose may be the wrong one.
         name, *_, side = line.split()
         if side in _OTHER and not best.apart(best.linkage, name) < best.allowed:
             best.lines[i] = line[:-len(side)] + _OTHER[side]
@@ -120,7 +120,7 @@ def _why(drawing: Drawing) -> str:
 
 
 def _sweep(drive: Source, read: scene.InputSettings) -> Optional[Tuple[float, float]]:
-    """Return between which ends the limits of its joint let an input move, in its reach."""
+    """Return the limits of an input: those of its joint, within its reach."""
     if drive.ends is None:
         return None
     low, high = (float(short(end, 1e-15)) for end in drive.ends)

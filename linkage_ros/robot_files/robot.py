@@ -65,12 +65,12 @@ class Joint:
 
     @property
     def hinges(self) -> List['Joint']:
-        """Return the hinges that it is made of, or itself."""
+        """Return the hinges of a ball that is made of some, else the joint itself."""
         return [one for part in self.parts for one in part.hinges] or [self]
 
 
 def plain(name: str, most: int) -> str:
-    """Return a name of letters, digits and single underscores, of no more than so many."""
+    """Return a name of at most so many letters, digits and single underscores."""
     found = re.sub('[^A-Za-z0-9]+', '_', name).strip('_')[:most]
     return found if found[:1].isalpha() else f'joint_{found}'.rstrip('_')
 
@@ -78,9 +78,23 @@ def plain(name: str, most: int) -> str:
 @dataclass
 class Robot:
     """
-    Frames of bodies, joints, which of them motors move, and which are a multiple of others.
+    Bodies and joints of a robot, in the pose of its file.
 
-    Some are held where they are.
+    Attributes
+    ----------
+    root : str
+        The body that does not move.
+    frames : dict
+        The pose of each body.
+    joints : list of Joint
+        All joints.
+    driven : list of str
+        Joints that motors move.
+    follows : dict
+        For each dependent joint another joint, the ratio and the offset.
+    held : dict
+        Positions of joints that are fixed.
+
     """
 
     root: str
@@ -134,7 +148,7 @@ class Robot:
         self.join(name, kind, bodies, first, axis, other, second=second)
 
     def follow(self, name: str, other: str, ratio: float, offset: float) -> None:
-        """Have a joint be a multiple of another, plus an offset."""
+        """Make a joint dependent: ratio * position + offset of another."""
         if ratio:
             self.follows[name] = other, float(ratio), float(offset)
 
@@ -144,7 +158,7 @@ class Robot:
         return {joint.name: joint.position for joint in self.joints if joint.position is not None}
 
     def source(self, name: str) -> Tuple[str, float, float]:
-        """Return the joint that another follows, if not itself, its ratio and its offset."""
+        """Return the joint that another depends on, or itself, with ratio and offset."""
         ratio, offset, passed = 1.0, 0.0, [*self.driven]
         while name in self.follows and name not in passed:
             passed.append(name)

@@ -26,14 +26,14 @@ from ..linkage.rod_lines import FORMS, WindowError
 from ..scene.joint_names import quoted_name
 from ..words import listed
 
-# Limits of a hinge that say nothing [rad].
+# A hinge with wider limits [rad] has none.
 _ANY = 0.999 * math.pi
-# Poses on each side of the motors' ranges that a check moves them in.
+# Number of poses along each side of the motors' ranges.
 _SIDE = 7
 
 
 class Link(NamedTuple):
-    """A link on a joint, its parent, and its axis, which may be the other way round."""
+    """A link: its parent, its joint, and the joint's axis and place on the parent."""
 
     parent: str
     joint: Joint
@@ -98,7 +98,7 @@ class Rods:
         return ' '.join(short(float(x)) for x in seen)
 
     def _add(self, joint: Joint) -> None:
-        """Add a link on a joint with one that is there."""
+        """Add a link, and its joint with a link that is there."""
         backwards = joint.bodies[0] not in self._bodies
         base, body = joint.bodies[::-1] if backwards else joint.bodies
         if joint.kind not in (HINGE, SLIDE):
@@ -180,7 +180,7 @@ def _on_bodies(joints: Sequence[Joint]) -> Dict[str, List[Joint]]:
 def described(robot: Robot, group: Group, others: Sequence[str]
               ) -> Tuple[str, Dict[str, Any], List[str]]:
     """
-    Return a mechanism's name, its parameters, and what is to be said of it.
+    Return a mechanism's name, its parameters, and its report.
 
     Raises ValueError for loops that rods cannot be, or whose poses are others than the robot's.
     """
@@ -199,7 +199,7 @@ def described(robot: Robot, group: Group, others: Sequence[str]
 
 
 def _lines(found: Rods) -> Tuple[List[str], List[str]]:
-    """Return lines whose limits can be, and what is said where they are not the file's."""
+    """Return lines with limits that allow one pose, and a report if they are not the file's."""
     lines = found.lines()
     try:
         mechanisms.create('rods', joints=lines)
@@ -216,7 +216,7 @@ def _lines(found: Rods) -> Tuple[List[str], List[str]]:
 
 
 def _ranges(machine: scene.SceneMechanism, found: Rods) -> Dict[str, Tuple[float, float]]:
-    """Return ranges of the motors, as the robot counts them, in which all is a pose."""
+    """Return ranges of the motors' positions in which every pose exists."""
     names = [*machine.inputs]
     start = np.array([machine.inputs[name].start for name in names])
     sizes = np.array([2.5 if machine.linkage.is_angle(name) else 0.5 * x

@@ -19,8 +19,8 @@ from ..command import RequestError
 
 
 def read(path: str, root: Element) -> Robot:
-    """Return the robot that the first model with joints is."""
-    _say_frames(root)
+    """Return the robot of the first model with joints."""
+    _make_axes_explicit(root)
     for model in (*root.findall('model'), *root.findall('world/model')):
         parts = [*_parts(model, '', path)]
         if any(part.tag == 'joint' for _, part in parts):
@@ -28,8 +28,8 @@ def read(path: str, root: Element) -> Robot:
     raise RequestError('the SDF has no model with joints')
 
 
-def _say_frames(root: Element) -> None:
-    """Write what is without saying up to version 1.4 of a file: axes are in the model's frame."""
+def _make_axes_explicit(root: Element) -> None:
+    """Make explicit that up to version 1.4 axes are in the model's frame."""
     if tuple(map(int, root.get('version', '1.12').split('.'))) <= (1, 4):
         for axis in (*root.iter('axis'), *root.iter('axis2')):
             if not text(axis, 'use_parent_model_frame'):
@@ -37,7 +37,7 @@ def _say_frames(root: Element) -> None:
 
 
 def _parts(model: Element, name: str, path: str) -> Iterator[Tuple[str, Element]]:
-    """Yield the parts of a model by name, those of models in it too."""
+    """Yield the parts of a model and of the models in it, with their full names."""
     yield name, model
     for part in model:
         inner = f'{name}::{part.get("name", "")}'.lstrip(':')
@@ -56,7 +56,7 @@ def _included(part: Element, name: str, path: str) -> Iterator[Tuple[str, Elemen
     if not file.is_file() or part.get('merge') in ('1', 'true'):
         raise RequestError(f'the model includes {uri!r}, which is not read: write it in its place')
     root = parse(str(file))
-    _say_frames(root)
+    _make_axes_explicit(root)
     model = root.find('model')
     if model is None:
         raise RequestError(f'{file} has no model')
@@ -70,14 +70,14 @@ def _included(part: Element, name: str, path: str) -> Iterator[Tuple[str, Elemen
 
 
 class _Model:
-    """Frames of a model's parts; names in it count from the model that they are said in."""
+    """Frames of a model's parts; a name is relative to the model in which it stands."""
 
     def __init__(self, parts: Dict[str, Element]):
         self._parts = parts
         self.frame = lru_cache(None)(self._frame)
 
     def robot(self) -> Robot:
-        """Return the robot that it is."""
+        """Return the robot of the model."""
         links = [name for name, part in self._parts.items() if part.tag == 'link']
         joints = {name: part for name, part in self._parts.items() if part.tag == 'joint'}
         ends = {name: (self.body(self.named(name, text(part, 'parent'))),
@@ -164,7 +164,7 @@ class _Model:
         return way
 
     def _gear(self, robot: Robot, name: str, part: Element, ends: Tuple[str, str]) -> None:
-        """Have the second of two joints that turn on one body follow the first."""
+        """Make the second of two hinges on one body depend on the first."""
         body = self.body(self.named(name, text(part, 'gearbox_reference_body')))
         turns: List[Tuple[str, float]] = []
         for end, tag in zip(ends, ('axis', 'axis2')):

@@ -13,18 +13,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 import math
-from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
+from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Sequence, Set, Tuple
 
 import numpy as np
 
 from .robot import BALL, FIXED, FREE, HINGE, Joint, Robot, SLIDE
 from ..command import RequestError
 
-# A pose moves by no more than this in a step [rad, or parts of the size].
+# The largest step of an iteration [rad, or of the size].
 STRIDE = 0.5
-# After a step this small [rad, or of the size] the next is rounding: steps square.
+# The last step [rad, or of the size]: steps square, so that the next would be rounding.
 STILL = 1e-8
-# Bodies in loops that are closed together.
+# The most bodies of one component.
 MOST = 100
 # Hinges nearer to each other [m] cross in a point.
 TOGETHER = 1e-6
@@ -32,7 +32,7 @@ TOGETHER = 1e-6
 CLOSED = 1e-10
 # Loops that are less stiff, of their size, are at a dead point.
 DEAD = 1e-6
-# In which order joints are taken into the tree, so that hinges and balls are left to close it.
+# The order of joints in the tree, which leaves hinges and balls to close the loops.
 _TREE = {FIXED: 0, SLIDE: 1, FREE: 2, BALL: 3, HINGE: 4}
 
 
@@ -48,7 +48,7 @@ class Element(NamedTuple):
 
 
 class Poses(NamedTuple):
-    """Positions of the elements [rad or m], a row a pose, and how each displaces what is on it."""
+    """Positions of the elements [rad or m], a row a pose, and the displacement by each."""
 
     positions: np.ndarray
     moved: np.ndarray
@@ -59,14 +59,14 @@ class Poses(NamedTuple):
 
 
 def top(home: Dict[str, str], body: str) -> str:
-    """Return the body that stands for all that are joined with one."""
+    """Return the body that represents a set of joined bodies."""
     while home[body] != body:
         home[body] = body = home[home[body]]
     return body
 
 
 def trees(robot: Robot) -> Tuple[Dict[str, Tuple[str, Joint]], List[Joint]]:
-    """Return on which body, by which joint, each body hangs, and the joints that close loops."""
+    """Return the parent and the joint of each body, and the joints that close loops."""
     home = {body: body for body in robot.frames}
     near: Dict[str, List[Tuple[str, Joint]]] = {body: [] for body in robot.frames}
     cuts = []
@@ -82,7 +82,7 @@ def trees(robot: Robot) -> Tuple[Dict[str, Tuple[str, Joint]], List[Joint]]:
     found: Dict[str, Tuple[str, Joint]] = {}
     for start in (robot.root, *robot.frames):
         if start != robot.root and start not in found:
-            # A body that is only held by what closes loops.
+            # A body that only cuts connect.
             place = robot.frames[start][:3, 3]
             found[start] = robot.root, Joint('', FREE, (robot.root, start), (place, place),
                                              (place, place))
@@ -97,7 +97,7 @@ def trees(robot: Robot) -> Tuple[Dict[str, Tuple[str, Joint]], List[Joint]]:
 
 def displaced(robot: Robot, moves: Mapping[str, np.ndarray], positions: Mapping[str, float]
               ) -> Robot:
-    """Return a robot with some bodies displaced on their bases, and joints where they are then."""
+    """Return a robot with some bodies displaced on their parents, and new positions of joints."""
     moved = {robot.root: np.eye(4)}
     for body, (base, _) in trees(robot)[0].items():
         moved[body] = moved[base] @ moves[body] if body in moves else moved[base]
@@ -117,7 +117,7 @@ def displaced(robot: Robot, moves: Mapping[str, np.ndarray], positions: Mapping[
 
 def blocks(found: Mapping[str, Tuple[str, Joint]], cuts: Sequence[Joint]
            ) -> List[Tuple[Set[str], List[Joint]]]:
-    """Return the loops of a tree and cuts, those that share joints together: bodies and cuts."""
+    """Return bodies and cuts of the loops of a tree; loops that share joints are together."""
     lots: List[Tuple[Set[str], List[Joint]]] = []
     for cut in cuts:
         ways: List[Set[str]] = []
@@ -135,7 +135,7 @@ def blocks(found: Mapping[str, Tuple[str, Joint]], cuts: Sequence[Joint]
 
 
 def components(robot: Robot) -> Iterator['Component']:
-    """Yield the loops that share joints, each lot on its own."""
+    """Yield the loops of a robot; those that share joints are one component."""
     found, cuts = trees(robot)
     for bodies, own in blocks(found, cuts):
         if len(bodies) > MOST:
@@ -219,7 +219,7 @@ class Component:
         self._on[body] = parent
 
     def _equations(self) -> None:
-        """Note points on both ends of each cut that have to be the same."""
+        """Set the points that coincide on both ends of each cut."""
         ends, points = [], []
         for end, cut in zip(self._cut_ends, self._cuts):
             ways = [np.zeros((2, 3))]
@@ -242,16 +242,16 @@ class Component:
                 if joint.position is not None}
 
     def at_start(self, count: int = 1) -> Poses:
-        """Return so many times the pose of the file."""
+        """Return the pose of the file, `count` times."""
         return Poses(np.zeros((count, len(self._elements))),
                      np.tile(np.eye(4), (count, len(self._elements), 1, 1)))
 
-    def held(self, names: Sequence[str]) -> np.ndarray:
+    def columns_of(self, names: Sequence[str]) -> np.ndarray:
         """Return which columns are of the joints that are named."""
         return np.array([self._names[i] in names for i in self._column], bool)
 
     def most_moved(self, ways: np.ndarray) -> List[str]:
-        """Return the joint with a name that some ways move the most."""
+        """Return the joint with a name that moves the most in some directions."""
         sizes = np.linalg.norm(ways, axis=0) * self._named[self._column]
         return [self._names[self._column[int(np.argmax(sizes))]]]
 
@@ -277,21 +277,21 @@ class Component:
         return step
 
     def step_between(self, one: Poses, other: Poses) -> np.ndarray:
-        """Return by how much each column is farther in other poses; what turns in three is not."""
+        """Return the difference of two poses in each column; balls have none."""
         return (other.positions - one.positions)[:, self._column]
 
-    def stiffness(self, poses: Poses, still: np.ndarray, nullity: int
+    def stiffness(self, poses: Poses, fixed: np.ndarray, nullity: int
                   ) -> Tuple[np.ndarray, np.ndarray]:
         """Return the least and the product of singular values of each pose: 0 at a dead point."""
-        slope = self.errors(poses, True)[1][:, :, ~still] / self.size
+        slope = self.errors(poses, True)[1][:, :, ~fixed] / self.size
         values = np.linalg.eigvalsh(slope.swapaxes(1, 2) @ slope)[:, nullity:]
         values = np.sqrt(np.maximum(values, 0.0))
         return np.min(values, axis=1, initial=1.0), np.prod(values, axis=1)
 
-    def nullity(self, still: np.ndarray) -> int:
-        """Return how many joints move freely, in an open pose."""
-        step = np.random.default_rng(2).uniform(-0.3, 0.3, (1, len(still)))
-        slope = self.errors(self.stepped(self.at_start(), step * self.unit), True)[1][:, :, ~still]
+    def nullity(self, fixed: np.ndarray) -> int:
+        """Return the degrees of freedom that the loops leave, in a random open pose."""
+        step = np.random.default_rng(2).uniform(-0.3, 0.3, (1, len(fixed)))
+        slope = self.errors(self.stepped(self.at_start(), step * self.unit), True)[1][:, :, ~fixed]
         return int(np.sum(np.linalg.eigvalsh(slope[0].T @ slope[0]) < (3e-4 * self.size) ** 2))
 
     def _frames(self, poses: Poses) -> np.ndarray:
@@ -320,7 +320,7 @@ class Component:
         return Poses(positions, moved)
 
     def errors(self, poses: Poses, slopes: bool = False) -> Tuple[np.ndarray, np.ndarray]:
-        """Return what is open in each pose [m], and its derivatives by the columns."""
+        """Return the residuals of the loops in each pose [m], and their derivatives by columns."""
         frames = self._frames(poses)
         seen = (frames[:, self._ends] @ self._points[..., None])[..., 0]
         error = (seen[:, :, 0] - seen[:, :, 1])[..., :3].reshape(len(frames), -1)
@@ -332,31 +332,28 @@ class Component:
         slope = np.einsum('prsci,rsc->pric', rates, self._signed)
         return error, slope.reshape(*error.shape, -1) * self.unit
 
-    def closed(self, poses: Poses, still: np.ndarray, count: int = 12,
-               home: Optional[np.ndarray] = None, firm: float = 0.0, soft: float = 1e-14
-               ) -> Poses:
+    def closed(self, poses: Poses, fixed: np.ndarray, count: int = 12, pull: float = 0.0,
+               soft: float = 1e-14) -> Poses:
         """
-        Return poses that Newton's method has closed, as far as it can in so many steps.
+        Return poses after so many steps of Newton's method, or fewer if they are closed.
 
-        The columns that are `still` do not move. `home` [columns] pulls poses back, at first
-        as firmly as loops pull, then less and less. Ways to move that loops hold no more firmly
-        than `soft` are hardly gone.
+        The columns that are `fixed` do not move. `pull` draws poses to that of the file, by half
+        as much in each step. `soft` damps motions that the loops hardly resist. Both are parts of
+        the loops' stiffness.
         """
-        free = ~still
+        free = ~fixed
         for i in range(count):
             error, slope = self.errors(poses, True)
             slope = slope[:, :, free]
             down = slope.swapaxes(1, 2)
-            square, pull = down @ slope, (down @ error[:, :, None])[..., 0]
-            most = np.einsum('pii->p', square)[:, None]
-            weight = soft * most
-            if home is not None:
-                weight = weight + most * max(firm * 0.5 ** i, 1e-13)
-                pull = pull + weight * ((poses.positions[:, self._column] - home) / self.unit)[
-                    :, free]
-            square = square + weight[:, :, None] * np.eye(free.sum()) + 1e-300 * np.eye(free.sum())
-            step = np.zeros((len(error), len(still)))
-            step[:, free] = -np.linalg.solve(square, pull[..., None])[..., 0]
+            square, force = down @ slope, (down @ error[:, :, None])[..., 0]
+            weight = soft * np.einsum('pii->p', square)[:, None]
+            if pull:
+                weight *= 1.0 + max(pull * 0.5 ** i, 1e-13) / soft
+                force += weight * (poses.positions[:, self._column] / self.unit)[:, free]
+            square += (weight[:, :, None] + 1e-300) * np.eye(free.sum())
+            step = np.zeros((len(error), len(fixed)))
+            step[:, free] = -np.linalg.solve(square, force[..., None])[..., 0]
             far = np.max(np.abs(step), axis=1, initial=0.0)[:, None]
             step *= np.minimum(1.0, STRIDE / np.maximum(far, STRIDE)) * self.unit
             poses = self.stepped(poses, step)
@@ -365,11 +362,11 @@ class Component:
         return poses
 
     def gap(self, poses: Poses) -> np.ndarray:
-        """Return by how much the loops are open at most, of the size, in each pose."""
+        """Return the largest residual in each pose, as a part of the size."""
         return np.max(np.abs(self.errors(poses)[0]), axis=1, initial=0.0) / self.size
 
     def moves(self, poses: Poses) -> Dict[str, np.ndarray]:
-        """Return how the joint that each body hangs on displaces it in the first pose."""
+        """Return the displacement of each body on its parent in the first pose."""
         moved: Dict[str, np.ndarray] = {}
         for i, each in enumerate(self._elements):
             moved[each.body] = moved.get(each.body, np.eye(4)) @ poses.moved[0, i]
@@ -384,28 +381,28 @@ class Component:
         turned = positions - math.tau * np.round(positions / math.tau)
         return np.where(self._slides, positions / self.size, turned) * ~self._are_balls
 
-    def free_ways(self, poses: Poses, still: np.ndarray, least: float = 3e-4) -> np.ndarray:
+    def free_ways(self, poses: Poses, fixed: np.ndarray, least: float = 3e-4) -> np.ndarray:
         """
         Return in which ways joints of the first pose can move, a row each, at least at first.
 
         Loops that are less stiff than `least`, of their size, do not count.
         """
-        slope = self.errors(poses.some(np.arange(1)), True)[1][0][:, ~still]
+        slope = self.errors(poses.some(np.arange(1)), True)[1][0][:, ~fixed]
         _, values, ways = np.linalg.svd(slope)
-        found = np.zeros((len(ways) - np.sum(values > least * self.size), len(still)))
-        found[:, ~still] = ways[len(ways) - len(found):]
+        found = np.zeros((len(ways) - np.sum(values > least * self.size), len(fixed)))
+        found[:, ~fixed] = ways[len(ways) - len(found):]
         return found
 
     def free(self, ways: np.ndarray) -> np.ndarray:
-        """Return which elements move in some ways."""
+        """Return which elements move in some directions."""
         moved = np.zeros(len(self._elements))
         np.maximum.at(moved, self._column, np.linalg.norm(ways, axis=0))
         return moved > 1e-6
 
     def loose(self, poses: Poses, motors: Sequence[str]) -> Tuple[List[str], int]:
-        """Return joints that move though motors do not, and how many of them say where all is."""
-        ways = self.free_ways(poses, self.held(motors))
-        # What a rod on balls spins on does not count.
+        """Return the joints that move while motors do not, and their degrees of freedom."""
+        ways = self.free_ways(poses, self.columns_of(motors))
+        # The spin of a rod on balls does not count.
         ways = ways * ~self._are_balls[self._column]
         names = [self._names[i] for i in np.flatnonzero(self.free(ways) & self._named)]
         return names, int(np.linalg.matrix_rank(ways, 1e-6)) if names else 0
@@ -422,15 +419,15 @@ class Component:
 
     def immobile(self, poses: Poses) -> List[str]:
         """Return the joints with a name that cannot move near the first pose, closed."""
-        still = self.held([])
+        fixed = self.columns_of([])
         rng = np.random.default_rng(3)
         moved = np.zeros(len(self._elements), bool)
         for _ in range(3):
-            ways = self.free_ways(poses, still)
+            ways = self.free_ways(poses, fixed)
             moved |= self.free(ways)
             step = ways.T @ rng.normal(size=len(ways))
             step *= 0.1 / max(np.max(np.abs(step), initial=0.0), 0.1)
-            poses = self.closed(self.stepped(poses, step[None] * self.unit), still)
+            poses = self.closed(self.stepped(poses, step[None] * self.unit), fixed)
         return [self._names[i] for i in np.flatnonzero(self._named & ~moved)]
 
     def read(self, poses: Poses) -> Dict[str, np.ndarray]:

@@ -23,10 +23,10 @@ from ..command import RequestError
 from ..words import listed, meant, quoted
 
 _ENDS = ('name', 'parent', 'child', 'parent_xyz', 'child_xyz', 'axis')
-# What a file of loops has one of, and the keys of each loop.
+# The kinds of loops in a loops file, and the keys of each loop.
 LOOPS = {'closures': ('link_a', 'link_b', 'point', 'axis'), 'closed_loop': (),
          'pin_loops': _ENDS, 'ball_loops': _ENDS}
-# What else it may have; the last two tell nothing of loops.
+# All its keys; the last two have no effect.
 _KEYS = (*LOOPS, 'type', 'joint_name', 'joint_type', 'ball_upgrades', 'independent', 'name_mot',
          'actuated_joints', 'dependent', 'ball_limit_deg')
 _CLOSING = re.compile(r'(?P<name>.*closing_.+)_1')
@@ -68,7 +68,7 @@ class Reader:
             row += below[link]
         if lost := [link for link in names if link not in robot.frames]:
             raise RequestError(f'{lost[0]} hangs on itself')
-        # The link that each frame is on, and where on it.
+        # The link of each frame, and its pose on the link.
         self._frames = {link: (link, _NOWHERE) for link in robot.frames}
         self._frames.update((frame.get('name', ''), (frame.get('link', ''), origin(frame)))
                             for frame in root.findall('frame'))
@@ -93,7 +93,7 @@ class Reader:
             self.robot.follow(name, mimic.get('joint', ''), ratio, start)
 
     def _pair(self, name: str, kind: str, frames: Tuple[str, str], *axes: Any) -> None:
-        """Close a loop by two frames, each called as a link, by itself or as a joint."""
+        """Close a loop by two frames, each by its name or that of a link or a joint."""
         (one, start), (other, end) = (
             self._frames.get(frame) or self._frames[self._children[frame]] for frame in frames)
         self.robot.close(name, kind, (one, other), (start, end), *axes)
@@ -142,7 +142,7 @@ class Reader:
         return self.robot.frames[link] @ own
 
     def _of_gazebo(self) -> None:
-        """Add the joints that are added to the model once Gazebo has made SDF of it."""
+        """Add the joints that Gazebo adds to the model."""
         for cut in self._root.findall('gazebo/joint'):
             one, other = (attribute(cut, tag, 'link') or text(cut, tag)
                           for tag in ('parent', 'child'))
@@ -180,7 +180,7 @@ class Reader:
                    *((name, 'SPHERICAL') for name in loops.get('ball_upgrades', ()))]
         for name, kind in changes:
             self._change(name, str(kind).upper())
-        # What it says of motors is of the closed robot, transmissions are of the open tree.
+        # Its motors are those of the closed robot, transmissions those of the open tree.
         self.robot.driven = [name for key in ('independent', 'name_mot', 'actuated_joints')
                              for name in loops.get(key, ())] or self.robot.driven
 
