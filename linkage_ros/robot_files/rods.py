@@ -18,10 +18,10 @@ from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Seq
 import numpy as np
 
 from . import check
-from .dyads import short
 from .loops import Group
 from .robot import BALL, HINGE, Joint, plain, Robot, SLIDE
 from .. import mechanisms, scene
+from ..linkage.dyads import short
 from ..linkage.rod_lines import FORMS, WindowError
 from ..scene.joint_names import quoted_name
 from ..words import listed
