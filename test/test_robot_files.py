@@ -680,6 +680,11 @@ def test_all_joints_of_a_whole_robot_are_published(imported, file):
     assert {*LIBRARIES[1](text).joints} <= published
 
 
+def test_a_comment_of_another_format_makes_no_urdf(tmp_path):
+    file = written(tmp_path, 'four_bar.sdf', ('</sdf>', '</sdf><!-- from <robot> -->'))
+    assert model.description(str(file)).startswith('<robot')
+
+
 def test_a_motor_between_two_moving_links_is_measured(imported, tmp_path):
     # As in a parallelogram: the elbow turns back as far as the shoulder turns.
     machine, = imported('four_bar.urdf', '--driven', 'elbow').values()

@@ -14,6 +14,7 @@ import numpy as np
 
 from . import readers
 from .closing import posed
+from .elements import parse
 from .robot import HINGE, Robot, SLIDE
 from .spatial import trees
 from .. import scene
@@ -24,15 +25,14 @@ OTHERS = 'others'
 
 def description(path: str, loops: Optional[str] = None) -> str:
     """Return a robot as robot_state_publisher takes it: a URDF as it is, else its tree."""
-    robot, text = readers.read(path, loops), Path(path).read_text()
-    return text if '<robot' in text else urdf(robot)
+    robot = readers.read(path, loops)
+    return Path(path).read_text() if parse(path).tag == 'robot' else urdf(robot)
 
 
 def urdf(robot: Robot) -> str:
     """Return the tree of a robot, all joints at zero where its URDF has them at zero."""
-    found, _ = trees(robot)
-    tree = {joint.name for _, joint in found.values()}
-    robot = posed(robot, {name: 0.0 for name in robot.positions if name in tree})
+    names = {joint.name for _, joint in trees(robot)[0].values()}
+    robot = posed(robot, {name: 0.0 for name in robot.positions if name in names})
     root = ElementTree.Element('robot', name='robot')
     ElementTree.SubElement(root, 'link', name=robot.root)
     homes = {robot.root: robot.frames[robot.root]}
