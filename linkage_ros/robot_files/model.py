@@ -14,7 +14,7 @@ import numpy as np
 
 from . import readers
 from .closing import posed
-from .elements import parse
+from .elements import at, parse
 from .robot import HINGE, Robot, SLIDE
 from .spatial import trees
 from .. import scene
@@ -35,31 +35,25 @@ def urdf(robot: Robot) -> str:
     robot = posed(robot, {name: 0.0 for name in robot.positions if name in names})
     root = ElementTree.Element('robot', name='robot')
     ElementTree.SubElement(root, 'link', name=robot.root)
-    homes = {robot.root: robot.frames[robot.root]}
     for body, (base, joint) in trees(robot)[0].items():
-        moves = joint.kind in (HINGE, SLIDE) and joint.position is not None
-        home = robot.frames[body].copy()
+        frame, seen = robot.frames[body], np.linalg.inv(robot.frames[base])
+        if joint.kind not in (HINGE, SLIDE) or joint.position is None:
+            _joint(root, f'{body}_fixed', 'fixed', base, body, seen @ frame)
+            continue
+        # In URDF the frame of a joint is that of its child.
         forward = joint.bodies[1] == body
-        if moves:
-            # In URDF the frame of a joint is that of its child.
-            home[:3, 3] = joint.places[not forward]
-        names = (f'{body}/joint', body) if moves and not np.array_equal(
-            home, robot.frames[body]) else (body,)
-        made = _joint(root, joint.name if moves else f'{body}_fixed', 'fixed' if not moves else (
-            'prismatic' if joint.kind == SLIDE else 'revolute' if joint.limits else 'continuous'),
-            base, names[0], np.linalg.inv(homes[base]) @ home)
-        if moves:
-            way = home[:3, :3].T @ joint.axis * (1.0 if forward else -1.0)
-            ElementTree.SubElement(made, 'axis', xyz=_text(way))
+        home = at(joint.places[not forward], frame[:3, :3])
+        child = body if np.array_equal(home, frame) else f'{body}/joint'
+        kind = 'prismatic' if joint.kind == SLIDE else 'revolute' if joint.limits else 'continuous'
+        made = _joint(root, joint.name, kind, base, child, seen @ home)
+        ElementTree.SubElement(made, 'axis', xyz=_text(
+            home[:3, :3].T @ joint.axis * (1.0 if forward else -1.0)))
+        if kind != 'continuous':
             low, high = joint.limits or (-math.inf, math.inf)
-            if made.get('type') != 'continuous':
-                low, high = max(low, -1e3), min(high, 1e3)
-                ElementTree.SubElement(made, 'limit', lower=repr(low), upper=repr(high),
-                                       effort='0', velocity='0')
-        if len(names) > 1:
-            _joint(root, f'{body}_fixed', 'fixed', names[0], body,
-                   np.linalg.inv(home) @ robot.frames[body])
-        homes[body] = robot.frames[body]
+            ElementTree.SubElement(made, 'limit', lower=repr(max(low, -1e3)),
+                                   upper=repr(min(high, 1e3)), effort='0', velocity='0')
+        if child != body:
+            _joint(root, f'{body}_fixed', 'fixed', child, body, np.linalg.inv(home) @ frame)
     return ElementTree.tostring(root, encoding='unicode')
 
 
