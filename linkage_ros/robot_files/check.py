@@ -144,14 +144,14 @@ class _Tracker:
     def __init__(self, robot: Robot, component: Component, driven: Sequence[str],
                  sources: List[str], slack: float):
         self._component, self._slack = component, slack
-        self._still = component.columns_of(driven)
+        self._fixed = component.columns_of(driven)
         # For each driven joint its source, ratio and offset.
         self._movers = {name: (sources.index(source), ratio, offset) for name in driven
                         for source, ratio, offset in [robot.source(name)]}
 
     def track(self, start: np.ndarray, targets: np.ndarray) -> Track:
         """Return poses on straight paths of the motors, each closed from the one before."""
-        component, fixed, count = self._component, self._still, len(targets)
+        component, fixed, count = self._component, self._fixed, len(targets)
         steps = -(-POSES // count)
         poses = component.closed(component.at_start(count), fixed)
         self._base = component.errors(poses)[0][0]
@@ -165,12 +165,15 @@ class _Tracker:
         little = motors[:, 0] + LITTLE * (motors[:, 1] - motors[:, 0])
         ahead, fine = self._advanced(poses, motors[:, 0], little, drift, 0)
         drift[fine] = component.step_between(poses, ahead)[fine] / LITTLE
+        last = drift
         for k in range(steps):
             before = poses
             poses, fine = self._advanced(
                 poses, motors[going, k], motors[going, k + 1], drift, HALVINGS)
-            drift = component.step_between(before, poses).take(np.flatnonzero(fine), axis=0)
-            poses, going = poses.some(np.flatnonzero(fine)), going[fine]
+            moved = component.step_between(before, poses)[fine]
+            # The path is extrapolated by a parabola.
+            drift, last = 2.0 * moved - last[fine], moved
+            poses, going = poses.some(fine), going[fine]
             if not len(going):
                 break
             alive[going, k] = True
@@ -186,7 +189,7 @@ class _Tracker:
         step = component.aimed(poses, drift, {
             name: ratio * after[:, i] + offset
             for name, (i, ratio, offset) in self._movers.items()})
-        new = component.closed(component.stepped(poses, step), self._still, 8)
+        new = component.closed(component.stepped(poses, step), self._fixed, 8)
         fine = (np.max(np.abs(component.errors(new)[0] - self._base), axis=1)
                 < (CLOSED + 10.0 * self._slack) * component.size) & (
             np.max(np.abs(component.step_between(poses, new)) / component.unit, axis=1) < LEAP)

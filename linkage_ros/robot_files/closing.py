@@ -52,13 +52,11 @@ def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
     tree, moves = trees(robot)[0], {}
     for name in values.keys() - {joint.name for _, joint in tree.values()}:
         raise RequestError(f'{name} closes a loop, so that other joints say where it is')
-    for body, (_, joint) in tree.items():
+    for body, (base, joint) in tree.items():
         if joint.name in values and joint.position is not None:
-            change = values[joint.name] - joint.position
-            slides = joint.kind == SLIDE
-            moves[body] = displacements(
-                screws(joint.axis, joint.places[0], slides),
-                np.array(change if joint.bodies[1] == body else -change), slides)
+            slides, change = joint.kind == SLIDE, np.array(values[joint.name] - joint.position)
+            screw = screws(joint.motion(body), joint.place(base), slides)
+            moves[body] = displacements(screw, change, slides)
     return displaced(robot, moves, values)
 
 

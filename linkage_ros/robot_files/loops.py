@@ -139,15 +139,14 @@ def _with_balls(robot: Robot, joints: List[Joint]) -> List[Joint]:
         if body == robot.root or len(own) != 2 or any(
                 joint.name in robot.driven or joint.kind not in (HINGE, BALL) for joint in own):
             continue
-        (one, two), axes = ((joint, joint.bodies[0] == body) for joint in own), np.array(
-            [joint.axis for joint in own])
-        bodies = one[0].bodies[one[1]], two[0].bodies[two[1]]
-        places = one[0].places[one[1]], two[0].places[two[1]]
+        one, two = own
+        bodies = one.other(body), two.other(body)
+        places = one.place(bodies[0]), two.place(bodies[1])
         if bodies[0] != bodies[1] and np.linalg.norm(places[0] - places[1]) < TOGETHER \
-                and (BALL in (own[0].kind, own[1].kind)
-                     or np.linalg.norm(np.cross(*axes)) > ASKEW):
-            ball = Joint(f'{own[0].name}+{own[1].name}', BALL, bodies, places, own[0].axes,
-                         parts=tuple(own))
+                and (BALL in (one.kind, two.kind)
+                     or np.linalg.norm(np.cross(one.axis, two.axis)) > ASKEW):
+            ball = Joint(f'{one.name}+{two.name}', BALL, bodies, places, one.axes,
+                         parts=(one, two))
             joints, on[body] = [*(joint for joint in joints if joint not in own), ball], []
             for end in bodies:
                 on[end] = [ball if joint in own else joint for joint in on[end]]

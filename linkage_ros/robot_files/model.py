@@ -41,13 +41,11 @@ def urdf(robot: Robot) -> str:
             _joint(root, f'{body}_fixed', 'fixed', base, body, seen @ frame)
             continue
         # In URDF the frame of a joint is that of its child.
-        forward = joint.bodies[1] == body
-        home = at(joint.places[not forward], frame[:3, :3])
+        home = at(joint.place(base), frame[:3, :3])
         child = body if np.array_equal(home, frame) else f'{body}/joint'
         kind = 'prismatic' if joint.kind == SLIDE else 'revolute' if joint.limits else 'continuous'
         made = _joint(root, joint.name, kind, base, child, seen @ home)
-        ElementTree.SubElement(made, 'axis', xyz=_text(
-            home[:3, :3].T @ joint.axis * (1.0 if forward else -1.0)))
+        ElementTree.SubElement(made, 'axis', xyz=_text(home[:3, :3].T @ joint.motion(body)))
         if kind != 'continuous':
             low, high = joint.limits or (-math.inf, math.inf)
             ElementTree.SubElement(made, 'limit', lower=repr(max(low, -1e3)),

@@ -53,6 +53,18 @@ class Joint:
     is_cut: bool = False
     parts: Tuple['Joint', ...] = ()
 
+    def other(self, body: str) -> str:
+        """Return the body that it joins to one."""
+        return self.bodies[self.bodies[0] == body]
+
+    def place(self, body: str) -> Any:
+        """Return its place on a body [m]."""
+        return self.places[self.bodies[1] == body]
+
+    def motion(self, body: str) -> Any:
+        """Return the axis on the other body about or along which positions move a body."""
+        return self.axes[0] if self.bodies[1] == body else -self.axes[1]
+
     @property
     def axis(self) -> Any:
         """Return the axis on the first body."""

@@ -113,20 +113,20 @@ class Rods:
 
     def _end(self, joint: Joint, body: str) -> str:
         """Return the other end of a ball of a rod: its link and place."""
-        other = joint.bodies[joint.bodies[0] == body]
+        other = joint.other(body)
         if other not in self._bodies:
             raise ValueError(f'{joint.name} holds {body} to {other}, which hangs on rods alone')
-        return f'{self._bodies[other]} {self._text(joint.places[joint.bodies[1] == other])}'
+        return f'{self._bodies[other]} {self._text(joint.place(other))}'
 
     def _rod(self, body: str, held: Tuple[Joint, ...]) -> None:
-        ends = [joint.places[joint.bodies[1] == body] for joint in held]
+        ends = [joint.place(body) for joint in held]
         length = short(float(np.linalg.norm(ends[0] - ends[1])))
         name = self._named(held[0])
         self.rods.append(f'{name} rod {self._end(held[0], body)} {self._end(held[1], body)} '
                          f'length {length}')
 
     def _cylinder(self, half: Joint, balls: Sequence[Joint]) -> None:
-        ends = [ball.places[ball.bodies[1] == body] for ball, body in zip(balls, half.bodies)]
+        ends = [ball.place(body) for ball, body in zip(balls, half.bodies)]
         way = ends[1] - ends[0]
         if np.linalg.norm(np.cross(half.axis, way)) > 1e-6 * np.linalg.norm(way):
             raise ValueError(f'{half.name} does not slide along the line of its balls')

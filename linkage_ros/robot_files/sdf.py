@@ -173,8 +173,7 @@ class _Model:
             if joint is None:
                 raise RequestError(f'gearbox {name} turns {end} against {body}, on no joint')
             axis = self.frame(name)[:3, :3] @ self._axis(name, part.find(tag))
-            turns.append((joint.name, math.copysign(1.0, axis @ joint.axis) * (
-                1.0 if joint.bodies[1] == end else -1.0)))
+            turns.append((joint.name, math.copysign(1.0, axis @ joint.motion(end))))
         (first, sign), (second, other) = turns
         ratio = float(text(part, 'gearbox_ratio', '1'))
         robot.follow(second, first, -ratio * sign * other, 0.0)

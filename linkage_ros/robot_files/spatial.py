@@ -208,9 +208,7 @@ class Component:
     def _add(self, found: Dict[str, Tuple[str, Joint]], body: str) -> None:
         """Add the elements that move a body; those of its base are there."""
         base, joint = found[body]
-        parent, forward = self._last(found, base), joint.bodies[1] == body
-        place = joint.places[not forward]
-        axis = joint.axes[not forward] * (1.0 if forward else -1.0)
+        parent, place, axis = self._last(found, base), joint.place(base), joint.motion(body)
         parts = {kind: [(kind, axis)] for kind in (HINGE, SLIDE, BALL)}
         parts[FREE] = [*((SLIDE, each) for each in np.eye(3)), (BALL, axis)]
         for kind, way in parts.get(joint.kind, ()):
