@@ -112,7 +112,7 @@ def closed(robot: Robot) -> Closed:
         names, followers = ([name for name in component.positions if name in several]
                             for several in (robot.driven, robot.follows))
         try:
-            poses, moved = nearest(component, names, followers)
+            poses, report = nearest(component, names, followers)
         except ValueError as error:
             made.open_loops.update((joint.name, str(error)) for joint in component.joints)
             continue
@@ -122,7 +122,7 @@ def closed(robot: Robot) -> Closed:
                 made.faults.update((joint.name, fault) for joint in component.joints)
         moves.update(component.moves(poses))
         positions.update((name, float(value[0])) for name, value in component.read(poses).items())
-        made.report.extend([moved] * bool(moved))
+        made.report.extend([report] * bool(report))
     return made._replace(robot=displaced(robot, moves, positions))
 
 
@@ -195,18 +195,17 @@ def nearest(component: Component, names: List[str], followers: List[str]) -> Tup
         _check_unfolded(component, poses, names, max(DEAD, 3.0 * math.sqrt(gap)))
         return poses, ''
     # If the loops cannot be closed otherwise, followers move, and then motors.
-    found, held_now = start, names
-    open_by = math.inf
-    for kept in [names + followers] * bool(followers) + [names] + [[]] * bool(names):
-        other, less = _closed_ones(component, component.columns_of(kept))
-        if less < 0.9 * open_by:
-            found, open_by, held_now = other, less, kept
+    found, held_ones, open_by = start, names, math.inf
+    for tried in [names + followers] * bool(followers) + [names] + [[]] * bool(names):
+        others, smallest = _closed_ones(component, component.columns_of(tried))
+        if smallest < 0.9 * open_by:
+            found, held_ones, open_by = others, tried, smallest
         if open_by < CLOSED:
             break
-    said = '' if held_now or not names else \
+    report = '' if held_ones or not names else \
         f'{", ".join(names)} moved: their loops cannot be closed where the file has them.'
-    determined = ~component.free(component.free_ways(found, component.columns_of(held_now))) \
-        if held_now else 1.0
+    determined = ~component.free(component.free_ways(found, component.columns_of(held_ones))) \
+        if held_ones else 1.0
     away = np.linalg.norm(component.away(found.positions) * determined, axis=1)
     nearest_one = int(np.argmin(away))
     for i in np.flatnonzero(away < ALIKE * away[nearest_one] + ALIKE_LENGTH):
@@ -214,12 +213,12 @@ def nearest(component: Component, names: List[str], followers: List[str]) -> Tup
         name, first, second = component.farthest_apart(two, determined)
         if abs(first - second) > DISTINCT:
             # Motors that had to move are part of the choice.
-            chosen = [name, *(motor for motor in names if not held_now and motor != name)]
+            chosen = [name, *(motor for motor in names if not held_ones and motor != name)]
             ends = [' '.join(f'{each}={component.read(two)[each][k]:.3g}' for each in chosen)
                     for k in (0, 1)]
             raise ValueError(f'the file has them open, and they close as well with {ends[0]} as '
                              f'with {ends[1]}: choose by --pose {name}=...')
-    return found.some(np.array([nearest_one])), said
+    return found.some(np.array([nearest_one])), report
 
 
 def _closed_ones(component: Component, fixed: np.ndarray) -> Tuple[Poses, float]:
