@@ -161,6 +161,17 @@ def test_a_command_says_what_its_actuator_has_to_hold(graph):
     assert stream.commands[-1].effort[1] == 0.0
 
 
+@pytest.mark.parametrize('stroke, effort', [(1.0, [1.0 / math.sqrt(0.75)]), (2.0, []), (0.0, [])])
+def test_an_effort_without_bound_is_no_effort(graph, stroke, effort):
+    # Two equal bars and the cylinder between their ends: its force is endless where they lie in
+    # one line, and unknown where it has no length.
+    stream = Stream(graph, {
+        'mechanisms': ['boom'], 'boom.type': 'custom', 'boom.loads': ['OB=-1.0'],
+        'boom.joints': ['O ground 0 0', 'P ground 1 0', 'B cylinder P O 1 left']})
+    stream.want(['boom_cylinder'], [stroke])
+    assert [abs(x) for x in stream.commands[-1].effort] == pytest.approx(effort, rel=1e-12)
+
+
 def test_commands_move_the_picture(stream, graph):
     graph.start(Kinematics, LEVER, cli_args=['--ros-args', '-r', 'crank_states:=servo_commands'])
     shown = graph.listen(JointState, 'lever/joint_states')

@@ -169,6 +169,18 @@ def test_a_sweep_is_followed_though_the_crank_was_started_elsewhere(graph):
     assert graph.set(driver, lever__crank__start=2.5).successful
 
 
+def test_a_cylinder_is_moved_over_its_scaled_stroke_whoever_sets_the_scale(graph):
+    given = {'mechanisms': ['boom'], 'boom.type': 'custom', 'boom.joints': [
+        'O ground 0 0', 'P ground 1 0', 'B cylinder P O 1.5 left']}
+    owner, driver = graph.start(Kinematics, given), graph.start(CrankDriver, given)
+    graph.until(lambda: graph.set(owner, boom__scale=5.0).successful
+                and of(driver, 'boom.scale') == 5.0)
+    assert driver.scene.machines['boom'].inputs == owner.scene.machines['boom'].inputs
+    heard = graph.listen(JointState, 'crank_states')
+    # Beyond the stroke without the scale.
+    graph.until(lambda: heard and heard[-1].position[0] > 2.6)
+
+
 def test_of_values_that_change_and_change_back_the_last_holds(graph):
     service = graph.start(ServoInverse, LEVER)
     publisher = graph.node.create_publisher(ParameterEvent, TOPIC, LATCHED)

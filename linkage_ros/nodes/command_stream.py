@@ -213,7 +213,7 @@ class CommandStream:
                 efforts = [effort for command in commands for effort in command.efforts]
                 self._commands.publish(joint_states(
                     unpack(stamp), names, values, speeds if moving else (),
-                    () if any(map(math.isnan, efforts)) else efforts))
+                    efforts if all(map(math.isfinite, efforts)) else ()))
             else:
                 self._publishers[names, moving].publish(
                     stamp, [np.array(values + speeds * moving)])

@@ -48,7 +48,7 @@ TRACER = Field('string', 'Joint whose curve is the locus; empty: the last.', rea
 DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [m].', positive=True,
                   readers=ALL)
 BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the usual one.', -1, 1, readers=ALL)
-SCALE = Field('double', 'Factor of every length.', positive=True, readers=(KINEMATICS, INVERSE))
+SCALE = Field('double', 'Factor of every length.', positive=True, readers=ALL)
 LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.', 1, 50,
                   readers=(KINEMATICS,))
 MIRRORED = Field('bool', 'Whether each leg has a mirror image on the other side; '
