@@ -24,7 +24,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
 import math
-from typing import Dict, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from xml.etree.ElementTree import Element, SubElement
 
 from . import shapes
 from .. import palette
@@ -398,3 +399,11 @@ def _input_travels(machine, assembly) -> Dict[str, Optional[Travel]]:
 def numbers(*values: float) -> str:
     """Return numbers with all their digits; adding zero makes -0.0 plain."""
     return ' '.join(repr(float(value) + 0.0) for value in values)
+
+
+def add(parent: Element, tag: str, *values: Any, **attributes: str) -> Element:
+    """Add an element to a robot model in XML; its text is a word or numbers."""
+    made = SubElement(parent, tag, attributes)
+    if values:
+        made.text = values[0] if isinstance(values[0], str) else numbers(*values)
+    return made

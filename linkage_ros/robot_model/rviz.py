@@ -27,27 +27,11 @@ SAMPLES = 25
 def adapted(config: dict, machines: Mapping[str, SceneMechanism], frame_id: str,
             namespace: str = '', robot_model: bool = False, frame_prefix: str = '') -> dict:
     """
-    Return a configuration that shows other mechanisms.
+    Return a configuration that shows mechanisms, and whose camera sees them all.
 
-    Parameters
-    ----------
-    config : dict
-        A configuration with one group of displays a mechanism, which bears its name.
-    machines : mapping
-        The mechanisms to be shown, by name; the camera sees them all.
-    frame_id : str
-        The frame of their poses.
-    namespace : str
-        Namespace of their topics; empty: none.
-    robot_model : bool
-        Whether to show what needs a robot_state_publisher as well.
-    frame_prefix : str
-        Prefix of the robot_state_publishers' frames.
-
-    Returns
-    -------
-    dict
-
+    `config` has one group of displays a mechanism, of the mechanism's name; the poses are in
+    `frame_id`, the topics in `namespace`. `robot_model` enables displays that need a
+    robot_state_publisher, whose frames begin with `frame_prefix`.
     """
     made = copy.deepcopy(config)
     manager = made['Visualization Manager']

@@ -13,11 +13,11 @@ Format: the SDFormat specification (sdformat.org/spec).
 
 from __future__ import annotations
 
-from typing import Any, Optional
+from typing import Optional
 from xml.etree import ElementTree
 
 from .assembled import Assembled, Gear, Motor, Solid, weight
-from .bodies import COLOURS, Joint, numbers, Piece
+from .bodies import add, COLOURS, Joint, Piece
 from .. import palette
 
 
@@ -25,7 +25,7 @@ def write(model: Assembled) -> str:
     """Return a robot model, its loops closed, as SDF."""
     # Gazebo Classic reads versions up to 1.7, which have no mimic.
     root = ElementTree.Element('sdf', version='1.11' if model.gears else '1.7')
-    robot = _add(root, 'model', name=model.name)
+    robot = add(root, 'model', name=model.name)
     gears = {gear.joint: gear for gear in model.gears}
     motors = {motor.joint: motor for motor in model.motors}
     homes = {point.name: solid.name for solid in model.solids for point in solid.points}
@@ -36,8 +36,8 @@ def write(model: Assembled) -> str:
         if solid.joint:
             _add_ends(joint, gears.get(name), motors.get(name), solid.position)
         for point in solid.points:
-            frame = _add(robot, 'frame', name=point.name, attached_to=solid.name)
-            _add(frame, 'pose', *point.place, *[0.0] * 4)
+            frame = add(robot, 'frame', name=point.name, attached_to=solid.name)
+            add(frame, 'pose', *point.place, *[0.0] * 4)
     cuts = [(solid, point) for solid in model.solids for point in solid.points if point.meets]
     for solid, point in cuts:
         hinge = Joint(f'{point.name}_hinge', 'revolute', 1.0, None)
@@ -58,30 +58,21 @@ def write(model: Assembled) -> str:
     return ElementTree.tostring(root, encoding='unicode')
 
 
-def _add(parent: ElementTree.Element, tag: str, *values: Any, **attributes: str
-         ) -> ElementTree.Element:
-    """Add an element with a text or with numbers."""
-    made = ElementTree.SubElement(parent, tag, attributes)
-    if values:
-        made.text = values[0] if isinstance(values[0], str) else numbers(*values)
-    return made
-
-
 def _add_plugin(robot: ElementTree.Element, file: str, name: str, **values: str) -> None:
-    plugin = _add(robot, 'plugin', filename=f'gz-sim-{file}-system',
+    plugin = add(robot, 'plugin', filename=f'gz-sim-{file}-system',
                   name=f'gz::sim::systems::{name}')
     for tag, text in values.items():
-        _add(plugin, tag, text)
+        add(plugin, tag, text)
 
 
 def _add_joint(robot: ElementTree.Element, name: str, joint: Optional[Joint], parent: str,
                child: str) -> ElementTree.Element:
     """Add a joint, a fixed one where there is none, at the child's frame."""
-    element = _add(robot, 'joint', name=name, type=joint.kind if joint else 'fixed')
-    _add(element, 'parent', parent)
-    _add(element, 'child', child)
+    element = add(robot, 'joint', name=name, type=joint.kind if joint else 'fixed')
+    add(element, 'parent', parent)
+    add(element, 'child', child)
     if joint:
-        _add(_add(element, 'axis'), 'xyz', *joint.axis)
+        add(add(element, 'axis'), 'xyz', *joint.axis)
     return element
 
 
@@ -90,36 +81,36 @@ def _add_ends(joint: ElementTree.Element, gear: Optional[Gear], motor: Optional[
     """Say how a joint follows another, or between which ends it is moved."""
     axis, = joint.iter('axis')
     if gear:
-        mimic = _add(axis, 'mimic', joint=gear.input)
+        mimic = add(axis, 'mimic', joint=gear.input)
         for tag, value in ('multiplier', gear.ratio), ('offset', 0.0), ('reference', 0.0):
-            _add(mimic, tag, value)
+            add(mimic, tag, value)
     if motor and motor.sweep:
-        limit = _add(axis, 'limit')
+        limit = add(axis, 'limit')
         for tag, end in zip(('lower', 'upper'), motor.sweep):
-            _add(limit, tag, end - start)
+            add(limit, tag, end - start)
 
 
 def _add_link(robot: ElementTree.Element, solid: Solid) -> None:
-    link = _add(robot, 'link', name=solid.name)
-    _add(link, 'pose', *solid.pose, relative_to=solid.parent or '__model__')
+    link = add(robot, 'link', name=solid.name)
+    add(link, 'pose', *solid.pose, relative_to=solid.parent or '__model__')
     mass, centre, moments = solid.weight
     if mass:
-        inertial = _add(link, 'inertial')
-        _add(inertial, 'pose', *centre, *[0.0] * 4)
-        _add(inertial, 'mass', mass)
-        inertia = _add(inertial, 'inertia')
+        inertial = add(link, 'inertial')
+        add(inertial, 'pose', *centre, *[0.0] * 4)
+        add(inertial, 'mass', mass)
+        inertia = add(inertial, 'inertia')
         for tag, moment in zip(('ixx', 'iyy', 'izz', 'ixy'), moments):
-            _add(inertia, tag, moment)
+            add(inertia, tag, moment)
     for i, piece in enumerate(solid.pieces):
         _add_visual(link, f'{solid.name}_{i}', piece)
 
 
 def _add_visual(link: ElementTree.Element, name: str, piece: Piece) -> None:
-    visual = _add(link, 'visual', name=name)
-    _add(visual, 'pose', *piece.pose)
-    shape = _add(_add(visual, 'geometry'), piece.shape)
+    visual = add(link, 'visual', name=name)
+    add(visual, 'pose', *piece.pose)
+    shape = add(add(visual, 'geometry'), piece.shape)
     for tag, values in piece.sizes.items():
-        _add(shape, tag, *values)
-    material = _add(visual, 'material')
+        add(shape, tag, *values)
+    material = add(visual, 'material')
     for tag in 'ambient', 'diffuse':
-        _add(material, tag, *palette.rgb(COLOURS[piece.colour]), 1.0)
+        add(material, tag, *palette.rgb(COLOURS[piece.colour]), 1.0)
