@@ -231,6 +231,5 @@ def _closed_ones(component: Component, fixed: np.ndarray) -> Tuple[Poses, float]
         -1.0, 1.0, (count, columns)))
     poses = component.closed(poses, fixed, 40, 1e-2)
     poses = component.closed(poses, fixed, 12)
-    poses = component.wrapped(poses)
     gaps = component.gap(poses)
     return poses.some(np.flatnonzero(gaps <= 1.001 * gaps.min() + CLOSED)), float(gaps.min())

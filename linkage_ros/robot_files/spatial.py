@@ -282,15 +282,13 @@ class Component:
                   ) -> Tuple[np.ndarray, np.ndarray]:
         """Return the least and the product of singular values of each pose: 0 at a dead point."""
         slope = self.errors(poses, True)[1][:, :, ~fixed] / self.size
-        values = np.linalg.eigvalsh(slope.swapaxes(1, 2) @ slope)[:, nullity:]
-        values = np.sqrt(np.maximum(values, 0.0))
+        values = np.linalg.svd(slope, compute_uv=False)[:, :np.sum(~fixed) - nullity]
         return np.min(values, axis=1, initial=1.0), np.prod(values, axis=1)
 
     def nullity(self, fixed: np.ndarray) -> int:
         """Return the degrees of freedom that the loops leave, in a random open pose."""
         step = np.random.default_rng(2).uniform(-0.3, 0.3, (1, len(fixed)))
-        slope = self.errors(self.stepped(self.at_start(), step * self.unit), True)[1][:, :, ~fixed]
-        return int(np.sum(np.linalg.eigvalsh(slope[0].T @ slope[0]) < (3e-4 * self.size) ** 2))
+        return len(self.free_ways(self.stepped(self.at_start(), step * self.unit), fixed))
 
     def _frames(self, poses: Poses) -> np.ndarray:
         """Return the displacement after each element; the last is that of the root."""
@@ -299,11 +297,6 @@ class Component:
         for i, each in enumerate(self._elements):
             np.matmul(frames[:, each.parent], poses.moved[:, i], out=frames[:, i])
         return frames
-
-    def wrapped(self, poses: Poses) -> Poses:
-        """Return poses without whole turns of hinges."""
-        turns = math.tau * np.round(poses.positions / math.tau)
-        return poses._replace(positions=poses.positions - np.where(self._slides, 0.0, turns))
 
     def stepped(self, poses: Poses, step: np.ndarray) -> Poses:
         """Return poses with a step of the columns [rad or m] more."""
@@ -393,9 +386,7 @@ class Component:
 
     def free(self, ways: np.ndarray) -> np.ndarray:
         """Return which elements move in some directions."""
-        moved = np.zeros(len(self._elements))
-        np.maximum.at(moved, self._column, np.linalg.norm(ways, axis=0))
-        return moved > 1e-6
+        return np.maximum.reduceat(np.linalg.norm(ways, axis=0), self._first) > 1e-6
 
     def loose(self, poses: Poses, motors: Sequence[str]) -> Tuple[List[str], int]:
         """Return the joints that move while motors do not, and their degrees of freedom."""
@@ -429,9 +420,10 @@ class Component:
         return [self._names[i] for i in np.flatnonzero(self._named & ~moved)]
 
     def read(self, poses: Poses) -> Dict[str, np.ndarray]:
-        """Return the positions of named joints [rad or m]; those of cuts are wrapped."""
-        found = {self._names[i]: poses.positions[:, i] + self._starts[i]
-                 for i in np.flatnonzero(self._named)}
+        """Return the positions of named joints [rad or m], within half a turn of the file's."""
+        turns = math.tau * np.round(poses.positions / math.tau)
+        positions = self._starts + poses.positions - np.where(self._slides, 0.0, turns)
+        found = {self._names[i]: positions[:, i] for i in np.flatnonzero(self._named)}
         frames = self._frames(poses)
         for cut, (first, second) in zip(self._cuts, self._cut_ends):
             if cut.position is not None and cut.kind == HINGE:
