@@ -680,6 +680,13 @@ def test_all_joints_of_a_whole_robot_are_published(imported, file):
     assert {*LIBRARIES[1](text).joints} <= published
 
 
+def test_a_universal_joint_with_one_axis_is_refused(capsys, tmp_path):
+    file = written(tmp_path, 'four_bar.urdf', ('name="wrist" type="revolute"',
+                                               'name="wrist" type="universal"'), (
+        '<child_axis xyz="0 1 0"/>', ''))
+    assert 'joint wrist is universal and must have two axes' in refused(capsys, file)
+
+
 def test_a_comment_of_another_format_makes_no_urdf(tmp_path):
     file = written(tmp_path, 'four_bar.sdf', ('</sdf>', '</sdf><!-- from <robot> -->'))
     assert model.description(str(file)).startswith('<robot')

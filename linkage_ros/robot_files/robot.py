@@ -137,6 +137,8 @@ class Robot:
             raise RequestError(f'joint {name} must be within {FARTHEST:g} m')
         if kind in (HINGE, SLIDE, UNIVERSAL) and not np.all(sizes > 0.0):
             raise RequestError(f'the axis of joint {name} has no length')
+        if kind == UNIVERSAL and second is None:
+            raise RequestError(f'joint {name} is universal and must have two axes')
         if kind == UNIVERSAL:
             # Two hinges with a cross between them.
             cross = f'{name}/cross'

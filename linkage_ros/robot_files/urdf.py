@@ -152,7 +152,8 @@ class Reader:
             if text(cut, 'axis/use_parent_model_frame') in ('1', 'true'):
                 axis = frame[:3, :3].T @ axis
             kind = cut.get('type', '')
-            second = numbers(text(cut, 'axis2/xyz', '0 0 1')) if kind == UNIVERSAL else None
+            second = numbers(text(cut, 'axis2/xyz', '0 0 1')) if KINDS.get(
+                kind, kind) == UNIVERSAL else None
             self.robot.join(cut.get('name', ''), kind, (one, other), frame, axis, second=second)
         weld(self.robot, self._root.findall('gazebo/plugin'))
 
