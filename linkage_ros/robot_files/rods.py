@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from itertools import product
 import math
-from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Set, Tuple
 
 import numpy as np
 
@@ -32,15 +32,6 @@ _ANY = 0.999 * math.pi
 _SIDE = 7
 
 
-class Link(NamedTuple):
-    """A link: its parent, its joint, and the joint's axis and place on the parent."""
-
-    parent: str
-    joint: Joint
-    axis: np.ndarray
-    place: np.ndarray
-
-
 class Rods:
     """
     The lines of a group of joints.
@@ -56,7 +47,9 @@ class Rods:
         ground, self.frame_id = group.ground, group.frame_id
         self._seen = np.linalg.inv(robot.frames[self.frame_id])
         self._driven = {*robot.driven}
-        self.links: Dict[str, Link] = {}
+        # The joint of each link, and its end of a line: its parent, its place and its axis.
+        self.links: Dict[str, Joint] = {}
+        self._ends: Dict[str, str] = {}
         self.rods: List[str] = []
         # The joint that drives each input, and the input's value in the pose of the robot.
         self.inputs: Dict[str, Joint] = {}
@@ -99,13 +92,13 @@ class Rods:
 
     def _add(self, joint: Joint) -> None:
         """Add a link, and its joint with a link that is there."""
-        backwards = joint.bodies[0] not in self._bodies
-        base, body = joint.bodies[::-1] if backwards else joint.bodies
+        base, body = sorted(joint.bodies, key=self._bodies.keys().__contains__, reverse=True)
         if joint.kind not in (HINGE, SLIDE):
             raise ValueError(f'{joint.name} is a joint of type {joint.kind} and no end of a rod')
         name = self._bodies[body] = self._named(joint)
-        self.links[name] = Link(self._bodies[base], joint,
-                                -joint.axis if backwards else joint.axis, joint.places[backwards])
+        self.links[name] = joint
+        self._ends[name] = (f'{self._bodies[base]} at {self._text(joint.place(base))} axis '
+                            f'{self._text(joint.motion(body), False)}')
         if joint.name in self._driven:
             if joint.kind != HINGE:
                 raise ValueError(f'{joint.name} drives, and is no hinge and no cylinder')
@@ -138,18 +131,16 @@ class Rods:
     def lines(self, limits: Mapping[str, Tuple[float, float]] = {}) -> List[str]:
         """Return the lines, with limits for some other than the file's."""
         found = []
-        for name, link in self.links.items():
-            word = 'motor' if name in self.inputs else link.joint.kind
-            ends = None if word == 'motor' else limits.get(name, self._limits(link))
-            found.append(f'{name} {word} {link.parent} at {self._text(link.place)} axis '
-                         f'{self._text(link.axis, False)}' + (
-                             f' within {short(ends[0])} {short(ends[1])}' if ends else ''))
+        for name, joint in self.links.items():
+            word = 'motor' if name in self.inputs else joint.kind
+            ends = None if word == 'motor' else limits.get(name, self._limits(joint))
+            found.append(f'{name} {word} {self._ends[name]}' + (
+                f' within {short(ends[0])} {short(ends[1])}' if ends else ''))
         return found + self.rods
 
     @staticmethod
-    def _limits(link: Link) -> Optional[Tuple[float, float]]:
+    def _limits(joint: Joint) -> Optional[Tuple[float, float]]:
         """Return a joint's limits relative to its position; None without limits."""
-        joint = link.joint
         if joint.limits is None or joint.position is None:
             return None
         low, high = (end - joint.position for end in joint.limits)
@@ -165,10 +156,10 @@ class Rods:
             yield f'{name}.offset', self.zeros[name] - joint.start
             yield f'{name}.start', self.zeros[name]
         yield 'joint_names', [
-            f'{name}={quoted_name(link.joint.name)}' + (
-                f'{position:+}' if (position := float(short(link.joint.start))) else '')
-            for name, link in self.links.items() if name not in self.inputs
-            and link.joint.position is not None]
+            f'{name}={quoted_name(joint.name)}' + (
+                f'{position:+}' if (position := float(short(joint.start))) else '')
+            for name, joint in self.links.items() if name not in self.inputs
+            and joint.position is not None]
         yield 'only_named', True
 
 
@@ -209,7 +200,7 @@ def _lines(found: Rods) -> Tuple[List[str], List[str]]:
             raise
         said = ', '.join(f'{name} from {low + zero:.4g} to {high + zero:.4g}'
                          for name, (low, high) in error.limits.items()
-                         for zero in [found.links[name].joint.start])
+                         for zero in [found.links[name].start])
         return found.lines(limits=error.limits), [
             f'Limits: inside those of the file, or without any, there may be a second pose; these '
             f'are the largest shown to have one at most: {said}.']
@@ -240,10 +231,10 @@ def _corners(machine: scene.SceneMechanism, found: Rods) -> Iterator[str]:
     for held in machine.linkage.windows():
         names = [line.names[0] for line in held.lines]
         inverse = machine.linkage.driven_by(*names)
-        zeros = [found.links[name].joint.start for name in names]
+        zeros = [found.links[name].start for name in names]
         for corner in product(*held.limits):
             motors = inverse.joint_angles(corner, [*found.inputs])
-            where = ', '.join(f'{found.links[name].joint.name} at {value + zero:.4g}'
+            where = ', '.join(f'{found.links[name].name} at {value + zero:.4g}'
                               for name, value, zero in zip(names, corner, zeros))
             there = ', '.join(
                 f'{joint.name} at {motors[name] - machine.inputs[name].offset:.4g}'
