@@ -14,6 +14,7 @@ import numpy as np
 
 from .robot import FARTHEST, FIXED, Robot
 from ..command import RequestError
+from ..robot_model.bodies import pose
 
 Element = ElementTree.Element
 
@@ -82,15 +83,6 @@ def origin(part: Optional[Element]) -> np.ndarray:
     if part is None:
         return np.eye(4)
     return pose(*numbers(f'{part.get("xyz", "0 0 0")} {part.get("rpy", "0 0 0")}', 6))
-
-
-def pose(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """Return a pose by its place [m] and its angles about fixed axes [rad]."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos((roll, pitch, yaw)), np.sin((roll, pitch, yaw))
-    about_z, about_y, about_x = np.array([
-        [[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]], [[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]],
-        [[1, 0, 0], [0, cr, -sr], [0, sr, cr]]])
-    return at((x, y, z), about_z @ about_y @ about_x)
 
 
 def at(place: Any, turned: Any = ((1, 0, 0), (0, 1, 0), (0, 0, 1))) -> np.ndarray:

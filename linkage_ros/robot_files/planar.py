@@ -16,11 +16,12 @@ from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tu
 
 import numpy as np
 
-from . import check, loops, model
+from . import check, loops
 from .robot import Joint, plain, Robot, SLIDE
 from .. import mechanisms, scene
 from ..linkage.dyads import bar_name, Dyads, Hinge, Motor, Pin, ROUNDING, short, Slide
 from ..linkage.mechanism import Mechanism
+from ..robot_model.bodies import coordinates
 from ..scene.joint_names import quoted_name
 
 # The most joints of which pairs are tried as motors.
@@ -316,12 +317,11 @@ def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
     seen = [(joint, found) for joint in drawing.loop.joints if joint.position is not None
             and joint not in drawing.moved_by and joint not in drawing.driven
             and (found := drawing.measured_by(joint))]
-    frame = drawing.loop.frame
     measured = drawing.measured and drawing.measured_by(drawing.measured)
     yield 'type', 'custom'
     yield 'joints', drawing.lines
     yield 'frame_id', drawing.loop.frame_id
-    yield 'pose', [float(short(value)) for value in (*frame[:3, 3], *model.rpy(frame[:3, :3]))]
+    yield 'pose', [float(short(value)) for value in coordinates(drawing.loop.frame)]
     links = {link.name: link for link in drawing.linkage.links}
     names = []
 

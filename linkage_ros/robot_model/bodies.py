@@ -27,6 +27,8 @@ import math
 from typing import Any, Dict, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 from xml.etree.ElementTree import Element, SubElement
 
+import numpy as np
+
 from . import shapes
 from .. import palette
 from ..linkage.builder import GROUND
@@ -399,6 +401,28 @@ def _input_travels(machine, assembly) -> Dict[str, Optional[Travel]]:
 def numbers(*values: float) -> str:
     """Return numbers with all their digits; adding zero makes -0.0 plain."""
     return ' '.join(repr(float(value) + 0.0) for value in values)
+
+
+def pose(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> np.ndarray:
+    """Return a pose as a matrix (4, 4), by its place [m] and its angles about fixed axes [rad]."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos((roll, pitch, yaw)), np.sin((roll, pitch, yaw))
+    about_z, about_y, about_x = np.array([
+        [[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]], [[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]],
+        [[1, 0, 0], [0, cr, -sr], [0, sr, cr]]])
+    made = np.eye(4)
+    made[:3, :3], made[:3, 3] = about_z @ about_y @ about_x, (x, y, z)
+    return made
+
+
+def coordinates(matrix: np.ndarray) -> Tuple[float, ...]:
+    """Return x, y, z [m], roll, pitch and yaw [rad] of a pose (4, 4)."""
+    a, b = matrix[:2, 0]
+    yaw = math.atan2(b, a) if math.hypot(a, b) > 1e-9 else 0.0
+    sin, cos = math.sin(yaw), math.cos(yaw)
+    ahead, aside = matrix[:2, 2], matrix[:2, 1]
+    return (*matrix[:3, 3].tolist(),
+            math.atan2(sin * ahead[0] - cos * ahead[1], cos * aside[1] - sin * aside[0]),
+            math.atan2(-matrix[2, 0], cos * a + sin * b), yaw)
 
 
 def add(parent: Element, tag: str, *values: Any, **attributes: str) -> Element:

@@ -10,8 +10,8 @@ from typing import Any, Dict, Iterable, Mapping, Tuple
 
 import numpy as np
 
+from .bodies import pose
 from .shapes import input_values
-from ..robot_files.elements import pose
 from ..scene import SceneMechanism
 
 GROUP = 'rviz_common/Group'
