@@ -201,10 +201,10 @@ def flat(robot: Robot, group: Group, drives: Sequence[str]) -> Loop:
         if abs(first[2] - second[2]) > TOGETHER * 1e-3:
             across[joint.name] = abs(first[2] - second[2])
         axis = seen[:3, :3] @ joint.axis
+        way = complex(*axis[:2])
         found.append(replace(
-            joint, places=(complex(*first[:2]), complex(*second[:2])), axes=[
-                complex(*axis[:2]) / abs(complex(*axis[:2])) if joint.kind == SLIDE
-                else float(np.sign(axis[2]))]))
+            joint, places=(complex(*first[:2]), complex(*second[:2])),
+            axes=[way / abs(way) if joint.kind == SLIDE else float(np.sign(axis[2]))] * 2))
     places = [place for joint in found for place in joint.places]
     size = max(abs(place - other) for place in places for other in places)
     if size < TOGETHER:

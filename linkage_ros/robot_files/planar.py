@@ -143,10 +143,9 @@ class Drawing(Dyads):
         if joint.kind == SLIDE:
             block = child if self.parts[child].slide is joint else parent
             part = self.parts[block]
-            sign = math.copysign(1.0, (part.along / joint.axis).real)
+            sign = math.copysign(1.0, (part.along / joint.motion(block)).real)
             way = (self.on[block][part.joint] - part.start) / part.along
-            return (part.link, sign if block == child else -sign, way.real) \
-                if part.slide is joint else None
+            return (part.link, sign, way.real) if part.slide is joint else None
         pin = self.known(child, joint.places[1]) or ''
         base, body = (parent, child) if self.home[pin] == parent else (child, parent)
         if self.home[pin] != base:
@@ -162,8 +161,7 @@ class Drawing(Dyads):
             along, side = (end - start) * complex(0.5, 0.75 ** 0.5), self.said(abs(end - start))
             tip = self.name(start + along, body, f'dyad {pin} {other} {side} {side} left')
             link = bar_name(pin, tip)
-        return link, joint.axis if body == child else -joint.axis, phase(
-            along / self.parts[base].along)
+        return link, joint.motion(body), phase(along / self.parts[base].along)
 
     def drive(self, word: str, joint: Joint, ratio: float, offset: float) -> Tuple[str, str]:
         """Note an input, as `Dyads` asks for; those of one source are geared to the first."""
