@@ -130,7 +130,7 @@ def test_two_outputs_of_one_input_and_a_name_of_nobody_are_said(stream, capfd):
     assert stream.want(['flap', 'lever_A.x', 'boom'], [flap(0.2), 100.0, 1.0]).keys() == {'servo'}
     said = capfd.readouterr().err
     assert 'flap and lever_A.x are moved by one input: name one of them' in said
-    assert 'nothing is called boom' in said
+    assert 'no output is called boom' in said
 
 
 def test_hostile_bytes_end_nothing(stream, graph):
@@ -253,8 +253,8 @@ def test_of_several_inputs_what_cannot_be_had_is_held_and_said(graph, capfd):
     assert found.keys() == good.keys()
     assert min(abs(found['leg_crank'][0] - left) for left, _ in changed) < 1e-12
     said = capfd.readouterr().err
-    for reason in ('leg_P.x and leg_P.y cannot be 9, 9: P.x, P.y at 9, 9 is nowhere in the reach',
-                   'digger has 3 inputs: name as many outputs of it, not digger_H.x and'):
+    for reason in ('leg_P.x and leg_P.y cannot be 9, 9: P.x, P.y at 9, 9 is outside the reach',
+                   'digger has 3 inputs: name 3 of its outputs, not digger_H.x and'):
         assert reason in said
 
 
@@ -323,7 +323,7 @@ def test_a_trajectory_of_a_foot_and_a_bucket(graph, several_plan):
     (['flap'], [([0.0], []), ([4.0], [])], 'point 1: flap cannot be 4: the lever reaches'),
     (['flap'], [([0.0, 1.0], [])], 'point 0 must have 1 positions'),
     (['flap'], [([0.0], [1.0, 2.0])], 'as many velocities or none, not 1 and 2'),
-    (['flap', 'wing'], [([0.0, 0.0], [])], 'nothing is called wing'),
+    (['flap', 'wing'], [([0.0, 0.0], [])], 'no output is called wing'),
     (['flap', 'flap'], [([0.0, 0.0], [])], 'flap and flap are moved by one input'),
     (['bar_A.x'], [([1e3], [])], 'point 0: bar_A.x cannot be 1000'),
     (['flap'], [([math.nan], [])], 'point 0: flap cannot be nan: a value must be finite')])

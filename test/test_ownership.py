@@ -149,7 +149,8 @@ def test_other_mechanisms_are_said_and_the_rest_is_followed(graph, warned):
     assert of(service, 'leg.dimensions.a') == 38.0
     assert warned[:2] == [
         "/kinematics has another mechanism, which is not followed: leg.type is 'jansen' here and "
-        "'klann' there", '/kinematics has other mechanisms: mine, yours']
+        "'klann' there", '/kinematics has other mechanisms; only one of the nodes has: '
+        'mine, yours']
     assert graph.set(owner, lever__dimensions__a=91.0).successful
     graph.until(lambda: of(service) == 91.0)
     assert len(warned) == 3

@@ -146,7 +146,7 @@ class Drawing(Dyads):
             sign = math.copysign(1.0, (part.along / joint.motion(block)).real)
             way = (self.on[block][part.joint] - part.start) / part.along
             return (part.link, sign, way.real) if part.slide is joint else None
-        pin = self.known(child, joint.places[1]) or ''
+        pin = self.joint_at(child, joint.places[1]) or ''
         base, body = (parent, child) if self.home[pin] == parent else (child, parent)
         if self.home[pin] != base:
             return None
@@ -158,7 +158,8 @@ class Drawing(Dyads):
             except ValueError:
                 # No word places a second joint on this block or barrel.
                 return None
-            along, side = (end - start) * complex(0.5, 0.75 ** 0.5), self.said(abs(end - start))
+            along = (end - start) * complex(0.5, 0.75 ** 0.5)
+            side = self.length_text(abs(end - start))
             tip = self.name(start + along, body, f'dyad {pin} {other} {side} {side} left')
             link = bar_name(pin, tip)
         return link, joint.motion(body), phase(along / self.parts[base].along)
@@ -172,9 +173,9 @@ class Drawing(Dyads):
             if other.source == source and (word == 'crank') == (other.name[:5] == 'crank'):
                 gear = ratio / other.ratio
                 offset -= gear * other.offset
-                said = self.said(offset) if word != 'crank' else short(
+                angle_or_length = self.length_text(offset) if word != 'crank' else short(
                     math.remainder(offset, math.tau))
-                return number, f' geared {other.name} {gear!r} {said}'
+                return number, f' geared {other.name} {gear!r} {angle_or_length}'
         self.drives.append(Source(word + number, source, ratio, offset, ratio * (
             self._robot.positions.get(source) or 0.0) + offset, ends))
         return number, ''
@@ -183,7 +184,7 @@ class Drawing(Dyads):
         """Return the position of a joint's motor in the file."""
         return joint.start
 
-    def alike(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
+    def special_line(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
         """Return the start of a line for bars that mirror others, and so pass dead points."""
         (first, start), (second, end) = one, two
         for corner, at in self.places:
