@@ -6,7 +6,7 @@
 import copy
 import json
 import math
-from typing import Any, Dict, Iterable, Mapping, Tuple
+from typing import Any, Dict, Iterable, Iterator, Mapping, Tuple
 
 import numpy as np
 
@@ -76,13 +76,13 @@ def _seen(machine: SceneMechanism) -> Tuple[np.ndarray, np.ndarray]:
     return places @ seen[:3, :2].T + seen[:3, 3], seen[:3, 2]
 
 
-def _renamed(group, name, namespace):
+def _renamed(group: Mapping[str, Any], name: str, namespace: str) -> Dict[str, Any]:
     start = f'/{namespace.strip("/")}/'.replace('//', '/')
     text = json.dumps(group).replace(f'"/{group["Name"]}/', f'"{start}{name}/')
     return {**json.loads(text), 'Name': name}
 
 
-def _all(displays):
+def _all(displays: Iterable[dict]) -> Iterator[dict]:
     for display in displays:
         yield display
         yield from _all(display.get('Displays', ()))
