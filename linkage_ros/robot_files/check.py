@@ -72,45 +72,48 @@ def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
     if len(ends) > 1:
         low, high = targets
         targets = np.random.default_rng(1).uniform(low, high, (PATHS, len(ends)))
-    tracker = _Tracker(robot, component, driven, [*ends], slack)
-    count, beyond = 0, ''
+    tracker, sources = _Tracker(robot, component, driven, [*ends], slack), [*ends]
+    good, beyond = np.zeros((0, 1), bool), ''
     for _ in range(3):
         targets = targets[np.max(np.abs(targets - start), axis=1) > 1e-9]
         if not len(targets):
             break
         track = tracker.track(start, targets)
-        apart, names = _differences(machine, component, [*ends], track)
+        apart, names = _differences(machine, component, sources, track)
         allowed = (EXACT + 30.0 * slack) / np.maximum(track.margin, 1e-4)
         good = np.logical_and.accumulate(track.alive & (apart <= allowed), axis=1)
-        paths, first = np.arange(len(good)), np.minimum(good.sum(axis=1), good.shape[1] - 1)
-        # Past a change point a robot can continue in two ways.
-        near = np.minimum.accumulate(track.volume, axis=1)[paths, first] < CHANGE * np.max(
-            track.volume[track.alive], initial=0.0)
-        for i in paths[track.alive[paths, first] & ~good[paths, first] & ~near]:
-            if np.max(track.margin[track.alive]) < DEAD:
-                raise Difference('it could not be checked: its loops are at a dead point wherever '
-                                 'its motors are')
-            at, off = (i, first[i]), apart[i, first[i]]
-            where = ', '.join(f'{source} at {value:.4g}'
-                              for source, value in zip(ends, track.motors[at]))
-            raise Difference(f'with {where} ' + (
-                'it has no pose, where the loops of the robot are closed' if math.isnan(off)
-                else f'{names[at]} is off by {off:.2g}'))
-        count = int(good.sum())
-        if not good[paths, first].all():
+        _check_ends(track, sources, apart, names, good)
+        if not good.all():
             beyond = '; not beyond ' + (
                 'a change point' if (track.alive & ~good).any() else 'where its loops end')
-        if count >= FEWEST:
+        if good.sum() >= FEWEST:
             worst = np.unravel_index(np.argmax(np.where(good, apart, -1.0)), good.shape)
-            reached = track.motors[good].T
             moved = ', '.join(f'{source} from {values.min():.4g} to {values.max():.4g}'
-                              for source, values in zip(ends, reached))
-            return (f'Checked: {machine.name}: in {count} poses of the robot, its loops closed in '
-                    f'space, {moved}, the worst difference is {apart[worst]:.0e}, of '
+                              for source, values in zip(sources, track.motors[good].T))
+            return (f'Checked: {machine.name}: in {good.sum()} poses of the robot, its loops '
+                    f'closed in space, {moved}, the worst difference is {apart[worst]:.0e}, of '
                     f'{names[worst]}{beyond}.')
-        share = good.sum(axis=1) / good.shape[1]
-        targets = start + (targets - start) * share[:, None]
-    raise Difference(f'it could not be checked in more than {count} poses')
+        targets = start + (targets - start) * good.mean(axis=1)[:, None]
+    raise Difference(f'it could not be checked in more than {good.sum()} poses')
+
+
+def _check_ends(track: Track, sources: List[str], apart: np.ndarray, names: np.ndarray,
+                good: np.ndarray) -> None:
+    """Raise Difference for a path with good poses up to a wrong one, unless it branches there."""
+    largest = np.max(track.volume, where=track.alive, initial=0.0)
+    for i in np.flatnonzero(~good.all(axis=1)):
+        at = i, good[i].sum()
+        # Past a change point a robot can continue in two ways.
+        if not track.alive[at] or np.min(track.volume[i, :at[1] + 1]) < CHANGE * largest:
+            continue
+        if np.max(track.margin, where=track.alive, initial=0.0) < DEAD:
+            raise Difference('it could not be checked: its loops are at a dead point wherever '
+                             'its motors are')
+        where = ', '.join(f'{source} at {value:.4g}'
+                          for source, value in zip(sources, track.motors[at]))
+        raise Difference(f'with {where} ' + (
+            'it has no pose, where the loops of the robot are closed' if math.isnan(apart[at])
+            else f'{names[at]} is off by {apart[at]:.2g}'))
 
 
 def _differences(machine: scene.SceneMechanism, component: Component, sources: List[str],
