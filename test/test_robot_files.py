@@ -14,7 +14,7 @@ import random
 import re
 
 from linkage_ros import mechanisms, scene
-from linkage_ros.robot_files import closing, command, model, readers
+from linkage_ros.robot_files import check, closing, command, model, readers
 from linkage_ros.robot_files.spatial import trees
 import numpy as np
 import pytest
@@ -169,6 +169,26 @@ def test_a_scene_is_held_against_its_robot_over_the_range_of_its_motor(tmp_path,
     (count, worst), = checked(text)
     assert count >= 200 and worst < 1e-12 and 'motor from -1.2 to 1.2' in text
     assert ('# wrist has its ends 0.01 m apart along its axis' in text) == ('0.01' in place)
+
+
+@pytest.mark.parametrize('old, new', [
+    (' parallelogram', ' antiparallelogram'), ('ground 0.3 0', 'ground 0.3 1e-8'),
+    ('=-shoulder', '=shoulder'), ('=elbow-1.57079632', '=elbow-1.57079633')])
+def test_a_mechanism_that_differs_from_its_robot_is_refused(old, new):
+    robot = closing.closed(readers.read(str(ROBOTS / 'four_bar.urdf'))).robot
+    given, _ = command.described(robot)
+
+    def compared():
+        machine = scene.read(given).machines['motor']
+        return check.compared(robot, machine, ['motor'], {'motor': (-1.2, 1.2)}, 0.0)
+
+    assert compared().startswith('Checked: motor: in 240 poses')
+    key = 'motor.joint_names' if '=' in old else 'motor.joints'
+    changed = [line.replace(old, new) for line in given[key]]
+    assert changed != given[key]
+    given[key] = changed
+    with pytest.raises(check.Difference, match='with motor at .* is off by'):
+        compared()
 
 
 def test_a_parallelogram_that_hangs_in_its_file_stays_one(imported):
