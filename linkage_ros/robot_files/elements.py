@@ -62,11 +62,11 @@ def text(part: Element, tag: str, otherwise: str = '') -> str:
     return (part.findtext(tag) or otherwise).strip()
 
 
-def numbers(said: Union[str, Sequence[Any]], count: int = 3) -> np.ndarray:
+def numbers(given: Union[str, Sequence[Any]], count: int = 3) -> np.ndarray:
     """Return the numbers of a text or a list; raise ValueError if they are not `count`."""
-    found = np.array(said.split() if isinstance(said, str) else said, float)
+    found = np.array(given.split() if isinstance(given, str) else given, float)
     if found.shape != (count,) or not np.all(np.abs(found) < FARTHEST):
-        raise ValueError(f'{said!r} must be {count} numbers within {FARTHEST:g}')
+        raise ValueError(f'{given!r} must be {count} numbers within {FARTHEST:g}')
     return found
 
 

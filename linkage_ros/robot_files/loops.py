@@ -24,11 +24,12 @@ OPEN = 1e-5
 
 class Loop(NamedTuple):
     """
-    Joints of a linkage on a ground; its plane is `frame`, seen from the link `frame_id`.
+    A linkage in its plane, whose pose on the link `frame_id` is `frame`.
 
-    In the plane places are complex, and so are the axes of slides; that of a hinge is 1 or -1.
-    What cannot be closed is a gap [m]; what is nearer than `near` [m] is at one place. Axes lean
-    against the plane's [rad]. Some joints have ends that are apart [m] across the plane.
+    Places of joints are complex [m], and so are the axes of slides; the axis of a hinge is 1 or
+    -1. `size` is the largest distance of two joints [m], `gap` the distance that cannot be closed
+    [m], `lean` the inclination of axes [rad], and `across` has the distances of joints' ends
+    normal to the plane [m].
     """
 
     ground: str
@@ -42,11 +43,12 @@ class Loop(NamedTuple):
 
     @property
     def near(self) -> float:
+        """Points nearer to each other [m] coincide."""
         return self.size * min(max(ROUNDING, 10.0 * self.gap / self.size), 1e-6)
 
 
 class Group(NamedTuple):
-    """Joints of loops that share bars, their ground and its frame; why they are not planar."""
+    """Loops that share bars: ground and its frame, joints, why not planar, and planar parts."""
 
     ground: str
     frame_id: str

@@ -30,7 +30,7 @@ _OTHER = {'left': 'right', 'right': 'left', 'out': 'in', 'in': 'out'}
 
 
 class Source(NamedTuple):
-    """An input, ratio * position + offset of its source; its ends, if its joint has limits."""
+    """An input: ratio * position + offset of its source; `ends` are the limits of its joint."""
 
     name: str
     source: str
@@ -42,15 +42,16 @@ class Source(NamedTuple):
 
 class Drawing(Dyads):
     """
-    The lines that place the bodies of a loop; lengths are those that each body has on its own.
+    Joint lines of a planar loop, with the lengths of its bodies.
 
     Attributes
     ----------
     drives : list of Source
+        The inputs.
     driven : list of Joint
-        The joints that drive the lines.
+        The joints of the inputs.
     measured : Joint, optional
-        The motor between two moving links that tells where what drives is.
+        The motor between two moving links that measures the input.
 
     """
 
@@ -165,7 +166,7 @@ class Drawing(Dyads):
         return link, joint.motion(body), phase(along / self.parts[base].along)
 
     def drive(self, word: str, joint: Joint, ratio: float, offset: float) -> Tuple[str, str]:
-        """Note an input, as `Dyads` asks for; those of one source are geared to the first."""
+        """Add an input, as `Dyads` requires; inputs of one source are geared to the first."""
         source, factor, start = self._robot.source(joint.name)
         ends = joint.limits and tuple(sorted(ratio * limit + offset for limit in joint.limits))
         ratio, offset, number = ratio * factor, offset + ratio * start, self.number(word)
