@@ -9,13 +9,12 @@ All inputs are at their starts, so that every loop is closed at the beginning of
 
 from __future__ import annotations
 
-import cmath
 import math
 from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .bodies import BALL, Body, BOX, Joint, Piece, Point, Robot, ROD, size
+from .bodies import BALL, Body, BOX, Joint, Piece, Point, pose, Robot, ROD, size
 from ..scene import SceneError, SceneMechanism
 from ..scene.motion import Motion
 
@@ -132,28 +131,21 @@ def _solved(machine: SceneMechanism, starts: Dict[str, float]
 def _slots(machine: SceneMechanism, bodies: Sequence[Body], positions: Dict[str, float]
            ) -> Iterator[Body]:
     """Yield the bodies in slots of yokes, which have no joint in the tree."""
-    at: Dict[str, Tuple[complex, float]] = {}
+    at: Dict[str, np.ndarray] = {}
     for body in bodies:
-        start, turn = at.get(body.parent, (0j, 0.0))
-        if body.joint:
-            x, y, *_, yaw = body.posed(positions[body.joint.name])
-            start, turn = start + cmath.rect(1.0, turn) * complex(x, y), turn + yaw
-        elif at:
-            turn += body.pose[5]
-        at[body.name] = start, turn
-    places = {point.name: (at[body.name][0] + cmath.rect(1.0, at[body.name][1])
-                           * complex(*point.place), point) for body in bodies
-              for point in body.points}
+        own = pose(*body.posed(positions[body.joint.name] if body.joint else 0.0))
+        at[body.name] = at[body.parent] @ own if at else np.eye(4)
+    points = {point.name: (at[body.name] @ (*point.place, 0.0, 1.0), point)
+              for body in bodies for point in body.points}
     for prefix in machine.assembly().legs:
         for link, pin in machine.linkage.yokes.items():
             name = f'{machine.name}_{prefix}{link}'
-            start, turn = at[f'{name}_link']
-            place, point = places[f'{machine.name}_{prefix}{pin}']
-            seen = (place - start) * cmath.rect(1.0, -turn)
+            place, point = points[f'{machine.name}_{prefix}{pin}']
+            x, y = np.linalg.solve(at[f'{name}_link'], place)[:2].tolist()
             joint = Joint(f'{name}_slot', 'prismatic', 1.0, None)
             met = Point(f'{name}_pin', (0.0, 0.0), point.name, point.radius)
-            yield Body(f'{name}_slot_link', f'{name}_link',
-                       (seen.real, seen.imag, 0.0, 0.0, 0.0, 0.5 * math.pi), joint, [], [met])
+            yield Body(f'{name}_slot_link', f'{name}_link', (x, y, 0.0, 0.0, 0.0, 0.5 * math.pi),
+                       joint, [], [met])
 
 
 def weight(pieces: Sequence[Piece], density: float) -> Weight:
