@@ -92,7 +92,7 @@ class Rods:
 
     def _add(self, joint: Joint) -> None:
         """Add a link, and its joint with a link that is there."""
-        base, body = sorted(joint.bodies, key=self._bodies.keys().__contains__, reverse=True)
+        base, body = sorted(joint.bodies, key=self._bodies.__contains__, reverse=True)
         if joint.kind not in (HINGE, SLIDE):
             raise ValueError(f'{joint.name} is a joint of type {joint.kind} and no end of a rod')
         name = self._bodies[body] = self._named(joint)

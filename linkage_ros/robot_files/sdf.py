@@ -87,12 +87,11 @@ class _Model:
         bodies = ['world'] * any('world' in pair for pair in ends.values()) + sorted(
             links, key=children.__contains__)
         robot = Robot(bodies[0], {name: self.frame(name) for name in bodies})
-        for name, part in joints.items():
-            if part.get('type') != 'gearbox':
-                self._join(robot, name, part, ends[name])
-        for name, part in joints.items():
-            if part.get('type') == 'gearbox':
-                self._gear(robot, name, part, ends[name])
+        # A gearbox refers to other joints.
+        gears = [name for name, part in joints.items() if part.get('type') == 'gearbox']
+        for name in sorted(joints, key=gears.__contains__):
+            add = self._gear if name in gears else self._join
+            add(robot, name, joints[name], ends[name])
         for model in (part for part in self._parts.values() if part.tag == 'model'):
             for plugin in model.findall('plugin'):
                 kind = f'{plugin.get("name")} {plugin.get("filename")}'.lower()
