@@ -16,7 +16,7 @@ import re
 
 from linkage_ros import mechanisms, scene
 from linkage_ros.robot_files import check, closing, command, model, readers
-from linkage_ros.robot_files.spatial import trees
+from linkage_ros.robot_files.spatial import posed, trees
 import numpy as np
 import pytest
 from robots import LIBRARIES
@@ -804,7 +804,7 @@ def test_links_are_where_other_readers_of_a_urdf_have_them(tmp_path, seed, libra
     robot = readers.read(str(file))
     positions = {name: float(rng.uniform(-3.0, 3.0)) for name in robot.positions}
     there = library(text).places(dict.fromkeys(positions, 0.0) | positions, names)
-    here = closing.posed(robot, positions).frames
+    here = posed(robot, positions).frames
     for name in names:
         assert here[name][:3, 3] == pytest.approx(there[name], abs=1e-12)
 

@@ -7,23 +7,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 import math
-from typing import Dict, Iterable, List, Mapping, NamedTuple, Tuple
+from typing import Dict, List, Mapping, NamedTuple, Tuple
 
 import numpy as np
 
-from .robot import FIXED, Robot, SLIDE
-from .spatial import (
-    CLOSED,
-    Component,
-    components,
-    DEAD,
-    displaced,
-    displacements,
-    Poses,
-    screws,
-    trees,
-)
-from ..command import RequestError
+from .robot import FIXED, Robot
+from .spatial import CLOSED, Component, components, DEAD, displaced, posed, Poses, trees
 from ..words import listed
 
 # A gap that is smaller, of the size of its loops, is rounding: files have angles such as 1.5708.
@@ -36,28 +25,6 @@ STARTS = 24
 ALIKE, ALIKE_LENGTH, DISTINCT = 1.2, 1e-3, 1e-3
 # A step of motors away from a dead point [rad, or of the size].
 ASIDE = 0.1
-
-
-def check_names(robot: Robot, names: Iterable[str]) -> None:
-    """Raise RequestError for a name that no joint of one degree of freedom has."""
-    for name in names:
-        if name not in robot.positions:
-            raise RequestError(f'there is no joint {name!r}; allowed: '
-                               f'{listed(robot.positions, 200)}')
-
-
-def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
-    """Return a robot with some joints moved; raise RequestError for an unknown joint."""
-    check_names(robot, values)
-    tree, moves = trees(robot)[0], {}
-    for name in values.keys() - {joint.name for _, joint in tree.values()}:
-        raise RequestError(f'{name} closes a loop, so that other joints say where it is')
-    for body, (base, joint) in tree.items():
-        if joint.name in values and joint.position is not None:
-            slides, change = joint.kind == SLIDE, np.array(values[joint.name] - joint.position)
-            screw = screws(joint.motion(body), joint.place(base), slides)
-            moves[body] = displacements(screw, change, slides)
-    return displaced(robot, moves, values)
 
 
 def held(robot: Robot, values: Mapping[str, float]) -> Robot:

@@ -12,7 +12,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from . import check, closing, loops, planar, readers, rods
+from . import check, closing, loops, planar, readers, rods, spatial
 from .robot import FARTHEST, Joint, Robot
 from .. import command
 from ..scene.writing import in_yaml
@@ -45,8 +45,8 @@ def show(args: Optional[List[str]]) -> None:
     with np.errstate(all='ignore'):
         robot = readers.read(asked.file, asked.loops)
         robot.driven = asked.driven or robot.driven
-        closing.check_names(robot, asked.driven or ())
-        robot = closing.posed(robot, _values(asked.pose))
+        robot.check_names(asked.driven or ())
+        robot = spatial.posed(robot, _values(asked.pose))
         robot = closing.held(robot, {**robot.held, **_values(asked.hold)})
         given, said = described(robot)
     # Unprintable characters in names of the file could end a comment.

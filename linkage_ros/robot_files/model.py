@@ -11,10 +11,9 @@ from typing import Any, Dict, Optional
 import numpy as np
 
 from . import readers
-from .closing import posed
 from .elements import at, parse
 from .robot import FARTHEST, HINGE, Robot, SLIDE
-from .spatial import trees
+from .spatial import posed, trees
 from .. import scene
 from ..robot_model.bodies import coordinates
 from ..robot_model.urdf import link, tree_joint

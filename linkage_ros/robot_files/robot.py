@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 import re
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple
 
 import numpy as np
 
 from ..command import RequestError
+from ..words import listed
 
 HINGE, SLIDE, BALL, FIXED, UNIVERSAL, FREE = (
     'hinge', 'slide', 'ball', 'fixed', 'universal', 'free')
@@ -170,6 +171,13 @@ class Robot:
     def positions(self) -> Dict[str, float]:
         """Return the positions of all joints that have a name."""
         return {joint.name: joint.position for joint in self.joints if joint.position is not None}
+
+    def check_names(self, names: Iterable[str]) -> None:
+        """Raise RequestError for a name that no joint of one degree of freedom has."""
+        for name in names:
+            if name not in self.positions:
+                raise RequestError(f'there is no joint {name!r}; allowed: '
+                                   f'{listed(self.positions, 200)}')
 
     def source(self, name: str) -> Tuple[str, float, float]:
         """Return the joint that another depends on, or itself, with ratio and offset."""

@@ -115,6 +115,20 @@ def displaced(robot: Robot, moves: Mapping[str, np.ndarray], positions: Mapping[
         body: moved[body] @ frame for body, frame in robot.frames.items()})
 
 
+def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
+    """Return a robot with some joints moved; raise RequestError for an unknown joint."""
+    robot.check_names(values)
+    tree, moves = trees(robot)[0], {}
+    for name in values.keys() - {joint.name for _, joint in tree.values()}:
+        raise RequestError(f'{name} closes a loop, so that other joints say where it is')
+    for body, (base, joint) in tree.items():
+        if joint.name in values and joint.position is not None:
+            slides, change = joint.kind == SLIDE, np.array(values[joint.name] - joint.position)
+            screw = screws(joint.motion(body), joint.place(base), slides)
+            moves[body] = displacements(screw, change, slides)
+    return displaced(robot, moves, values)
+
+
 def blocks(found: Mapping[str, Tuple[str, Joint]], cuts: Sequence[Joint]
            ) -> List[Tuple[Set[str], List[Joint]]]:
     """Return bodies and cuts of the loops of a tree; loops that share joints are together."""
