@@ -83,9 +83,8 @@ def trees(robot: Robot) -> Tuple[Dict[str, Tuple[str, Joint]], List[Joint]]:
     for start in (robot.root, *robot.frames):
         if start != robot.root and start not in found:
             # A body that only cuts connect.
-            place = robot.frames[start][:3, 3]
-            found[start] = robot.root, Joint('', FREE, (robot.root, start), (place, place),
-                                             (place, place))
+            places = [robot.frames[start][:3, 3]] * 2
+            found[start] = robot.root, Joint('', FREE, (robot.root, start), places, places)
         row = [start]
         for body in row:
             for other, joint in near[body]:
@@ -119,8 +118,9 @@ def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
     """Return a robot with some joints moved; raise RequestError for an unknown joint."""
     robot.check_names(values)
     tree, moves = trees(robot)[0], {}
-    for name in values.keys() - {joint.name for _, joint in tree.values()}:
-        raise RequestError(f'{name} closes a loop, so that other joints say where it is')
+    names = {joint.name for _, joint in tree.values()}
+    if cuts := [name for name in values if name not in names]:
+        raise RequestError(f'{cuts[0]} closes a loop, so that other joints say where it is')
     for body, (base, joint) in tree.items():
         if joint.name in values and joint.position is not None:
             slides, change = joint.kind == SLIDE, np.array(values[joint.name] - joint.position)
