@@ -21,7 +21,7 @@ from ..words import elided
 NAME = 'from_robot'
 NEEDS = 'pip install pyyaml, and mujoco for MJCF'
 # The report on a mechanism that differs from its robot, or could not be compared.
-WRONG = 'held against the robot'
+WRONG = 'compared with the robot'
 
 
 def main(args: Optional[List[str]] = None) -> int:
@@ -36,9 +36,9 @@ def show(args: Optional[List[str]]) -> None:
     parser.add_argument('file', metavar='FILE', help='the robot')
     parser.add_argument('--loops', metavar='FILE', help='YAML with the loop joints of a URDF')
     parser.add_argument('--driven', metavar='JOINT', nargs='+', help='joints that motors move '
-                        '(default: those of which the file says so, or else of any)')
-    for option, meaning in (('pose', 'where a joint is while sides are read'),
-                            ('hold', 'where a joint stays')):
+                        '(default: those of the file, else any that determine the others)')
+    for option, meaning in (('pose', 'position of a joint in the pose that determines sides'),
+                            ('hold', 'position at which a joint is fixed')):
         parser.add_argument(f'--{option}', metavar='JOINT=VALUE', nargs='+', default=[],
                             help=f'{meaning} [rad or m]; several may follow')
     asked = parser.parse_args(args)
@@ -56,8 +56,8 @@ def show(args: Optional[List[str]]) -> None:
     print(*(f'# {line}' for line in head), in_yaml(given), sep='\n', end='')
     print(*(f'{NAME}: {line}' for line in head[2:]), sep='\n', file=sys.stderr)
     if wrong := [line for line in said if WRONG in line]:
-        raise command.RequestError(f'{len(wrong)} mechanisms are left out, as they could not be '
-                                   'held against the robot')
+        raise command.RequestError(f'{len(wrong)} mechanisms are left out, as they differ from the '
+                                   'robot or could not be compared with it')
 
 
 def _launch(asked: Any) -> str:
