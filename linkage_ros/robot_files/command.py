@@ -56,8 +56,8 @@ def show(args: Optional[List[str]]) -> None:
     print(*(f'# {line}' for line in head), in_yaml(given), sep='\n', end='')
     print(*(f'{NAME}: {line}' for line in head[2:]), sep='\n', file=sys.stderr)
     if wrong := [line for line in said if WRONG in line]:
-        raise command.RequestError(f'{len(wrong)} mechanisms are left out, as they differ from the '
-                                   'robot or could not be compared with it')
+        raise command.RequestError(f'{len(wrong)} mechanisms are left out, as they differ from '
+                                   'the robot or could not be compared with it')
 
 
 def _launch(asked: Any) -> str:
