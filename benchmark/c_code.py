@@ -105,7 +105,7 @@ int main(void)
         {name}_point p;
         {name}_side a = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, j = a, b = a;
         {name}_sample(k, q);
-        if (!{name}_at(q, &p)) continue;
+        if (!{name}_at(q, 1, &p)) continue;
         for (int i = 0; i < {n}; i++) {{
             a.position[i] = p.position[0][i];
             a.velocity[i] = a.effort[i] = 1;

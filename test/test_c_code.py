@@ -32,7 +32,8 @@ SCENE = {
     'bent.type': 'custom', 'bent.joints': [
         'O ground 0 0', 'A crank O 0.4', 'B crank A 0.3 zero O', 'C rigid A B 0.2 0.4 left']}
 OUTPUTS = {'slotted_lever': ('lever', 'A.x'), 'four_bar': ('QB', 'distance(O,B)'),
-           'jansen': ('G.x', 'angle(A,G)'), 'whitworth': ('lever',), 'slider_crank': ('block',),
+           'jansen': ('G.x', 'angle(A,G)'), 'whitworth': ('lever', 'block'),
+           'peaucellier': ('PB', 'BC'), 'slider_crank': ('block',),
            'boom': ('B.x', 'angle(O,B)')}
 CALLER = """
 void {name}_over(long count, const {number} *given, {number} *out)

@@ -211,8 +211,8 @@ class _Header:
                                   f'{number} inputs[{n}]'))
         given, beside, made = ('&value', ['near'], [f'*{what}']) if n == 1 else (
             'value', [f'near[{i}]' for i in range(n)], [f'inputs[{i}]' for i in range(n)])
-        known = ' && '.join(f'isfinite({code})' for code in (
-            ['value'] if n == 1 else [f'value[{i}]' for i in range(n)]) + beside)
+        known = ' && '.join(f'isfinite({given.lstrip("&")}{place})' for place in (
+            [''] if n == 1 else [f'[{i}]' for i in range(n)]))
         return '\n'.join([
             f'/* The {what} for {said}, nearest to `near`, whole turns included. Returns 0, and',
             f'   leaves {what} alone, where there is none. */',

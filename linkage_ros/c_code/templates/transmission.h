@@ -28,7 +28,7 @@ static inline const char *@name@_name(int side, int i)
 }
 
 @at@
-/* How large a position is, and after how much it is the same again, or 0. */
+/* One over the size of a position; or half the turn after which it is the same again, or 0. */
 static inline @number@ @name@_scale(int side, int i, int is_turn)
 {
     static const @number@ scale[@sides@][@n@][2] = { @scales@ };
@@ -41,10 +41,11 @@ static inline @number@ @name@_gap(const @number@ to[@n@], const @name@_point *p,
     @number@ most = @zero@;
     int i;
     for (i = 0; i < @n@; i++) {
-        const @number@ turn = @name@_scale(side, i, 1);
+        const @number@ half = @name@_scale(side, i, 1);
         gap[i] = to[i] - p->position[side > 0][i];
-        gap[i] -= turn > @zero@ ? turn * floor@f@(gap[i] / turn + @half@) : @zero@;
-        most = fmax@f@(most, fabs@f@(gap[i]) / @name@_scale(side, i, 0));
+        if (half > @zero@ && fabs@f@(gap[i]) > half)
+            gap[i] -= @two@ * half * floor@f@(@half@ * gap[i] / half + @half@);
+        most = fmax@f@(most, fabs@f@(gap[i]) * @name@_scale(side, i, 0));
     }
     return most;
 }
@@ -57,13 +58,13 @@ static inline int @name@_solved(const @name@_point *p, int side, int transposed,
     int i, j, k, best, sign = 1;
     for (i = 0; i < @n@; i++) {
         for (j = 0; j < @n@; j++) {
-            a[i][j] = transposed ? p->rate[side > 0][j][i] / @name@_scale(side, j, 0)
-                : p->rate[side > 0][i][j] / @name@_scale(side, i, 0);
+            a[i][j] = transposed ? p->rate[side > 0][j][i] * @name@_scale(side, j, 0)
+                : p->rate[side > 0][i][j] * @name@_scale(side, i, 0);
             if (!isfinite(a[i][j]))
                 return 0;
             most = fmax@f@(most, fabs@f@(a[i][j]));
         }
-        a[i][@n@] = transposed ? b[i] : b[i] / @name@_scale(side, i, 0);
+        a[i][@n@] = transposed ? b[i] : b[i] * @name@_scale(side, i, 0);
     }
     for (k = 0; k < @n@; k++) {
         for (best = k, i = k + 1; i < @n@; i++)
@@ -86,32 +87,40 @@ static inline int @name@_solved(const @name@_point *p, int side, int transposed,
         x[i] /= a[i][i];
     }
     for (i = 0; i < @n@; i++) {
-        x[i] /= transposed ? @name@_scale(side, i, 0) : @one@;
+        x[i] *= transposed ? @name@_scale(side, i, 0) : @one@;
         if (!isfinite(x[i]))
             return 0;
     }
     return sign;
 }
 
+@within@
 /* Newton steps from inputs q to positions; each comes nearer, and stays on
-   its side of singular poses. Returns 0, with q anywhere, where they do not get there. */
-static inline int @name@_reached(@given@int side, int (*at)(@types@const @number@ *, @name@_point *),
-    int steps, const @number@ position[@n@], @number@ q[@n@], @name@_point *p)
+   its side of singular poses. Returns 0, with q anywhere, where they do not get there; -1 where a
+   strict start is that far off, as those of closed forms for other assemblies are. */
+static inline int @name@_reached(@given@int side, int (*at)(@types@const @number@ *, int, @name@_point *),
+    int steps, int is_strict, const @number@ position[@n@], @number@ q[@n@], @name@_point *p)
 {
     @name@_point next;
     @number@ gap[@n@], x[@n@] = { @zero@ }, y[@n@] = { @zero@ }, to[@n@], share = @one@, longest, left, now;
     @number@ steepest = @one@;
     int i, j, sign, other = 0;
-    if (!at(@pass@q, p))
+    if (!at(@pass@q, side < 2, p)@clamped@)
         return 0;
     left = @name@_gap(position, p, side, gap);
+    if (left <= @enough@)
+        return 1;
+    if (is_strict && left > @other@)
+        return -1;
+    if (side > 1 && !at(@pass@q, 1, p))
+        return 0;
     sign = @name@_solved(p, side, 0, @least@, gap, x);
     while (--steps > 0 && sign && left > @enough@ && share > @finest@) {
         for (longest = @one@, i = 0; i < @n@; i++)
             longest = fmax@f@(longest, fabs@f@(x[i]) / @longest@);
         for (i = 0; i < @n@; i++)
             to[i] = q[i] + share / longest * x[i];
-        now = at(@pass@to, &next) ? @name@_gap(position, &next, side, gap) : left;
+        now = at(@pass@to, 1, &next) ? @name@_gap(position, &next, side, gap) : left;
         if (now < left)
             other = @name@_solved(&next, side, 0, @least@, gap, y);
         if (now < left && (other == sign || now <= @close@)) {
@@ -128,8 +137,18 @@ static inline int @name@_reached(@given@int side, int (*at)(@types@const @number
     }
     for (i = 0; i < @n@; i++)
         for (j = 0; j < @n@; j++)
-            steepest = fmax@f@(steepest, fabs@f@(p->rate[side > 0][i][j]) / @name@_scale(side, i, 0));
-    return left <= @close@ * steepest;
+            steepest = fmax@f@(steepest, fabs@f@(p->rate[side > 0][i][j]) * @name@_scale(side, i, 0));
+    return left <= @other@ && left <= @close@ * steepest;
+}
+
+/* How far inputs are from others. */
+static inline @number@ @name@_away(const @number@ q[@n@], const @number@ near[@n@])
+{
+    @number@ sum = fabs@f@(q[0] - near[0]);
+    int i;
+    for (i = 1; i < @n@; i++)
+        sum += fabs@f@(q[i] - near[i]);
+    return sum;
 }
 
 /* Whether inputs are within the sweeps that are set. */
@@ -164,7 +183,7 @@ static inline int @name@_begin(@given@@name@_memory *m)
     m->held[0] = m->held[1] = none;
     for (i = 0; i < @samples@; i++) {
         @name@_sample(i, m->input[1]);
-        if (@name@_at(@pass@m->input[1], &m->point[1]))
+        if (@name@_at(@pass@m->input[1], 1, &m->point[1]))
             return 1;
     }
     return 0;
@@ -188,8 +207,6 @@ static inline int @name@_transmit(@given@@name@_memory *m, int side, const @name
     /* A command stays within the sweep that is set; a measurement is what it is. */
     if (status == @N@_OK && side && !@name@_inside(q))
         status = @N@_OUT_OF_REACH;
-    for (i = 0; status == @N@_OK && i < @n@; i++)
-        status = isfinite(found.position[other][i]) ? @N@_OK : @N@_OUT_OF_REACH;
     if (status == @N@_OK) {
         m->point[side] = found;
         for (i = 0; i < @n@; i++) {
