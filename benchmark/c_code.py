@@ -35,7 +35,8 @@ SCENES = ('config/slotted_lever', 'config/jansen', 'config/excavator', 'examples
 POSES, CALLS = 16, 20_000
 USES = {
     'pose': '{name}_pose p; {name}_solve(given[k], &p); out = p.angle_{output};',
-    'inverse': 'float x = given[k] + 0.05f; {name}_crank_for_angle_{output}(found[k], x, &x); '
+    # Next to the other end of the reach, so that each assembly mode is chosen somewhere.
+    'inverse': 'float x = given[{last} - k]; {name}_crank_for_angle_{output}(found[k], x, &x); '
                'out = x;',
     'actuators to joints': 'side.position[0] = given[k]; out = side.velocity[0] = 1.0f; '
                            '{name}_actuators_to_joints(&memory, &side, &other); '
@@ -149,7 +150,7 @@ def measured(compiler, flags, name, output, use):
     values = {'name': name, 'count': POSES, **{
         key: ', '.join(f'{value:.7g}f' for value in each)
         for key, each in (('given', given + 1e-7), ('found', found))}}
-    body = USES[use].format(name=name, output=output)
+    body = USES[use].format(name=name, output=output, last=POSES - 1)
     begin = f'{name}_begin(&memory);' if 'memory' in body else ''
     text = header.written(machine, (output,), True, [f'{name}_{output}'])
     with tempfile.TemporaryDirectory() as folder:

@@ -327,7 +327,7 @@ static inline float lever_away(const float q[1], const float near[1])
 /* Whether inputs are within the sweeps that are set. */
 static inline int lever_inside(const float q[1])
 {
-    static const float end[1][2] = {  { (-INFINITY), (INFINITY) }  };
+    static const float end[1][2] = { { (-INFINITY), (INFINITY) } };
     int i;
     for (i = 0; i < 1; i++)
         if (!(q[i] >= end[i][0] - 1e-05f && q[i] <= end[i][1] + 1e-05f))
@@ -339,16 +339,14 @@ static inline int lever_inside(const float q[1])
 static inline int lever_from_actuators(const float position[1], float q[1], lever_point *p)
 {
     /* The inputs' turns, and one over them; 0 where there is none. */
-    static const float turn[1][2] = {  { 0.0f, 0.0f }  };
+    static const float turn[1][2] = { { 0.0f, 0.0f } };
     float start[1][1], away[1], far, best = (INFINITY), near[1];
     lever_point found;
     int i, k, next, ended;
     for (i = 0; i < 1; i++)
-        near[i] = q[i];
-    start[0][0] = near[0];
-    for (k = 0; k < 1; k++)
-        start[k][0] = position[0];
+        start[0][i] = near[i] = q[i];
     for (k = 0; k < 1; k++) {
+        start[k][0] = position[0];
         for (i = 0; i < 1; i++)
             start[k][i] += turn[i][0] * floorf((near[i] - start[k][i]) * turn[i][1] + 0.5f);
         away[k] = lever_away(start[k], near);
@@ -403,12 +401,12 @@ static inline void lever_modes_joints(const float position[1],
 static inline int lever_from_joints(const float position[1], float q[1], lever_point *p)
 {
     /* The inputs' turns, and one over them; 0 where there is none. */
-    static const float turn[1][2] = {  { 6.2831855f, 0.15915494f }  };
+    static const float turn[1][2] = { { 6.2831855f, 0.15915494f } };
     float start[2][1], away[2], far, best = (INFINITY), near[1];
     lever_point found;
     int i, k, next, ended;
     for (i = 0; i < 1; i++)
-        near[i] = q[i];
+        start[0][i] = near[i] = q[i];
     lever_modes_joints(position, start);
     for (k = 0; k < 2; k++) {
         for (i = 0; i < 1; i++)
@@ -465,12 +463,12 @@ static inline void lever_modes_angle_lever(const float position[1],
 static inline int lever_from_angle_lever(const float position[1], float q[1], lever_point *p)
 {
     /* The inputs' turns, and one over them; 0 where there is none. */
-    static const float turn[1][2] = {  { 6.2831855f, 0.15915494f }  };
+    static const float turn[1][2] = { { 6.2831855f, 0.15915494f } };
     float start[2][1], away[2], far, best = (INFINITY), near[1];
     lever_point found;
     int i, k, next, ended;
     for (i = 0; i < 1; i++)
-        near[i] = q[i];
+        start[0][i] = near[i] = q[i];
     lever_modes_angle_lever(position, start);
     for (k = 0; k < 2; k++) {
         for (i = 0; i < 1; i++)
@@ -500,7 +498,7 @@ static inline int lever_from_angle_lever(const float position[1], float q[1], le
 /* Inputs all over their ways for i = 1, 2, ...; for 0 where they start. */
 static inline void lever_sample(long i, float q[1])
 {
-    static const float way[1][4] = {  { 0.0f, (-3.1415927f), 6.2831855f, 0.41421357f }  };
+    static const float way[1][4] = { { 0.0f, (-3.1415927f), 6.2831855f, 0.41421357f } };
     int k;
     for (k = 0; k < 1; k++) {
         const float x = way[k][3] * (float)i;

@@ -46,9 +46,9 @@ class Code:
         self.literal = self.dialect.number
         self._constants: Dict[Real, int] = {}
 
-    def row(self, values: Iterable[float]) -> str:
-        """Return numbers as an initializer."""
-        return ', '.join(map(self.literal, values))
+    def rows(self, rows: Iterable[Iterable[float]]) -> str:
+        """Return rows of numbers as initializers."""
+        return ', '.join('{ %s }' % ', '.join(map(self.literal, row)) for row in rows)
 
     def times(self, code: str, factor: float) -> str:
         """Return code times a number."""

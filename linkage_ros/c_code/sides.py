@@ -8,41 +8,30 @@ Both are outputs of the linkage. Positions are converted through the inputs, vel
 exact Jacobians, efforts by their transposes, so that power is conserved.
 """
 
-from importlib.resources import files
-from itertools import product
 import math
-from typing import Dict, Iterable, Iterator, List, Sequence, Tuple
-
-import numpy as np
+from typing import Dict, Iterator, List, Sequence, Tuple
 
 from .axes import actuators, Axis, axis, joints, start
 from .code import Code, open_linkage
-from .names import comment, constants, field, filled, literal
+from .inverses import Inverses
+from .names import comment, constants, field, filled, literal, template
 from ..formula.expression import arctangent, Real, real
 from ..formula.program import Program
 from ..linkage.builder import in_metres
-from ..linkage.inverse_linkage import InverseLinkage, Mode
 from ..scene import SceneMechanism
 
 # In double and in single precision: below which part of its size a Jacobian is singular, and in a
 # search; what a search may miss, an input may be beside its sweep, and what is near enough.
 LIMITS = {'double': (1e-6, 1e-12, 1e-13, 1e-9, 1e-14),
           'float': (1e-3, 1e-5, 4e-6, 1e-5, 2e-6)}
-# Poses from a closed form and of a search, its longest step [rad, sizes] and the smallest part.
-CLOSED, SEARCHED, LONGEST, FINEST = 4, 64, 0.5, 2.0 ** -12
+# The longest step of Newton's method [rad, sizes], and its smallest part.
+LONGEST, FINEST = 0.5, 2.0 ** -12
 # A start of a closed form that is off by more is for another assembly [rad, sizes].
 OTHER = 1e-2
 # What is tried last is taken as further away by this.
 LAST = 1e6
-# Inputs that are no further apart are one [rad, sizes].
-ALIKE = 1e-6
 # Samples for the first pose of a search.
 SAMPLES = 4096
-
-
-def template(name: str) -> str:
-    """Return a template of this room."""
-    return files(__package__).joinpath('templates', name).read_text()
 
 
 class Sides:
@@ -72,34 +61,32 @@ class Sides:
             'number': self.code.number, 'f': self.code.suffix, 'sides': len(self.pairs) + 1,
             'given': f'const {machine.name}_linkage *c, ' if is_open else '',
             'types': f'const {machine.name}_linkage *, ' if is_open else '',
-            'pass': 'c, ' if is_open else '', 'samples': SAMPLES, 'closed': CLOSED,
+            'pass': 'c, ' if is_open else '', 'samples': SAMPLES,
             **{key: number(value) for key, value in {**one, **limits}.items()}}
-        self.poses = 0
+        self._inverses = Inverses(machine.linkage, self.code, self.values)
 
     def text(self) -> str:
         """Return all types and functions."""
         machine, (first, second) = self.machine, self.pairs['']
-        scales = [first, *(own for _, own in self.pairs.values())]
-        inverses = [self._inverse(0, 'actuators', first), *(
-            self._inverse(i, tag[1:] or 'joints', own)
-            for i, (tag, (_, own)) in enumerate(self.pairs.items(), 1))]
+        tables = [first, *(own for _, own in self.pairs.values())]
+        tags = ['actuators', 'joints', *(tag[1:] for tag in self.pairs if tag)]
         return filled(template('transmission.h'), {
-            **self.values, 'at': '\n'.join(map(self._at, self.pairs)),
-            'inverses': '\n'.join(inverses), 'within': self._within(),
-            'clamped': (f' && !(is_strict && {self.name}_within(q, 1)\n            && at('
-                        f'{self.values["pass"]}q, side < 2, p))') if self._arcs() else '',
+            **self.values, **self._inverses.within(), 'at': '\n'.join(map(self._at, self.pairs)),
+            'inverses': '\n'.join(map(self._inverses.function, range(len(tags)), tags, tables)),
             'about': self._about(),
             'enums': self._enum('actuator', first) + '\n' + self._enum('joint', second),
             'actuator_names': ', '.join(literal(each.name) for each in first),
             'joint_names': ', '.join(literal(each.name) for each in second),
-            'scales': ', '.join(self._rows((1.0 / each.size, 0.5 * each.turn) for each in own)
-                                for own in scales),
-            'ways': self._rows((at, *way) for at, way in zip(self._start(), self._ways()))[1:-1],
-            'ends': self._rows(self._counted(i, drive.ends or (-math.inf, math.inf))
-                               for i, drive in enumerate(machine.inputs.values()))[1:-1]})
+            'scales': ', '.join('{ %s }' % self.code.rows(
+                (1.0 / each.size, 0.5 * each.turn) for each in own) for own in tables),
+            'ways': self.code.rows((at, *way) for at, way in zip(self._start(), self._ways())),
+            'ends': self.code.rows(self._counted(i, drive.ends or (-math.inf, math.inf))
+                                   for i, drive in enumerate(machine.inputs.values()))})
 
-    def _rows(self, rows: Iterable[Sequence[float]]) -> str:
-        return '{ ' + ', '.join(f'{{ {self.code.row(row)} }}' for row in rows) + ' }'
+    @property
+    def poses(self) -> int:
+        """Return the largest number of poses of a call, once the text is written."""
+        return self._inverses.poses
 
     def _counted(self, i: int, ends: Sequence[float]) -> Tuple[float, ...]:
         """Return values of an input in units of its size."""
@@ -200,120 +187,6 @@ class Sides:
                 if links[name].kind != 'prismatic':
                     yield name, load
                 name = links[name].parent
-
-    def _inverse(self, side: int, tag: str, axes: Sequence[Axis]) -> str:
-        """Return the function from positions to the inputs."""
-        linkage, code = self.machine.linkage, self.code
-        inputs = {input_.name: i for i, input_ in enumerate(linkage.inputs)}
-        values = [code.times(
-            f'position[{i}]' + (f' - {code.literal(each.offset)}' if each.offset else ''),
-            1.0 / each.factor) for i, each in enumerate(axes)]
-        outputs = tuple(each.output for each in axes)
-        closed = None if inputs.keys() >= {*outputs} else linkage.inverse(outputs).closed
-        start = ' '.join(f'start[0][{i}] = near[{i}];' for i in inputs.values())
-        made, count, steps, how, stop, moved = '', 1, f'{CLOSED}', 'By its gear', 'break;', ''
-        strict, tries = '0', CLOSED
-        if closed:
-            made, count = self._modes(tag, outputs, closed, values)
-            start, how = f'{self.name}_modes_{tag}(position, start);', 'In closed form'
-            strict, tries = f'far < {code.literal(LAST)}', CLOSED + 2
-            if code.is_open and linkage.dimensions:
-                start = (f'if (c->is_own)\n        {start}\n    else\n        for (k = 0; k < '
-                         f'{count}; k++)\n            for (i = 0; i < {len(inputs)}; i++)\n'
-                         f'                start[k][i] = k ? {code.literal(math.nan)} : near[i];')
-                steps, how = f'c->is_own ? {CLOSED} : {SEARCHED}', (
-                    'In closed form; with other dimensions by a search')
-                strict, tries = f'c->is_own && {strict}', SEARCHED
-        elif not inputs.keys() >= {*outputs}:
-            steps, tries, how = f'{SEARCHED}', SEARCHED + 1, 'By a search'
-            if len(inputs) == 1 and not code.is_open:
-                middles = [0.5 * (low + high) / self.sizes[0] for low, high, *_ in
-                           linkage.monotone(outputs[0], math.inf)[0]]
-                count, stop, moved = 1 + len(middles), '', (
-                    f'far = {self.name}_away(start[next], near);')
-                start += ''.join(f'\n    start[{k}][0] = {code.literal(value)};'
-                                 for k, value in enumerate(middles, 1))
-        for value, output in zip(values, outputs):
-            if output in inputs:
-                i = inputs[output]
-                start += (f'\n    for (k = 0; k < {count}; k++)\n        start[k][{i}] = '
-                          f'{code.times(value, 1.0 / self.sizes[i])};')
-        most = count * tries
-        self.poses = max(self.poses, most)
-        measured = side == 0 and how != 'By its gear'
-        return made + filled(template('inverse.h'), {
-            **self.values, 'tag': tag, 'side': side, 'count': count, 'steps': steps, 'stop': stop,
-            'moved': moved, 'strict': strict,
-            'starts': f'    {start}', 'how': f'{how}, {most} poses at most',
-            'at': f'{self.name}_at' + (f'_{tag}' if side > 1 else ''),
-            'turns': self._rows((input_.turn, 1.0 / input_.turn) if input_.turns and
-                                input_.name not in outputs else (0.0, 0.0)
-                                for input_ in linkage.inputs)[1:-1],
-            'inside': f'\n                && {self.name}_inside(start[next])' * measured})
-
-    def _modes(self, tag: str, outputs: Tuple[str, ...], closed: InverseLinkage,
-               values: Sequence[str]) -> Tuple[str, int]:
-        """Return the function for the inputs of all assembly modes, and their number."""
-        inputs, number = self.machine.linkage.inputs, self.code.number
-        n, code = len(inputs), Code(self.name, self.machine.linkage, number == 'float')
-        # If an input has a period of several turns, each turn has its own pose.
-        turns, modes = list(product(*closed.turns)), self._own_modes(outputs, closed)
-        count = len(modes) * len(turns)
-        program = Program([value for mode in modes for value in mode.inputs], len(values),
-                          closed.given)
-
-        def ending(codes: List[str]) -> List[str]:
-            body = []
-            for k, (mode, turned) in enumerate(product(range(len(modes)), turns)):
-                for i in range(n):
-                    place, value = f'start[{k}][{i}]', codes[mode * n + i]
-                    value += f' + {code.literal(turned[i])}' if turned[i] else ''
-                    body.append(f'    {place} = {code.times(value, 1.0 / self.sizes[i])};')
-                if self._arcs():
-                    body.append(f'    {place} = {self.name}_within(start[{k}], 0) ? {place} : '
-                                f'{code.literal(math.nan)};')
-            return body
-
-        return code.function(
-            '/* The inputs in each assembly mode, NAN where there is none. */\n'
-            f'static inline void {self.name}_modes_{tag}(const {number} position[{n}],\n'
-            f'    {number} start[{count}][{n}])',
-            self.machine.linkage.bind(program), values, ending), count
-
-    def _arcs(self) -> List[Tuple[float, float]]:
-        """Return middles and half the lengths of the reach, [] where it has no ends."""
-        inputs = self.machine.linkage.inputs
-        if len(inputs) > 1 or inputs[0].is_whole(self.machine.linkage.reach()):
-            return []
-        inside = LIMITS[self.code.number][-1]
-        return [(0.5 * (low + high) / inputs[0].size, 0.5 * (high - low) / inputs[0].size - inside)
-                for low, high in self.machine.linkage.reach()]
-
-    def _within(self) -> str:
-        """Return the function that holds the input to its reach, '' where that has no ends."""
-        arcs, input_ = self._arcs(), self.machine.linkage.inputs[0]
-        turn = input_.turn if input_.turns else 0.0
-        return filled(template('within.h'), {
-            **self.values, 'arc_count': len(arcs), 'arcs': self._rows(arcs)[1:-1],
-            'turn': self.code.literal(turn), 'by_turn': self.code.literal(turn and 1.0 / turn)
-            }) if arcs else ''
-
-    def _own_modes(self, outputs: Tuple[str, ...], closed: InverseLinkage) -> Sequence[Mode]:
-        """Return the assembly modes in which a linkage of one input is anywhere in its reach."""
-        linkage, modes = self.machine.linkage, closed.modes
-        if len(outputs) > 1:
-            return modes
-        # Between extremes of the output the mode is the same; in the middle two may meet.
-        pieces, _ = linkage.monotone(outputs[0], math.inf)
-        inputs = np.array([low + 0.382 * (high - low) for low, high, *_ in pieces])
-        starts = linkage.bind(Program([mode.inputs[0] for mode in modes], 1, closed.given)).over(
-            linkage.posed((), outputs).over(inputs)[0])
-        gaps, turn = np.add.outer(closed.turns[0], starts) - inputs, linkage.inputs[0].turn
-        if linkage.inputs[0].turns:
-            gaps -= turn * np.round(gaps / turn)
-        is_own = np.abs(gaps).min(axis=0) < ALIKE * linkage.inputs[0].size
-        return [mode for mode, own in zip(modes, is_own.any(axis=1)) if own] if is_own.any(
-            axis=0).all() else modes
 
     def checks(self) -> Iterator[Tuple[Real, str]]:
         """Yield expressions of dimensions that must be positive, with their error messages."""

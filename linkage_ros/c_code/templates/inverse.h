@@ -1,4 +1,4 @@
-/* From positions to the inputs nearest to q. @how@. */
+/* From positions to the inputs nearest to q. @how@, @poses@ poses at most. */
 static inline int @name@_from_@tag@(@given@const @number@ position[@n@], @number@ q[@n@], @name@_point *p)
 {
     /* The inputs' turns, and one over them; 0 where there is none. */
@@ -7,9 +7,10 @@ static inline int @name@_from_@tag@(@given@const @number@ position[@n@], @number
     @name@_point found;
     int i, k, next, ended;
     for (i = 0; i < @n@; i++)
-        near[i] = q[i];
+        start[0][i] = near[i] = q[i];
 @starts@
     for (k = 0; k < @count@; k++) {
+@given_inputs@
         for (i = 0; i < @n@; i++)
             start[k][i] += turn[i][0] * floor@f@((near[i] - start[k][i]) * turn[i][1] + @half@);
         away[k] = @name@_away(start[k], near);
