@@ -56,7 +56,7 @@ def opened(machine: SceneMechanism, joints: Sequence[str] = ()) -> str:
     text = sides.text()
     names = ', '.join(sides.linkage.dimensions) or 'none'
     return guarded(sides, [f'Dimensions [m] that may be given: {names}.'], [
-        sides.code.helpers(), sides.code.struct(), sides.code.setter(list(sides.checks())), text])
+        sides.code.helpers(), sides.code.struct(), sides.code.setter(), text])
 
 
 def guarded(sides: Sides, about: Sequence[str], parts: Sequence[str]) -> str:

@@ -20,16 +20,17 @@ from ..formula.program import Program
 from ..linkage.builder import in_metres
 from ..scene import SceneMechanism
 
-# In double and in single precision: below which part of its size a Jacobian is singular, and in a
-# search; what a search may miss, an input may be beside its sweep, and what is near enough.
-LIMITS = {'double': (1e-6, 1e-12, 1e-13, 1e-9, 1e-14),
-          'float': (1e-3, 1e-5, 4e-6, 1e-5, 2e-6)}
-# The longest step of Newton's method [rad, sizes], and its smallest part.
-LONGEST, FINEST = 0.5, 2.0 ** -12
-# A start of a closed form that is off by more is for another assembly [rad, sizes].
-OTHER = 1e-2
-# What is tried last is taken as further away by this.
-LAST = 1e6
+# Limits by precision. A Jacobian is `singular` below this part of its size, and below `least` for
+# Newton's method, which ends where `enough` is left of a position [rad, sizes], and may leave
+# `close`; an input may be beyond an end by `slack`.
+LIMITS = {'double': {'singular': 1e-6, 'least': 1e-12, 'enough': 1e-14, 'close': 1e-13,
+                     'slack': 1e-9},
+          'float': {'singular': 1e-3, 'least': 1e-5, 'enough': 2e-6, 'close': 4e-6,
+                    'slack': 1e-5}}
+# The longest step of Newton's method [rad, sizes], and its finest part. The start of a closed form
+# that misses by more than `other` is of another assembly, and tried last: as if `last` further.
+COMMON = {'longest': 0.5, 'finest': 2.0 ** -12, 'other': 1e-2, 'last': 1e6, 'infinity': math.inf,
+          'zero': 0.0, 'half': 0.5, 'one': 1.0, 'two': 2.0}
 # Samples for the first pose of a search.
 SAMPLES = 4096
 
@@ -52,17 +53,14 @@ class Sides:
         for group in outputs:
             own = [axis(machine, output) for output in group]
             self.pairs['_' + '_'.join(field(self.linkage, each) for each in group)] = [], own
-        number, one = self.code.literal, {'half': 0.5, 'zero': 0.0, 'one': 1.0, 'two': 2.0}
-        limits = dict(zip(('singular', 'least', 'close', 'slack', 'enough'),
-                          LIMITS[self.code.number]), longest=LONGEST, finest=FINEST,
-                      other=OTHER, last=LAST, infinity=math.inf)
         self.values: Dict[str, object] = {
             'name': machine.name, 'N': machine.name.upper(), 'n': len(self.sizes),
             'number': self.code.number, 'f': self.code.suffix, 'sides': len(self.pairs) + 1,
             'given': f'const {machine.name}_linkage *c, ' if is_open else '',
             'types': f'const {machine.name}_linkage *, ' if is_open else '',
             'pass': 'c, ' if is_open else '', 'samples': SAMPLES,
-            **{key: number(value) for key, value in {**one, **limits}.items()}}
+            **{key: self.code.literal(value)
+               for key, value in {**COMMON, **LIMITS[self.code.number]}.items()}}
         self._inverses = Inverses(machine.linkage, self.code, self.values)
 
     def text(self) -> str:
@@ -79,7 +77,7 @@ class Sides:
             'joint_names': ', '.join(literal(each.name) for each in second),
             'scales': ', '.join('{ %s }' % self.code.rows(
                 (1.0 / each.size, 0.5 * each.turn) for each in own) for own in tables),
-            'ways': self.code.rows((at, *way) for at, way in zip(self._start(), self._ways())),
+            'ranges': self.code.rows(self._ranges()),
             'ends': self.code.rows(self._counted(i, drive.ends or (-math.inf, math.inf))
                                    for i, drive in enumerate(machine.inputs.values()))})
 
@@ -93,15 +91,12 @@ class Sides:
         unit = self.sizes[i] * self.machine.scale_of(self.linkage.inputs[i].name)
         return tuple(end / unit for end in ends)
 
-    def _start(self) -> List[float]:
-        return [value / size for value, size in zip(start(self.machine), self.sizes)]
-
-    def _ways(self) -> Iterator[Tuple[float, ...]]:
-        """Yield the start, range and step of each input's samples."""
-        for i, drive in enumerate(self.machine.inputs.values()):
+    def _ranges(self) -> Iterator[Tuple[float, ...]]:
+        """Yield the start of each input, the range of its samples, and their step."""
+        for i, (drive, first) in enumerate(zip(self.machine.inputs.values(), start(self.machine))):
             low, high = self._counted(i, drive.ends or max(
                 drive.reach, key=lambda arc: arc[1] - arc[0]))
-            yield low, high - low, math.sqrt((i + 1) ** 2 + 1.0) % 1.0
+            yield first / self.sizes[i], low, high - low, math.sqrt((i + 1) ** 2 + 1.0) % 1.0
 
     def _enum(self, side: str, axes: Sequence[Axis]) -> str:
         upper = f'{self.name}_{side}'.upper()
@@ -187,18 +182,6 @@ class Sides:
                 if links[name].kind != 'prismatic':
                     yield name, load
                 name = links[name].parent
-
-    def checks(self) -> Iterator[Tuple[Real, str]]:
-        """Yield expressions of dimensions that must be positive, with their error messages."""
-        built = self.linkage.structure.built
-        for bar in built.bars:
-            yield bar.length, f'the bar {bar.first}-{bar.second} must be longer than zero'
-        for name, height in built.triangles.items():
-            yield (abs(height) + real(1.0),
-                   f'no triangle has the sides at {name}: each must be shorter than the others')
-        for input_ in built.inputs:
-            if not input_.turns:
-                yield real(input_.high) - input_.low, f'the {input_.name} must have a way to go'
 
 
 def _undivided(value: Real) -> Real:

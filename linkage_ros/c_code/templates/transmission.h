@@ -163,14 +163,14 @@ static inline int @name@_inside(const @number@ q[@n@])
 }
 
 @inverses@
-/* Inputs all over their ways for i = 1, 2, ...; for 0 where they start. */
+/* Sample i of the inputs, all over their ranges; 0 is where they start. */
 static inline void @name@_sample(long i, @number@ q[@n@])
 {
-    static const @number@ way[@n@][4] = { @ways@ };
+    static const @number@ range[@n@][4] = { @ranges@ };
     int k;
     for (k = 0; k < @n@; k++) {
-        const @number@ x = way[k][3] * (@number@)i;
-        q[k] = i ? way[k][1] + way[k][2] * (x - floor@f@(x)) : way[k][0];
+        const @number@ x = range[k][3] * (@number@)i;
+        q[k] = i ? range[k][1] + range[k][2] * (x - floor@f@(x)) : range[k][0];
     }
 }
 
