@@ -122,8 +122,8 @@ static inline int lever_reaches(float crank)
     return isfinite(crank);
 }
 
-/* What a call returns: 0, or a sum of these. OUT_OF_REACH: the linkage cannot get there, or may
-   not. SINGULAR: it would take an infinite velocity or effort. NOT_KNOWN: a number is missing. */
+/* Status of a call: 0, or a sum of these. OUT_OF_REACH: outside the reach or the sweep. SINGULAR: a
+   velocity or an effort would be infinite. NOT_KNOWN: a value is NaN or infinite. */
 enum { LEVER_OK = 0, LEVER_OUT_OF_REACH = 1, LEVER_SINGULAR = 2, LEVER_NOT_KNOWN = 4 };
 enum { LEVER_ACTUATOR_LEVER_CRANK = 0 };
 enum { LEVER_JOINT_LEVER_LEVER = 0 };
@@ -132,12 +132,12 @@ typedef struct { float position[1], velocity[1], effort[1]; } lever_side;
 typedef lever_side lever_actuators;
 typedef lever_side lever_joints;
 
-/* A pose: positions of the actuators [0] and joints [1], their rates by each input, and what the
-   inputs give against the loads. */
+/* A pose: positions of the actuators [0] and joints [1], their rates by each input, and the inputs'
+   efforts against the loads. */
 typedef struct { float position[2][1], rate[2][1][1], load[1]; } lever_point;
 
-/* What is remembered between calls: where the actuators were, where the joints were to be, and the
-   last valid values of both. lever_begin fills it. */
+/* The state between calls, which lever_begin initializes: the last poses and inputs by measured
+   actuators [0] and by commanded joints [1], and the last valid values of both. */
 typedef struct {
     lever_point point[2];
     float input[2][1];
@@ -209,7 +209,7 @@ static inline float lever_scale(int side, int i, int is_turn)
     return scale[side][i][is_turn];
 }
 
-/* From a pose to positions, the shorter way; returns the largest, in sizes. */
+/* Gaps from a pose to positions, the shorter way round; returns the largest, in sizes. */
 static inline float lever_gap(const float to[1], const lever_point *p, int side, float gap[1])
 {
     float most = 0.0f;
@@ -268,9 +268,9 @@ static inline int lever_solved(const lever_point *p, int side, int transposed, f
     return sign;
 }
 
-/* Newton steps from inputs q to positions; each comes nearer, and stays on
-   its side of singular poses. Returns 0, with q anywhere, where they do not get there; -1 where a
-   strict start is that far off, as those of closed forms for other assemblies are. */
+/* Newton's method from inputs q to positions: each step comes nearer, and stays on its side of
+   singular poses. Returns 0, with any q, if it does not converge; -1 if it is strict and q misses
+   by so much that it belongs to another assembly. */
 static inline int lever_reached(int side, int (*at)(const float *, int, lever_point *),
     int steps, int is_strict, const float position[1], float q[1], lever_point *p)
 {
@@ -495,18 +495,18 @@ static inline int lever_from_angle_lever(const float position[1], float q[1], le
     return best < (INFINITY);
 }
 
-/* Inputs all over their ways for i = 1, 2, ...; for 0 where they start. */
+/* Sample i of the inputs, all over their ranges; 0 is where they start. */
 static inline void lever_sample(long i, float q[1])
 {
-    static const float way[1][4] = { { 0.0f, (-3.1415927f), 6.2831855f, 0.41421357f } };
+    static const float range[1][4] = { { 0.0f, (-3.1415927f), 6.2831855f, 0.41421357f } };
     int k;
     for (k = 0; k < 1; k++) {
-        const float x = way[k][3] * (float)i;
-        q[k] = i ? way[k][1] + way[k][2] * (x - floorf(x)) : way[k][0];
+        const float x = range[k][3] * (float)i;
+        q[k] = i ? range[k][1] + range[k][2] * (x - floorf(x)) : range[k][0];
     }
 }
 
-/* Forget all that was, and find a pose to start from; returns 0 if there is none. */
+/* Initialize the memory and find a first pose; returns 0 if there is none. */
 static inline int lever_begin(lever_memory *m)
 {
     static const lever_side none = { { 0.0f }, { 0.0f }, { 0.0f } };
@@ -536,7 +536,7 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
     if (status == LEVER_OK && !(side ? lever_from_joints(from->position, q, &found)
             : lever_from_actuators(from->position, q, &found)))
         status = LEVER_OUT_OF_REACH;
-    /* A command stays within the sweep that is set; a measurement is what it is. */
+    /* Only a command has to be in the sweep: a measurement may be outside. */
     if (status == LEVER_OK && side && !lever_inside(q))
         status = LEVER_OUT_OF_REACH;
     if (status == LEVER_OK) {
@@ -551,7 +551,7 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
         m->is_known[1] = 0;
     all = status;
 
-    /* Velocities at the pose that is asked for, or else where it is; what is held stands still. */
+    /* Velocities at the requested pose, else at the last one; a held position has velocity 0. */
     at = &m->point[m->is_known[side] ? side : other];
     if (status == LEVER_NOT_KNOWN && (m->is_known[0] || m->is_known[1]))
         status = LEVER_OK;
@@ -568,7 +568,7 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
         held->velocity[i] = status == LEVER_OK ? y[i] : 0.0f;
     all |= status;
 
-    /* Efforts where the actuators are: power in is power out, but for what the loads take. */
+    /* Efforts at the actuators' pose: power in is power out plus that of the loads. */
     at = &m->point[m->is_known[0] ? 0 : 1];
     status = m->is_known[0] || m->is_known[1] ? LEVER_OK : LEVER_NOT_KNOWN;
     for (i = 0; status == LEVER_OK && i < 1; i++) {
@@ -588,14 +588,14 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
     return all | status;
 }
 
-/* From the actuators' positions, velocities and efforts to the joints'. Returns a status; what it
-   is not OK about is held: positions and efforts as they were last, velocities at zero. */
+/* From the actuators' positions, velocities and efforts to the joints'. Returns a status: where it
+   is not OK, positions and efforts are the last valid ones, and velocities 0. */
 static inline int lever_actuators_to_joints(lever_memory *m, const lever_actuators *from, lever_joints *to)
 {
     return lever_transmit(m, 0, from, to);
 }
 
-/* The same from the joints to the actuators, which go to the answer nearest to where they are. */
+/* The same from the joints to the actuators, to the inputs nearest to the last ones. */
 static inline int lever_joints_to_actuators(lever_memory *m, const lever_joints *from, lever_actuators *to)
 {
     return lever_transmit(m, 1, from, to);

@@ -94,7 +94,7 @@ class Code:
 
     def struct(self) -> str:
         """Return the struct of constants; it is complete once all functions are written."""
-        return '\n'.join(['/* What follows from the dimensions. */', 'typedef struct {',
+        return '\n'.join(['/* Constants that depend on the dimensions. */', 'typedef struct {',
                           f'    double k[{max(len(self._constants), 1)}];', '    int is_own;',
                           f'}} {self.name}_linkage;', ''])
 

@@ -1,5 +1,5 @@
 // Written by linkage_ros. SPDX-License-Identifier: Apache-2.0
-// Actuators all over their ways are taken to the joints and back.
+// Positions of the actuators over all their range, to the joints and back.
 #include <cmath>
 #include <cstdio>
 #include <vector>

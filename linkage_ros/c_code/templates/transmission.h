@@ -1,5 +1,5 @@
-/* What a call returns: 0, or a sum of these. OUT_OF_REACH: the linkage cannot get there, or may
-   not. SINGULAR: it would take an infinite velocity or effort. NOT_KNOWN: a number is missing. */
+/* Status of a call: 0, or a sum of these. OUT_OF_REACH: outside the reach or the sweep. SINGULAR: a
+   velocity or an effort would be infinite. NOT_KNOWN: a value is NaN or infinite. */
 enum { @N@_OK = 0, @N@_OUT_OF_REACH = 1, @N@_SINGULAR = 2, @N@_NOT_KNOWN = 4 };
 @enums@
 /* @about@. */
@@ -7,12 +7,12 @@ typedef struct { @number@ position[@n@], velocity[@n@], effort[@n@]; } @name@_si
 typedef @name@_side @name@_actuators;
 typedef @name@_side @name@_joints;
 
-/* A pose: positions of the actuators [0] and joints [1], their rates by each input, and what the
-   inputs give against the loads. */
+/* A pose: positions of the actuators [0] and joints [1], their rates by each input, and the inputs'
+   efforts against the loads. */
 typedef struct { @number@ position[2][@n@], rate[2][@n@][@n@], load[@n@]; } @name@_point;
 
-/* What is remembered between calls: where the actuators were, where the joints were to be, and the
-   last valid values of both. @name@_begin fills it. */
+/* The state between calls, which @name@_begin initializes: the last poses and inputs by measured
+   actuators [0] and by commanded joints [1], and the last valid values of both. */
 typedef struct {
     @name@_point point[2];
     @number@ input[2][@n@];
@@ -35,7 +35,7 @@ static inline @number@ @name@_scale(int side, int i, int is_turn)
     return scale[side][i][is_turn];
 }
 
-/* From a pose to positions, the shorter way; returns the largest, in sizes. */
+/* Gaps from a pose to positions, the shorter way round; returns the largest, in sizes. */
 static inline @number@ @name@_gap(const @number@ to[@n@], const @name@_point *p, int side, @number@ gap[@n@])
 {
     @number@ most = @zero@;
@@ -95,9 +95,9 @@ static inline int @name@_solved(const @name@_point *p, int side, int transposed,
 }
 
 @within@
-/* Newton steps from inputs q to positions; each comes nearer, and stays on
-   its side of singular poses. Returns 0, with q anywhere, where they do not get there; -1 where a
-   strict start is that far off, as those of closed forms for other assemblies are. */
+/* Newton's method from inputs q to positions: each step comes nearer, and stays on its side of
+   singular poses. Returns 0, with any q, if it does not converge; -1 if it is strict and q misses
+   by so much that it belongs to another assembly. */
 static inline int @name@_reached(@given@int side, int (*at)(@types@const @number@ *, int, @name@_point *),
     int steps, int is_strict, const @number@ position[@n@], @number@ q[@n@], @name@_point *p)
 {
@@ -174,7 +174,7 @@ static inline void @name@_sample(long i, @number@ q[@n@])
     }
 }
 
-/* Forget all that was, and find a pose to start from; returns 0 if there is none. */
+/* Initialize the memory and find a first pose; returns 0 if there is none. */
 static inline int @name@_begin(@given@@name@_memory *m)
 {
     static const @name@_side none = { { @zero@ }, { @zero@ }, { @zero@ } };
@@ -204,7 +204,7 @@ static inline int @name@_transmit(@given@@name@_memory *m, int side, const @name
     if (status == @N@_OK && !(side ? @name@_from_joints(@pass@from->position, q, &found)
             : @name@_from_actuators(@pass@from->position, q, &found)))
         status = @N@_OUT_OF_REACH;
-    /* A command stays within the sweep that is set; a measurement is what it is. */
+    /* Only a command has to be in the sweep: a measurement may be outside. */
     if (status == @N@_OK && side && !@name@_inside(q))
         status = @N@_OUT_OF_REACH;
     if (status == @N@_OK) {
@@ -219,7 +219,7 @@ static inline int @name@_transmit(@given@@name@_memory *m, int side, const @name
         m->is_known[1] = 0;
     all = status;
 
-    /* Velocities at the pose that is asked for, or else where it is; what is held stands still. */
+    /* Velocities at the requested pose, else at the last one; a held position has velocity 0. */
     at = &m->point[m->is_known[side] ? side : other];
     if (status == @N@_NOT_KNOWN && (m->is_known[0] || m->is_known[1]))
         status = @N@_OK;
@@ -236,7 +236,7 @@ static inline int @name@_transmit(@given@@name@_memory *m, int side, const @name
         held->velocity[i] = status == @N@_OK ? y[i] : @zero@;
     all |= status;
 
-    /* Efforts where the actuators are: power in is power out, but for what the loads take. */
+    /* Efforts at the actuators' pose: power in is power out plus that of the loads. */
     at = &m->point[m->is_known[0] ? 0 : 1];
     status = m->is_known[0] || m->is_known[1] ? @N@_OK : @N@_NOT_KNOWN;
     for (i = 0; status == @N@_OK && i < @n@; i++) {
@@ -256,14 +256,14 @@ static inline int @name@_transmit(@given@@name@_memory *m, int side, const @name
     return all | status;
 }
 
-/* From the actuators' positions, velocities and efforts to the joints'. Returns a status; what it
-   is not OK about is held: positions and efforts as they were last, velocities at zero. */
+/* From the actuators' positions, velocities and efforts to the joints'. Returns a status: where it
+   is not OK, positions and efforts are the last valid ones, and velocities 0. */
 static inline int @name@_actuators_to_joints(@given@@name@_memory *m, const @name@_actuators *from, @name@_joints *to)
 {
     return @name@_transmit(@pass@m, 0, from, to);
 }
 
-/* The same from the joints to the actuators, which go to the answer nearest to where they are. */
+/* The same from the joints to the actuators, to the inputs nearest to the last ones. */
 static inline int @name@_joints_to_actuators(@given@@name@_memory *m, const @name@_joints *from, @name@_actuators *to)
 {
     return @name@_transmit(@pass@m, 1, from, to);

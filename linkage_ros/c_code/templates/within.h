@@ -1,4 +1,4 @@
-/* Whether an input is within its reach or, by rounding, beyond an end; if so, `is_moved` there. */
+/* Whether an input is in its reach, or beyond an end by rounding; `is_moved` brings it inside. */
 static inline int @name@_within(@number@ q[1], int is_moved)
 {
     /* Middles of arcs, and half their lengths. */
