@@ -568,7 +568,7 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
         held->velocity[i] = status == LEVER_OK ? y[i] : 0.0f;
     all |= status;
 
-    /* Efforts at the actuators' pose: power in is power out plus that of the loads. */
+    /* Efforts at the actuators' pose: their power is that of the joints, less that of the loads. */
     at = &m->point[m->is_known[0] ? 0 : 1];
     status = m->is_known[0] || m->is_known[1] ? LEVER_OK : LEVER_NOT_KNOWN;
     for (i = 0; status == LEVER_OK && i < 1; i++) {

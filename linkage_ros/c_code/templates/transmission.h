@@ -236,7 +236,7 @@ static inline int @name@_transmit(@given@@name@_memory *m, int side, const @name
         held->velocity[i] = status == @N@_OK ? y[i] : @zero@;
     all |= status;
 
-    /* Efforts at the actuators' pose: power in is power out plus that of the loads. */
+    /* Efforts at the actuators' pose: their power is that of the joints, less that of the loads. */
     at = &m->point[m->is_known[0] ? 0 : 1];
     status = m->is_known[0] || m->is_known[1] ? @N@_OK : @N@_NOT_KNOWN;
     for (i = 0; status == @N@_OK && i < @n@; i++) {
