@@ -159,6 +159,37 @@ def test_the_inverse_finds_the_nearest_input(library, machines, name, output):
         assert invert(given, ctypes.byref(found)) == 0 and found.value == 7.0
 
 
+@pytest.mark.parametrize('name, output', [
+    ('four_bar', 'QB'), ('slotted_lever', 'lever'), ('jansen', 'BC'), ('whitworth', 'lever'),
+    ('peaucellier', 'BC'), ('klann', 'CF')])
+def test_an_inverse_takes_no_more_poses_than_its_header_says(machines, tmp_path, name, output):
+    machine, rng = machines[name], np.random.default_rng(6)
+    text = header.written(machine, (output,))
+    said = re.findall(r'(\d+) poses at most', text)[-1]
+    counted = re.sub(rf'(int {name}_at_angle_{output}\([^;]*?\)\n{{\n)', r'\1    taken++;\n', text)
+    assert counted.count('taken++') == 1
+    library = loaded(tmp_path, f"""
+static int taken;
+{counted}
+int poses(double value, double near)
+{{
+    double found;
+    taken = 0;
+    (void){name}_crank_for_angle_{output}(value, near, &found);
+    return taken;
+}}
+""")
+    (low, high), = machine.first.reach
+    edge = 0.01 * (high - low)
+    values = machine.linkage.joint_angles(np.concatenate([
+        rng.uniform(low + edge, high - edge, 200), [low, high]]), [output])[output]
+    taken = [library.poses(*map(ctypes.c_double, (value, near))) for value, near in zip(
+        [*values, *rng.uniform(-7.0, 7.0, 200)], rng.uniform(-9.0, 9.0, 402))]
+    assert max(taken) <= int(said)
+    # Inside the reach a closed form is checked, not searched.
+    assert machine.linkage.inverse(output).closed is None or max(taken[:200]) == 1
+
+
 def test_several_inputs_are_found_for_as_many_outputs(machines, tmp_path):
     machine, rng = machines['five_bar'], np.random.default_rng(5)
     text = header.written(machine, ('P.x', 'P.y'))

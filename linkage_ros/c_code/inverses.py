@@ -110,14 +110,16 @@ class Inverses:
         modes, count = self._modes(tag, self._own_modes(outputs, closed), closed, values)
         call = f'{code.name}_modes_{tag}(position, start);'
         strict = f'far < {self._values["last"]}'
+        # Each start may be tried twice, at an end of the reach with one more pose.
+        poses = count * (CLOSED + 2 + bool(self._arcs))
         if not code.is_open or not self._linkage.dimensions:
             return modes, {'count': count, 'how': 'In closed form', 'starts': f'    {call}',
-                           'strict': strict, 'poses': count * (CLOSED + 2)}
+                           'strict': strict, 'poses': poses}
         return modes, {
             'count': count, 'how': 'In closed form; with other dimensions by a search',
             'starts': f'    if (c->is_own)\n        {call}\n    else\n        for (k = 1; k < '
                       f'{count}; k++)\n            start[k][0] = {code.literal(math.nan)};',
-            'strict': f'c->is_own && {strict}', 'poses': SEARCHED,
+            'strict': f'c->is_own && {strict}', 'poses': max(poses, SEARCHED + 1),
             'steps': f'c->is_own ? {CLOSED} : {SEARCHED}'}
 
     def _modes(self, tag: str, modes: Sequence[Mode], closed: InverseLinkage,
