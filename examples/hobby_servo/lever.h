@@ -212,13 +212,13 @@ static inline float lever_scale(int side, int i, int is_turn)
 /* Gaps from a pose to positions, the shorter way round; returns the largest, in sizes. */
 static inline float lever_gap(const float to[1], const lever_point *p, int side, float gap[1])
 {
-    float most = 0.0f;
+    float most = 0;
     int i;
     for (i = 0; i < 1; i++) {
         const float half = lever_scale(side, i, 1);
         gap[i] = to[i] - p->position[side > 0][i];
-        if (half > 0.0f && fabsf(gap[i]) > half)
-            gap[i] -= 2.0f * half * floorf(0.5f * gap[i] / half + 0.5f);
+        if (half > 0 && fabsf(gap[i]) > half)
+            gap[i] -= 2 * half * floorf(0.5f * gap[i] / half + 0.5f);
         most = fmaxf(most, fabsf(gap[i]) * lever_scale(side, i, 0));
     }
     return most;
@@ -228,7 +228,7 @@ static inline float lever_gap(const float to[1], const lever_point *p, int side,
 static inline int lever_solved(const lever_point *p, int side, int transposed, float least,
     const float b[1], float x[1])
 {
-    float a[1][1 + 1], most = 1.0f, t;
+    float a[1][1 + 1], most = 1, t;
     int i, j, k, best, sign = 1;
     for (i = 0; i < 1; i++) {
         for (j = 0; j < 1; j++) {
@@ -250,7 +250,7 @@ static inline int lever_solved(const lever_point *p, int side, int transposed, f
             a[k][j] = a[best][j];
             a[best][j] = t;
         }
-        sign = (best == k) == (a[k][k] > 0.0f) ? sign : -sign;
+        sign = (best == k) == (a[k][k] > 0) ? sign : -sign;
         for (i = k + 1; i < 1; i++)
             for (t = a[i][k] / a[k][k], j = k; j <= 1; j++)
                 a[i][j] -= t * a[k][j];
@@ -261,7 +261,7 @@ static inline int lever_solved(const lever_point *p, int side, int transposed, f
         x[i] /= a[i][i];
     }
     for (i = 0; i < 1; i++) {
-        x[i] *= transposed ? lever_scale(side, i, 0) : 1.0f;
+        x[i] *= transposed ? lever_scale(side, i, 0) : 1;
         if (!isfinite(x[i]))
             return 0;
     }
@@ -275,8 +275,8 @@ static inline int lever_reached(int side, int (*at)(const float *, int, lever_po
     int steps, int is_strict, const float position[1], float q[1], lever_point *p)
 {
     lever_point next;
-    float gap[1], x[1] = { 0.0f }, y[1] = { 0.0f }, to[1], share = 1.0f, longest, left, now;
-    float steepest = 1.0f;
+    float gap[1], x[1] = { 0 }, y[1] = { 0 }, to[1], share = 1, longest, left, now;
+    float steepest = 1;
     int i, j, sign, other = 0;
     if (!at(q, side < 2, p))
         return 0;
@@ -289,7 +289,7 @@ static inline int lever_reached(int side, int (*at)(const float *, int, lever_po
         return 0;
     sign = lever_solved(p, side, 0, 1e-05f, gap, x);
     while (--steps > 0 && sign && left > 2e-06f && share > 0.00024414062f) {
-        for (longest = 1.0f, i = 0; i < 1; i++)
+        for (longest = 1, i = 0; i < 1; i++)
             longest = fmaxf(longest, fabsf(x[i]) / 0.5f);
         for (i = 0; i < 1; i++)
             to[i] = q[i] + share / longest * x[i];
@@ -300,13 +300,13 @@ static inline int lever_reached(int side, int (*at)(const float *, int, lever_po
             *p = next;
             left = now;
             sign = other;
-            share = 1.0f;
+            share = 1;
             for (i = 0; i < 1; i++) {
                 q[i] = to[i];
                 x[i] = y[i];
             }
         } else
-            share = left <= 4e-06f ? 0.0f : 0.5f * share;
+            share = left <= 4e-06f ? 0 : 0.5f * share;
     }
     for (i = 0; i < 1; i++)
         for (j = 0; j < 1; j++)
@@ -509,7 +509,7 @@ static inline void lever_sample(long i, float q[1])
 /* Initialize the memory and find a first pose; returns 0 if there is none. */
 static inline int lever_begin(lever_memory *m)
 {
-    static const lever_side none = { { 0.0f }, { 0.0f }, { 0.0f } };
+    static const lever_side none = { { 0 }, { 0 }, { 0 } };
     int i;
     m->is_known[0] = m->is_known[1] = m->is_held[0] = m->is_held[1] = 0;
     m->held[0] = m->held[1] = none;
@@ -527,7 +527,7 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
     lever_side *held = &m->held[other];
     lever_point found;
     const lever_point *at;
-    float q[1], x[1], y[1] = { 0.0f };
+    float q[1], x[1], y[1] = { 0 };
     int i, j, status = LEVER_OK, all;
     for (i = 0; i < 1; i++) {
         q[i] = m->input[!m->is_known[0]][i];
@@ -565,7 +565,7 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
     for (i = 0; i < 1; i++)
         status |= isfinite(y[i]) ? LEVER_OK : LEVER_SINGULAR;
     for (i = 0; i < 1; i++)
-        held->velocity[i] = status == LEVER_OK ? y[i] : 0.0f;
+        held->velocity[i] = status == LEVER_OK ? y[i] : 0;
     all |= status;
 
     /* Efforts at the actuators' pose: their power is that of the joints, less that of the loads. */

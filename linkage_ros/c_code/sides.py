@@ -30,7 +30,7 @@ LIMITS = {'double': {'singular': 1e-6, 'least': 1e-12, 'enough': 1e-14, 'close':
 # The longest step of Newton's method [rad, sizes], and its finest part. The start of a closed form
 # that misses by more than `other` is of another assembly, and tried last: as if `last` further.
 COMMON = {'longest': 0.5, 'finest': 2.0 ** -12, 'other': 1e-2, 'last': 1e6, 'infinity': math.inf,
-          'zero': 0.0, 'half': 0.5, 'one': 1.0, 'two': 2.0}
+          'half': 0.5}
 # Samples for the first pose of a search.
 SAMPLES = 4096
 

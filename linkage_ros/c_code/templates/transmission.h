@@ -38,13 +38,13 @@ static inline @number@ @name@_scale(int side, int i, int is_turn)
 /* Gaps from a pose to positions, the shorter way round; returns the largest, in sizes. */
 static inline @number@ @name@_gap(const @number@ to[@n@], const @name@_point *p, int side, @number@ gap[@n@])
 {
-    @number@ most = @zero@;
+    @number@ most = 0;
     int i;
     for (i = 0; i < @n@; i++) {
         const @number@ half = @name@_scale(side, i, 1);
         gap[i] = to[i] - p->position[side > 0][i];
-        if (half > @zero@ && fabs@f@(gap[i]) > half)
-            gap[i] -= @two@ * half * floor@f@(@half@ * gap[i] / half + @half@);
+        if (half > 0 && fabs@f@(gap[i]) > half)
+            gap[i] -= 2 * half * floor@f@(@half@ * gap[i] / half + @half@);
         most = fmax@f@(most, fabs@f@(gap[i]) * @name@_scale(side, i, 0));
     }
     return most;
@@ -54,7 +54,7 @@ static inline @number@ @name@_gap(const @number@ to[@n@], const @name@_point *p,
 static inline int @name@_solved(const @name@_point *p, int side, int transposed, @number@ least,
     const @number@ b[@n@], @number@ x[@n@])
 {
-    @number@ a[@n@][@n@ + 1], most = @one@, t;
+    @number@ a[@n@][@n@ + 1], most = 1, t;
     int i, j, k, best, sign = 1;
     for (i = 0; i < @n@; i++) {
         for (j = 0; j < @n@; j++) {
@@ -76,7 +76,7 @@ static inline int @name@_solved(const @name@_point *p, int side, int transposed,
             a[k][j] = a[best][j];
             a[best][j] = t;
         }
-        sign = (best == k) == (a[k][k] > @zero@) ? sign : -sign;
+        sign = (best == k) == (a[k][k] > 0) ? sign : -sign;
         for (i = k + 1; i < @n@; i++)
             for (t = a[i][k] / a[k][k], j = k; j <= @n@; j++)
                 a[i][j] -= t * a[k][j];
@@ -87,7 +87,7 @@ static inline int @name@_solved(const @name@_point *p, int side, int transposed,
         x[i] /= a[i][i];
     }
     for (i = 0; i < @n@; i++) {
-        x[i] *= transposed ? @name@_scale(side, i, 0) : @one@;
+        x[i] *= transposed ? @name@_scale(side, i, 0) : 1;
         if (!isfinite(x[i]))
             return 0;
     }
@@ -102,8 +102,8 @@ static inline int @name@_reached(@given@int side, int (*at)(@types@const @number
     int steps, int is_strict, const @number@ position[@n@], @number@ q[@n@], @name@_point *p)
 {
     @name@_point next;
-    @number@ gap[@n@], x[@n@] = { @zero@ }, y[@n@] = { @zero@ }, to[@n@], share = @one@, longest, left, now;
-    @number@ steepest = @one@;
+    @number@ gap[@n@], x[@n@] = { 0 }, y[@n@] = { 0 }, to[@n@], share = 1, longest, left, now;
+    @number@ steepest = 1;
     int i, j, sign, other = 0;
     if (!at(@pass@q, side < 2, p)@clamped@)
         return 0;
@@ -116,7 +116,7 @@ static inline int @name@_reached(@given@int side, int (*at)(@types@const @number
         return 0;
     sign = @name@_solved(p, side, 0, @least@, gap, x);
     while (--steps > 0 && sign && left > @enough@ && share > @finest@) {
-        for (longest = @one@, i = 0; i < @n@; i++)
+        for (longest = 1, i = 0; i < @n@; i++)
             longest = fmax@f@(longest, fabs@f@(x[i]) / @longest@);
         for (i = 0; i < @n@; i++)
             to[i] = q[i] + share / longest * x[i];
@@ -127,13 +127,13 @@ static inline int @name@_reached(@given@int side, int (*at)(@types@const @number
             *p = next;
             left = now;
             sign = other;
-            share = @one@;
+            share = 1;
             for (i = 0; i < @n@; i++) {
                 q[i] = to[i];
                 x[i] = y[i];
             }
         } else
-            share = left <= @close@ ? @zero@ : @half@ * share;
+            share = left <= @close@ ? 0 : @half@ * share;
     }
     for (i = 0; i < @n@; i++)
         for (j = 0; j < @n@; j++)
@@ -177,7 +177,7 @@ static inline void @name@_sample(long i, @number@ q[@n@])
 /* Initialize the memory and find a first pose; returns 0 if there is none. */
 static inline int @name@_begin(@given@@name@_memory *m)
 {
-    static const @name@_side none = { { @zero@ }, { @zero@ }, { @zero@ } };
+    static const @name@_side none = { { 0 }, { 0 }, { 0 } };
     int i;
     m->is_known[0] = m->is_known[1] = m->is_held[0] = m->is_held[1] = 0;
     m->held[0] = m->held[1] = none;
@@ -195,7 +195,7 @@ static inline int @name@_transmit(@given@@name@_memory *m, int side, const @name
     @name@_side *held = &m->held[other];
     @name@_point found;
     const @name@_point *at;
-    @number@ q[@n@], x[@n@], y[@n@] = { @zero@ };
+    @number@ q[@n@], x[@n@], y[@n@] = { 0 };
     int i, j, status = @N@_OK, all;
     for (i = 0; i < @n@; i++) {
         q[i] = m->input[!m->is_known[0]][i];
@@ -233,7 +233,7 @@ static inline int @name@_transmit(@given@@name@_memory *m, int side, const @name
     for (i = 0; i < @n@; i++)
         status |= isfinite(y[i]) ? @N@_OK : @N@_SINGULAR;
     for (i = 0; i < @n@; i++)
-        held->velocity[i] = status == @N@_OK ? y[i] : @zero@;
+        held->velocity[i] = status == @N@_OK ? y[i] : 0;
     all |= status;
 
     /* Efforts at the actuators' pose: their power is that of the joints, less that of the loads. */

@@ -9,7 +9,7 @@ static inline int @name@_within(@number@ q[1], int is_moved)
         gap -= @turn@ * floor@f@(gap * @by_turn@ + @half@);
         over = fabs@f@(gap) - arc[i][1];
         if (over <= @slack@) {
-            q[0] -= is_moved && over > @zero@ ? copysign@f@(over, gap) : @zero@;
+            q[0] -= is_moved && over > 0 ? copysign@f@(over, gap) : 0;
             return 1;
         }
     }
