@@ -118,7 +118,8 @@ class Inverses:
         return modes, {
             'count': count, 'how': 'In closed form; with other dimensions by a search',
             'starts': f'    if (c->is_own)\n        {call}\n    else\n        for (k = 1; k < '
-                      f'{count}; k++)\n            start[k][0] = {code.literal(math.nan)};',
+                      f'{count}; k++)\n            for (i = 0; i < {len(self._sizes)}; i++)\n'
+                      f'                start[k][i] = {code.literal(math.nan)};',
             'strict': f'c->is_own && {strict}', 'poses': max(poses, SEARCHED + 1),
             'steps': f'c->is_own ? {CLOSED} : {SEARCHED}'}
 
