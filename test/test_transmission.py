@@ -392,7 +392,7 @@ const char *{name}_placed(const double *dimension, const double *q, double *posi
     {name}_point p;
     const char *wrong = {name}_set(&c, dimension);
     if (!wrong)
-        position[0] = {name}_at(&c, q, &p) ? p.position[1][0] : NAN;
+        position[0] = {name}_at(&c, q, 1, &p) ? p.position[1][0] : NAN;
     return wrong;
 }}
 """ for name, machine in machines.items()))
@@ -460,8 +460,8 @@ def test_a_package_names_what_the_scene_names(tmp_path):
 
 
 @pytest.mark.parametrize('arguments, said', [
-    (['--out', '{0}/My-Package'], 'must end in the name of a package'),
-    (['--out', '{0}'], 'or one that this command wrote'), ([], 'required: --out'),
+    (['--out', '{0}/My-Package'], "must end in the package's name"),
+    (['--out', '{0}'], 'or one written by this command'), ([], 'required: --out'),
     (['--out', '{0}/legs', '--joints', 'elbow'], "no mechanism has a joint 'elbow'")])
 def test_what_cannot_be_written_is_one_sentence(tmp_path, capsys, arguments, said):
     folder = tmp_path / 'mine'

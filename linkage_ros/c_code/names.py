@@ -1,14 +1,20 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Names of a scene as C identifiers, comments and texts, whatever letters they have."""
+"""Names of a scene, with any characters, as C identifiers, comments and texts."""
 
+from importlib.resources import files
 import re
 from typing import Iterable, List, Mapping
 
 from ..linkage.mechanism import Mechanism
 
 _PLACE = re.compile(r'@(\w+)@')
+
+
+def template(name: str) -> str:
+    """Return a template of this room."""
+    return files(__package__).joinpath('templates', name).read_text()
 
 
 def filled(template: str, values: Mapping[str, object]) -> str:
@@ -40,7 +46,7 @@ def field(linkage: Mechanism, output: str) -> str:
 
 
 def comment(text: str) -> str:
-    """Return a text that ends no comment and no line."""
+    """Return a text without anything that would end a comment or a line."""
     return re.sub(r'[^ -~]', '?', text).replace('*/', '* /').replace('/*', '/ *').replace(
         '\\', '/').replace('??', '? ?')
 
