@@ -117,6 +117,7 @@ def test_a_pose_is_the_same_on_any_number_of_cores():
         os.sched_setaffinity(0, cores)
 
 
+@pytest.mark.slow
 def test_a_process_that_is_forked_has_threads_of_its_own():
     code = f"""
 import os

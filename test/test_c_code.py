@@ -102,7 +102,7 @@ def values(machine, count):
     return np.column_stack(rows)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
 def test_poses_and_rates_are_those_of_python(library, machines, name, count=300):
     machine = machines[name]
@@ -159,6 +159,7 @@ def test_the_inverse_finds_the_nearest_input(library, machines, name, output):
         assert invert(given, ctypes.byref(found)) == 0 and found.value == 7.0
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name, output', [
     ('four_bar', 'QB'), ('slotted_lever', 'lever'), ('jansen', 'BC'), ('whitworth', 'lever'),
     ('peaucellier', 'BC'), ('klann', 'CF')])

@@ -204,6 +204,7 @@ def without(module, code):
                           cwd=ROOT, capture_output=True, text=True, timeout=60)
 
 
+@pytest.mark.slow
 def test_the_library_works_where_there_is_no_ros():
     done = without('rclpy', """
         from linkage_ros import scene

@@ -75,7 +75,7 @@ def one_by_one(linkage, thetas):
     return np.array([linkage.function()(*given) for given in np.atleast_2d(thetas).T.tolist()])
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('kind', TYPES)
 def test_every_bit_is_the_same(kind):
     linkage = mechanisms.create(kind)

@@ -328,6 +328,7 @@ def test_the_build_says_in_one_line_that_there_is_no_python(copy, tmp_path):
     assert 'No Python from 3.10 to 3.14 was found' in said
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
 def test_clean_leaves_what_git_keeps(copy):
     before = sorted(copy.rglob('*'))

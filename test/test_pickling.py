@@ -96,6 +96,7 @@ def test_scenes_and_what_is_in_them_can_be_sent(file):
             assert (other.inputs, other.joints) == (machine.inputs, machine.joints)
 
 
+@pytest.mark.slow
 def test_processes_that_share_nothing_answer_the_same():
     linkages = list(LINKAGES.values())
     with get_context('spawn').Pool(1) as pool:

@@ -114,7 +114,7 @@ def test_a_change_of_the_geometry_reaches_all_three(graph, nodes):
         node.get_parameter('lever.dimensions.a').value == 90.0 for node in others))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_them_quietly(number):
     process = Process('scene', CONFIG / 'all.yaml')

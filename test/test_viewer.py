@@ -1341,6 +1341,7 @@ def test_messages_that_cannot_be_read_are_dropped_and_said_once(show, capfd):
     assert 'Traceback' not in said
 
 
+@pytest.mark.slow
 def test_what_other_nodes_say_of_a_parameter_is_anything(graph, show):
     def other(**kwargs):
         node = rclpy.create_node('a_node', **kwargs)
