@@ -91,7 +91,7 @@ def test_arrays_functions_and_machine_code_say_the_same(name):
         np.testing.assert_allclose(quick[joint], place, rtol=0.0, atol=1e-13 * linkage.longest)
 
 
-@pytest.mark.sample(17)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('power', [-600, -30, 40, 600])
 @pytest.mark.parametrize('name', CASES)
 def test_a_case_of_another_size_is_the_same_to_the_bit(name, power):

@@ -72,7 +72,7 @@ def test_a_file_that_is_no_mechanism_is_named(tmp_path, text, said):
     assert error.startswith('ImportError: linkage_ros.mechanisms.broken ') and said in error
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('seeds', [1, pytest.param(5, marks=pytest.mark.long)])
 @pytest.mark.parametrize('kind', list(mechanisms.TYPES))
 def test_every_mechanism_holds_what_any_linkage_must(kind, seeds):
@@ -82,6 +82,7 @@ def test_every_mechanism_holds_what_any_linkage_must(kind, seeds):
     assert not found, found[0]
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('kind', WIDER)
 def test_the_wider_catalogue_is_right_to_the_last_digits(kind):
     linkage = mechanisms.create(kind)
@@ -92,6 +93,7 @@ def test_the_wider_catalogue_is_right_to_the_last_digits(kind):
     assert rows and not broken(rows), summary(rows)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('count', [4, pytest.param(12, marks=pytest.mark.long)])
 @pytest.mark.parametrize('kind', WIDER)
 def test_other_dimensions_and_branches_are_right_too(kind, count):
@@ -265,7 +267,7 @@ def _curves():
         yield pytest.param(partial(_near_a_change_point, seed), id=f'near a change point {seed}')
 
 
-@pytest.mark.sample(14)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('make', [*_curves()])
 def test_a_drawn_curve_is_within_a_five_hundredth_of_its_size(make):
     linkage = make()

@@ -182,6 +182,7 @@ def test_commands_move_the_picture(stream, graph):
 
 # --- in turn, and all round ---
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('type_, output, part', [
     ('four_bar', 'QB', 1.0), ('jansen', 'G.x', 1.0), ('slider_crank', 'block', 1.0),
     ('watt', 'P.y', 1.0), ('whitworth', 'lever', 3.0)])
@@ -319,6 +320,7 @@ def test_a_trajectory_of_a_foot_and_a_bucket(graph, several_plan):
         np.testing.assert_allclose(point.velocities, slope(actuators_at, part), rtol=1e-6)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('names, points, reason', [
     (['flap'], [([0.0], []), ([4.0], [])], 'point 1: flap cannot be 4: the lever reaches'),
     (['flap'], [([0.0, 1.0], [])], 'point 0 must have 1 positions'),

@@ -505,7 +505,7 @@ def refused(ask, text) -> bool:
 
 
 @pytest.mark.filterwarnings('error')
-@pytest.mark.sample(12)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('role, every', [
     *((role, 2 if role in PARSED else 10) for role in (*ROLES, *OUTPUTS)),
     *(pytest.param(role, 1, marks=pytest.mark.long) for role in (*ROLES, *OUTPUTS))])

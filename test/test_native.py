@@ -83,6 +83,7 @@ def test_every_bit_is_the_same(kind):
     assert np.array_equal(by_batch(linkage, thetas), one_by_one(linkage, thetas), equal_nan=True)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('kind', ['jansen', 'slotted_lever'])
 def test_so_it_is_for_the_legs_of_a_walker(kind, monkeypatch, code):
     design = mechanisms.design(kind)

@@ -81,6 +81,7 @@ def read(reader, text):
     return sender.meaning, sender.read(text)
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('names', [[], ['a'], ['a', 'bc'], ['leg_crank'] * 7])
 @pytest.mark.parametrize('velocities', [True, False])
 @pytest.mark.parametrize('effort', [True, False])

@@ -172,6 +172,7 @@ def test_a_scene_is_held_against_its_robot_over_the_range_of_its_motor(tmp_path,
     assert ('# wrist has its ends 0.01 m apart along its axis' in text) == ('0.01' in place)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('old, new', [
     (' parallelogram', ' antiparallelogram'), ('ground 0.3 0', 'ground 0.3 1e-8'),
     ('=-shoulder', '=shoulder'), ('=elbow-1.57079632', '=elbow-1.57079633')])

@@ -366,7 +366,7 @@ def lengths(given):
                   if '.dimensions.' in p.name]
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('given', [*TYPES.values(), SMALL, SIGNED, SWEPT, {'jansen.scale': 5e-324},
                                    {'jansen.scale': 1e308}],
                          ids=[*TYPES, 'small', 'signed', 'swept', 'least', 'most'])
@@ -383,6 +383,7 @@ def test_the_ends_of_every_slider_are_whole_stops(given):
     assert len(numbers) > 3
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('given, stops', [
     *((given, 3) for given in (*map(TYPES.get, ('water_drop', 'peaucellier', 'slotted_lever')),
                                SMALL, SIGNED, SWEPT)),

@@ -96,6 +96,7 @@ def test_many_angles_out_of_reach_are_not_all_named(call):
     assert 'and 95 more' in response.message and len(response.servo_angle) == 100
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('parameters, request_, message', [
     (None, {'lever_angle': []}, 'lever_angle is empty'),
     (None, {'lever_angle': [0.1], 'servo_near': [0.1, 0.2]}, 'servo_near .* 1 .* not 2'),
@@ -303,6 +304,7 @@ def test_one_servo_near_serves_any_number_of_values(graph):
     assert np.abs(np.diff(other)).max() < 0.5 and np.abs(other - working).min() > 0.5
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('request_, message', [
     ({'servo_near': [1e308]}, 'servo_near must be finite and within 1e+06 rad of zero'),
     ({'servo_near': [-1.1 * scene.FARTHEST]}, 'servo_near must be finite and within'),

@@ -35,7 +35,8 @@ def made(name):
     return mechanisms.create('custom', joints=case.joints, **case.numbers), case.numbers
 
 
-@pytest.mark.parametrize('count', [12, pytest.param(80, marks=pytest.mark.long)])
+@pytest.mark.parametrize('count', [
+    pytest.param(12, marks=pytest.mark.slow), pytest.param(80, marks=pytest.mark.long)])
 def test_a_five_bar_has_all_its_working_modes(count):
     rng, modes = np.random.default_rng(7), 0
     for _ in range(count):

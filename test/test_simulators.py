@@ -98,7 +98,7 @@ class MuJoCo:
         assert not self.data.warning.number.any()
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', some_quick([*MACHINES, *OWN], KINDS))
 def test_mujoco_has_every_joint_where_it_is_and_every_loop_closed(name):
     one = simulated(name)

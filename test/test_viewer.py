@@ -718,6 +718,7 @@ def test_nobody_is_listened_to_while_nobody_looks(show, monkeypatch):
     asyncio.run(use(running.viewer.url))
 
 
+@pytest.mark.slow
 def test_a_browser_that_has_not_drawn_is_sent_no_more(show):
     running = show({**LEG, 'leg.crank.speed': 1.0, 'rate': 200.0})
     heard = running.graph.listen(MarkerArray, 'leg/markers')
@@ -810,6 +811,7 @@ REQUESTS = [
 ]
 
 
+@pytest.mark.sample(20)
 @pytest.mark.parametrize('op, fields, reason', REQUESTS, ids=range(len(REQUESTS)))
 def test_a_request_is_answered_whatever_it_holds(lever, op, fields, reason):
     def text(value):
