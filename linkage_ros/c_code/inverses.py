@@ -146,8 +146,8 @@ class Inverses:
             '/* The inputs in each assembly mode, NAN where there is none. */\n'
             f'static inline void {name}_modes_{tag}(const {number} position[{n}],\n'
             f'    {number} start[{count}][{n}])', self._linkage.bind(Program(
-                [value for mode in modes for value in mode.inputs], len(values), closed.given)),
-            values, ending), count
+                [value for mode in modes for value in mode.inputs], len(values),
+                closed.arguments)), values, ending), count
 
     def _own_modes(self, outputs: Tuple[str, ...], closed: InverseLinkage) -> Sequence[Mode]:
         """Return the assembly modes in which the linkage is anywhere in its reach, if known."""
@@ -158,8 +158,8 @@ class Inverses:
         pieces, _ = linkage.monotone(outputs[0], math.inf)
         inputs = np.array([low + 0.382 * (high - low) for low, high, *_ in pieces])
         values = linkage.posed((), outputs).over(inputs)[0]
-        starts = linkage.bind(Program([mode.inputs[0] for mode in modes], 1, closed.given)).over(
-            values)
+        starts = linkage.bind(Program(
+            [mode.inputs[0] for mode in modes], 1, closed.arguments)).over(values)
         is_own = first.apart(np.add.outer(closed.turns[0], starts), inputs).min(
             axis=0) < ALIKE * first.size
         return [mode for mode, own in zip(modes, is_own.any(axis=1)) if own] if is_own.any(
