@@ -257,6 +257,17 @@ def test_system_time_that_is_set_makes_no_jump(graph, on_system_time, seconds):
         assert 0.0 <= (message.position[0] - before) % math.tau < 2.0
 
 
+@pytest.mark.slow
+def test_a_slow_driver_goes_on_after_system_time_is_set_back(graph):
+    node = graph.start(OnSystemTime, {
+        'mechanisms': ['drop'], 'drop.type': 'water_drop', 'rate': 0.8})
+    heard = graph.listen(JointState, 'crank_states')
+    graph.until(lambda: heard)
+    node.set_by = Duration(seconds=-3600)
+    del heard[:]
+    graph.until(lambda: heard)
+
+
 def test_a_change_amid_a_leap_of_system_time_makes_no_jump_either(graph, on_system_time):
     node, heard = on_system_time
     before = heard[-1].position[0]

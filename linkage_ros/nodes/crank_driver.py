@@ -133,6 +133,9 @@ class CrankDriver(scene_node.SceneNode):
         """Restart the timer if the clock was set back since the last message."""
         set_back = self._now is not None and self._time()[0] < self._now
         if set_back and self.scene.rate:
+            # From here on the time is no longer set back: a timer that is reset again and again
+            # never fires.
+            self._follow_clock()
             self._timer.reset()
 
 
