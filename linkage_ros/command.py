@@ -5,6 +5,7 @@
 
 import argparse
 import os
+import re
 import sys
 from typing import Callable, List, Mapping, NoReturn, Optional, Sequence
 
@@ -22,6 +23,14 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Raise RequestError."""
         raise RequestError(message)
+
+    def parse_args(self, args=None, namespace=None) -> argparse.Namespace:  # type: ignore
+        """Return the arguments; raise RequestError for unknown ones."""
+        found, unknown = self.parse_known_args(args, namespace)
+        if unknown:
+            options = re.findall(r'--[\w-]+', self.format_usage())
+            self.error(f'unrecognized arguments: {" ".join(unknown)}{meant(unknown[0], options)}')
+        return found
 
 
 def run(name: str, work: Callable, args: Optional[Sequence[str]], needs: str) -> int:
