@@ -148,6 +148,8 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'jansen.dimensions.m': math.nan}, 'jansen.dimensions.m must be a finite'),
     ({'jansen.dimensions.m': math.inf}, 'jansen.dimensions.m must be a finite'),
     ({'jansen.dimensions.m': 500.0}, 'jansen.dimensions must let the jansen be assembled'),
+    ({**OWN, 'own.joints': ['O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'B dyad A Q 1 2 left']},
+     'own.joints must let the custom be assembled at some angle$'),
     ({'jansen.dimensions.q': 1.0}, 'jansen.dimensions.q is not a .* jansen.dimensions.a, '),
     ({'jansen.dimension.a': 1.0}, 'jansen.dimension.a is not a parameter .* jansen.dimensions.a'),
     ({'jansen': None}, 'jansen is not a parameter .* jansen.type'),
