@@ -3,7 +3,7 @@
 
 // A slider with a number beside it, and a switch; what is refused springs back, with the reason.
 
-import { units } from './units.js';
+import { figures, units } from './units.js';
 
 const STOPS = 1000;
 const FINE = 0.1;
@@ -214,7 +214,7 @@ export class Slider {
   }
 
   shortened(value) {
-    return String(Number((value * this.factor).toPrecision(this.digits)));
+    return figures(value * this.factor, this.digits);
   }
 }
 
