@@ -4,11 +4,12 @@
 // How a mechanism moves: a slider for each input, play and step, and what its outputs are now.
 
 import { element, LINEAR, Newest, put, Reason, Slider, typed } from './control.js';
-import { units } from './units.js';
+import { figures, units } from './units.js';
 
 const STEP = Math.PI / 180;
 const STEPS_A_STROKE = 100;
 const SECONDS_A_STROKE = 3;
+const NOTHING = 1e-9;
 const FIGURES = 5;
 const FIGURES_OF_MANY = 3;
 
@@ -16,10 +17,10 @@ function button(textContent, ariaLabel, onclick) {
   return element('button', { type: 'button', textContent, ariaLabel, title: ariaLabel, onclick });
 }
 
-function shown(value, unit, figures = FIGURES) {
+function shown(value, unit, digits = FIGURES) {
   if (value === null) return '—';
   const seen = value * units.of(unit).factor;
-  return Math.abs(seen) < 1e-9 ? '0' : String(Number(seen.toPrecision(figures)));
+  return figures(Math.abs(seen) < NOTHING ? 0 : seen, digits);
 }
 
 /** An input: its slider, which follows it, and buttons for a step back and on. */
@@ -70,7 +71,7 @@ class OutputRow {
       : element('span');
     this.unit = element('span', { className: 'unit' });
     this.rates = Array.from({ length: count }, () => element('td'));
-    this.row = element('tr', {}, element('th', { scope: 'row', textContent: name }),
+    this.row = element('tr', {}, element('th', { scope: 'row' }, element('span', { textContent: name })),
       element('td', {}, this.value, ' ', this.unit), ...this.rates);
     this.value.onchange = async () => {
       const { unit } = this.output;
@@ -196,6 +197,7 @@ export class Motion {
     const answer = await this.connection.ask({ op: 'pose', mechanism: this.mechanism.key, ...this.arrows });
     this.looking = false;
     if (answer.inputs) this.show(answer);
+    else if (!this.inputs.size) this.say(answer);
   }
 
   show({ inputs, outputs, arrows }) {
@@ -210,6 +212,7 @@ export class Motion {
 
   build(names, inputs, outputs) {
     this.built = names;
+    this.say({});
     const want = async what => {
       const answer = await this.want(what);
       if (!inputs[what.output]) this.say(answer);
@@ -222,7 +225,7 @@ export class Motion {
     this.table.replaceChildren(
       element('thead', {}, element('tr', {}, element('th', { scope: 'col', textContent: 'output' }),
         element('th', { scope: 'col', textContent: 'value' }),
-        ...all.map(name => element('th', { scope: 'col', textContent: `d / d ${name}` })))),
+        ...all.map(name => element('th', { scope: 'col' }, 'd / d ', element('span', { textContent: name }))))),
       element('tbody', {}, ...[...this.outputs.values()].map(({ row }) => row)));
     this.folding.hidden = !this.outputs.size;
   }
