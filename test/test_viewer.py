@@ -1882,8 +1882,9 @@ import('/picture.js').then(({ Picture }) => {
   return Array.from({ length: 2000 }, () => {
     const picture = new Picture(document.getElementById('picture')), written = [];
     picture.mechanisms = Array.from({ length: 16 }, (_, i) => (
-      { key: i, name: 'linkage'.slice(i % 5) }));
-    Object.assign(picture, { scale: 1, middle: [0, 0], centre: [0, 0], maps: new Map() });
+      { key: i, title: 'linkage'.slice(i % 5) }));
+    Object.assign(picture, {
+      scale: 1, middle: [0, 0], centre: [0, 0], maps: new Map(), canvas: CANVAS });
     const y = 4 ** (5 * random()), x = 4 ** (5 * random());
     for (const { key } of picture.mechanisms) {
       picture.maps.set(key, [[1, 0, 0, 0], [0, 1, 0, 0]]);
@@ -1899,17 +1900,27 @@ import('/picture.js').then(({ Picture }) => {
 
 @pytest.mark.slow
 @needs_browser
-def test_titles_are_written_beside_or_below_each_other_wherever_they_are(address, tmp_path):
+@pytest.mark.parametrize('width, height, fewest', [(1e5, 1e5, 16), (390, 380, 0)])
+def test_titles_are_written_beside_or_below_each_other_wherever_they_are(
+        address, tmp_path, width, height, fewest):
+    canvas = f'{{ clientWidth: {width}, clientHeight: {height} }}'
+
     async def look():
         async with browser.Browser(tmp_path) as page:
             await page.open(address)
-            return await page.value(TITLES)
+            return await page.value(TITLES.replace('CANVAS', canvas))
 
-    for written in asyncio.run(look()):
-        x, y, width = np.transpose(written)
+    pictures = asyncio.run(look())
+    assert min(map(len, pictures)) >= fewest
+    for written in filter(None, pictures):
+        x, y, wide = np.transpose(written)
+        seen = (x >= 0.0) & (x <= width)
+        assert (x - 0.5 * wide)[seen].min(initial=width) > 0.0
+        assert (x + 0.5 * wide)[seen].max(initial=0.0) < width
+        assert y.max() + 18.0 < height
         apart = np.maximum(abs(y[:, None] - y) / 18.0,
-                           2.0 * abs(x[:, None] - x) / (width[:, None] + width))
-        assert apart[~np.eye(len(x), dtype=bool)].min() > 1.0 - 1e-9
+                           2.0 * abs(x[:, None] - x) / (wide[:, None] + wide))
+        assert apart[~np.eye(len(x), dtype=bool)].min(initial=1.0) > 1.0 - 1e-9
 
 
 @pytest.mark.long
@@ -2064,6 +2075,287 @@ def test_mechanisms_of_one_name_in_two_namespaces_are_told_apart(graph, show, lo
         await browser.until(beside)
 
     looked_at(running, doing)
+
+
+# A crank and a rocker whose names are as long as names may be.
+LONG = {'mechanisms': ['m' * 64], **{f'{"m" * 64}.{name}': value for name, value in {
+    'type': 'custom', 'crank' + 'k' * 59 + '.speed': 1.0, 'dimensions.r': 1.234567,
+    'loads': ['D=100 20', f'B{"y" * 63}=-4 200'],
+    'joints': [
+        'O ground 0 0', 'Q ground 3 0', f'A{"x" * 63} crank O r called crank{"k" * 59}',
+        f'B{"y" * 63} dyad A{"x" * 63} Q 2.5 2 left', f'D line O A{"x" * 63} 2'],
+}.items()}}
+
+
+@pytest.mark.long
+@needs_browser
+@pytest.mark.parametrize('scale', [1e-6, 1.0, 1e6])
+def test_nothing_is_cut_in_a_narrow_window_however_long(show, looked_at, scale):
+    name, = LONG['mechanisms']
+    running = show({**RATE, **LONG, f'{name}.scale': scale})
+
+    async def doing(seen):
+        page = seen.page
+        await page.value('document.getElementById("arrows").value = "force",'
+                         'document.getElementById("arrows").onchange()')
+        for width, click in ((320, False), (1200, False), (320, True)):
+            await page.resize(width, 568, 'light')
+            if click:
+                await page.value('document.getElementById("workshop").click()')
+            await seen.output(name, 'D.x')
+            assert await page.value('document.documentElement.scrollWidth') <= width
+            assert await page.value(
+                '[...document.querySelectorAll("button, th, td, h2, input[type=text], .row > *")]'
+                '.filter(one => one.offsetParent && one.scrollWidth > one.clientWidth + 1 &&'
+                ' getComputedStyle(one).display !== "inline").map(one => one.outerHTML)') == []
+
+    looked_at(running, doing)
+
+
+@pytest.mark.slow
+@needs_browser
+def test_a_number_has_room_in_its_field_and_all_the_digits_that_have(address, tmp_path):
+    given = [sign * value * 10.0 ** power for sign in (1.0, -1.0)
+             for value in (1.0, 1.234567891, 9.99999999) for power in range(-300, 300)]
+
+    async def look():
+        async with browser.Browser(tmp_path) as page:
+            await page.open(address)
+            return await page.value('import("/units.js").then(({ figures }) =>'
+                                    f' {given}.map(value => figures(value, 6)))')
+
+    for value, text in zip(given, asyncio.run(look())):
+        assert len(text) <= 9
+        digits = 3 if abs(math.log10(abs(value))) > 99.0 else 4
+        assert float(text) == pytest.approx(value, rel=10.0 ** (1 - digits))
+        if 1.0 <= abs(value) < 1e5:
+            assert float(text) == float(f'{value:.6g}')
+
+
+@pytest.mark.long
+@needs_browser
+def test_a_linkage_in_space_is_drawn_whole_and_says_what_the_page_does_not(
+        show, looked_at, tmp_path):
+    ankle = scene.load(str(ROOT / 'examples' / 'ankle.yaml'))
+    running = show({**without_defaults(ankle), 'rate': 20.0})
+
+    async def doing(seen):
+        async def whole():
+            picture = await seen.canvas()
+            places = coloured(picture, *BLUE)
+            if not len(places):
+                return False
+            height, width, _ = picture.shape
+            low, high = places.min(axis=0), places.max(axis=0)
+            return (low > 20).all() and (high < (height - 20, width - 20)).all() \
+                and high[0] - low[0] > 0.5 * height
+
+        await browser.until(whole)
+        text = await seen.page.value(f'{seen.section("ankle")}.innerText')
+        assert 'ankle is a linkage in space' in text
+        assert '+1' in text and '\N{MINUS SIGN}1' in text and 'Plot' not in text
+        await seen.page.downloads(tmp_path)
+        await seen.page.value(f"""[...{seen.section('ankle')}.querySelectorAll('button')].find(
+            button => button.textContent === 'C').click()""")
+        await browser.until((tmp_path / 'ankle.h').exists)
+
+    looked_at(running, doing)
+    assert (tmp_path / 'ankle.h').read_text() == header.written(ankle.machines['ankle'])
+
+
+@pytest.mark.long
+@needs_browser
+def test_an_enlarged_plot_fits_any_window_and_hides_no_message(show, looked_at):
+    running = show(LEG)
+
+    async def doing(seen):
+        page, plot = seen.page, f'{seen.section("leg")}.querySelector(".plot")'
+        await page.value(f'({plot}).closest("details").open = true')
+        await browser.until(lambda: page.value(f'/^Position/.test({plot}.ariaLabel)'))
+        await page.value('[...document.querySelectorAll("button")].find('
+                         'button => button.textContent === "Enlarge").click()')
+        for width, height in ((1400, 900), (390, 844), (844, 390)):
+            await page.resize(width, height, 'light')
+
+            async def fits(width=width):
+                wide = await page.value(f'{plot}.querySelector("canvas").clientWidth')
+                return 0.8 * width < wide < width
+
+            await browser.until(fits)
+            assert await page.value('document.querySelector(".large").scrollWidth') <= width
+        running.graph.end(running.viewer)
+        await browser.until(lambda: page.value('!document.getElementById("notice").hidden'))
+        assert await page.value(
+            '(({ x, y, width, height }) => document.elementFromPoint('
+            'x + width / 2, y + height / 2))'
+            '(document.getElementById("notice").getBoundingClientRect()).id') == 'notice'
+        page.complaints.clear()
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
+def test_a_curve_is_not_drawn_through_a_pole_however_small_the_plot(show, looked_at):
+    running = show(LEG)
+
+    async def doing(seen):
+        page, plot = seen.page, f'{seen.section("leg")}.querySelector(".plot")'
+        await page.resize(390, 844, 'light')
+        await browser.until(lambda: page.value(f"""(() => {{
+            ({plot}).closest('details').open = true;
+            const select = {seen.section('leg')}.querySelector('select[aria-label=Quantity]');
+            if (select.value !== 'force ratio') {{
+                select.value = 'force ratio';
+                select.dispatchEvent(new Event('change'));
+            }}
+            return /^Force ratio of BC: .* and beyond/.test({plot}.ariaLabel);
+        }})()"""))
+        # In each column, the part of the plot's height that is blue, however pale.
+        blue = await page.value(f"""(() => {{
+            const canvas = {plot}.querySelector('canvas'), {{ width, height }} = canvas;
+            const {{ data }} = canvas.getContext('2d').getImageData(0, 0, width, height);
+            return Array.from({{ length: width }}, (_, x) => Array.from({{ length: height }},
+                (_, y) => data.subarray(4 * (x + y * width), 4 * (x + y * width) + 4)).filter(
+                ([red, , blue, seen]) => seen && blue > red + 8).length / height);
+        }})()""")
+        assert max(blue) < 0.6 and sum(part > 0.0 for part in blue) > 200
+
+    looked_at(running, doing)
+
+
+# Names of joints, none on another, cut, or nearer to another's joint.
+NAMES = """
+import('/picture.js').then(({ Picture }) => {
+  let seed = 7;
+  const random = () => (seed = seed * 16807 % 2147483647) / 2147483647;
+  return Array.from({ length: 300 }, () => {
+    const picture = new Picture(document.getElementById('picture')), written = [];
+    const places = [];
+    while (places.length < 8) {
+      const [x, y] = [390 * random(), 380 * random()];
+      if (places.every(([a, b]) => Math.hypot(x - a, y - b) > 70)) places.push([x, y]);
+    }
+    const points = places.map((_, i) => 'joint'.slice(i % 4));
+    Object.assign(picture, { scale: 1, middle: [0, 0], centre: [0, 0],
+      canvas: { clientWidth: 390, clientHeight: 380 } });
+    picture.at = (x, y) => [x, y];
+    picture.text = (name, x, y) => written.push([x, y, picture.context.measureText(name).width]);
+    picture.names([{ mechanism: { value: () => points }, look: { kind: 'joints', width: 6 },
+      places: Float64Array.from(places.flat()) }]);
+    return [places, written];
+  });
+})"""
+
+
+@pytest.mark.slow
+@needs_browser
+def test_names_of_joints_are_whole_apart_and_beside_their_own(address, tmp_path):
+    async def look():
+        async with browser.Browser(tmp_path) as page:
+            await page.open(address)
+            return await page.value(NAMES)
+
+    for joints, written in asyncio.run(look()):
+        x, y, width = np.transpose(written)
+        assert (x - 0.5 * width).min() > 0.0 and (x + 0.5 * width).max() < 390.0
+        assert y.min() > 8.0 and y.max() < 372.0
+        apart = np.maximum(abs(y[:, None] - y) / 16.0,
+                           2.0 * abs(x[:, None] - x) / (width[:, None] + width))
+        assert apart[~np.eye(len(x), dtype=bool)].min() > 1.0 - 1e-9
+        away = np.hypot(*(np.maximum(abs(own[:, None] - of) - half, 0.0) for own, of, half in zip(
+            (x, y), np.transpose(joints), (0.5 * width[:, None], 8.0))))
+        assert (away.argmin(axis=1) == np.arange(len(x))).all()
+
+
+@pytest.mark.slow
+@needs_browser
+@pytest.mark.parametrize('width', [60, 250, 900])
+def test_a_long_line_in_the_picture_is_broken_where_it_ends(address, tmp_path, width):
+    words = f'longest force: 200 N at B{"y" * 63}, the crank holds -316 N·m'
+
+    async def look():
+        async with browser.Browser(tmp_path) as page:
+            await page.open(address)
+            return await page.value(
+                f"""import('/picture.js').then(({{ Picture }}) => {{
+                    const picture = new Picture(document.getElementById('picture'));
+                    return picture.broken({words!r}, {width}).map(
+                        line => [line, picture.context.measureText(line).width]);
+                }})""")
+
+    lines, wide = zip(*asyncio.run(look()))
+    assert ''.join(lines) == words and max(wide) < width
+    assert (len(lines) > 1) == (width < 900)
+
+
+@pytest.mark.long
+@needs_browser
+def test_arrows_are_asked_for_wherever_their_mechanism_s_part_of_the_panel_is(show, looked_at):
+    running = show(LEVER)
+
+    async def doing(seen):
+        page = seen.page
+        await page.resize(1200, 200, 'light')
+        await page.value("""(() => {
+            const { send } = WebSocket.prototype;
+            window.asked = new Set();
+            WebSocket.prototype.send = function (text) {
+                const { mechanism, arrows } = JSON.parse(text);
+                if (arrows) window.asked.add(mechanism);
+                send.call(this, text);
+            };
+            document.getElementById('arrows').value = 'velocity';
+            document.getElementById('arrows').onchange();
+        })()""")
+        await browser.until(lambda: page.value('window.asked.size === 2'))
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
+def test_a_picture_that_cannot_be_drawn_does_not_keep_the_next_one_from_being_drawn(
+        show, looked_at):
+    running = show(LEVER)
+
+    async def doing(seen):
+        page = seen.page
+        await page.value("""(() => {
+            const context = document.getElementById('picture').getContext('2d');
+            const { clearRect } = context;
+            window.drawn = 0;
+            context.clearRect = function (...where) {
+                window.drawn += 1;
+                if (window.drawn === 3) throw new Error('nothing can be drawn');
+                clearRect.apply(context, where);
+            };
+        })()""")
+        await browser.until(lambda: page.value('window.drawn > 10'))
+        assert len(page.complaints) == 1
+        page.complaints.clear()
+
+    looked_at(running, doing)
+
+
+def test_where_an_input_is_that_nobody_has_named_is_not_guessed(graph, show):
+    running = show(LEG, kinds=(Kinematics,))
+    crank_states = graph.node.create_publisher(JointState, 'crank_states', 10)
+
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/leg')
+            reason = (await page.ask('pose', '/leg'))['reason']
+
+            async def heard():
+                crank_states.publish(JointState(name=['leg_crank'], position=[2.0]))
+                return (await page.ask('pose', '/leg')).get('inputs')
+
+            return reason, (await browser.until(heard))['crank']['value']
+
+    reason, value = asyncio.run(use(running.viewer.url))
+    assert reason == 'the crank is not known yet: no message names leg_crank'
+    assert value == pytest.approx(2.0)
 
 
 @pytest.mark.slow

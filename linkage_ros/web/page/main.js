@@ -112,6 +112,7 @@ const connection = new Connection({
       }
       from += 8 + 12 * count;
     }
+    panel.follow();
     draw(() => connection.tell({ op: 'drawn' }));
     frames += 1;
   },
@@ -126,8 +127,11 @@ function draw(after) {
   scheduled = true;
   requestAnimationFrame(() => {
     scheduled = false;
-    picture.draw();
-    after?.();
+    try {
+      picture.draw();
+    } finally {
+      after?.();
+    }
   });
 }
 

@@ -21,6 +21,7 @@ class Section {
     this.mechanism = mechanism;
     this.motion = new Motion(mechanism, connection, !folded, say);
     this.plot = new Plot(mechanism, connection, this.motion);
+    this.plot.element.hidden = mechanism.inSpace;
     this.motion.place.after(this.plot.element);
     this.motion.onshow = () => this.plot.look();
     this.tuning = new Tuning(mechanism, connection, !folded, own => light(mechanism, own));
@@ -92,7 +93,15 @@ export class Panel {
   }
 
   look() {
-    for (const { motion, inSight } of this.sections.values()) if (inSight || !motion.inputs.size) motion.look();
+    for (const { motion, mechanism, inSight } of this.sections.values()) {
+      if (inSight || mechanism.arrows.kind || !motion.inputs.size) motion.look();
+    }
+  }
+
+  /** Keep arrows in step with the picture; those of many mechanisms come as often as all else. */
+  follow() {
+    if (this.sections.size > 1) return;
+    for (const { motion, mechanism } of this.sections.values()) if (mechanism.arrows.kind) motion.look();
   }
 
   /** Undo by the usual key, where no text is written. */
