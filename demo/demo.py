@@ -17,7 +17,7 @@ HERE = Path(__file__).parent
 
 try:
     from domains import Domain
-    from linkage_ros import scene
+    from linkage_ros import command, scene
     from linkage_ros.render import files
     from linkage_ros.render.parts import USUAL, USUAL_IN_MOTION
     from linkage_ros.render.picture import Picture
@@ -51,19 +51,20 @@ def main() -> int:
     """Run the demo; return the exit code of the process."""
     # However it ends, no node is left behind.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    return command.run('demo', lambda _: show(), None, '`make demo` installs it')
+
+
+def show():
+    """Observe the nodes, report and draw; raise DemoError if something is wrong."""
+    machines = list(scene.load(SCENE).machines.values())
     try:
-        machines = list(scene.load(SCENE).machines.values())
         motions, answer = observe(machines)
-        report_motions(motions)
-        report_answer(next(m for m in machines if m.linkage.type == 'slotted_lever'), answer)
-        draw(motions)
-        print(NEXT)
-    except (DemoError, RuntimeError) as error:
-        print(f'demo: {error}', file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        return 130
-    return 0
+    except RuntimeError as error:
+        raise DemoError(error) from None
+    report_motions(motions)
+    report_answer(next(m for m in machines if m.linkage.type == 'slotted_lever'), answer)
+    draw(motions)
+    print(NEXT)
 
 
 def observe(machines):

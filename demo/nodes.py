@@ -9,12 +9,13 @@ import signal
 import subprocess
 
 from ament_index_python.packages import get_package_prefix, PackageNotFoundError
+from linkage_ros.command import RequestError
 
 EXECUTABLES = ('crank_driver', 'kinematics', 'servo_inverse')
 SECONDS_TO_END = 10.0
 
 
-class DemoError(Exception):
+class DemoError(RequestError):
     """What is missing or went wrong, in one sentence."""
 
 

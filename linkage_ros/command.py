@@ -62,11 +62,19 @@ def run(name: str, work: Callable, args: Optional[Sequence[str]], needs: str) ->
     except ImportError as error:
         why = f'{(error.name or "").split(".")[0]} is not installed: {needs}'
     except OSError as error:
-        why = f'{error.filename}: {error.strerror}' if error.filename else error
+        why = f'{error.filename}: {error.strerror}{_beside(error)}' if error.filename else error
     except KeyboardInterrupt:
         why = 'interrupted'
     print(f'{name}: {" ".join(str(why).split())}', file=sys.stderr)
     return 1
+
+
+def _beside(error: OSError) -> str:
+    """Return the end of a sentence that suggests the file that is nearly a missing one."""
+    folder, name = os.path.split(str(error.filename))
+    if not isinstance(error, FileNotFoundError) or not os.path.isdir(folder or '.'):
+        return ''
+    return meant(name, os.listdir(folder or '.'))
 
 
 def chosen(machines: Mapping[str, SceneMechanism], names: Sequence[str]) -> List[SceneMechanism]:

@@ -1122,6 +1122,21 @@ def test_make_view_says_where_to_look_and_ends_all_that_it_started(stop):
         process.wait(browser.DEADLINE)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize('arguments', [
+    ('view.py', ROOT / 'config' / 'jansen.yaml', '0'), ('demo.py',)], ids=lambda some: some[0])
+def test_make_view_and_make_demo_end_quietly_when_nobody_reads_what_they_print(arguments):
+    name, *others = arguments
+    environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)}
+    process = subprocess.Popen(
+        [sys.executable, ROOT / 'demo' / name, *others], env=environment,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process.stdout.close()
+    said = process.stderr.read()
+    assert process.wait(browser.DEADLINE) == 0
+    assert all('[INFO]' in line for line in said.splitlines())
+
+
 @pytest.mark.long
 @pytest.mark.parametrize('parameters, named', [
     ({'port': 'taken'}, 'address already in use'), ({'port': 'taken'}, 'by PORT=8021'),
