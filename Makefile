@@ -160,18 +160,12 @@ $(venv)/.tools: $(venv)/.installed $(tools)
 	  || echo 'planegcs and SolveSpace cannot be built here, and are left out.'
 	@touch $@
 
-.venv-docs/.installed: $(lock)/docs.txt
-	@about='what draws and what makes the pages.' wheels/install.sh '$(PYTHON)' .venv-docs $<
-	@touch $@
-
-.venv-lint/.installed: $(lock)/lint.txt
-	@about='what checks style and types.' wheels/install.sh '$(PYTHON)' .venv-lint $<
-	@touch $@
-
-.venv-ament/.installed: $(lock)/ament.txt
-	@about='what ament checks style with.' wheels/install.sh '$(PYTHON)' .venv-ament $<
-	@touch $@
-
-.venv-lock/.installed: $(lock)/lock.txt
-	@about='what pins the rest.' wheels/install.sh '$(PYTHON)' .venv-lock $<
+# Environments beside that of the nodes, each of one lock file.
+.venv-docs/.installed: private export about := what draws and what makes the pages.
+.venv-lint/.installed: private export about := what checks style and types.
+.venv-ament/.installed: private export about := what ament checks style with.
+.venv-lock/.installed: private export about := what pins the rest.
+.venv-docs/.installed .venv-lint/.installed .venv-ament/.installed .venv-lock/.installed: \
+.venv-%/.installed: $(lock)/%.txt
+	@wheels/install.sh '$(PYTHON)' .venv-$* $<
 	@touch $@

@@ -114,7 +114,8 @@ def test_the_smooth_branch_is_followed_through_a_change_point(size):
     assert np.isfinite(speed).all()
     assert np.abs(np.diff(speed, axis=0)).max() < 0.02 * size
     assert np.sign(side_of(linkage, [math.pi - 0.01, math.pi + 0.01])).tolist() == [1.0, -1.0]
-    assert linkage.reach() == TURN and linkage.dead_points() == [-math.pi]
+    assert linkage.reach() == [(-math.tau, math.tau)]
+    assert linkage.dead_points() == pytest.approx([-math.pi, math.pi], abs=1e-15)
 
 
 def test_the_linkage_with_one_change_point_is_itself_again_after_two_turns():

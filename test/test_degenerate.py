@@ -243,17 +243,45 @@ def test_no_angles_give_no_places(kind):
         assert all(value.size == 0 for value in ask(none).values())
 
 
-def test_the_reach_past_a_change_point_is_that_of_the_turn_from_minus_pi_to_pi():
+def test_the_reach_past_a_change_point_is_that_of_two_turns():
     # The four-bar changes sides at pi; the bar on its rocker meets C on one of them only.
     found = linkage('O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'B dyad A Q 2 3 left',
                     'R ground 4 -4', 'C dyad B R 3 2.5 left')
-    reach, theta = found.reach(), np.linspace(-math.pi, math.pi, 4001)[:-1]
+    reach, theta = found.reach(), np.linspace(-math.tau, math.tau, 8001)[:-1]
     placed = np.isfinite(found.solve(theta)['C']).all(-1)
-    held = np.any([(lo <= theta) & (theta <= hi) for lo, hi in reach], axis=0)
-    assert placed.any() and not placed.all() and (placed == held).all()
-    assert all(-math.pi <= lo < hi <= math.pi for lo, hi in reach)
-    ends = [end for arc in reach for end in arc if abs(end) != math.pi]
-    assert found.dead_points() == pytest.approx(sorted([-math.pi, *ends]))
+    inside = found.inputs[0].on(reach, theta)
+    assert placed.any() and not placed.all() and (placed == inside).all()
+    assert all(-math.tau <= lo < math.tau and lo < hi for lo, hi in reach)
+    # At pi the linkage changes to the side on which it is inside the reach, and back at -pi.
+    ends = [float(found.inputs[0].wrapped(end)) for arc in reach for end in arc]
+    assert found.dead_points() == pytest.approx(sorted([-math.pi, math.pi, *ends]))
+
+
+@pytest.mark.parametrize('lengths, period', [
+    ((1.0, 2.0, 3.0, 4.0), 2), ((1.0, 3.0, 2.0, 4.0), 2), ((2.0, 3.0, 2.0, 3.0), 1),
+    ((1.0, 3.0, 3.0, 1.0), 2), ((1.0, 2.0, 2.5, 3.0), 1), ((1e-9, 2e-9, 3e-9, 4e-9), 2)])
+def test_one_change_point_a_turn_doubles_the_period(lengths, period):
+    found = mechanisms.create('four_bar', **dict(zip('abcd', lengths)))
+    theta, (input_,) = np.linspace(-3.0, 3.0, 8), found.inputs
+    assert found.period() == input_.period == period
+    now, later, between = (found.solve(theta + turn, ('B',))['B'] for turn in (
+        0.0, input_.turn, math.tau))
+    np.testing.assert_allclose(later, now, atol=1e-14 * max(lengths))
+    assert (period == 1) == np.allclose(between, now, atol=1e-3 * max(lengths))
+
+
+@pytest.mark.parametrize('output', ['QB', 'AB', 'P.x', 'B.y'])
+def test_the_inverse_has_the_answers_of_both_turns_about_a_change_point(output):
+    found = mechanisms.create('four_bar', a=1.0, b=2.0, c=3.0, d=4.0)
+    for theta in (0.3, -2.0, 4.0, -5.5):
+        value = found.joint_angles(theta, (output,))[output]
+        answers = found.input_for(output, value)
+        assert np.nanmin(np.abs(answers - theta)) < 1e-12
+        back = found.joint_angles(answers[np.isfinite(answers)], (output,))[output]
+        np.testing.assert_allclose(np.abs(np.remainder(
+            back - value + math.pi, math.tau) - math.pi), 0.0, atol=1e-13)
+        assert found.input_for(output, value, theta + 2 * math.tau) == pytest.approx(
+            theta + 2 * math.tau, abs=1e-12)
 
 
 @pytest.mark.parametrize('theta', [3.1415926535897927, math.pi, -math.pi, 1e9, -7.0, 0.0])
@@ -266,7 +294,7 @@ def test_a_dead_point_is_between_minus_pi_and_pi(theta):
 
 @pytest.mark.parametrize('lengths, expected', [
     ({'a': 2.0, 'b': 3.0, 'c': 2.0, 'd': 3.0}, [-math.pi, 0.0]),
-    ({'a': 1.0, 'b': 2.0, 'c': 3.0, 'd': 4.0}, [-math.pi])])
+    ({'a': 2.0, 'b': 4.0, 'c': 3.0, 'd': 3.0}, [-math.tau, 0.0])])
 def test_a_dead_point_at_zero_is_zero(lengths, expected):
     assert mechanisms.create('four_bar', **lengths).dead_points() == expected
 

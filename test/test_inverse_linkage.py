@@ -131,7 +131,7 @@ def test_of_random_linkages_no_answer_is_missed_and_none_invented(seeds):
                 inverse = linkage.inverse(asked)
             except ValueError as error:
                 # The first input does not move it, whatever its formula says.
-                assert 'do not tell all inputs' in str(error)
+                assert 'do not determine all inputs' in str(error)
                 continue
             if not inverse.closed:
                 continue

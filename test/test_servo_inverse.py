@@ -178,7 +178,7 @@ def test_all_working_modes_of_a_foot_are_told_and_the_nearest_comes_first(graph)
     ({**FOOT, 'near': [0.0, 1e9]}, 'near must be finite and within 1e+06'),
     ({**FOOT, 'outputs': ['P.x']}, 'as many outputs are needed'),
     ({**FOOT, 'outputs': ['P.x', 'Z.y']}, "no output 'Z.y'"),
-    ({**FOOT, 'outputs': ['A.x', 'A.y']}, 'A.x, A.y do not tell all inputs'),
+    ({**FOOT, 'outputs': ['A.x', 'A.y']}, 'A.x, A.y do not determine all inputs'),
     ({**FOOT, 'mechanism': 'boom'}, 'mechanism must be one of leg, drop'),
     ({**FOOT, 'mechanism': 'drop'}, 'drop has 1 inputs')])
 def test_what_cannot_be_asked_of_several_inputs_gets_the_reason(graph, request_, reason):

@@ -67,6 +67,11 @@ def near_zeros(curve: Callable, arc: Arc, input_: Input, rounding: np.ndarray,
         if input_.is_cut(theta[end]):
             yield from map(NearZero, [float(theta[end])] * len(size),
                            np.abs(values[:, end]).tolist(), rounding.tolist(), size.tolist())
+    # A sample may be the zero itself, with a rate of either sign.
+    inner, before, after = np.abs(values[:, 1:-1]), np.abs(values[:, :-2]), np.abs(values[:, 2:])
+    row, place = np.nonzero((inner <= rounding[:, None]) & (inner < before) & (inner <= after))
+    yield from map(NearZero, theta[place + 1].tolist(), inner[row, place].tolist(),
+                   rounding[row].tolist(), size[row].tolist())
     searched = ((_crossings(values, folds), values),
                 (_approaches(theta, values, rates, NEAR * size[:, None]), rates))
     for kind, ((row, place), samples) in enumerate(searched):

@@ -27,8 +27,8 @@ SAMPLES, FEWEST, ROUNDS = 720, 33, 4
 HALVINGS = 12
 # Where an arc is looked at: in its middle, symmetric linkages may have an arm of no length.
 INSIDE = 0.49
-# What places may differ by from turn to turn, as a part of their size, and be the same.
-ALIKE = 1e-6
+# Poses that are compared with those a period later; by how much of their size places may differ.
+PERIODIC, ALIKE = 64, 1e-6
 # More ends than these are rounding, of the direction of an arm without length: between them there
 # is nothing to be looked for.
 MOST = 100
@@ -64,7 +64,7 @@ def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Calla
         ends.append(input_.low)
     if any(x.margin.varies and x not in closed for x in limits):
         ends += [end for arc in input_.between(ends) for end in _limits(margins, *arc)]
-    found = reachable_arcs(ends, assembled, input_, lambda: _is_periodic(places, input_))
+    found = reachable_arcs(ends, assembled, input_, lambda: is_periodic(places, input_))
     if input_.is_whole(found):
         return found
     trimmed = [_trimmed(assembled, *arc) for arc in found]
@@ -140,12 +140,16 @@ def _trimmed(assembled: Callable, lo: float, hi: float) -> Arc:
     return low, high
 
 
-def _is_periodic(places: Callable, input_: Input) -> bool:
-    """Return whether all joints are at the same places a period later."""
-    theta = np.linspace(input_.low, input_.high, 66)[1:-1]
+def is_periodic(places: Callable, input_: Input) -> bool:
+    """
+    Return whether poses are the same a period of an input later.
+
+    `places` takes values of the input, shape (n,), and returns coordinates (any, n).
+    """
+    theta = np.linspace(input_.low, input_.high, PERIODIC + 2)[1:-1]
     now, later = (places(theta + turn) for turn in (0.0, input_.turn))
     with np.errstate(invalid='ignore'):
-        alike = np.abs(now - later) <= ALIKE * np.fmax.reduce(np.abs(now), axis=None)
+        alike = np.abs(now - later) <= ALIKE * np.fmax.reduce(np.abs(now), axis=None, initial=0.0)
     return bool(np.all(alike | (np.isnan(now) & np.isnan(later))))
 
 

@@ -33,7 +33,7 @@ class Input(NamedTuple):
 
     All poses lie between `low` and `high`: one period of an angle, or the longest stroke.
     `period` is the number of turns after which poses repeat: above one if it drives cranks by
-    fractional gears, infinite for irrational ratios.
+    fractional gears or passes one change point per turn, infinite for irrational ratios.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Input(NamedTuple):
 
     @property
     def turns(self) -> bool:
-        """Whether it is an angle."""
+        """Whether it is an angle after whose period poses repeat."""
         return self.kind == ANGLE and self.period < math.inf
 
     @property
@@ -135,6 +135,15 @@ class Input(NamedTuple):
 
 
 CRANK = Input('crank')
+
+
+def spread(inputs: Sequence[Input], count: int) -> List[np.ndarray]:
+    """Return values of each input (count,): poses that fill their ranges evenly."""
+    # Multiples of square roots of primes, without their whole parts.
+    parts = np.outer(np.sqrt([2, 3, 5, 7, 11, 13, 17, 19][:len(inputs)]),
+                     np.arange(1, count + 1)) % 1.0
+    return [input_.low + part * (input_.high - input_.low)
+            for input_, part in zip(inputs, parts)]
 
 
 def wrapped(theta: Any, turn: float = math.tau) -> Any:

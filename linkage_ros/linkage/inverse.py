@@ -2,17 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The inverse: values of the inputs that give as many outputs the values that are asked for.
+The inverse: values of the inputs at which as many outputs have given values.
 
-Where the inverse linkage comes apart into dyads, each of its assembly modes is a closed form.
-Which of them the linkage has itself, its forward formula tells: an answer gives the outputs their
-values but for rounding, with every dyad on its side, inside the reach. What does not come apart is
-searched: one input between the extremes of the output, several by steps on the exact Jacobian.
+If the inverse linkage decomposes into dyads, each of its assembly modes is a closed form. The
+forward formula selects the modes of the linkage itself: at a solution the outputs have the given
+values up to rounding, each dyad is on its side, and the inputs are inside the reach. Otherwise the
+inputs are searched; see `search`.
 """
 
 from __future__ import annotations
 
-from functools import cached_property, reduce
+from functools import cached_property, partial, reduce
 from itertools import chain, combinations, product
 import math
 import operator
@@ -33,14 +33,14 @@ from typing import (
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .analysis import Analysis
 from .arguments import numbers
 from .curves import LEAST
-from .inputs import Input
+from .input_range import is_periodic
+from .inputs import Input, spread
 from .inverse_linkage import InverseLinkage, Mode, taken_apart
 from .inverse_rods import taken_apart as rods_taken_apart
 from .planar import TOLERANCE
-from .search import blocks, Search, SINGULAR
+from .search import blocks, search_for, SINGULAR
 from ..cache import Cache
 from ..formula.expression import (
     argument,
@@ -59,35 +59,33 @@ from ..words import listed, quoted
 if TYPE_CHECKING:
     from .mechanism import Mechanism
 
-# Rounding of an output on its way through both formulas, as a part of its size.
+# Bound of an output's rounding error through both formulas, as a part of the output's size.
 ROUNDING = 32 * 2.0 ** -53
-# An answer is tried so far beside where it was found [rad, sizes], as the reach may end there.
+# Where the forward formula has no value, the reach may end: it is evaluated this far to each side
+# of a solution [rad, sizes].
 BESIDE = 16 * 2.0 ** -52 * math.pi
-# At an end of the reach, where rates have no bound, what that makes of an output, as a part; and
-# from where on that end is near enough for both of its sides to give the same inputs.
+# Next to an end of the reach rates are unbounded: the error allowed for an output there, as a part
+# of its size, and the rate from which on that error is allowed.
 ENDED, STEEP = 1e-7, 1e4
-# What misses by more than this part of the output's size is the answer of another assembly.
+# A larger error than this part of the output's size belongs to another assembly.
 OTHER = 1e-2
-# What is below zero by so many tolerances, a thousandth of its size, is no end of the reach.
+# A margin below minus this many tolerances, a thousandth of its size, is outside the reach.
 FAR = 1e-3 / TOLERANCE
-# Newton steps that may take a closed form's rounding away; each doubles the digits.
+# Newton steps at most that remove a closed form's rounding; each doubles the number of digits.
 POLISHING = 5
-# Where rates are smaller than this, outputs tell inputs worse than a step of Newton's can mend.
+# Below this rate the inputs are ill-conditioned, and a Newton step does not improve them.
 SOUND = 0.1
-# Answers that are no further apart than this [rad, sizes], or than what rounding of the outputs
-# makes of it where that is no more than the second, are one.
+# Two solutions are one if they differ by less than the first [rad, sizes], or by less than the
+# outputs' rounding explains, which is considered up to the second.
 SAME, NEIGHBOURS = 1e-13, 1e-4
-# Outputs go on in steps of this part of their size, and what is nearer than the second is where
-# the inputs are [rad, sizes].
+# Largest step of an output while it is followed, as a part of its size; and the distance below
+# which a mode is the one that the inputs are in [rad, sizes].
 STEP, ALIKE = 0.3, 1e-5
-# An input is at an end of its sweep if the outputs do not tell by rounding, or by this, and by
-# this part of the end.
+# Distance to an end of a sweep that counts as that end, in sizes and as a part of the end.
 CLOSE, ULPS = 1e-7, 4 * 2.0 ** -52
-# More than any input.
+# Greater than any input.
 LARGE = 1e300
-# Poses in which outputs are compared with those a turn later.
-SAMPLES = 64
-# So many values of a path are looked at together.
+# Number of values of a path that are processed together.
 BLOCK = 1024
 
 Found = Tuple[Tuple[float, ...], Tuple[float, ...]]
@@ -96,14 +94,14 @@ Ends = Optional[Sequence[Optional[Tuple[float, float]]]]
 
 class Answer(NamedTuple):
     """
-    Values of all inputs that give outputs the values that are wanted.
+    Values of all inputs at which the outputs have the given values.
 
     Attributes
     ----------
     inputs : tuple of float
         In the order of `Mechanism.inputs` [rad or m].
     inverse : Inverse
-        Whose answer it is.
+        The inverse that it solves.
 
     """
 
@@ -115,25 +113,25 @@ class Answer(NamedTuple):
         """
         Return the working mode.
 
-        For each link that hangs on an input crank, by its name, the side to which it turns off
+        For each link at the tip of an input crank, by its name, the side to which it turns off
         from the line between the crank's joints, +1 left; and 'det', the sign of the determinant
-        of d outputs / d inputs. 0 where that cannot be told.
+        of d outputs / d inputs. 0 where rounding hides the sign.
         """
         return self.inverse.signs(self.inputs)
 
     @property
     def margin(self) -> float:
         """
-        Return the least singular value of d outputs / d inputs by the greatest or 1.
+        Return the least singular value of d outputs / d inputs, divided by the greatest or 1.
 
-        0 where the inputs cannot move the outputs some way, or not hold them. Lengths are counted
-        in parts of the longest bar or about the stroke, angles in rad.
+        It is 0 where the inputs cannot move the outputs in some direction, or cannot resist a load
+        in some direction. Units are rad, the longest bar for outputs, about the stroke for inputs.
         """
         return self.inverse.margin(self.inputs)
 
     @property
     def is_singular(self) -> bool:
-        """Whether it is at a singular pose, where no more than half of the digits are right."""
+        """Whether the pose is singular, so that at most half of the digits are right."""
         return self.margin < SINGULAR
 
     @property
@@ -151,12 +149,13 @@ class Inverse:
     Attributes
     ----------
     outputs : tuple of str
-        What is asked for, named as `Mechanism.has_output` says.
+        Names of the outputs; see `Mechanism.has_output`.
     closed : InverseLinkage or None
-        Its joint lines, assembly modes and their program; None where the inverse is searched.
+        Joint lines and assembly modes of the inverse linkage; None if the inverse is searched.
     inputs : tuple of Input
-        Those of the linkage. One whose gears come round after very many turns has the period of
-        the outputs; where they have none, it is infinite, and one turn is answered alone.
+        The inputs of the linkage. If the gears of one repeat only after very many turns, its
+        period is that of the outputs, or infinite if they have none: then solutions are those of
+        one turn.
 
     """
 
@@ -169,27 +168,26 @@ class Inverse:
         self._angular = [linkage.is_angle(name) for name in outputs]
         self._scales = [1.0 if angular else linkage.longest for angular in self._angular]
         self._sizes = [input_.size for input_ in linkage.inputs]
-        self._check, self._choices = linkage.checked(outputs), Cache()
+        self._check, self._programs = linkage.checked(outputs), Cache()
         self.inputs = tuple(map(self._coming_round, range(self._n), linkage.inputs))
-        # After how much an output is the same: a turn, of an input that is held its period.
-        held = {input_.name: input_ for input_ in self.inputs}
-        self._rounds = [math.inf if not angular or name in held and not held[name].turns else
-                        held[name].turn if name in held else math.tau
-                        for name, angular in zip(outputs, self._angular)]
-        # Of each input half a period, the period, and below what it is zero.
+        # The period of each output: a turn, or that of the input that it is.
+        fixed = {input_.name: input_ for input_ in self.inputs}
+        self._periods = [math.inf if not angular or name in fixed and not fixed[name].turns else
+                         fixed[name].turn if name in fixed else math.tau
+                         for name, angular in zip(outputs, self._angular)]
+        # Half a period of each input, the period, and the value below which it is zero.
         self._turned = [(0.5 * input_.turn, input_.turn, LEAST) if input_.turns else
                         (math.inf, math.inf, LEAST * input_.size) for input_ in self.inputs]
         self.closed: Optional[InverseLinkage] = (
             taken_apart if linkage.axes == 'xy' else rods_taken_apart)(linkage, outputs)
         if self.closed:
-            # For each mode: 1 if it is an answer, 0 if not, NaN if that is to be looked at closer;
-            # the inputs and rates.
+            # For each mode: 1 if it is a solution, 0 if not, NaN if `_own` has to decide; the
+            # inputs and the rates.
             self._rows = self._judged_modes(self.closed)
             self._row = 1 + self._n * (self._n + 1)
             self._solve = linkage.bind(Program(self._rows, self._n, self.closed.given))
         else:
-            self._search: Any = Analysis(linkage).branches(*outputs) if self._n == 1 else Search(
-                linkage, outputs, self._rounds)
+            self._search = search_for(linkage, outputs, self.inputs, self._periods)
 
     @cached_property
     def _rated(self) -> Pose:
@@ -203,49 +201,48 @@ class Inverse:
         return f'# {self.linkage.type} driven by {what}\n{self.closed}'
 
     def _coming_round(self, by: int, input_: Input) -> Input:
-        """Return an input with the period of the outputs, where its own has too many turns."""
+        """Return an input with the period of the outputs if its own has too many turns."""
         if not input_.turns or self.linkage.period(by) == input_.period:
             return input_
         rates = [self.linkage.gear(name, by)[0] for name in self.linkage.geared_to(by)]
-        return input_._replace(period=next((
-            period for period in (1.0, *(1.0 / abs(rate) for rate in rates if abs(rate) > 1.0))
-            if self._repeats(by, math.tau * period)), math.inf))
+        periods = (1.0, *(1.0 / abs(rate) for rate in rates if abs(rate) > 1.0), math.inf)
+        return next(each for each in (input_._replace(period=period) for period in periods)
+                    if not each.turns or is_periodic(partial(self._outputs_over, by), each))
 
-    def _repeats(self, by: int, turn: float) -> bool:
-        """Return whether poses are the same after an input has turned by so much [rad]."""
-        parts = np.outer(np.arange(1, SAMPLES + 1), np.sqrt([2, 3, 5, 7, 11, 13, 17, 19][
-            :self._n])) % 1.0
-        inputs = [x.low + part * (x.high - x.low) for x, part in zip(self.linkage.inputs, parts.T)]
-        first = self._check.over(*inputs)[:self._n]
-        inputs[by] = inputs[by] + turn
-        gaps = self._check.over(*inputs)[:self._n] - first
-        for gap, angular, scale in zip(gaps, self._angular, self._scales):
-            gap -= math.tau * np.round(gap / math.tau) * angular
-            gap /= scale
-        return bool(np.all(np.isnan(gaps) == np.isnan(first)) and not np.nanmax(
-            np.abs(gaps), initial=0.0) > ENDED)
+    def _outputs_over(self, by: int, values: np.ndarray) -> np.ndarray:
+        """Return the outputs, angles as directions, over one input; the others are spread."""
+        inputs = spread(self.linkage.inputs, len(values))
+        inputs[by] = values
+        rows = zip(self._check.over(*inputs), self._angular, self._scales)
+        return np.concatenate([[np.cos(row), np.sin(row)] if angular else [row / scale]
+                               for row, angular, scale in rows])
 
-    # All answers.
+    # --- all solutions ---
 
     def all(self, values: ArrayLike, near: Optional[ArrayLike] = None) -> List[Answer]:
         """
-        Return all answers for one value of each output.
+        Return all solutions for one value of each output.
 
         Parameters
         ----------
         values : float or array-like (outputs,)
-            What the outputs are to be [rad or m], angles with whole turns aside, an input that is
-            held with whole periods.
+            Values of the outputs [rad or m]; angles are equal up to whole turns, and an output
+            that is an input up to whole periods of it.
         near : array-like (inputs,), optional
-            Values of the inputs [rad or m] to which the answers are brought by whole turns, the
-            nearest first, a length being counted in parts of about its stroke.
+            Values of the inputs [rad or m]. Whole turns are added to the solutions to bring them
+            nearest to it, and the nearest comes first; the unit of a length is about its stroke.
 
         Returns
         -------
         list of Answer
-            Those of the linkage's own assembly, its `branches`, inside its reach; without `near`
-            crank angles in [-pi, pi), the first input's ascending; [] where the outputs cannot be
-            had. Of answers that rounding does not tell apart one is given.
+            The solutions of the linkage's own assembly, its `branches`, inside its reach; [] if
+            there are none. Without `near` crank angles are in [-pi, pi), and the first input
+            ascends. Solutions that differ by rounding only are one.
+
+        Raises
+        ------
+        ValueError
+            If there is not one value for each output, and one finite `near` for each input.
 
         """
         found = [inputs for inputs, _ in self._all(self._one_each(values))]
@@ -259,13 +256,13 @@ class Inverse:
 
     def over(self, *values: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
         """
-        Return all answers for arrays of values, one array for each output.
+        Return all solutions for arrays of values [rad or m], one array for each output.
 
         Returns
         -------
         (array (inputs, *shape, answers), array (outputs * inputs, *shape, answers))
-            The inputs, the first ascending, filled up with NaN; and the rate of each output by the
-            first input, by the second and so on.
+            The inputs [rad or m], the first ascending, padded with NaN; and the rate of each
+            output by the first input, by the second and so on.
 
         """
         rows = np.broadcast_arrays(*(numbers('values', each) for each in values))
@@ -279,7 +276,7 @@ class Inverse:
         return inputs, rates
 
     def _all(self, values: Tuple[float, ...]) -> List[Found]:
-        """Return inputs in order, each with d output / d input row by row, for one question."""
+        """Return all solutions for finite values, in order; [] for others."""
         if not all(map(math.isfinite, values)):
             return []
         values = self._reduced(values)
@@ -294,12 +291,12 @@ class Inverse:
         return self._distinct(found) if len(found) > 1 else found
 
     def _at(self, values: Sequence[float]) -> List[Tuple[float, ...]]:
-        """Return what each assembly mode has to say of values; see `_judged`."""
+        """Return the verdict, inputs and rates of each assembly mode; see `_judged_modes`."""
         flat, size = self._solve.at(*values), self._row
         return [flat[start:start + size] for start in range(0, len(flat), size)]
 
     def _judged_modes(self, closed: InverseLinkage) -> List[Real]:
-        """Return what all modes answer, held to the forward formula and polished by it."""
+        """Return verdict, inputs and rates of all modes, checked by the forward formula."""
         n, structure, parts = self._n, self.linkage.structure, []
         if n == 2 and closed.is_own:
             return [part for mode in closed.modes for part in self._own_mode(mode)]
@@ -308,48 +305,32 @@ class Inverse:
         for mode in closed.modes:
             for turns in product(*closed.turns):
                 inputs = [value + turn for value, turn in zip(mode.inputs, turns)]
-                # What outputs say of a linkage's inputs the inverse's say by their place.
                 row = substituted(forward, inputs)
-                verdict, *answer = self._judged(inputs, row[:n], row[n:n + n * n], [
+                answer = self._judged(inputs, row[:n], row[n:n + n * n], [
                     margin + FAR * limit.tolerance
                     for margin, limit in zip(row[n + n * n:], limits)])
-                if n == 1:
-                    # The lesser rate is the more exact.
-                    answer[1] = where(self._scales[0] / self._sizes[0] < abs(answer[1]),
-                                      1.0 / mode.rates[0][0], answer[1])
-                parts += [verdict, *answer]
+                parts += [*answer, *(_inverse(mode.rates) if n < 3 else row[n:n + n * n])]
         return parts
 
     def _own_mode(self, mode: Mode) -> List[Real]:
-        """Return the inputs of a mode that need not be held to the forward formula, and rates."""
-        (a, b), (c, d) = mode.rates
-        det = a * d - b * c
+        """Return verdict, inputs and rates of a mode that needs no check."""
         return [where(abs(sum(mode.inputs, real(0.0))) < LARGE, 1.0, 0.0),
-                *map(self._counted, range(self._n), mode.inputs),
-                d / det, -c / det, -b / det, a / det]
+                *map(self._counted, range(self._n), mode.inputs), *_inverse(mode.rates)]
 
     def _judged(self, inputs: Sequence[Real], reached: Sequence[Real], rates: Sequence[Real],
                 margins: Sequence[Real]) -> List[Real]:
-        """Return whether inputs are an answer, these after a step of Newton's, and their rates."""
+        """Return whether inputs are a solution, and the inputs after one Newton step."""
         n, gaps, det = self._n, [], self._determinant(rates)
         size = math.prod(self._scales) / math.prod(self._sizes)
         verdict = real(1.0) if det is None else where(
             NEIGHBOURS * size < abs(det), 1.0, math.nan)
-        # At an end of the reach outputs may be NaN, not where a limit is missed by far.
+        # Outputs may be NaN at an end of the reach, but not far outside it.
         other = reduce(lambda unknown, margin: where(margin < 0.0, 0.0, unknown), margins, where(
             abs(inputs[0]) < LARGE, math.nan, 0.0))
-        held = {input_.name for input_ in self.inputs}
-        for i, (turn, scale) in enumerate(zip(self._rounds, self._scales)):
+        for i, (turn, scale) in enumerate(zip(self._periods, self._scales)):
             gap = reached[i] - argument(i)
-            if self._angular[i] and self.outputs[i] in {
-                    *self.linkage.structure.built.driven} - held:
-                # What is given is what is had, in whatever turn.
-                gap = 0.0 * gap
-            elif self.outputs[i] in held and math.isfinite(turn):
+            if math.isfinite(turn):
                 gap = gap - turn * nearest_integer(gap / turn)
-            elif math.isfinite(turn):
-                gap = where(math.pi < gap, gap - math.tau, where(gap < -math.pi, gap + math.tau,
-                                                                 gap))
             gaps.append(gap)
             other = where(NEIGHBOURS * scale < abs(gap), 0.0, where(
                 abs(gap) <= NEIGHBOURS * scale, math.nan, other))
@@ -363,10 +344,10 @@ class Inverse:
                 steepest <= STEEP * scale, verdict, math.nan), other)
         polished = [self._counted(by, x - step)
                     for by, (x, step) in enumerate(zip(inputs, self._steps(gaps, rates)))]
-        return [verdict, *polished, *rates]
+        return [verdict, *polished]
 
     def _counted(self, by: int, x: Real) -> Real:
-        """Return an input as it is counted: an angle in the turns from -pi, zero without sign."""
+        """Return an input, an angle within one period around zero, zero without sign."""
         half, turn, least = self._turned[by]
         if math.isfinite(turn):
             x = x - turn * nearest_integer(x / turn)
@@ -379,7 +360,7 @@ class Inverse:
             rates[0] * rates[3] - rates[1] * rates[2])
 
     def _steps(self, gaps: Sequence[Real], rates: Sequence[Real]) -> Sequence[Real]:
-        """Return the steps of Newton's method where outputs tell inputs well, elsewhere 0."""
+        """Return the steps of Newton's method, 0 where the inputs are ill-conditioned."""
         det = self._determinant(rates)
         if det is None:
             return [real(0.0)] * self._n
@@ -391,17 +372,17 @@ class Inverse:
                 (gaps[1] * rates[0] - gaps[0] * rates[1]) / det]
 
     def _reduced(self, values: Tuple[float, ...]) -> Tuple[float, ...]:
-        """Return values with angles beyond a turn within one: sine and cosine lose no digit."""
+        """Return values with large angles reduced to one turn, by sine and cosine, exactly."""
         return tuple(float(_within_turn(x, turn)) if abs(x) > turn else x
-                     for x, turn in zip(values, self._rounds))
+                     for x, turn in zip(values, self._periods))
 
     def _own(self, mode: int, inputs: Tuple[float, ...], values: Sequence[float],
              within: bool = True) -> Optional[Found]:
-        """Return inputs that a mode gives, and rates, if the linkage has its outputs there."""
+        """Return the inputs of a mode and the rates if they are a solution, else None."""
         n, at, slack = self._n, self._check.at, ROUNDING
         row = at(*inputs)
         if row[0] != row[0] or n > 1 and any(x != x for x in row[1:n]):
-            # The reach ends here, but for rounding.
+            # This is an end of the reach, up to rounding.
             for beside in self._beside(inputs):
                 row, slack = at(*beside), BESIDE
                 if not any(x != x for x in row[:n]):
@@ -426,11 +407,11 @@ class Inverse:
     def _rates_at_end(self, mode: int, inputs: Tuple[float, ...], values: Sequence[float],
                       rates: Tuple[float, ...]) -> Optional[Tuple[float, ...]]:
         """
-        Return rates, next to an end of the reach those of the mode, None beyond it.
+        Return the rates at a solution, or None if it is beyond an end of the reach.
 
-        There rounding of the inputs moves outputs by far more than rounding. Beyond it the mode
-        has its dyads on other sides than the linkage: the inputs turn back, and their rates have
-        the other sign.
+        Next to an end of the reach rounding of the inputs spoils the rates of the forward formula,
+        and those of the mode replace them. Beyond the end the mode has its dyads on other sides
+        than the linkage: the inputs turn back, and their rates have the other sign.
         """
         n, closed = self._n, cast(InverseLinkage, self.closed)
         if np.abs(self._jacobian(rates)).max() < (STEEP if n > 1 else 1.0):
@@ -439,10 +420,11 @@ class Inverse:
             rows = (self._check.at(*beside) for beside in self._beside(inputs))
             rates = next((row[n:] for row in rows if np.isfinite(row).all()), rates)
         mode //= math.prod(map(len, closed.turns))
-        turning = np.reshape(self._choices.get_or_make(mode, lambda: self.linkage.bind(Program(
-            [*chain(*closed.modes[mode].rates)], n, closed.given))).at(*values), (n, n))
+        pose = self._programs.get_or_make(('rates', mode), lambda: self.linkage.bind(Program(
+            [*chain(*closed.modes[mode].rates)], n, closed.given)))
+        turning = np.reshape(pose.at(*values), (n, n))
         with np.errstate(invalid='ignore'):
-            # The identity but for rounding; each dyad on its other side turns a sign.
+            # The identity up to rounding; a dyad on its other side turns a sign.
             both = turning @ np.reshape(rates, (n, n)).T
             if np.linalg.det(both) < 0.0 or (np.diag(both) < 0.0).any():
                 return None
@@ -454,16 +436,16 @@ class Inverse:
         return tuple(found.T.ravel().tolist())
 
     def _beside(self, inputs: Tuple[float, ...]) -> Iterator[Tuple[float, ...]]:
-        """Yield inputs that differ by rounding, one a little."""
+        """Yield inputs of which one differs by little more than rounding."""
         for i, size in enumerate(self._sizes):
             for step in (BESIDE * size, -BESIDE * size):
                 yield (*inputs[:i], inputs[i] + step, *inputs[i + 1:])
 
     def _missed(self, row: Sequence[float], inputs: Sequence[float], values: Sequence[float],
                 slack: float) -> Tuple[List[float], bool, float]:
-        """Return what outputs miss, whether that is rounding, and the most, in their sizes."""
+        """Return the outputs' errors, whether they are rounding, and the greatest by its size."""
         n, gaps, sure, most = self._n, [], True, 0.0
-        for i, (value, turn, scale) in enumerate(zip(values, self._rounds, self._scales)):
+        for i, (value, turn, scale) in enumerate(zip(values, self._periods, self._scales)):
             gap = row[i] - value
             if gap - gap == 0.0:
                 gap = math.remainder(gap, turn)
@@ -472,7 +454,7 @@ class Inverse:
             if not away <= allowed:
                 for rate, x, size in zip(row[n + i::n], inputs, self._sizes):
                     allowed += slack * abs(rate) * max(size, abs(x))
-                    # Next to a dead point the last digit of an input may be worth more than that.
+                    # Next to a dead point an ulp of an input may move the output by more.
                     own += 2.0 ** -52 * abs(rate) * abs(x)
                 own = min(own, OTHER * scale) if own < math.inf else 0.0
                 sure = sure and away <= max(min(allowed, ENDED * scale), own)
@@ -482,7 +464,7 @@ class Inverse:
 
     def _stepped(self, inputs: Tuple[float, ...], rates: Sequence[float],
                  gaps: Sequence[float]) -> Tuple[float, ...]:
-        """Return inputs after a step of Newton's method; NaN where there is none."""
+        """Return inputs after a step of Newton's method; NaN if the Jacobian is singular."""
         if self._n == 1:
             return (inputs[0] - gaps[0] / rates[0] if rates[0] else math.nan,)
         try:
@@ -492,7 +474,7 @@ class Inverse:
         return tuple(x - step for x, step in zip(inputs, steps.tolist()))
 
     def _within(self, inputs: Sequence[float]) -> Tuple[float, ...]:
-        """Return inputs as they are counted: angles in the turns from -pi."""
+        """Return inputs, angles within one period around zero."""
         found = []
         for x, (half, turn, least) in zip(inputs, self._turned):
             if not -half <= x < half:
@@ -501,12 +483,12 @@ class Inverse:
         return tuple(found)
 
     def _distinct(self, found: Sequence[Found]) -> List[Found]:
-        """Return answers in order, without those that rounding does not tell from another."""
-        kept: List[Found] = []
+        """Return solutions in order, one of those that differ by rounding."""
+        distinct: List[Found] = []
         for answer in sorted(found):
-            if not any(self._are_one(answer, other) for other in kept):
-                kept.append(answer)
-        return kept
+            if not any(self._are_one(answer, other) for other in distinct):
+                distinct.append(answer)
+        return distinct
 
     def _are_one(self, answer: Found, other: Found) -> bool:
         apart = 0.0
@@ -522,16 +504,16 @@ class Inverse:
         return bool(apart <= rounding * (1.0 + values[0]) / max(values[-1], SAME))
 
     def _jacobian(self, rates: Sequence[float]) -> np.ndarray:
-        """Return d outputs / d inputs, both in their sizes, from rates by each input."""
+        """Return d outputs / d inputs, both in units of their sizes, from rates by each input."""
         return (np.reshape(rates, (self._n, self._n)).T * self._sizes
                 / np.reshape(self._scales, (-1, 1)))
 
     def _found(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """
-        Return all answers for values (outputs, questions), in no order, NaN where there is none.
+        Return all solutions for values (outputs, n), in no order, NaN where there are fewer.
 
-        Their shapes are (answers, inputs, questions) and (answers, inputs * outputs, questions).
-        Answers that rounding does not tell from one another are all given.
+        Their shapes are (answers, inputs, n) and (answers, inputs * outputs, n). Solutions that
+        differ by rounding are not merged.
         """
         values = self._within_turns(values)
         if not self.closed:
@@ -548,18 +530,18 @@ class Inverse:
         return rows[:, 1:n + 1], rows[:, n + 1:]
 
     def _within_turns(self, values: np.ndarray) -> np.ndarray:
-        """Return values (outputs, questions) as `_reduced` does; NaN what is not finite."""
+        """Return values (outputs, n) as `_reduced` does; NaN for those that are not finite."""
         near = np.abs(values) <= math.tau
         if near.all():
             return values
         values = np.where(np.isfinite(values), values, np.nan)
-        for row, turn in zip(values, self._rounds):
+        for row, turn in zip(values, self._periods):
             far = np.abs(row) > turn
             row[far] = _within_turn(row[far], turn)
         return values
 
     def _single(self, inputs: np.ndarray, rates: np.ndarray) -> None:
-        """Make NaN what rounding does not tell from another answer."""
+        """Make NaN all but one of the solutions that differ by rounding."""
         doubtful = np.zeros(inputs.shape[2], bool)
         for one, two in combinations(inputs, 2):
             away = self._away(one, two)
@@ -567,14 +549,14 @@ class Inverse:
                 doubtful |= away <= self._n * NEIGHBOURS ** 2
         for place in np.flatnonzero(doubtful):
             here = inputs[:, :, place], rates[:, :, place]
-            kept = self._distinct([(tuple(x), tuple(r)) for x, r in zip(
+            distinct = self._distinct([(tuple(x), tuple(r)) for x, r in zip(
                 *(part.tolist() for part in here)) if x[0] == x[0]])
-            for part, each in zip(here, zip(*kept)):
+            for part, each in zip(here, zip(*distinct)):
                 part[:] = np.nan
-                part[:len(kept)] = each
+                part[:len(distinct)] = each
 
     def _away(self, inputs: np.ndarray, others: np.ndarray) -> np.ndarray:
-        """Return the squares of how far inputs (inputs, ...) are from others, in their sizes."""
+        """Return the squared distances of inputs (inputs, ...) from others, in their sizes."""
         total = []
         for x, y, (_, turn, _), size in zip(inputs, others, self._turned, self._sizes):
             gap = x - y
@@ -594,30 +576,30 @@ class Inverse:
                              f'numbers, got {quoted(found.tolist())}')
         return tuple(found.ravel().tolist())
 
-    # One of the answers.
+    # --- one of the solutions ---
 
     def nearest(self, values: Sequence[Any], near: Optional[Sequence[Any]] = None,
                 ends: Ends = None) -> Tuple[Any, Any]:
         """
-        Return one answer.
+        Return one solution.
 
         Parameters
         ----------
         values : sequence of float or array
-            What each output is to be [rad or m].
+            The value of each output [rad or m].
         near : sequence of float or array, optional
-            The answer nearest to these inputs is taken, whole turns included, a length being
-            counted in parts of about its stroke. Default: of one input the least with which the
-            output grows, else the least: that is the working branch of a lever, on which lever
-            and crank turn the same way. Of several inputs the one whose first is the least.
+            Values of the inputs [rad or m]: the solution is the nearest to them, whole turns
+            included; the unit of a length is about its stroke. Default: with one input, the least
+            at which the output increases, else the least (on this working branch of a lever, lever
+            and crank turn the same way); with several, the one whose first input is the least.
         ends : sequence of (float, float) or None, optional
-            For each input the lowest and the highest value [rad or m] that may be taken.
+            For each input the range [rad or m] that the solution has to lie in, or None.
 
         Returns
         -------
         (tuple of float or array, tuple of float or array)
-            The inputs, and the rate of each output by the first input, by the second and so on;
-            NaN where there is none.
+            The inputs [rad or m], and the rate of each output by the first input, by the second
+            and so on; NaN where there is no solution.
 
         """
         limits = tuple(ends or (None,) * self._n)
@@ -645,14 +627,15 @@ class Inverse:
     def path(self, values: Sequence[np.ndarray], near: Optional[Sequence[float]] = None,
              ends: Ends = None) -> Tuple[Any, Any]:
         """
-        Return the answers that go on from value to value: each is the nearest to the last.
+        Return solutions for successive values: each is the nearest to the one before.
 
         Parameters
         ----------
         values : sequence of array (n,)
-            What each output is to be, one after the other [rad or m].
+            The successive values of each output [rad or m].
         near, ends
-            As for `nearest`, for the first value; a value that cannot be had is passed over.
+            As for `nearest`, for the first value. Values without a solution are left out, and the
+            next one continues from the solution before them.
 
         Returns
         -------
@@ -664,7 +647,7 @@ class Inverse:
         limits, beside = tuple(ends or (None,) * self._n), near and tuple(np.ravel(near).tolist())
         found = np.full((self._n + self._n ** 2, inputs.shape[2]), np.nan)
         breaks: Dict[int, np.ndarray] = {}
-        at, known = 0, np.flatnonzero(self._may_be_taken(inputs, limits))
+        at, known = 0, np.flatnonzero(self._may_be_inside(inputs, limits))
         while (k := int(known.searchsorted(at))) < len(known):
             at = int(known[k])
             answers = [(tuple(x), tuple(r)) for x, r in zip(inputs[:, :, at].tolist(), rates[
@@ -677,18 +660,18 @@ class Inverse:
             if mode not in breaks:
                 breaks[mode] = self._breaks(inputs, mode)
             stop = min(int(breaks[mode][breaks[mode].searchsorted(at)]) + 1, at + BLOCK)
-            places = self._going_on(inputs[mode, :, at:stop], place, limits)
+            places = self._continued(inputs[mode, :, at:stop], place, limits)
             stop = at + places.shape[1]
             found[:self._n, at:stop], found[self._n:, at:stop] = places, rates[mode, :, at:stop]
             at, beside = stop, tuple(places[:, -1].tolist())
         return tuple(found[:self._n]), tuple(found[self._n:])
 
-    def _may_be_taken(self, inputs: np.ndarray, limits: Sequence) -> np.ndarray:
-        """Return for each question whether an answer may lie between the ends."""
+    def _may_be_inside(self, inputs: np.ndarray, limits: Sequence) -> np.ndarray:
+        """Return for each value whether a solution may lie between the ends."""
         may = inputs[:, 0] == inputs[:, 0]
         for by, (pair, (_, turn, _), size) in enumerate(zip(limits, self._turned, self._sizes)):
             if pair:
-                # What is beyond by more than this no rounding of an output takes to the end.
+                # Rounding of an output moves an input to its end from no farther away.
                 low, high = (end + side * NEIGHBOURS * (size + abs(end))
                              for end, side in zip(pair, (-1.0, 1.0)))
                 first = inputs[:, by] + (turn * np.ceil((low - inputs[:, by]) / turn)
@@ -697,15 +680,15 @@ class Inverse:
         return may.any(axis=0)
 
     def _breaks(self, inputs: np.ndarray, mode: int) -> np.ndarray:
-        """Return after which questions another answer is nearer than that of the same mode."""
+        """Return after which values a solution of another mode is nearer than the next one."""
         away = self._away(inputs.swapaxes(0, 1)[:, :, 1:], inputs[mode, :, None, :-1])
         own = away[mode].copy()
         away[mode] = np.inf
         return np.append(np.flatnonzero(~(own < np.fmin.reduce(away))), inputs.shape[2] - 1)
 
-    def _going_on(self, inputs: np.ndarray, start: Sequence[float], limits: Sequence
+    def _continued(self, inputs: np.ndarray, start: Sequence[float], limits: Sequence
                   ) -> np.ndarray:
-        """Return inputs that go on from a start, whole turns included, as far as they may."""
+        """Return inputs that continue from a start, whole turns included, up to the ends."""
         places = inputs.copy()
         for row, begin, pair, (_, turn, _) in zip(places, start, limits, self._turned):
             if math.isfinite(turn):
@@ -719,7 +702,7 @@ class Inverse:
         return places
 
     def _each(self, values: Sequence[Any]) -> Sequence[Any]:
-        """Return all answers, floats for floats and arrays for arrays."""
+        """Return all solutions, floats for floats and arrays for arrays."""
         if set(map(type, values)) == {float}:
             return self._all(tuple(values))
         inputs, rates = self.over(*values)
@@ -727,7 +710,7 @@ class Inverse:
 
     def _chosen(self, answers: Sequence[Any], near: Optional[Sequence[Any]],
                 limits: Sequence) -> Tuple[Any, Any, Any]:
-        """Return which of some answers is chosen, its inputs and its rates."""
+        """Return the number, inputs and rates of the chosen one of some solutions."""
         n = self._n
         if not answers:
             return 0.0, (math.nan,) * n, (math.nan,) * (n * n)
@@ -738,16 +721,16 @@ class Inverse:
 
     def _choice(self, *what: Any) -> Pose:
         """Return the code that `_make_choice` makes."""
-        return self._choices.get_or_make(what, lambda: self._make_choice(*what))
+        return self._programs.get_or_make(what, lambda: self._make_choice(*what))
 
     def _make_choice(self, count: int, follows: bool, ended: Tuple[bool, ...]) -> Pose:
         """
-        Return the code that chooses one of some answers, or for 0 that of the modes.
+        Return the code that chooses one of `count` solutions, or, if it is 0, one of the modes.
 
-        Given are the answers, each its inputs and rates, or the values; then, if so, the inputs
-        that the answer is to be nearest to, and for each that is to lie between ends, these. What
-        is beyond an end by so little that the outputs do not tell is at the end. Before the answer
-        its number is returned, NaN where a mode is to be looked at closer.
+        Its arguments are the inputs and rates of each solution, or the values; then, if it
+        `follows`, the inputs that the solution has to be nearest to; then the two ends of each
+        input that is `ended`. An input beyond an end by rounding of the outputs is at the end. The
+        code returns the number of the chosen one, NaN if `_own` has to decide, inputs and rates.
         """
         n, size = self._n, self._n + self._n ** 2
         total = (count * size or n) + n * follows + 2 * sum(ended)
@@ -759,7 +742,7 @@ class Inverse:
             0, count * size, size)] or [self._rows[i:i + size + 1] for i in range(
                 0, len(self._rows), size + 1)]
         unknown = reduce(lambda found, row: where(row[0] <= 1.0, found, math.nan), rows, real(0.0))
-        for value, turn in zip(values, () if count else self._rounds):
+        for value, turn in zip(values, () if count else self._periods):
             if math.isfinite(turn):
                 unknown = unknown + where(abs(value) <= turn, 0.0, math.nan)
         choices = []
@@ -784,7 +767,7 @@ class Inverse:
 
     def _place(self, by: int, row: Sequence[Real], near: Sequence[Real],
                ends: Sequence[Real]) -> Tuple[Real, List[Real]]:
-        """Return where an input is chosen, whole turns aside, and what tells that it is not."""
+        """Return an input with whole turns added, and the conditions under which it is out."""
         x, size, turn = row[by], self._sizes[by], self._turned[by][1]
 
         def beside(value: Real, other: Real) -> Real:
@@ -811,21 +794,22 @@ class Inverse:
 
     def follow(self, values: ArrayLike, near: ArrayLike) -> Found:
         """
-        Return the answer that goes on from where the inputs were without a jump.
+        Return the solution that is continuous from given inputs.
 
         Parameters
         ----------
         values : array-like (outputs,)
-            What the outputs are to be [rad or m].
+            The values of the outputs [rad or m].
         near : array-like (inputs,)
-            Where the inputs were [rad or m]; whole turns of a crank are kept.
+            The present inputs [rad or m]; whole turns of a crank are preserved.
 
         Returns
         -------
         (tuple of float, tuple of float)
-            The inputs that outputs lead to which go straight from what they were to what is asked
-            for, angles the shorter way; and the rate of each output by the first input, by the
-            second and so on. NaN where that would pass a dead point, or leave the reach.
+            The inputs [rad or m] at the end of a motion in which the outputs go straight from
+            their present values to `values`, angles the shorter way; and the rate of each output
+            by the first input, by the second and so on. NaN if the motion passes a dead point or
+            leaves the reach.
 
         """
         values, near = self._one_each(values), self._one_each(near, 'near')
@@ -835,24 +819,15 @@ class Inverse:
         values = self._reduced(values)
         if self.closed:
             return self._along(values, near) or nothing
-        if self._n > 1:
-            inputs, jacobian = self._search.followed(np.array(near), np.array(values))
-            return tuple(inputs.tolist()), tuple(jacobian.T.ravel().tolist())
-        first = self.inputs[0]
-        turns, size = first.turns_of(near[0]), self._sizes[0]
-        found, rate = self._search.follow(self._rated.at, size, values[0], near[0] - turns)
-        if self._search.is_one and first.is_whole(self.linkage.reach()):
-            # The output turns all round with the crank: beyond pi they go on together.
-            turns = float(first.beside(found, near[0])) - found
-        return (found + turns,), (rate,)
+        return self._search.follow(values, near)
 
     def _along(self, values: Tuple[float, ...], near: Tuple[float, ...]) -> Optional[Found]:
-        """Return what the mode that the inputs are in leads to."""
+        """Return the end of the motion in the mode of the present inputs."""
         start = self._check.at(*near)[:self._n]
         if any(x != x for x in start):
             return None
         gaps = [math.remainder(value - now, turn)
-                for value, now, turn in zip(values, start, self._rounds)]
+                for value, now, turn in zip(values, start, self._periods)]
         steps = math.ceil(max(abs(gap) / scale for gap, scale in zip(gaps, self._scales)) / STEP)
         at = {mode: near for mode, place in self._modes(start, near)
               if max(abs(x - y) / size for x, y, size in zip(place, near, self._sizes)) < ALIKE}
@@ -872,7 +847,7 @@ class Inverse:
 
     def _modes(self, values: Sequence[float], near: Sequence[float]
                ) -> Iterator[Tuple[int, Tuple[float, ...]]]:
-        """Yield what each assembly mode answers that has an answer, next to other inputs."""
+        """Yield number and inputs of each mode that can be assembled, nearest to others."""
         for mode, row in enumerate(self._at(values)):
             inputs = row[1:self._n + 1]
             if not any(x != x for x in inputs):
@@ -882,27 +857,18 @@ class Inverse:
         return tuple(x + input_.turn * round((y - x) / input_.turn) if input_.turns else x
                      for input_, x, y in zip(self.inputs, inputs, near))
 
-    # The search for what does not come apart.
+    # --- the search, where there is no closed form ---
 
     def _searched(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Return all answers as `_found` does."""
-        if self._n == 1:
-            inputs = self._search.answers(values[0])[:, None] * self._sizes[0]
-            rates = self._rated.over(inputs.ravel())[1].reshape(inputs.shape)
-            return self.inputs[0].wrapped(np.where(
-                np.abs(inputs) < self._turned[0][2], 0.0, inputs)), rates
-        found = [self._search.answers(column) for column in values.T]
-        most = max((len(each) for each in found), default=0)
-        inputs = np.full((max(most, 1), self._n, len(found)), np.nan)
-        for column, each in enumerate(found):
-            inputs[:len(each), :, column] = each
+        """Return all solutions as `_found` does."""
+        inputs = self._search.answers(values)
         rates = self._rated.over(*inputs.swapaxes(0, 1))[self._n:].swapaxes(0, 1)
         return inputs, rates
 
-    # The working mode.
+    # --- the working mode ---
 
     def margin(self, inputs: Sequence[float]) -> float:
-        """Return how far from singular a pose is; see `Answer.margin`."""
+        """Return the distance of a pose from a singular one; see `Answer.margin`."""
         jacobian = self._jacobian(self._rated.at(*inputs)[self._n:])
         if not np.isfinite(jacobian).all():
             return 0.0
@@ -936,10 +902,19 @@ def _sign(value: float, size: float) -> int:
 
 
 def _columns(inputs: np.ndarray, rates: np.ndarray) -> List[Found]:
-    """Return the answers to one question, of arrays."""
+    """Return the solutions of the first value in arrays, in order."""
     found = [(tuple(row), tuple(rate)) for row, rate in zip(
         inputs[:, :, 0].tolist(), rates[:, :, 0].tolist()) if row[0] == row[0]]
     return sorted(found)
+
+
+def _inverse(rates: Sequence[Sequence[Real]]) -> List[Real]:
+    """Return d output / d input, by each input, of the rates of up to two inputs by outputs."""
+    if len(rates) == 1:
+        return [1.0 / rates[0][0]]
+    (a, b), (c, d) = rates
+    det = a * d - b * c
+    return [d / det, -c / det, -b / det, a / det]
 
 
 def _greater(x: Real, y: Real) -> Real:
@@ -947,12 +922,12 @@ def _greater(x: Real, y: Real) -> Real:
 
 
 def _rounded(values: np.ndarray) -> np.ndarray:
-    """Round an array that is used no more in place: to the nearest integers."""
+    """Round an array in place to the nearest integers."""
     return cast(np.ndarray, np.rint(values, out=values))
 
 
 def _before(one: Sequence[Real], other: Sequence[Real]) -> Real:
-    """Return whether numbers come before others, the first that differ telling."""
+    """Return whether numbers precede others in lexicographic order."""
     (x, *rest), (y, *others) = one, other
     return 0.5 < where(x < y, 1.0, where(y < x, 0.0, where(_before(rest, others), 1.0, 0.0))) \
         if rest else x < y

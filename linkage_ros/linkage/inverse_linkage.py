@@ -24,7 +24,7 @@ from . import joint_lines
 from .builder import GROUND, Link, UNIT
 from .design import Design
 from .dyads import Dyads, Hinge, Motor, Slide
-from .inputs import Input
+from .inputs import Input, spread
 from .quantities import Names, PAIR, Structure
 from ..formula.expression import (
     arctangent,
@@ -204,13 +204,8 @@ def _pose(linkage: Mechanism) -> Optional[Dict[str, float]]:
     """Return all joint angles and coordinates in some pose that has nothing special."""
     names = (*linkage.joints, *(f'{point}.{axis}' for point in linkage.points for axis in 'xy'))
     pose = linkage.posed((), names)
-    first, *others = linkage.inputs
-    if others:
-        # Fractions of square roots of primes, which fill a cube evenly.
-        parts = np.outer(np.arange(1, TRIES + 1), np.sqrt([2, 3, 5, 7, 11, 13, 17, 19][
-            :len(linkage.inputs)])) % 1.0
-        values = [input_.low + part * (input_.high - input_.low)
-                  for input_, part in zip(linkage.inputs, parts.T)]
+    if len(linkage.inputs) > 1:
+        values = spread(linkage.inputs, TRIES)
     else:
         arcs = linkage.reach()
         values = [np.array([lo + part * (hi - lo) for part in (0.382, 0.7, 0.13)

@@ -21,8 +21,8 @@ from .analysis import Analysis
 from .arguments import checked_dimensions, numbers
 from .builder import in_metres, UNIT
 from .design import Design
-from .input_range import arcs
-from .inputs import Arc, Input, MOST_COUNTED
+from .input_range import arcs, is_periodic
+from .inputs import Arc, Input, MOST_COUNTED, spread
 from .inverse import Answer, Inverse
 from .quantities import LinkPoint, Points, structure_of
 from ..cache import Cache
@@ -68,7 +68,7 @@ def _hashable(names: Any) -> Any:
 
 
 def _plain(names: Any) -> Any:
-    """Return names that are hashable as plain text, as they are to be held for others."""
+    """Return hashable names as plain text, since a subclass of str may change."""
     return tuple(map(plain_text, names)) if isinstance(names, tuple) else plain_text(names)
 
 
@@ -191,7 +191,7 @@ class Mechanism:
 
     def windows(self) -> list:
         """Return the links on two hinges in a row with two rods, and their limits."""
-        return [self.constants(held) for held in self.structure.built.windows]
+        return [self.constants(window) for window in self.structure.built.windows]
 
     def value(self, length: Real) -> Any:
         """Return the value of an expression of dimensions alone, lengths in its own unit."""
@@ -256,38 +256,65 @@ class Mechanism:
         """
         Return the number of turns of an input after which the pose repeats.
 
-        It is above one if the input drives cranks by fractional gears. Ratios are rounded to
-        fractions with denominators up to MOST_TURNS.
+        It is above one if the input drives cranks by fractional gears, or if it passes one change
+        point per turn. Gear ratios are rounded to fractions with denominators up to MOST_TURNS.
+        With arrays of dimensions, change points are ignored.
         """
+        return self.cache.get_or_make(('period', by), lambda: self._period(by))
+
+    def _period(self, by: int) -> int:
         ratios = [np.ravel(self.value(derivative(value, {by: 1.0}, {})))
                   for _, value in self.structure.built.driven.values()]
-        return math.lcm(*(Fraction(float(ratio)).limit_denominator(MOST_TURNS).denominator
-                          for each in ratios for ratio in each if math.isfinite(ratio)))
+        turns = math.lcm(*(Fraction(float(ratio)).limit_denominator(MOST_TURNS).denominator
+                           for each in ratios for ratio in each if math.isfinite(ratio)))
+        if turns > MOST_COUNTED or not self._passes_change_point(by):
+            return turns
+        return turns if is_periodic(lambda theta: self._points_over(by, theta), Input(
+            '', low=-math.pi * turns, high=math.pi * turns, period=turns)) else 2 * turns
+
+    def _passes_change_point(self, by: int) -> bool:
+        """Return whether a dyad of a crank has a gap of nothing but rounding."""
+        gaps = [(limit.tolerance, *limit.ends[:2]) for limit in self.structure.built.limits
+                if limit.ends and limit.ends.theta.args[0] == by]
+        values = [tuple(map(self.value, each)) for each in gaps]
+        return any(np.ndim(tolerance + start + end) == 0 and min(abs(start), abs(end)) <= tolerance
+                   for tolerance, start, end in values)
+
+    def _points_over(self, by: int, values: np.ndarray) -> np.ndarray:
+        """Return the coordinates of all joints over one input; the others are spread."""
+        inputs = spread([self._with_stroke(x) for x in self.structure.built.inputs], len(values))
+        inputs[by] = values
+        return self.bound('points', self.points).searched(*inputs)
 
     def _counted_input(self, by: int, input_: Input) -> Input:
         """Return an input with the limits [rad or m] of all poses."""
         if not input_.turns:
-            return input_._replace(low=self._metres(input_.low), high=self._metres(input_.high))
+            return self._with_stroke(input_)
         period = self.period(by)
         period = period if period <= MOST_COUNTED else 1
         return input_._replace(low=-math.pi * period, high=math.pi * period, period=period)
+
+    def _with_stroke(self, input_: Input) -> Input:
+        """Return an input with its stroke [m]; an angle is unchanged."""
+        return input_ if input_.turns else input_._replace(
+            low=self._metres(input_.low), high=self._metres(input_.high))
 
     # --- poses and how they change ---
 
     def solve(self, theta: Inputs, points: Names = None) -> dict:
         """Return the coordinates of each joint [m]: theta's shape and a last axis for x and y."""
         if isinstance(theta, float) and len(self.inputs) == 1:
-            wanted = _hashable(points)
-            place = self._placers.get(wanted) or self._placer(wanted)
+            names = _hashable(points)
+            place = self._placers.get(names) or self._placer(names)
             return place(theta)
         return self._vectors('points', theta, points)
 
-    def _placer(self, wanted: Any) -> Callable:
+    def _placer(self, points: Any) -> Callable:
         """Return a function from one value of the input, a float, to joints."""
-        names, pose = self._ready('points', wanted)
+        names, pose = self._ready('points', points)
         if pose.shape:
-            return lambda theta: self._vectors('points', theta, wanted)
-        return self._placers.get_or_make(_plain(wanted), lambda: pose.placer(names))
+            return lambda theta: self._vectors('points', theta, points)
+        return self._placers.get_or_make(_plain(points), lambda: pose.placer(names))
 
     def velocity(self, theta: Inputs, points: Names = None, by: int = 0) -> dict:
         """Differentiate `solve` by an input [m/rad, m/m]; infinite or NaN at a dead point."""
@@ -353,10 +380,10 @@ class Mechanism:
     def posed(self, points: Names = None, joints: Sequence[str] = (),
               rates: Sequence[str] = ()) -> Pose:
         """Return the code behind `function`."""
-        wanted = tuple(self._names(kind, _plain(_hashable(names)))
-                       for kind, names in (('points', points), ('angles', joints),
-                                           ('rates', rates)))
-        return self.bound('parts', wanted)
+        requested = tuple(self._names(kind, _plain(_hashable(names)))
+                          for kind, names in (('points', points), ('angles', joints),
+                                              ('rates', rates)))
+        return self.bound('parts', requested)
 
     def legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...],
              rows: np.ndarray) -> Batch:
@@ -486,21 +513,18 @@ class Mechanism:
 
         `output` is as for `inverse`; angles are equal up to whole turns. `others` are the fixed
         values of the other inputs. Without `near`, the result has all solutions, crank angles in
-        [-pi, pi), ascending, on a last axis of length one or more, padded with NaN. With `near` it
-        has the nearest, including whole turns, in the broadcast shape of value and near. It is NaN
-        where the output is unreachable or constant; a value beyond an extreme by rounding
-        counts as the extreme.
-
-        A linkage with one change point in a turn repeats only after two turns: its
-        solutions are those of the turn [-pi, pi), and `near` should lie there.
+        [-pi, pi) or within their period, ascending, on a last axis of length one or more, padded
+        with NaN. With `near` it has the nearest, including whole turns, in the broadcast shape of
+        value and near. It is NaN where the output is unreachable or constant; a value beyond an
+        extreme by rounding counts as the extreme.
         """
-        value, (inverse, held) = numbers('value', value), self._held(output, others)
+        value, (inverse, fixed) = numbers('value', value), self._with_others(output, others)
         if near is None:
-            return inverse.over(value, *held)[0][0]
+            return inverse.over(value, *fixed)[0][0]
         near = numbers('near', near)
-        return inverse.nearest((value, *held), (near, *held))[0][0][()]
+        return inverse.nearest((value, *fixed), (near, *fixed))[0][0][()]
 
-    def _held(self, output: Any, others: Sequence[float]) -> Tuple[Inverse, List[float]]:
+    def _with_others(self, output: Any, others: Sequence[float]) -> Tuple[Inverse, List[float]]:
         """Return the inverse of an output with all inputs but the first fixed."""
         self.check_output(output)
         if len(others) != len(self.inputs) - 1:
@@ -511,7 +535,7 @@ class Mechanism:
 
     def servos(self, output: str, value: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
         """Return all solutions as `input_for` does, and d output / d input there."""
-        inputs, rates = self._held(output, ())[0].over(numbers('value', value))
+        inputs, rates = self._with_others(output, ())[0].over(numbers('value', value))
         return inputs[0], rates[0]
 
     def servo_for(self, output: str, value: ArrayLike, near: Optional[ArrayLike] = None,
@@ -523,7 +547,7 @@ class Mechanism:
         Without `near` it is on the working branch, on which lever and crank turn the same way.
         Floats, or arrays in the broadcast shape of value and near; NaN without a solution.
         """
-        inverse, _ = self._held(output, ())
+        inverse, _ = self._with_others(output, ())
         given = [x if type(x) is float else numbers(name, x)
                  for name, x in (('value', value), ('near', near)) if x is not None]
         (found,), (rate,) = inverse.nearest(given[:1], given[1:] or None, [ends])
@@ -536,7 +560,7 @@ class Mechanism:
         See `Inverse.follow`, for a linkage with one input: the input [rad or m] with its whole
         turns, and d output / d input; NaN beyond the next dead point or extreme of the output.
         """
-        (found,), (rate,) = self._held(output, ())[0].follow(value, near)
+        (found,), (rate,) = self._with_others(output, ())[0].follow(value, near)
         return found, rate
 
     def inputs_for(self, outputs: Sequence[str], values: ArrayLike,
@@ -665,23 +689,23 @@ class Mechanism:
                              f'{len(self.inputs) - 1}, got {quoted(by)}')
         return int(by)
 
-    def _ready(self, kind: str, wanted: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
+    def _ready(self, kind: str, requested: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
         """Return the requested names and the function that computes them."""
-        key = kind, _hashable(wanted), *by
+        key = kind, _hashable(requested), *by
         return self._poses.get(key) or self._pose(kind, _plain(key[1]), *by)
 
-    def _pose(self, kind: str, wanted: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
-        names = self._names(kind, wanted)
+    def _pose(self, kind: str, requested: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
+        names = self._names(kind, requested)
         return self._poses.get_or_make(
-            (kind, wanted, *by), lambda: (names, self.bound(kind, names, *by)))
+            (kind, requested, *by), lambda: (names, self.bound(kind, names, *by)))
 
-    def _names(self, kind: str, wanted: Any) -> Tuple[str, ...]:
+    def _names(self, kind: str, requested: Any) -> Tuple[str, ...]:
         what, allowed = ('point', self.points) if kind in OF_POINTS else ('joint', self.joints)
         if kind == 'transmissions':
             what, allowed = 'transmission angle at', tuple(self.structure.built.transmissions)
-        if wanted is None:
+        if requested is None:
             return allowed
-        names = (wanted,) if isinstance(wanted, str) else wanted
+        names = (requested,) if isinstance(requested, str) else requested
         for name in names:
             if name not in allowed and not (what == 'joint' and self.has_output(name)):
                 raise ValueError(f'{self.type} has no {what} {quoted(name)}; '

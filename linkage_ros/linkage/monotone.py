@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Values of the input that bring about a wanted value of any output.
+Values of the only input at which any output has a given value.
 
-The output is cut into branches on which it rises or falls all along: at its extremes, at the ends
-of the reach, and where the linkage passes a dead point. On a branch a value is found by Newton's
-method kept inside a bracket, to the last digit.
+The output is cut into branches on which it is monotone: at its extremes, at the ends of the reach,
+and where the linkage passes a dead point. On a branch Newton's method inside a bracket finds the
+input to the last digit.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ import numpy as np
 from .curves import LEAST, refined, sampled, turns
 from .inputs import Arc, Input
 
-# Answers that are no further apart than this [rad] are one.
+# Solutions no farther apart than this [rad] are one.
 CLOSE = 1e-13
-# A step to the outermost sample of an arc by more than this part of the output breaks it off.
+# A larger step than this part of the output's range to the outermost sample of an arc is a break.
 BROKEN = 1e-6
-# Newton's method halves its error more than once a step; bisection needs one step a bit.
+# Steps of the bracketed search at most: bisection alone needs one per bit of a float.
 STEPS = 200
-# An output jumps that changes by more than this part of half a turn, or of its range, between
-# neighbouring values of the input.
+# A larger change than this part of half a turn, or of the output's range, between neighbouring
+# floats of the input is a jump.
 JUMP = 0.05
-# An output that changes by no more than so many times its rounding stands still.
+# A change by no more than this multiple of its rounding leaves an output constant.
 STILL = 64.0
-# What a value may miss, as a part of the output's range, before it counts as stepped over.
+# A larger error than this part of the output's range is a jump across the value, not a solution.
 MISSED = 1e-9
 
 
@@ -38,7 +38,7 @@ def in_order(answers: np.ndarray, input_: Input) -> np.ndarray:
     """
     Return values of an input, shape (candidates, n), as shape (n, answers).
 
-    Each row ascends, holds nothing twice, and is filled up with NaN; angles are in [-pi, pi).
+    Each row ascends without duplicates and is padded with NaN; angles are in [-pi, pi).
     """
     rows = np.sort(input_.wrapped(np.where(np.abs(answers) < LEAST, 0.0, answers)), axis=0)
     if len(rows) > 1:
@@ -52,7 +52,7 @@ def in_order(answers: np.ndarray, input_: Input) -> np.ndarray:
 
 
 def distinct(theta: Iterable[float], input_: Input) -> List[float]:
-    """Return values of an input in order, without those next to another."""
+    """Return values of an input in order, one of those that differ by rounding."""
     found = np.array(list(theta), float)
     return [x for x in in_order(found[:, None], input_)[0].tolist() if x == x]
 
@@ -70,20 +70,20 @@ class _Branch(NamedTuple):
 
 class MonotoneBranches:
     """
-    An output over the reach, in branches on which it rises or falls all along.
+    An output over the reach, in branches on which it is monotone.
 
     Parameters
     ----------
     curve : callable
         From values of the input, shape (n,), to the output and its rate, shape (2, n).
     arcs : sequence of (float, float)
-        Where the input may be; nowhere both sides of -pi or pi.
+        The reach; no arc extends to both sides of -pi or pi.
     marks : sequence of float
-        Values of the input next to which the output may change quickly or break off.
+        Values of the input next to which the output may change quickly or jump.
     angular : bool
         Whether the output is an angle, compared modulo a turn.
     rounding : float
-        What the output is rounded to at least; a value so far beyond an extreme is the extreme.
+        Least rounding of the output; a value beyond an extreme by no more counts as the extreme.
 
     """
 
@@ -102,22 +102,22 @@ class MonotoneBranches:
 
     def answers(self, values: np.ndarray) -> np.ndarray:
         """Return the values of the input for an output's, shape (n,), as (candidates, n)."""
-        asked = [(branch, place, target[place]) for branch in self._branches
-                 for target in self._targets(branch, values)
-                 if len(place := np.flatnonzero(np.isfinite(target)))]
-        found = np.full((max(len(asked), 1), *values.shape), np.nan)
-        if asked:
+        targets = [(branch, place, target[place]) for branch in self._branches
+                   for target in self._targets(branch, values)
+                   if len(place := np.flatnonzero(np.isfinite(target)))]
+        found = np.full((max(len(targets), 1), *values.shape), np.nan)
+        if targets:
             theta = self._solved(*map(np.concatenate, zip(*(
-                _bracketed(branch, target) for branch, _, target in asked))))
-            ends = np.cumsum([len(place) for _, place, _ in asked])[:-1]
+                _bracketed(branch, target) for branch, _, target in targets))))
+            ends = np.cumsum([len(place) for _, place, _ in targets])[:-1]
             near = 0.25 * self._rounding
-            for row, (branch, place, target), part in zip(found, asked, np.split(theta, ends)):
+            for row, (branch, place, target), part in zip(found, targets, np.split(theta, ends)):
                 part = np.where(target <= branch.value[0] + near, branch.theta[0], part)
                 row[place] = np.where(target >= branch.value[-1] - near, branch.theta[-1], part)
         return found
 
     def pieces(self, most: float) -> List[Tuple[float, float, float, float]]:
-        """Return the branches, cut where the output has changed by so much: inputs, outputs."""
+        """Return pieces of the branches, each two inputs and outputs at most `most` apart."""
         cut = []
         for theta, value, sign in self._branches:
             places = [0]
@@ -130,16 +130,16 @@ class MonotoneBranches:
 
     @property
     def is_one(self) -> bool:
-        """Whether the output rises, or falls, wherever the input may be."""
+        """Whether the output is monotone over the whole reach."""
         return len(self._branches) == 1
 
     def follow(self, pose: Callable, size: float, value: float,
                near: float) -> Tuple[float, float]:
         """
-        Return the input that gives a value on the branch that another is on, and the rate there.
+        Return the input at which the output has a value on the branch of `near`, and the rate.
 
-        `pose` is the curve for a float; inputs are here in rad or m, `size` of them in one. NaN
-        where the branch does not hold the value.
+        `pose` is the curve for a float, with inputs in rad or m, `size` of them in a unit of the
+        curve. NaN if the value is outside the branch.
         """
         for branch in self._branches:
             lo, hi = branch.theta[0], branch.theta[-1]
@@ -150,7 +150,7 @@ class MonotoneBranches:
         return math.nan, math.nan
 
     def _bracket(self, branch: _Branch, value: float) -> Optional[Tuple[float, float, float]]:
-        """Return the samples on both sides of a value, as the branch counts it, and that."""
+        """Return the samples on both sides of a value, and the value in turns of the branch."""
         low, high, slack = float(branch.value[0]), float(branch.value[-1]), self._rounding
         target = branch.sign * value
         if self._angular and math.isfinite(target):
@@ -190,7 +190,7 @@ class MonotoneBranches:
         with np.errstate(invalid='ignore'):
             size = math.pi if self._angular else float(
                 np.nanmax(value, initial=-np.inf) - np.nanmin(value, initial=np.inf))
-            # What the rates at both samples do not explain of the values there.
+            # The change of the value that the rates at both samples do not explain.
             places = np.flatnonzero(np.abs(self._difference(np.diff(value)) - np.diff(theta)
                                            * 0.5 * (rate[1:] + rate[:-1])) > JUMP * size)
         before, after = theta[places], theta[places + 1]
@@ -212,7 +212,7 @@ class MonotoneBranches:
         around = (theta + digit * np.array([[0.0], [1.0], [-1.0]])).clip(theta[0], theta[-1])
         value, rate = self._curve(around.ravel()).reshape(2, *around.shape)
         with np.errstate(all='ignore'):
-            # What the rate does not explain of the values next to each is rounding.
+            # The change over an ulp of the input that the rate does not explain is rounding.
             noise = np.abs(self._difference(value[1:] - value[0])
                            - rate[0] * (around[1:] - theta)).max(axis=0)
         noise[~np.isfinite(noise)] = 0.0
@@ -224,7 +224,7 @@ class MonotoneBranches:
                 yield theta[run], values, rate[0, run], noise[run]
 
     def _unbroken(self, ends: np.ndarray, beside: np.ndarray, middle: float) -> np.ndarray:
-        """Return the ends of an arc, or where the output breaks off right before them."""
+        """Return the ends of an arc, or the last values before a break next to them."""
         values = self._curve(np.array([*ends, *beside, middle]))[0]
         start, size = values[2:4], BROKEN * (math.pi if self._angular else np.ptp(values[2:]))
         with np.errstate(invalid='ignore'):
@@ -265,7 +265,7 @@ class MonotoneBranches:
         return gap - math.tau * np.round(gap / math.tau) if self._angular else gap
 
     def _targets(self, branch: _Branch, values: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield the values as the branch counts them; NaN where it does not hold them."""
+        """Yield the values in turns of the branch; NaN for values outside it."""
         lo, hi = branch.value[0], branch.value[-1]
         values, slack = branch.sign * values, self._rounding
         turn, count = math.tau, int((hi - lo + 2.0 * slack) // math.tau) + 1
@@ -273,18 +273,18 @@ class MonotoneBranches:
             turn, count = 0.0, 1
         else:
             with np.errstate(invalid='ignore'):
-                # Sine and cosine take off whole turns without loss, however many there are.
+                # Sine and cosine remove any number of whole turns without loss.
                 within = np.arctan2(np.sin(values), np.cos(values))
             values = np.where(np.abs(values) > math.tau, within, values)
             values = values + math.tau * np.ceil((lo - slack - values) / math.tau)
         for i in range(count):
             target = values + i * turn
-            held = (target >= lo - slack) & (target <= hi + slack)
-            yield np.where(held, np.clip(target, lo, hi), np.nan)
+            inside = (target >= lo - slack) & (target <= hi + slack)
+            yield np.where(inside, np.clip(target, lo, hi), np.nan)
 
     def _solved(self, lo: np.ndarray, hi: np.ndarray, target: np.ndarray,
                 sign: np.ndarray) -> np.ndarray:
-        """Return where the output meets its targets, by Newton's method inside a bracket."""
+        """Return the inputs of some targets, by Newton's method inside brackets."""
         theta, step = 0.5 * (lo + hi), hi - lo
         best, least, steepest = theta, np.full(theta.shape, np.inf), np.zeros(theta.shape)
         done = np.zeros(theta.shape, bool)
@@ -304,7 +304,7 @@ class MonotoneBranches:
             good = (lo < guess) & (guess < hi) & (np.abs(guess - theta) < 0.5 * step)
             following = np.where(good, guess, 0.5 * (lo + hi))
             theta, step = following, np.abs(following - theta)
-        # Where the output breaks off, its sides enclose values that it never has.
+        # At a jump both sides enclose values that the output never has.
         far = STILL * np.spacing(math.pi) * steepest + MISSED * self._range + self._rounding
         return np.where(least <= far, best, np.nan)
 

@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The inverse of outputs that belong together and do not come apart, by steps on the exact Jacobian.
+The search for inputs that give outputs their values, where the inverse has no closed form.
 
-Outputs that depend on few inputs are solved first, for those alone. Levenberg-Marquardt steps lead
-down from a grid over all that the inputs can be, then from both sides of each solution, as those
-next to a fold come in pairs.
+One input is searched on the branches on which its output is monotone (`BranchSearch`), several by
+steps on the exact Jacobian (`StepSearch`); both have the same methods. Of several, outputs that
+depend on few inputs are solved first, for those alone. Levenberg-Marquardt steps lead down from a
+grid over the ranges of the inputs, then from both sides of each solution, as solutions next to a
+fold come in pairs.
 
 Sources: Nocedal and Wright, "Numerical Optimization", sec. 10.3 (the steps); Gosselin and Angeles,
 "Singularity analysis of closed-loop kinematic chains", IEEE Trans. Robotics and Automation 6
@@ -17,38 +19,42 @@ from __future__ import annotations
 
 from itertools import chain, combinations
 import math
-from typing import Callable, List, Optional, Sequence, Set, Tuple, TYPE_CHECKING
+from typing import Callable, List, Optional, Sequence, Set, Tuple, TYPE_CHECKING, Union
 
 import numpy as np
 
+from .analysis import Analysis
+from .curves import LEAST
+from .inputs import Input
 from .quantities import Names
 from ..words import listed
 
 if TYPE_CHECKING:
     from .mechanism import Mechanism
 
-# Starts of a search at first and at most, and those of them that can be assembled at least.
+# Grid points of a search at first and at most, and the least number that can be assembled.
 STARTS, MOST_STARTS, ASSEMBLED = 1024, 1 << 16, 250
-# Steps from a start, how far one goes at most, and their damping: at first, at least, and in vain.
+# Steps from a start, the longest one, and their damping: initial, least, and that of giving up.
 STEPS, LONGEST_STEP = 40, 0.7
 DAMPING, LEAST_DAMPING, HOPELESS, TINY = 1e-3, 1e-14, 1e4, 1e-300
-# Newton steps that polish a solution; halvings of the way to what may lie beside it.
+# Newton steps that polish a solution; halvings of the distance at which a twin is searched.
 POLISHING, HALVINGS = 3, 24
-# Below this margin a pose is singular; below it wherever one looks, outputs tell too little.
+# Below the first margin a pose is singular; below the second in most poses, outputs are dependent.
 SINGULAR, DEPENDENT = 1e-6, 1e-10
-# Rounding of an output, and of an input where the Jacobian is one.
+# Rounding of an output, and of an input where the Jacobian is the identity.
 ROUNDED, CLOSE = 32 * 2.0 ** -53, 1e-13
-# Pieces of a way from pose to pose, the shortest of them, and Newton steps to the end of each.
+# Steps of a motion that is followed, the shortest of them, and Newton steps to the end of each.
 PIECES, SHORTEST, REFINED = 40, 1e-10, 30
 
 _Pair = Tuple[np.ndarray, np.ndarray]
+_Found = Tuple[Tuple[float, ...], Tuple[float, ...]]
 
 
 def blocks(linkage: Mechanism, outputs: Names) -> List[Tuple[List[int], List[int]]]:
     """
-    Return outputs that are solved one after the other, and the inputs that they tell.
+    Return groups of outputs that are solved in turn, and the inputs that each group determines.
 
-    Raises ValueError if they cannot tell all inputs.
+    Both are numbers in their order. Raises ValueError if the outputs cannot determine all inputs.
     """
     needs = [{by for by in range(len(outputs)) if linkage.moves(name, by)} for name in outputs]
     left: Set[int] = set(range(len(needs)))
@@ -68,26 +74,80 @@ def blocks(linkage: Mechanism, outputs: Names) -> List[Tuple[List[int], List[int
 
 def dependent(outputs: Names, rows: Sequence[int]) -> ValueError:
     """Return the error for outputs of which some depend on too few inputs."""
-    return ValueError(f'{listed(outputs)} do not tell all inputs: '
+    return ValueError(f'{listed(outputs)} do not determine all inputs: '
                       f'{listed(outputs[row] for row in rows)} depends on too few')
 
 
-class Search:
-    """Outputs as functions of the inputs, all of them counted in their sizes inside."""
+def search_for(linkage: Mechanism, outputs: Names, inputs: Sequence[Input],
+               turns: Sequence[float]) -> Union[BranchSearch, StepSearch]:
+    """
+    Return the search for the inputs of outputs.
+
+    Parameters
+    ----------
+    linkage : Mechanism
+        The linkage.
+    outputs : sequence of str
+        As many as there are inputs.
+    inputs : sequence of Input
+        Those of the linkage, with the periods of the outputs.
+    turns : sequence of float
+        For each output after how much it is the same [rad], or inf.
+
+    """
+    return StepSearch(linkage, outputs, turns) if len(outputs) > 1 else BranchSearch(
+        linkage, outputs[0], inputs[0])
+
+
+class BranchSearch:
+    """One output as a function of the only input, in monotone branches."""
+
+    def __init__(self, linkage: Mechanism, output: str, input_: Input):
+        self._input, self._linkage = input_, linkage
+        self._branches = Analysis(linkage).branches(output)
+        self._pose = linkage.posed((), (output,), (output,))
+
+    def answers(self, values: np.ndarray) -> np.ndarray:
+        """Return all inputs (answers, 1, n) for values (1, n), NaN where there are fewer."""
+        inputs = self._branches.answers(values[0])[:, None] * self._input.size
+        return np.asarray(self._input.wrapped(
+            np.where(np.abs(inputs) < LEAST * self._input.size, 0.0, inputs)))
+
+    def follow(self, values: Sequence[float], near: Sequence[float]) -> _Found:
+        """Return what `Inverse.follow` does."""
+        turns = self._input.turns_of(near[0])
+        found, rate = self._branches.follow(
+            self._pose.at, self._input.size, values[0], near[0] - turns)
+        if self._branches.is_one and self._input.is_whole(self._linkage.reach()):
+            # The output turns all round with the crank: beyond pi they go on together.
+            turns = float(self._input.beside(found, near[0])) - found
+        return (found + turns,), (rate,)
+
+
+class StepSearch:
+    """Outputs as functions of several inputs, all of them counted in their sizes inside."""
 
     def __init__(self, linkage: Mechanism, outputs: Names, turns: Sequence[float]):
         self.outputs, self.inputs = outputs, [input_.counted() for input_ in linkage.inputs]
         self.sizes = np.array([input_.size for input_ in linkage.inputs])
-        # After how much an output is the same; inputs that are outputs, by where they are in both.
+        # The period of each output; outputs that are inputs, by their numbers in both.
         self._turns = np.array(turns)
         self._given = {outputs.index(input_.name): by for by, input_ in enumerate(self.inputs)
                        if input_.name in outputs}
         self.scale = np.where(list(map(linkage.is_angle, outputs)), 1.0, linkage.longest)
         self._pose, self._margins = linkage.posed((), outputs, outputs), linkage.margins
         self.blocks = blocks(linkage, outputs)
-        self._check_told()
+        self._check_independent()
 
     def answers(self, values: np.ndarray) -> np.ndarray:
+        """Return all inputs (answers, inputs, n) for values (outputs, n), NaN where fewer."""
+        found = [self._answers(column) for column in values.T]
+        inputs = np.full((max(map(len, found), default=0) or 1, *values.shape), np.nan)
+        for column, each in enumerate(found):
+            inputs[:len(each), :, column] = each
+        return inputs
+
+    def _answers(self, values: np.ndarray) -> np.ndarray:
         """Return all inputs that give outputs their values, in rows."""
         start = [0.5 * (input_.low + input_.high) for input_ in self.inputs]
         for place, by in self._given.items():
@@ -97,15 +157,16 @@ class Search:
             if not self._given.keys() >= {*rows}:
                 found = np.concatenate([found[:0], *(
                     self.solutions(q, values, rows, columns) for q in found)])
-        return (found[self._held(found * self.sizes)]) * self.sizes
+        inputs = found * self.sizes
+        return np.asarray(inputs[self._are_assembled(inputs)])
 
-    def _held(self, inputs: np.ndarray) -> np.ndarray:
+    def _are_assembled(self, inputs: np.ndarray) -> np.ndarray:
         """Return for rows of inputs whether all of the linkage can be assembled there."""
         with np.errstate(invalid='ignore'):
             return np.asarray((self._margins(*inputs.T) >= 0.0).all(axis=0))
 
     def over(self, q: np.ndarray, target: np.ndarray) -> _Pair:
-        """Return what outputs miss of their target, and the Jacobian, for each row of q."""
+        """Return the errors of the outputs from their target, and the Jacobian, per row of q."""
         return self._missed(self._pose.searched(*(q * self.sizes).T), target)
 
     def _at(self, q: np.ndarray, target: np.ndarray) -> _Pair:
@@ -124,9 +185,9 @@ class Search:
 
     def solutions(self, q: np.ndarray, target: np.ndarray, rows: List[int],
                   columns: List[int]) -> np.ndarray:
-        """Return where some outputs are what they should be; other inputs are those of q."""
+        """Return the poses at which some outputs have their values; other inputs are fixed."""
         def missed(q: np.ndarray) -> Tuple[np.ndarray, ...]:
-            """Return what outputs miss, how much (inf where unknown), the Jacobian, rounding."""
+            """Return errors, their norm (inf where there is none), the Jacobian, and rounding."""
             gap, jacobian = self.over(q, target)
             gap, jacobian = gap[:, rows], jacobian[:, rows][:, :, columns]
             known = np.isfinite(gap).all(axis=1) & np.isfinite(jacobian).all(axis=(1, 2))
@@ -142,7 +203,7 @@ class Search:
             return q
 
         def beyond(q: np.ndarray) -> np.ndarray:
-            """Return poses on both sides of solutions, where others may lie behind a fold."""
+            """Return poses on both sides of solutions: a twin may lie behind a fold."""
             weakest = np.linalg.svd(missed(q)[2])[2][:, -1]
             away = LONGEST_STEP * np.outer([1.0, -1.0], 0.5 ** np.arange(HALVINGS)).ravel()
             return known(moved(np.repeat(q, len(away), axis=0),
@@ -161,7 +222,7 @@ class Search:
         return found
 
     def _starts(self, q: np.ndarray, columns: List[int], known: Callable) -> np.ndarray:
-        """Return poses over all that some inputs can be, more of them where few can be had."""
+        """Return a grid of assembled poses over some inputs, finer where few are assembled."""
         starts, many = np.empty((0, len(q))), STARTS
         while len(starts) < ASSEMBLED and many <= MOST_STARTS:
             n = math.ceil(many ** (1.0 / len(columns)) if len(columns) > 1 else many / 4)
@@ -172,8 +233,8 @@ class Search:
             starts, many = known(starts), 4 * many
         return starts
 
-    def _check_told(self) -> None:
-        """Raise ValueError if the outputs do not tell the inputs in most poses."""
+    def _check_independent(self) -> None:
+        """Raise ValueError if the outputs do not determine the inputs in most poses."""
         n = len(self.inputs)
         q = self._starts(np.zeros(n), list(range(n)), lambda q: q[np.isfinite(
             self.over(q, np.zeros(n))[1]).all(axis=(1, 2))])
@@ -182,22 +243,22 @@ class Search:
             raise dependent(self.outputs, range(n))
 
     def _distinct(self, q: np.ndarray, missed: Callable) -> np.ndarray:
-        """Return each solution once, those that are farthest from singular first."""
+        """Return each solution once, the farthest from singular first."""
         values = np.linalg.svd(missed(q)[2], compute_uv=False)
-        kept: List[Tuple[np.ndarray, float]] = []
+        distinct: List[Tuple[np.ndarray, float]] = []
         for i in np.argsort(-values[:, -1]):
             if all(max(input_.apart(x, y) for input_, x, y in zip(self.inputs, q[i], other)) > near
-                   for other, near in kept):
-                kept.append((q[i], CLOSE * (1.0 + values[i, 0]) / max(values[i, -1], CLOSE)))
-        return np.array([each for each, _ in kept]).reshape(-1, q.shape[1])
+                   for other, near in distinct):
+                distinct.append((q[i], CLOSE * (1.0 + values[i, 0]) / max(values[i, -1], CLOSE)))
+        return np.array([each for each, _ in distinct]).reshape(-1, q.shape[1])
 
-    def followed(self, near: np.ndarray, target: np.ndarray) -> _Pair:
-        """Return what `Inverse.follow` does, the rates as d outputs / d inputs."""
-        inputs, jacobian = self._followed(near / self.sizes, target)
-        inputs = inputs * self.sizes
-        if not self._held(inputs[None])[0]:
-            inputs, jacobian = inputs * np.nan, jacobian * np.nan
-        return inputs, jacobian * self.scale[:, None] / self.sizes
+    def follow(self, values: Sequence[float], near: Sequence[float]) -> _Found:
+        """Return what `Inverse.follow` does."""
+        inputs, jacobian = self._followed(near / self.sizes, np.array(values))
+        inputs, rates = inputs * self.sizes, (jacobian * self.scale[:, None] / self.sizes).T
+        if not self._are_assembled(inputs[None])[0]:
+            inputs, rates = inputs * np.nan, rates * np.nan
+        return tuple(inputs.tolist()), tuple(rates.ravel().tolist())
 
     def _followed(self, q: np.ndarray, target: np.ndarray) -> _Pair:
         start, jacobian = self._at(q, target)
@@ -215,7 +276,7 @@ class Search:
 
     def _corrected(self, start: np.ndarray, target: np.ndarray, aim: np.ndarray,
                    side: float) -> Optional[_Pair]:
-        """Return where outputs miss their target by an aim, near a start on one side of folds."""
+        """Return the pose near a start whose errors are `aim`, without passing a fold."""
         q, last = start, LONGEST_STEP
         for _ in range(REFINED):
             gap, jacobian = self._at(q, target)
@@ -235,12 +296,12 @@ class Search:
 
 
 def _rounding(q: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
-    """Return what rounding makes outputs miss: their own, and that of the inputs."""
+    """Return the errors that rounding of the outputs and of the inputs makes."""
     return ROUNDED * (1.0 + (np.abs(jacobian) @ np.maximum(1.0, np.abs(q))[..., None])[..., 0])
 
 
 def _descended(q: np.ndarray, missed: Callable, moved: Callable) -> np.ndarray:
-    """Return the solutions that Levenberg-Marquardt steps from some poses lead to."""
+    """Return the solutions that Levenberg-Marquardt steps reach from some poses."""
     (gap, size, jacobian, rounding), damping, found = missed(q), np.full(len(q), DAMPING), []
     for _ in range(STEPS):
         there = (np.abs(gap) <= rounding).all(axis=1)
@@ -264,7 +325,7 @@ def _descended(q: np.ndarray, missed: Callable, moved: Callable) -> np.ndarray:
 
 
 def _polished(q: np.ndarray, missed: Callable, moved: Callable) -> np.ndarray:
-    """Return solutions after some steps of Newton's method, where these are better."""
+    """Return solutions after those steps of Newton's method that reduce their errors."""
     for _ in range(POLISHING):
         gap, size, jacobian, _ = missed(q)
         trial = moved(q, -(np.linalg.pinv(jacobian) @ gap[..., None])[..., 0])
