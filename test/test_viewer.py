@@ -2068,6 +2068,9 @@ def test_a_reload_keeps_view_units_and_arrows_and_a_lost_connection_is_said(show
         # A bar of 1, scale 0.1, is 100 mm long in the picture.
         await browser.until(lambda: seen.number('drop', 'a'))
         assert await seen.number('drop', 'a') == 100.0
+        await page.value('document.getElementById("picture").focus()')
+        for _ in range(3):
+            await page.press('+')
         await page.open(running.viewer.url)
         await browser.until(lambda: page.value(
             'document.querySelectorAll("section").length === 1 && '
@@ -2075,6 +2078,9 @@ def test_a_reload_keeps_view_units_and_arrows_and_a_lost_connection_is_said(show
         assert await page.value('document.getElementById("workshop").checked')
         assert await page.value('document.getElementById("arrows").value') == 'velocity'
         assert await page.value('document.getElementById("notice").hidden')
+        # It is zoomed: there is a way back to the whole picture.
+        await seen.page.click('document.getElementById("whole")')
+        await browser.until(lambda: page.value('document.getElementById("whole").hidden'))
         running.graph.end(running.viewer)
         await browser.until(lambda: page.value(
             '/^Connection lost/.test(document.getElementById("notice").textContent)'))

@@ -18,7 +18,7 @@ const [views, status, names, workshop, arrows, whole, notice] = [
   'views', 'status', 'names', 'workshop', 'arrows', 'whole', 'notice'].map(at);
 const naming = names.closest('label');
 /** What a reload keeps. */
-const kept = { shown: '', names: true, workshop: false, arrows: '', ...JSON.parse(sessionStorage.getItem('kept') ?? '{}') };
+const kept = { shown: '', from: {}, names: true, workshop: false, arrows: '', ...JSON.parse(sessionStorage.getItem('kept') ?? '{}') };
 let { shown } = kept;
 let scheduled = false;
 let frames = 0;
@@ -35,10 +35,12 @@ const hand = new Hand(picture, {
   choose: (mechanism, dimension) => panel.goTo(mechanism.key, dimension),
 });
 picture.pull = () => hand.pull;
-picture.view = new View(picture.canvas, () => hand.grabbed !== null, () => {
+picture.view = new View(picture.canvas, () => hand.grabbed !== null, kept.from, () => {
   whole.hidden = picture.view.whole;
+  keep({ from: picture.view.from });
   draw();
 });
+whole.hidden = picture.view.whole;
 whole.onclick = () => picture.view.reset();
 
 /** Light up the bars of a dimension, and its slider. */
