@@ -2056,7 +2056,8 @@ def test_a_plot_follows_what_is_tuned_and_all_can_be_downloaded(show, looked_at,
 
 @pytest.mark.long
 @needs_browser
-def test_a_reload_keeps_view_units_and_arrows_and_a_lost_connection_is_said(show, looked_at):
+def test_a_reload_and_another_viewer_keep_what_is_seen_and_a_lost_connection_is_said(
+        show, looked_at):
     running = show({**LEVER, 'drop.scale': 0.1})
 
     async def doing(seen):
@@ -2078,12 +2079,17 @@ def test_a_reload_keeps_view_units_and_arrows_and_a_lost_connection_is_said(show
         assert await page.value('document.getElementById("workshop").checked')
         assert await page.value('document.getElementById("arrows").value') == 'velocity'
         assert await page.value('document.getElementById("notice").hidden')
-        # It is zoomed: there is a way back to the whole picture.
-        await seen.page.click('document.getElementById("whole")')
-        await browser.until(lambda: page.value('document.getElementById("whole").hidden'))
+        url = running.viewer.url
         running.graph.end(running.viewer)
         await browser.until(lambda: page.value(
             '/^Connection lost/.test(document.getElementById("notice").textContent)'))
+        running.viewer = running.graph.start(Viewer, {'port': int(re.search(r'(\d+)/$', url)[1])})
+        await browser.until(lambda: page.value('document.getElementById("notice").hidden'))
+        await browser.until(lambda: page.value(
+            f'document.querySelectorAll("section").length === 1 && !!{seen.section("drop")}'))
+        # It is zoomed still: there is a way back to the whole picture.
+        await seen.page.click('document.getElementById("whole")')
+        await browser.until(lambda: page.value('document.getElementById("whole").hidden'))
         page.complaints.clear()
 
     looked_at(running, doing)

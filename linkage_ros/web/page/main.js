@@ -80,8 +80,8 @@ const connection = new Connection({
     }
     at('empty').hidden = mechanisms.size > 0;
     say('');
-    // What was shown before a reload may be found later.
-    show(mechanisms.has(kept.shown) ? kept.shown : '');
+    // What was shown before a reload, or before the viewer ended, may be found later.
+    show(mechanisms.has(kept.shown) || !mechanisms.size ? kept.shown : '');
   },
 
   look({ number, mechanism, ...look }) {
