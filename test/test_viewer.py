@@ -1767,6 +1767,88 @@ def test_the_picture_is_zoomed_shifted_and_turned_by_keys_and_mouse(show, looked
     looked_at(running, doing)
 
 
+async def settled(seen):
+    """Return whether the picture is drawn and stands still."""
+    before = await seen.canvas()
+    return len(coloured(before, *GREEN)) > 100 and (await seen.canvas() == before).all()
+
+
+async def upright_lever(seen):
+    """Return where the tip and the pivot of a lever that stands upright are on the page."""
+    await browser.until(lambda: settled(seen))
+    await seen.page.click('document.getElementById("names")')
+    # The numbers of the grid are left out: they are grey too.
+    rows, columns = coloured((await seen.canvas())[:-40, 80:], *GREY).T + [[0], [80]]
+    top = await seen.page.value('document.getElementById("picture").getBoundingClientRect().y')
+    return ((float(columns[rows < rows.min() + 10].mean()), top + int(rows.min()) + 8),
+            (float(columns[rows > rows.max() - 10].mean()), top + int(rows.max()) - 8))
+
+
+@pytest.mark.long
+@needs_browser
+def test_a_second_finger_neither_moves_the_joint_of_the_first_nor_takes_one(show, looked_at):
+    running = show({**LEVER, 'lever.crank.speed': 0.0})
+
+    def crank():
+        return running.values('lever.crank.start')[0]
+
+    async def doing(seen):
+        page = seen.page
+        await seen.view('lever')
+        await seen.output('lever', 'lever')
+        x, y = (await upright_lever(seen))[0]
+        aside = x - 200.0, y + 100.0
+        await page.touch((x, y))
+        await page.touch((x - 30.0, y))
+        await browser.until(lambda: crank() > 0.1)
+        await page.touch((x - 30.0, y), aside)
+        before = crank()
+        for step in (20.0, 40.0, 60.0):
+            await page.touch((x - 30.0, y), (aside[0] - step, aside[1] + step))
+        # It follows the first finger still, from where it was.
+        await page.touch((x - 31.0, y), (aside[0] - 60.0, aside[1] + 60.0))
+        await browser.until(lambda: crank() != before)
+        assert crank() == pytest.approx(before, abs=0.05)
+        await page.touch((x - 31.0, y))
+        await page.touch()
+        before = crank()
+        # Two fingers zoom, though the second is put on a joint.
+        await page.touch(aside)
+        await page.touch(aside, (x - 31.0, y))
+        await page.touch(aside, (x + 60.0, y - 30.0))
+        await page.touch()
+        await browser.until(lambda: page.value('!document.getElementById("whole").hidden'))
+        assert crank() == before
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
+def test_a_click_on_a_bar_goes_to_its_slider_and_a_drag_from_it_does_not(show, looked_at):
+    running = show({**LEVER, 'lever.crank.speed': 0.0})
+
+    async def doing(seen):
+        page = seen.page
+        await seen.view('lever')
+        await seen.output('lever', 'lever')
+        tip, pivot = await upright_lever(seen)
+        bar = tip[0], 0.8 * pivot[1] + 0.2 * tip[1]
+        focus = 'document.activeElement.type'
+        await page.drag(bar, (bar[0] + 80.0, bar[1]))
+        await browser.until(lambda: page.value('!document.getElementById("whole").hidden'))
+        assert await page.value(focus) != 'range'
+        await page.click('document.getElementById("whole")')
+
+        async def gone():
+            await page.drag(bar, bar)
+            return await page.value(focus) == 'range'
+
+        await browser.until(gone)
+
+    looked_at(running, doing)
+
+
 @pytest.mark.long
 @needs_browser
 def test_a_joint_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
@@ -1775,19 +1857,8 @@ def test_a_joint_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
     async def doing(seen):
         await seen.view('lever')
 
-        async def settled():
-            before = await seen.canvas()
-            return len(coloured(before, *GREEN)) > 100 and (
-                await seen.canvas() == before).all()
-
         await seen.output('lever', 'lever')
-        await browser.until(settled)
-        await seen.page.click('document.getElementById("names")')
-        # The numbers of the grid are left out: they are grey too.
-        rows, columns = coloured((await seen.canvas())[:-40, 80:], *GREY).T + [[0], [80]]
-        top = await seen.page.value('document.getElementById("picture").getBoundingClientRect().y')
-        tip = float(columns[rows < rows.min() + 10].mean()), top + int(rows.min()) + 8
-        pivot = float(columns[rows > rows.max() - 10].mean()), top + int(rows.max()) - 8
+        tip, pivot = await upright_lever(seen)
         length = pivot[1] - tip[1]
 
         def at(phi):
@@ -1799,7 +1870,7 @@ def test_a_joint_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
         async def dragged(predicate, *places):
             """Drag as a person would: again if the page, laid out anew, missed the press."""
             for _ in range(3):
-                await browser.until(settled)
+                await browser.until(lambda: settled(seen))
                 await seen.page.drag(*places)
                 with contextlib.suppress(asyncio.TimeoutError):
                     return await asyncio.wait_for(browser.until(predicate), 10.0)
