@@ -77,8 +77,8 @@ def timed(method, theta):
 def table(rows):
     """Return rows as Markdown."""
     about, cores = machine([ours.Accelerated()]), len(os.sched_getaffinity(0))
-    lines = ['| linkage | poses | C, ns a pose | C, vector sine | machine code | to C '
-             f'| to C, vector sine | faster on {cores} cores |', '|---|' + '--:|' * 7]
+    lines = ['| linkage | poses | C [ns per pose] | C, vector sine | machine code | / C '
+             f'| / C, vector sine | speed-up on {cores} cores |', '|---|' + '--:|' * 7]
     lines += [f'| {title} | {size} | {scalar:.1f} | {vector:.1f} | {fast:.1f} '
               f'| {fast / scalar:.2f} | {fast / vector:.2f} | {gain:.2f} x |'
               for title, size, scalar, vector, fast, gain in rows]

@@ -49,23 +49,23 @@ def document(result):
 
 
 LEGEND = """\
-Times are medians [us a pose, all points], with the 95th percentile of single poses. Errors are
+Times are medians [us per pose, all points], with the 95th percentile of single poses. Errors are
 those of the worst point of a pose, in uL = 2^-53 x the longest bar, over the poses that did not
-fail: the median and the largest within a turn, awkward angles included, then the largest over
-all angles, some of them 1e9 turns out. *x sens* is the largest error within a turn in units of
-what half an ulp of every input does, after one ulp of the result. Failures are counted over all
-angles: no number (NaN), an exception, astray (off by more than 5 % of the longest bar: another
-assembly, or no convergence), and made up (a pose where there is none). *>* marks methods
-that follow: each pose is found from the one before, two degrees away at most."""
+fail: the median and the largest within a turn, awkward angles included, then the largest over all
+angles, some of them 1e9 turns out. *x sens* is the largest error within a turn, less one ulp of
+the result, in units of the change that half an ulp of every input makes. Failures are counted
+over all angles: NaN, an exception, astray (off by more than 5 % of the longest bar: another
+assembly, or no convergence), and made up (a pose where none exists). *>* marks methods that start
+from the preceding pose, at most two degrees away."""
 
 
 CHOICE = """\
-Each picture has linkage_ros in its forms (one pose alone by `function()`), the quickest C, and of
-each kind of peer one method: the quickest at 1000 poses of those that are right at all but one in
-a hundred angles, to all but the last three digits; where none is, the one that comes closest. The
-kinds are formulas, tables, root finders, programs for linkages and sketches, robot libraries and
-simulators. A curve in the lower panel is one method over its knob: nodes, iterations, tolerance.
-What is wrong at some angles says so behind its name."""
+Each picture shows linkage_ros in its forms (single poses by `function()`), the fastest C, and one
+method for each kind of peer: formulas, compilers, tables, root finders, programs for linkages and
+sketches, robot libraries and simulators. The method is the fastest at 1000 poses among those that
+are correct, except for the last three digits, at 99 of 100 angles; if there is none, the one with
+the fewest failures. A curve in the lower panel is one method over its setting: nodes, iterations,
+tolerance. A share of wrong poses is given after the method's name."""
 
 
 def table(result, kind):
@@ -209,18 +209,18 @@ def omissions(result):
 
 def targets(result):
     """Return the ratios that are aimed at, from the medians of this run."""
-    lines = ['| aim | wanted | measured |', '|---|---|---|']
+    lines = ['| ratio of CPU times | target | measured |', '|---|---|---|']
     jansen = methods(result, 'jansen')
     step = jansen.get(('pylinkage', 'step()'))
     for ours in (FLOATS, OURS):
         if ours in jansen and step:
-            lines.append(_aim(f"Jansen leg, one pose, all points, {ours[1]}, to pylinkage's step",
+            lines.append(_aim(f"Jansen leg, one pose, all points: {ours[1]} / pylinkage's step",
                               jansen[ours][1], step[1], 0.2))
     for point in 'GC':
         part = jansen.get((OURS[0], f'{point} alone'))
         for batch, ours in ((1, FLOATS), (BATCHES[-1], OURS)):
             if part:
-                lines.append(_aim(f'Jansen leg, {_poses(batch)}, {point} alone, to all points',
+                lines.append(_aim(f'Jansen leg, {_poses(batch)}: {point} alone / all points',
                                   part[batch], jansen[ours][batch], 1.0))
     for kind, title in TITLES.items():
         found = methods(result, kind)
@@ -228,7 +228,7 @@ def targets(result):
             for method, wanted in AIMS[limit[1]].items():
                 if method in found:
                     lines.append(_aim(
-                        f'{title}, {_poses(BATCHES[-1])}, {method[1]}, to C ({limit[1]})',
+                        f'{title}, {_poses(BATCHES[-1])}: {method[1]} / C ({limit[1]})',
                         found[method][BATCHES[-1]], found[limit][BATCHES[-1]], wanted))
     return '\n'.join([*lines, '', *_against_peers(result)])
 
@@ -257,7 +257,7 @@ RARE = 0.01
 
 def _against_peers(result):
     """Compare with the fastest peer, and with the fastest that is right at every angle."""
-    yield ('| us a pose | function() | numpy | machine code | fastest peer that is right '
+    yield ('| us per pose | function() | numpy | machine code | fastest peer that is right '
            '| fastest peer of all |')
     yield '|---|--:|--:|--:|---|---|'
     for kind, title in TITLES.items():
@@ -295,7 +295,7 @@ def _aim(what, row, other, wanted):
 
 def in_short(result):
     """Return what a pose takes of the largest and of the smallest linkage."""
-    lines = ['| CPU time a pose [us], on one core | ' + ' | '.join(map(_poses, BATCHES)) + ' |',
+    lines = ['| CPU time per pose [us], on one core | ' + ' | '.join(map(_poses, BATCHES)) + ' |',
              '|---' + '|--:' * len(BATCHES) + '|']
     for kind in ('jansen', 'slotted_lever'):
         found = methods(result, kind)
@@ -308,7 +308,7 @@ def in_short(result):
 
 def elsewhere(result):
     """Return who takes less time, as parts of ours, and is right."""
-    lines = ['| poses at once | less time than Python and numpy | less than machine code |',
+    lines = ['| poses at once | faster than Python and numpy | faster than machine code |',
              '|---|---|---|']
     for batch in BATCHES:
         lines.append(f'| {batch} | {_ahead(result, batch, OURS, FLOATS)} '
@@ -332,12 +332,12 @@ def _ahead(result, batch, *forms):
             if time < own:
                 name = method.partition(' through')[0].partition(',')[0]
                 told.setdefault(name, []).append(f'{title} {time / own:.2f}')
-    return '; '.join(f'{name}: {", ".join(where)}' for name, where in told.items()) or 'nobody'
+    return '; '.join(f'{name}: {", ".join(where)}' for name, where in told.items()) or 'none'
 
 
 def stability(found):
     """Return what benchmark.stability found, as Markdown."""
-    lines = ["| worst error / sensitivity, and of what | catalogue's dimensions "
+    lines = ["| largest error / sensitivity (and its output) | catalogue's dimensions "
              '| random dimensions | original formulas |', '|---|--:|--:|--:|']
     for kind, title in TITLES.items():
         lines.append(f'| {title} | ' + ' | '.join(
@@ -347,19 +347,22 @@ def stability(found):
                                  ('original', ('catalogue', 'random')))) + ' |')
     own = [row for row in found['accuracy'] if row['method'] == 'library']
     closed, reached = found['closure'], found['reach']
-    lines += ['', f'Of {_sum(own, "samples")} results of the library {_sum(own, "broken")} break '
-              f'the rule, {_sum(own, "nan")} are NaN where they should not be and '
-              f'{_sum(own, "missed_nan")} a number where NaN is due; of '
-              f'{_sum(closed, "samples")} angles {_sum(closed, "wrong")} are assembled, or not, '
-              f'wrongly. The reach of {_sum(reached, "designs")} random designs differs from '
-              f'brute force in {_sum(reached, "wrong")}.', '']
+    lines += ['', f'Of {_sum(own, "samples")} results of these four linkages '
+              f'{_sum(own, "broken")} break the rule, {_sum(own, "nan")} are NaN instead of a '
+              f'number, and {_sum(own, "missed_nan")} are a number instead of NaN. At '
+              f'{_sum(closed, "wrong")} of {_sum(closed, "samples")} angles the library and the '
+              f'reference disagree whether the linkage can be assembled. At '
+              f'{_sum(reached, "wrong")} of {_sum(reached, "designs")} random designs the reach '
+              f'differs from brute force.', '']
     several = found['linkages']
-    lines += [f'| {several["linkages"]} random linkages of every word: error / sensitivity of '
-              '| results | worst | 99.9 % are below |', '|---|--:|--:|--:|']
-    lines += [f'| {row["output"]} | {row["samples"]} | {row["max"]:.2g} | {row["p99.9"]:.2g} |'
-              for row in several['outputs']]
-    lines += ['', 'What was wrong, with them or with the check: ' + (', '.join(
-        f'{row["count"]} x {row["kind"]}' for row in several['problems']) or 'nothing') + '.']
+    lines += [f'| {several["linkages"]} random linkages: error / sensitivity of | results | rule '
+              '| largest | 99.9 % are below |', '|---|--:|--:|--:|--:|']
+    lines += [f'| {row["output"]} | {row["samples"]} | {8 if "rate" in row["output"] else 4} '
+              f'| {row["max"]:.2g} | {row["p99.9"]:.2g} |' for row in several['outputs']]
+    problems = ', '.join(f'{row["count"]} x {row["kind"].replace(" rule", " beyond the rule")}'
+                         for row in several['problems'])
+    lines += ['', 'Problems with these random linkages, in the library or in the check: '
+              f'{problems or "none"}.']
     return '\n'.join(lines)
 
 

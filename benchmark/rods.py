@@ -273,11 +273,12 @@ def methods(ours, motors):
     yield 'Newton on motor angles, to 1e-9', newton_on_motor_angles(1e-9, sides), False
     for nodes in (33, 129, 513):
         yield f'table of {nodes} x {nodes}, bilinear', table(ours, nodes, motors), False
-    yield 'polynomial of degree 8 (the judge), numpy', degree_eight, False
+    yield 'polynomial of degree 8 (the reference), numpy', degree_eight, False
     for count in (1, 2, 3):
-        yield f'pinocchio, {count} Newton steps from the pose before', pinocchio_loops(count), True
+        yield (f'pinocchio, {count} Newton steps from the preceding pose',
+               pinocchio_loops(count), True)
     for count in (10, 100):
-        yield f'MuJoCo, {count} time steps a pose', mujoco_steps(count), True
+        yield f'MuJoCo, {count} time steps per pose', mujoco_steps(count), True
 
 
 def made_anew(ours, low, high):
@@ -301,7 +302,7 @@ def set_up():
     made = made_anew(lambda linkage: None, LOW, HIGH)
     return {
         'a linkage, proof included': made,
-        'a refusal, with the largest limits that can be': made_anew(print, -wide, wide),
+        'a rejection, with the largest provable limits': made_anew(print, -wide, wide),
         'the first pose': made_anew(lambda linkage: linkage.function((), ask)(0.0, 0.0),
                                     LOW, HIGH) - made,
         'the first inverse': made_anew(lambda linkage: linkage.inputs_for(ask, (-0.1, 0.05)),
@@ -340,7 +341,7 @@ def run():
 
 def document_table(result):
     """Return the table of the page."""
-    lines = ['| method | CPU time a pose [us] | worst error [rad] | wrong or none |',
+    lines = ['| method | CPU time per pose [us] | worst error [rad] | wrong or none |',
              '|---|--:|--:|--:|']
     lines += [f'| {row["method"]} | {row["us"]:.3g} | {row["error"]:.1e} | '
               f'{row["wrong"]} of {row["poses"]} |' for row in result['rows']]

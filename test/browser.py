@@ -37,7 +37,7 @@ async def until(predicate, what=''):
                 value = await value
             if value:
                 return value
-            await asyncio.sleep(0.02)
+            await asyncio.sleep(0.005)
 
     try:
         return await asyncio.wait_for(held(), DEADLINE)

@@ -5,6 +5,7 @@
 
 import atexit
 from collections import defaultdict
+from functools import cache
 import gc
 import math
 import os
@@ -25,7 +26,8 @@ def pytest_collection_modifyitems(items):
     """Leave what is beyond the sample of a sweep to the slow tests, which are long."""
     sweeps = defaultdict(list)
     for item in items:
-        if item.get_closest_marker('sample') and not item.get_closest_marker('long'):
+        if item.get_closest_marker('sample') and not (
+                item.get_closest_marker('long') or item.get_closest_marker('slow')):
             sweeps[item.nodeid.partition('[')[0]].append(item)
     for cases in sweeps.values():
         count, = cases[0].get_closest_marker('sample').args
@@ -35,13 +37,31 @@ def pytest_collection_modifyitems(items):
                 case.add_marker(pytest.mark.slow)
     for item in items:
         if item.get_closest_marker('slow'):
+            if item.get_closest_marker('exhaustive'):
+                raise pytest.UsageError(f'{item.nodeid} is slow and exhaustive')
             item.add_marker(pytest.mark.long)
 
 
 def pytest_collection_finish():
-    """Leave what has been imported and collected to itself: collecting garbage takes less."""
+    """Leave what has been imported and collected to itself, and collect garbage less often."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(20_000, 20, 20)
+
+
+@pytest.fixture(scope='module')
+def machines(request):
+    """Return the mechanisms of the module's SCENE."""
+    from linkage_ros import scene
+
+    return scene.read(request.module.SCENE).machines
+
+
+@pytest.fixture(scope='module')
+def library(request, machines, tmp_path_factory):
+    """Return a function that returns one of them in C, as the module compiles it, once."""
+    return cache(lambda name: request.module.compiled(
+        tmp_path_factory.mktemp('c'), [machines[name]]))
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 
 """Real nodes on real topics: in this process, or as the processes that users start."""
 
+import gc
 import itertools
 import math
 import os
@@ -11,6 +12,7 @@ import sys
 import time
 
 from domains import Domain
+from rcl_interfaces.msg import Log
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -43,7 +45,6 @@ class Graph:
         rclpy.init(context=self.context, domain_id=self._domain or self._own.id)
         self.executor = SingleThreadedExecutor(context=self.context)
         self._nodes = []
-        self._stamps = itertools.count(1)
         self.node = self._add(rclpy.create_node('tester', context=self.context))
         return self
 
@@ -84,11 +85,25 @@ class Graph:
         while not (held := predicate()):
             assert time.monotonic() < deadline, 'did not happen in time'
             try:
-                self.executor.spin_once(timeout_sec=0.02)
+                self.executor.spin_once(timeout_sec=0.005)
             except InvalidHandle:
                 # Another thread ended a node while this one waited for it.
                 continue
         return held
+
+    def log(self):
+        """Return the list that gathers what nodes log that are started after this."""
+        # What is left of another node would take their loggers away from them, if of their names.
+        gc.collect()
+        gc.freeze()
+        return self.listen(Log, '/rosout', 1000)
+
+    def all_logged(self, node, log):
+        """Return the list that gathers /rosout when it has all that a node has logged."""
+        end = f'so far {len(log)}'
+        node.get_logger().info(end)
+        self.until(lambda: any(message.msg == end for message in log))
+        return log
 
     def set(self, node, meanwhile=lambda: None, **values):
         """
@@ -137,25 +152,40 @@ class Graph:
         return tick
 
     def crank(self, names, topic='crank_states'):
-        """Return a function that publishes crank angles until an answer is there."""
-        publisher = self.node.create_publisher(JointState, topic, 10)
+        """Return a hand on cranks."""
+        return Crank(self, names, topic)
 
-        def turn(angles, answers, velocities=(), seconds=DEADLINE):
-            message = JointState(name=names, position=angles, velocity=velocities)
-            message.header.stamp.sec = stamp = next(self._stamps)
 
-            published = -math.inf
+class Crank:
+    """A publisher of crank angles, each message with a stamp of its own."""
 
-            def answered():
-                nonlocal published
-                if time.monotonic() > published + RETRY:
-                    publisher.publish(message)
-                    published = time.monotonic()
-                return [m for m in answers if _stamp(m) == stamp]
+    _stamps = itertools.count(1)
 
-            return self.until(answered, seconds)[0]
+    def __init__(self, graph, names, topic):
+        self._graph, self._names = graph, names
+        self._publisher = graph.node.create_publisher(JointState, topic, 10)
 
-        return turn
+    def __call__(self, angles, answers, velocities=()):
+        """Publish angles until they are answered; return the answer."""
+        message, published = self._message(angles, velocities), -math.inf
+
+        def answered():
+            nonlocal published
+            if time.monotonic() > published + RETRY:
+                self._publisher.publish(message)
+                published = time.monotonic()
+            return [m for m in answers if _stamp(m) == message.header.stamp.sec]
+
+        return self._graph.until(answered)[0]
+
+    def send(self, angles, velocities=()):
+        """Publish angles once: whatever is answered later was not passed over before."""
+        self._publisher.publish(self._message(angles, velocities))
+
+    def _message(self, angles, velocities):
+        message = JointState(name=self._names, position=angles, velocity=velocities)
+        message.header.stamp.sec = next(self._stamps)
+        return message
 
 
 def _stamp(message):

@@ -6,17 +6,14 @@
 import ctypes
 from pathlib import Path
 import re
-import shutil
-import subprocess
 
+from c_libraries import COMPILER, loaded
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import command, header
 import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[1]
-COMPILER = shutil.which('cc') or shutil.which('gcc')
-STRICT = ('-std=c99', '-Wall', '-Wextra', '-pedantic', '-Werror', '-O2')
 
 pytestmark = pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
 
@@ -40,7 +37,7 @@ void {name}_over(long count, const {number} *given, {number} *out)
     long i;
     for (i = 0; i < count; i++) {{
         {name}_pose *p = ({name}_pose *)(out + i * {size});
-        out[i * {size} + {size} - 1] = {name}_solve({given}, p);
+        out[i * {size} + {size} - 1] = ({number}){name}_solve({given}, p);
         {name}_rates({given}, {places});
     }}
 }}
@@ -67,11 +64,7 @@ def compiled(folder, machines, single=False):
         text += [INVERTER.format(name=machine.name, input=linkage.inputs[0].name, number=number,
                                  field=re.search(rf'_for_(\w+)\({number} value', part)[1])
                  for part in text[-2].split('static inline ') if '_for_' in part]
-    source, library = folder / f'{number}.c', folder / f'{number}.so'
-    source.write_text('\n'.join(text))
-    subprocess.run([COMPILER, *STRICT, '-shared', '-fPIC', str(source), '-o', str(library), '-lm'],
-                   check=True)
-    return ctypes.CDLL(str(library))
+    return loaded(folder, '\n'.join(text))
 
 
 def solved(library, machine, inputs, kind=np.float64):
@@ -108,24 +101,12 @@ def values(machine, count):
     return np.column_stack(rows)
 
 
-@pytest.fixture(scope='module')
-def machines():
-    """Return the mechanisms of the scene."""
-    return scene.read(SCENE).machines
-
-
-@pytest.fixture(scope='module')
-def library(machines, tmp_path_factory):
-    """Return them in C."""
-    return compiled(tmp_path_factory.mktemp('c'), machines.values())
-
-
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
 def test_poses_and_rates_are_those_of_python(library, machines, name, count=300):
     machine = machines[name]
     inputs = values(machine, count)
-    *found, whole = solved(library, machine, inputs).T
+    *found, whole = solved(library(name), machine, inputs).T
     poses = expected(machine, inputs).T
     fields = 2 * len(machine.linkage.points) + len(machine.linkage.joints)
     assert np.array_equal(whole.astype(bool), np.isfinite(poses[:fields]).all(axis=0))
@@ -146,7 +127,7 @@ def test_the_reach_is_that_of_python(machines, name):
     assert scene.in_words(machine.first.reach) in text or len(machine.inputs) > 1
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name, output', [
     (name, output) for name, outputs in OUTPUTS.items() for output in outputs])
 def test_the_inverse_finds_the_nearest_input(library, machines, name, output):
@@ -156,7 +137,7 @@ def test_the_inverse_finds_the_nearest_input(library, machines, name, output):
     plain = re.sub(r'\W+', '_', output).strip('_')
     field = plain if '.' in output or '(' in output else (
         'angle_' if linkage.is_angle(output) else 'slide_') + plain
-    invert = library[f'{name}_{drive.input.name}_for_{field}_']
+    invert = library(name)[f'{name}_{drive.input.name}_for_{field}_']
     low, high = drive.reach[0]
     for theta in rng.uniform(low, high, 60):
         value = float(linkage.joint_angles(theta / unit, [output])[output]) * size
@@ -180,15 +161,12 @@ def test_the_inverse_finds_the_nearest_input(library, machines, name, output):
 def test_several_inputs_are_found_for_as_many_outputs(machines, tmp_path):
     machine, rng = machines['five_bar'], np.random.default_rng(5)
     text = header.written(machine, ('P.x', 'P.y'))
-    (tmp_path / 'leg.c').write_text(text + """
+    library = loaded(tmp_path, text + """
 int found(const double *value, const double *near, double *inputs)
 {
     return five_bar_inputs_for_P_x_P_y(value, near, inputs);
 }
 """)
-    subprocess.run([COMPILER, *STRICT, '-shared', '-fPIC', tmp_path / 'leg.c', '-o',
-                    tmp_path / 'leg.so', '-lm'], check=True)
-    library = ctypes.CDLL(str(tmp_path / 'leg.so'))
     inverse = machine.linkage.inverse(['P.x', 'P.y'])
     for _ in range(100):
         near, place = rng.uniform(-2.0, 2.0, 2), rng.uniform(-0.1, 0.2, 2)

@@ -130,7 +130,7 @@ def test_two_outputs_of_one_input_and_a_name_of_nobody_are_said(stream, capfd):
     assert stream.want(['flap', 'lever_A.x', 'boom'], [flap(0.2), 100.0, 1.0]).keys() == {'servo'}
     said = capfd.readouterr().err
     assert 'flap and lever_A.x are moved by one input: name one of them' in said
-    assert 'nothing is called boom' in said
+    assert 'no output is called boom' in said
 
 
 def test_hostile_bytes_end_nothing(stream, graph):
@@ -159,6 +159,17 @@ def test_a_command_says_what_its_actuator_has_to_hold(graph):
     assert command.effort.tolist() == pytest.approx([-3.0 * slope(flap, 0.7)], rel=1e-7)
     stream.want(['flap', 'bar_QB'], [flap(0.7), 1.2])
     assert stream.commands[-1].effort[1] == 0.0
+
+
+@pytest.mark.parametrize('stroke, effort', [(1.0, [1.0 / math.sqrt(0.75)]), (2.0, []), (0.0, [])])
+def test_an_effort_without_bound_is_no_effort(graph, stroke, effort):
+    # Two equal bars and the cylinder between their ends: its force is endless where they lie in
+    # one line, and unknown where it has no length.
+    stream = Stream(graph, {
+        'mechanisms': ['boom'], 'boom.type': 'custom', 'boom.loads': ['OB=-1.0'],
+        'boom.joints': ['O ground 0 0', 'P ground 1 0', 'B cylinder P O 1 left']})
+    stream.want(['boom_cylinder'], [stroke])
+    assert [abs(x) for x in stream.commands[-1].effort] == pytest.approx(effort, rel=1e-12)
 
 
 def test_commands_move_the_picture(stream, graph):
@@ -242,8 +253,8 @@ def test_of_several_inputs_what_cannot_be_had_is_held_and_said(graph, capfd):
     assert found.keys() == good.keys()
     assert min(abs(found['leg_crank'][0] - left) for left, _ in changed) < 1e-12
     said = capfd.readouterr().err
-    for reason in ('leg_P.x and leg_P.y cannot be 9, 9: P.x, P.y at 9, 9 is nowhere in the reach',
-                   'digger has 3 inputs: name as many outputs of it, not digger_H.x and'):
+    for reason in ('leg_P.x and leg_P.y cannot be 9, 9: P.x, P.y at 9, 9 is outside the reach',
+                   'digger has 3 inputs: name 3 of its outputs, not digger_H.x and'):
         assert reason in said
 
 
@@ -312,7 +323,7 @@ def test_a_trajectory_of_a_foot_and_a_bucket(graph, several_plan):
     (['flap'], [([0.0], []), ([4.0], [])], 'point 1: flap cannot be 4: the lever reaches'),
     (['flap'], [([0.0, 1.0], [])], 'point 0 must have 1 positions'),
     (['flap'], [([0.0], [1.0, 2.0])], 'as many velocities or none, not 1 and 2'),
-    (['flap', 'wing'], [([0.0, 0.0], [])], 'nothing is called wing'),
+    (['flap', 'wing'], [([0.0, 0.0], [])], 'no output is called wing'),
     (['flap', 'flap'], [([0.0, 0.0], [])], 'flap and flap are moved by one input'),
     (['bar_A.x'], [([1e3], [])], 'point 0: bar_A.x cannot be 1000'),
     (['flap'], [([math.nan], [])], 'point 0: flap cannot be nan: a value must be finite')])

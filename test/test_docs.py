@@ -140,7 +140,7 @@ def test_every_word_has_its_drawing_with_the_very_lines_that_it_shows():
     shown = {name: lines.splitlines() for name, lines in rows}
     assert len(rows) == len(shown) and set(shown) == set(machines)
     for name, lines in shown.items():
-        written = machines[name].given[f'{name}.joints']
+        written = machines[name].values[f'{name}.joints']
         assert lines == [line for line in written if line in lines]
         assert lines[-1] == written[-1]
         assert any(word in lines[-1].split() for word in joint_lines.FORMS)

@@ -212,6 +212,7 @@ def test_a_flap_is_put_where_a_planner_wants_it(reader, follow):
     assert controlled.count_subscribers('/planner/joint_trajectory') == 1
 
 
+@pytest.mark.slow
 def test_an_ankle_on_two_rods(graph, follow):
     states = graph.listen(JointState, 'joint_states', 100)
     assert 'ankle_joints_to_actuators' in follow('how-to/ankle')

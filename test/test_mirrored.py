@@ -67,7 +67,7 @@ def test_an_image_may_be_mirrored_again():
 
 @pytest.mark.parametrize('line, text', [
     ('m mirrored O A', 'joint A must be on the ground'), ('m mirrored O O', 'must differ'),
-    ('9 mirrored O H', 'is no name for a joint'), ('m mirrored O X', 'X is not placed before'),
+    ('9 mirrored O H', 'cannot name a joint'), ('m mirrored O X', 'X is not placed before'),
     ('m mirrored O', 'expected "NAME mirrored FIRST SECOND"'),
     ('m n mirrored O H', 'expected "NAME mirrored FIRST SECOND"')])
 def test_a_mirror_line_that_cannot_be_is_refused(line, text):

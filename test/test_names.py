@@ -95,7 +95,7 @@ def same(found, expected):
             assert np.array_equal(one[name], values, equal_nan=True), name
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize('kind', CLASSES)
 def test_text_of_any_class_is_a_name_and_later_callers_are_not_harmed(kind):
     known, last = fresh()

@@ -20,12 +20,12 @@ from linkage_ros import scene  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
-from rcl_interfaces.msg import Log, ParameterEvent  # noqa: E402
+from rcl_interfaces.msg import ParameterEvent  # noqa: E402
 from rclpy.logging import LoggingSeverity  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.publisher import Publisher  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
-from ros_harness import Graph, Process, RETRY  # noqa: E402
+from ros_harness import Graph, Process  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from sweeps import EXHAUSTIVE
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
@@ -34,8 +34,6 @@ from visualization_msgs.msg import MarkerArray  # noqa: E402
 CONFIG = Path(__file__).parents[1] / 'config'
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 LEVER = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}
-# What a process may still compute after a signal [s], however busy the machine is.
-ENDS_WITHIN = 1.0
 
 
 @pytest.fixture
@@ -55,22 +53,24 @@ def slips(monkeypatch):
 
 
 @pytest.fixture
-def errors(graph):
-    """Return what returns the errors that were logged."""
-    said = graph.listen(Log, '/rosout', 1000)
-    return lambda: [m.msg for m in said if m.level >= LoggingSeverity.ERROR]
+def log(graph):
+    """Return what was logged."""
+    return graph.log()
 
 
-def logged_once(graph, errors, *words):
-    """Wait for an error with some words, and see that there is no other."""
-    graph.until(errors)
-    with pytest.raises(AssertionError, match='in time'):
-        graph.until(lambda: len(errors()) > 1, 3 * RETRY)
-    assert all(word in errors()[0] for word in ('slip', *words)), errors()
+def errors(log):
+    """Return the errors that were logged."""
+    return [m.msg for m in log if m.level >= LoggingSeverity.ERROR]
+
+
+def logged_once(graph, node, log, *words):
+    """See that a node has logged one error, with some words."""
+    one, = errors(graph.all_logged(node, log))
+    assert all(word in one for word in ('slip', *words)), one
 
 
 @pytest.mark.parametrize('topic', ['m/joint_states', 'm/markers', 'joint_states'])
-def test_after_a_slip_the_next_crank_message_is_answered(graph, slips, errors, topic):
+def test_after_a_slip_the_next_crank_message_is_answered(graph, slips, log, topic):
     node = graph.start(Kinematics, {'mechanisms': ['m'], 'm.type': 'jansen'})
     turn = graph.crank(['m_crank'])
     answers = graph.listen(MarkerArray if topic == 'm/markers' else JointState, topic, 100)
@@ -81,23 +81,23 @@ def test_after_a_slip_the_next_crank_message_is_answered(graph, slips, errors, t
     turn([0.2], answers)
     assert not slips[topic]
     turn([0.3], answers)
-    logged_once(graph, errors, 'crank_states')
+    logged_once(graph, node, log, 'crank_states')
 
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('topic', ['m/locus', 'm/robot_description', 'robot_description',
                                    'scene_parameters'])
-def test_after_a_slip_of_the_worker_messages_are_answered(graph, slips, errors, topic):
+def test_after_a_slip_of_the_worker_messages_are_answered(graph, slips, log, topic):
     graph.until(lambda: graph.node.count_publishers('/rosout'))
     slips[topic] = 1
     node = graph.start(Kinematics, {'mechanisms': ['m'], 'm.type': 'jansen'})
     graph.until(lambda: not slips[topic])
-    logged_once(graph, errors)
     graph.crank(['m_crank'])([0.3], graph.listen(JointState, 'm/joint_states'))
     assert graph.set(node, m__dimensions__m=16.0).successful
+    logged_once(graph, node, log)
 
 
-def test_after_a_slip_the_timer_goes_on(graph, slips, errors):
+def test_after_a_slip_the_timer_goes_on(graph, slips, log):
     heard = graph.listen(JointState, 'crank_states', 100)
     node = graph.start(CrankDriver, LEVER)
     graph.until(lambda: heard and node.count_subscribers('/rosout'))
@@ -105,11 +105,11 @@ def test_after_a_slip_the_timer_goes_on(graph, slips, errors):
     graph.until(lambda: not slips['crank_states'])
     heard.clear()
     graph.until(lambda: len(heard) > 3)
-    logged_once(graph, errors)
+    logged_once(graph, node, log)
 
 
 @pytest.mark.parametrize('node_class', [Kinematics, CrankDriver, ServoInverse])
-def test_after_a_slip_parameters_can_be_set(graph, monkeypatch, errors, node_class):
+def test_after_a_slip_parameters_can_be_set(graph, monkeypatch, log, node_class):
     node = graph.start(node_class, LEVER)
     graph.until(lambda: node.count_subscribers('/rosout'))
     with monkeypatch.context() as context:
@@ -117,16 +117,16 @@ def test_after_a_slip_parameters_can_be_set(graph, monkeypatch, errors, node_cla
             context.setattr(scene, name, slip)
         result = graph.set(node, lever__dimensions__a=81.0)
     assert not result.successful and 'slip' in result.reason
-    logged_once(graph, errors)
     assert graph.set(node, lever__dimensions__a=82.0).successful
     assert node.get_parameter('lever.dimensions.a').value == 82.0
+    logged_once(graph, node, log)
 
 
 def slip(*_, **__):
     raise ZeroDivisionError('slip')
 
 
-def test_after_a_slip_the_owner_is_followed(graph, monkeypatch, errors):
+def test_after_a_slip_the_owner_is_followed(graph, monkeypatch, log):
     node = graph.start(CrankDriver, LEVER)
     graph.until(lambda: node.count_subscribers('/rosout'))
     publisher = graph.node.create_publisher(ParameterEvent, 'scene_parameters', LATCHED)
@@ -142,17 +142,17 @@ def test_after_a_slip_the_owner_is_followed(graph, monkeypatch, errors):
         for name in ('read', 'changed'):
             context.setattr(scene, name, slip)
         announce(dimensions__a=81.0)
-        graph.until(errors)
-    logged_once(graph, errors)
+        graph.until(lambda: errors(log))
     announce(dimensions__a=82.0)
     graph.until(lambda: node.get_parameter('lever.dimensions.a').value == 82.0)
+    logged_once(graph, node, log)
 
 
 @pytest.mark.parametrize('service, kind, request_', [
     ('servo_inverse', Service, Service.Request(lever_angle=[0.1])),
     ('inputs_for', InputsFor, InputsFor.Request(outputs=['P.x', 'P.y'], values=[0.5, 0.9]))],
     ids=['servo_inverse', 'inputs_for'])
-def test_after_a_slip_a_service_answers(graph, monkeypatch, errors, service, kind, request_):
+def test_after_a_slip_a_service_answers(graph, monkeypatch, log, service, kind, request_):
     node = graph.start(ServoInverse, {'mechanisms': ['lever', 'five'], 'five.type': 'five_bar',
                                       'lever.type': 'slotted_lever'})
     client = graph.node.create_client(kind, service)
@@ -161,8 +161,8 @@ def test_after_a_slip_a_service_answers(graph, monkeypatch, errors, service, kin
         context.setattr(ServoInverse, 'scene', property(slip))
         answer = graph.call(client, request_)
     assert not answer.success and 'slip' in answer.message
-    logged_once(graph, errors)
     assert 'slip' not in graph.call(client, request_).message
+    logged_once(graph, node, log)
 
 
 def trajectory(count, **middles):
@@ -177,7 +177,7 @@ def trajectory(count, **middles):
      JointState(name=['lever_lever'], position=[0.1])),
     ('wanted_trajectory', JointTrajectory, 'servo_trajectory', trajectory(3, lever_lever=0.1))],
     ids=['wanted_states', 'wanted_trajectory'])
-def test_after_a_slip_the_next_command_is_given(graph, slips, errors, topic, kind, answer, wanted):
+def test_after_a_slip_the_next_command_is_given(graph, slips, log, topic, kind, answer, wanted):
     node = graph.start(ServoInverse, LEVER)
     publisher = graph.node.create_publisher(kind, topic, 10)
     answers = graph.listen(JointState if kind is JointState else kind, answer)
@@ -186,9 +186,9 @@ def test_after_a_slip_the_next_command_is_given(graph, slips, errors, topic, kin
     slips[answer] = 1
     publisher.publish(wanted)
     graph.until(lambda: not slips[answer])
-    logged_once(graph, errors, topic)
     publisher.publish(wanted)
     graph.until(lambda: answers)
+    logged_once(graph, node, log, topic)
 
 
 # --- signals ---------------------------------------------------------------------------------
@@ -214,7 +214,12 @@ def cpu(process):
 
 
 def ends_quietly(process, number):
-    """Let a process end by a signal; return what else it printed."""
+    """
+    Let a process end by a signal; return what else it printed.
+
+    It computes less after the signal than before, when it did little more than its imports: left
+    alone with what it was busy with, it would compute more.
+    """
     def of_ended():
         used = resource.getrusage(resource.RUSAGE_CHILDREN)
         return used.ru_utime + used.ru_stime
@@ -223,7 +228,7 @@ def ends_quietly(process, number):
     process.interrupt(number)
     code, printed = process.end()
     assert code == 0 and 'Traceback' not in printed and 'rror' not in printed, printed
-    assert of_ended() - others - before < ENDS_WITHIN
+    assert of_ended() - others - before < before
     return printed
 
 
@@ -238,7 +243,7 @@ def many(tmp_path):
     return path
 
 
-@pytest.mark.sample(1)
+@pytest.mark.sample(0)
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('publishers', [
     0, pytest.param(100, marks=EXHAUSTIVE), pytest.param(1500, marks=EXHAUSTIVE)])
@@ -264,7 +269,7 @@ def test_a_signal_ends_the_start_of_a_thousand_mechanisms(processes, many, name,
             ends_quietly(process, number)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.sample(0)
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('name', [
     'servo_inverse', pytest.param('scene', marks=EXHAUSTIVE)])
@@ -279,12 +284,12 @@ def test_a_signal_ends_a_long_trajectory(processes, tmp_path, name, number):
         graph.until(lambda: publisher.get_subscription_count()
                     and graph.node.count_publishers('servo_trajectory'))
         before = cpu(process)
-        publisher.publish(trajectory(5000, **{'m_P.x': 0.059, 'm_P.y': 0.1}))
+        publisher.publish(trajectory(10_000, **{'m_P.x': 0.059, 'm_P.y': 0.1}))
         graph.until(lambda: cpu(process) > before + 0.2)
         ends_quietly(process, number)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize('number', SIGNALS)
 def test_a_signal_ends_a_node_that_compiles(processes, number):
     process = Process('kinematics', CONFIG / 'all.yaml')
@@ -307,7 +312,7 @@ def without_llvmlite(tmp_path, monkeypatch):
         [str(tmp_path), os.environ.get('PYTHONPATH', '')]))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ['kinematics', 'scene'])
 def test_without_llvmlite_a_message_that_nobody_listens_to_ends_nothing(
         processes, without_llvmlite, name):

@@ -8,9 +8,8 @@ from functools import lru_cache
 import inspect
 import math
 import operator
-import shutil
-import subprocess
 
+from c_libraries import loaded
 import gmpy2
 from linkage_ros import scene
 from linkage_ros.c_code import header
@@ -19,7 +18,6 @@ from linkage_ros.formula.operations import OPERATIONS, WITHOUT_RATE
 import numpy as np
 import pytest
 
-COMPILER = shutil.which('cc') or shutil.which('gcc')
 NAN = gmpy2.nan()
 # What each comes to, in as many digits as are asked for.
 TRUTH = {
@@ -110,9 +108,7 @@ def by_lanes(name, values):
 @pytest.fixture(scope='module')
 def c_library(tmp_path_factory):
     """Return a function that does an operation in C, for double or float."""
-    if not COMPILER:
-        pytest.skip('there is no C compiler')
-    folder, libraries = tmp_path_factory.mktemp('operations'), {}
+    libraries = {}
     lever = scene.read({'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}).machines['lever']
     for kind, f in (('double', ''), ('float', 'f')):
         text = [header.written(lever, (), bool(f))]
@@ -125,11 +121,7 @@ def c_library(tmp_path_factory):
             code = row.c.replace('{f}', f).replace('{name}', 'lever').format(*operands)
             text.append(f'void do_{name}(long size, const {kind} **x, {kind} *out) '
                         f'{{ long n; for (n = 0; n < size; n++) out[n] = {code}; }}')
-        source, library = folder / f'{kind}.c', folder / f'{kind}.so'
-        source.write_text('\n'.join(text))
-        subprocess.run([COMPILER, '-std=c99', '-O2', '-Wall', '-Werror', '-shared', '-fPIC',
-                        str(source), '-o', str(library), '-lm'], check=True)
-        libraries[kind] = ctypes.CDLL(str(library))
+        libraries[kind] = loaded(tmp_path_factory.mktemp('operations'), '\n'.join(text))
 
     def done(name, values, kind):
         values = [np.ascontiguousarray(each, kind) for each in values]

@@ -24,6 +24,7 @@ SEEDS = [pytest.param(range(1), id='few'),
          pytest.param(range(12, 391), id='many', marks=EXHAUSTIVE)]
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', SCENES)
 @pytest.mark.parametrize('seeds', SEEDS)
 def test_whatever_happens_the_node_publishes_what_the_library_says(name, seeds):

@@ -149,7 +149,8 @@ def test_other_mechanisms_are_said_and_the_rest_is_followed(graph, warned):
     assert of(service, 'leg.dimensions.a') == 38.0
     assert warned[:2] == [
         "/kinematics has another mechanism, which is not followed: leg.type is 'jansen' here and "
-        "'klann' there", '/kinematics has other mechanisms: mine, yours']
+        "'klann' there", '/kinematics has other mechanisms; only one of the nodes has: '
+        'mine, yours']
     assert graph.set(owner, lever__dimensions__a=91.0).successful
     graph.until(lambda: of(service) == 91.0)
     assert len(warned) == 3
@@ -167,6 +168,18 @@ def test_a_sweep_is_followed_though_the_crank_was_started_elsewhere(graph):
     assert graph.set(driver, lever__crank__speed=2.0).successful
     assert not graph.set(driver, lever__crank__start=0.4).successful
     assert graph.set(driver, lever__crank__start=2.5).successful
+
+
+def test_a_cylinder_is_moved_over_its_scaled_stroke_whoever_sets_the_scale(graph):
+    given = {'mechanisms': ['boom'], 'boom.type': 'custom', 'boom.joints': [
+        'O ground 0 0', 'P ground 1 0', 'B cylinder P O 1.5 left']}
+    owner, driver = graph.start(Kinematics, given), graph.start(CrankDriver, given)
+    graph.until(lambda: graph.set(owner, boom__scale=5.0).successful
+                and of(driver, 'boom.scale') == 5.0)
+    assert driver.scene.machines['boom'].inputs == owner.scene.machines['boom'].inputs
+    heard = graph.listen(JointState, 'crank_states')
+    # Beyond the stroke without the scale.
+    graph.until(lambda: heard and heard[-1].position[0] > 2.6)
 
 
 def test_of_values_that_change_and_change_back_the_last_holds(graph):

@@ -110,6 +110,7 @@ def test_all_that_make_installs_is_locked_with_hashes():
             for version in versions} <= locked
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('slip, complaint', [
     ('', ''), ('0', 'has another hash'), (None, 'Hashes are required')])
 def test_what_has_another_hash_or_none_is_not_installed(tmp_path, slip, complaint):
@@ -251,6 +252,7 @@ def depending_on_the_interfaces(sources):
         ament_package()""")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not shutil.which('colcon'), reason='colcon is not installed')
 def test_colcon_builds_the_interfaces_before_what_depends_on_them(copy, tmp_path):
     depending_on_the_interfaces(tmp_path / 'src')
@@ -281,6 +283,7 @@ def wrapped(folder, *lines):
 OLD = 'case "$*" in *version_info*) exit 1;; -V) echo Python 3.9.18; exit;; esac'
 
 
+@pytest.mark.sample(1)
 @pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
 @pytest.mark.parametrize('target', [
     'lint', 'docs', 'build',

@@ -19,7 +19,6 @@ from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
 from rcl_interfaces.msg import (
-    Log,  # noqa: E402
     Parameter as ParameterMessage,  # noqa: E402
     ParameterValue,  # noqa: E402
     SetParametersResult,  # noqa: E402
@@ -360,8 +359,8 @@ def test_a_set_within_the_process_is_at_once_and_is_kept(graph):
 
 
 def test_a_mistake_while_a_scene_is_prepared_leaves_the_one_before(graph, monkeypatch):
+    said = graph.log()
     node = graph.start(Slow, LEG)
-    said = graph.listen(Log, '/rosout', 100)
     client = Client(graph, node)
     graph.until(lambda: node.count_subscribers('/rosout'))
     monkeypatch.setattr(node, 'prepare', lambda new: 1 // 0)

@@ -58,8 +58,10 @@ def all_of_them(seed):
     return (*checks.CHECKS, *((checks.accelerated,) if seed % 10 == 0 else ()))
 
 
-def test_random_linkages_hold():
-    found = problems(range(10), a_few)
+@pytest.mark.parametrize('seeds', [
+    range(4), pytest.param(range(4, 10), marks=pytest.mark.slow)])
+def test_random_linkages_hold(seeds):
+    found = problems(seeds, a_few)
     assert not found, report(found)
 
 

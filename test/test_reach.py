@@ -109,6 +109,7 @@ def test_the_inversor_of_the_original_document_ends_at_its_published_angle():
     assert hi == -lo == pytest.approx(2 * math.acos(5 / 6), rel=1e-15)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('count', [25, pytest.param(300, marks=pytest.mark.long)])
 @pytest.mark.parametrize('half', [1, -1])
 def test_the_lever_reach_is_what_brute_force_finds(half, count):

@@ -65,26 +65,26 @@ def check(graph, reader):
 
 
 def compare(reader, text, sent):
-    """Read what arrived and compare it with what was sent; return its source."""
-    source = reader.source(text)
-    assert source.is_of(text) and source.meaning == sent.name
-    numbers = source.read(text)
+    """Read what arrived and compare it with what was sent; return its sender."""
+    sender = reader.sender(text)
+    assert sender.has_sent(text) and sender.meaning == sent.name
+    numbers = sender.read(text)
     assert message_layout.unpack(numbers.stamp) == sent.header.stamp
     assert numbers.positions == tuple(sent.position)
     assert numbers.velocities == tuple(sent.velocity)
-    return source
+    return sender
 
 
 def read(reader, text):
-    """Return what a reader says of a message: the meaning of its source, and its numbers."""
-    source = reader.source(text)
-    return source.meaning, source.read(text)
+    """Return what a reader says of a message: the meaning of its sender, and its numbers."""
+    sender = reader.sender(text)
+    return sender.meaning, sender.read(text)
 
 
 @pytest.mark.parametrize('names', [[], ['a'], ['a', 'bc'], ['leg_crank'] * 7])
 @pytest.mark.parametrize('velocities', [True, False])
 @pytest.mark.parametrize('effort', [True, False])
-def test_a_source_is_hardly_ever_deserialised(reader, check, names, velocities, effort):
+def test_a_sender_is_hardly_ever_deserialised(reader, check, names, velocities, effort):
     for seed in range(30):
         check(message(names, velocities, effort, seed=seed))
     assert reader.looked == 1
@@ -99,7 +99,7 @@ def test_what_differs_in_more_than_numbers_is_deserialised(reader, check):
     assert reader.looked == 5
 
 
-def test_sources_that_take_turns_are_hardly_ever_deserialised(reader, check):
+def test_senders_that_take_turns_are_hardly_ever_deserialised(reader, check):
     for seed in range(20):
         for name in ('a', 'b', 'c'):
             check(message([name], seed=seed))
@@ -154,16 +154,16 @@ def test_bytes_of_another_order_are_always_deserialised(reader):
     assert reader.looked == 4
 
 
-@pytest.mark.parametrize('sources', [1, 8, 9, 64, 256])
-def test_any_number_of_sources_is_learnt(reader, sources):
-    texts = [serialize_message(message([f'robot{i}_crank'])) for i in range(sources)]
+@pytest.mark.parametrize('senders', [1, 8, 9, 64, 256])
+def test_any_number_of_senders_is_learnt(reader, senders):
+    texts = [serialize_message(message([f'robot{i}_crank'])) for i in range(senders)]
     for _ in range(10):
         for text in texts:
-            reader.source(text)
-    assert reader.looked == sources
+            reader.sender(text)
+    assert reader.looked == senders
 
 
-def test_more_sources_than_are_remembered_cost_no_more_than_reading_each(reader, monkeypatch):
+def test_more_senders_than_are_remembered_cost_no_more_than_reading_each(reader, monkeypatch):
     learnt = Counter()
     layout = joint_state_reader.MessageLayout
     monkeypatch.setattr(joint_state_reader, 'MessageLayout', lambda *args: (
@@ -171,7 +171,7 @@ def test_more_sources_than_are_remembered_cost_no_more_than_reading_each(reader,
     texts = [serialize_message(message([f'robot{i}_crank'])) for i in range(1000)]
     for _ in range(8):
         for text in texts:
-            reader.source(text)
+            reader.sender(text)
     assert reader.looked <= 8000 and learnt.total() < 8000 / 12
 
 
@@ -187,13 +187,13 @@ def held(owner):
 
 
 def test_what_is_remembered_is_bounded_whatever_comes(reader, monkeypatch):
-    monkeypatch.setattr(joint_state_reader, 'SOURCES', 32)
+    monkeypatch.setattr(joint_state_reader, 'SENDERS', 32)
 
-    def after(sources):
-        for i in sources:
+    def after(senders):
+        for i in senders:
             text = serialize_message(message(['a' * (i % 7), f'{i:09}'][i % 2:]))
-            reader.source(text)
-            reader.source(text)
+            reader.sender(text)
+            reader.sender(text)
         return held(reader)
 
     first = held(reader)
@@ -202,7 +202,7 @@ def test_what_is_remembered_is_bounded_whatever_comes(reader, monkeypatch):
     assert after(range(500, 1000)) < many + 100  # at least 500 if each of them left something
 
 
-def test_a_source_that_cannot_be_learnt_excludes_itself_alone(reader):
+def test_a_sender_that_cannot_be_learnt_excludes_itself_alone(reader):
     odd, good = message(['a']), message(['b', 'c'])
     for _ in range(10):
         compare(reader, big_endian(odd), odd)
@@ -210,12 +210,12 @@ def test_a_source_that_cannot_be_learnt_excludes_itself_alone(reader):
     assert reader.looked == 10 + 1
 
 
-def test_a_name_that_is_no_text_excludes_its_source_alone(reader):
+def test_a_name_that_is_no_text_excludes_its_sender_alone(reader):
     sent = message(['a_crank', 'b'])
     good, bad = (serialize_message(sent), serialize_message(sent).replace(b'a_c', b'\xff\xfec'))
     for _ in range(5):
         compare(reader, good, sent)
-        assert reader.source(bad).meaning == deserialize_message(bad, JointState).name
+        assert reader.sender(bad).meaning == deserialize_message(bad, JointState).name
     assert reader.looked == 2
 
 
@@ -303,7 +303,7 @@ def test_no_claim_of_padding_makes_a_short_message_dangerous(reader):
     for options in range(256):
         for size in range(SHORTEST):
             with pytest.raises(Unreadable):
-                reader.source((b'\0\1\0' + bytes([options]) + whole[4:])[:size])
+                reader.sender((b'\0\1\0' + bytes([options]) + whole[4:])[:size])
     for options in range(0, 256, 5):
         for size in range(SHORTEST, len(whole)):
             text = (b'\0\1\0' + bytes([options]) + whole[4:])[:size]
@@ -318,7 +318,7 @@ def test_a_name_with_odd_ends_stands_for_no_other(reader, name):
         assert outcome(read, reader, tried) == outcome(plainly, tried)
 
 
-def test_the_node_hardly_ever_deserialises_a_message_of_a_source(graph, reader):
+def test_the_node_hardly_ever_deserialises_a_message_of_a_sender(graph, reader):
     graph.start(Kinematics)
     turn = graph.crank(['jansen_crank'])
     heard = graph.listen(JointState, 'jansen/joint_states')

@@ -26,7 +26,7 @@ NOT_INSTALLED = "import sys; sys.modules['llvmlite'] = None\n"
 
 
 @pytest.fixture(params=['machine code', 'plain Python'])
-def executor(request, monkeypatch):
+def backend(request, monkeypatch):
     """Machine code where it is installed, and as if it were not."""
     if request.param == 'plain Python':
         for name in [name for name in sys.modules if name.startswith('linkage_ros.nodes')
@@ -96,7 +96,7 @@ def test_without_llvmlite_and_without_subscribers_a_node_goes_on(tmp_path, name)
     assert code == 0 and 'Traceback' not in printed
 
 
-def test_loads_beside_another_mechanism_come_with_every_message(graph, executor):
+def test_loads_beside_another_mechanism_come_with_every_message(graph, backend):
     scene = Scene(graph, LOADED, ['joint_states'])
     for message in ({'name': ['a_crank'], 'position': [0.3]},
                     {'name': ['b_crank'], 'position': [0.4]}):
@@ -112,7 +112,7 @@ def test_loads_beside_another_mechanism_come_with_every_message(graph, executor)
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize('wrong', [math.nan, math.inf, 1e308])
-def test_a_speed_that_is_no_number_is_in_no_message(graph, executor, wrong):
+def test_a_speed_that_is_no_number_is_in_no_message(graph, backend, wrong):
     scene = Scene(graph, TWO, ['joint_states'])
     for _ in range(3):
         for name in ('a_crank', 'b_crank'):
@@ -138,7 +138,7 @@ def displayed(messages):
 
 @pytest.mark.slow
 @pytest.mark.parametrize('times', [6, pytest.param(30, marks=pytest.mark.long)])
-def test_markers_are_gone_wherever_noise_about_the_end_of_the_reach_was(graph, executor, times):
+def test_markers_are_gone_wherever_noise_about_the_end_of_the_reach_was(graph, backend, times):
     scene = Scene(graph, {'mechanisms': ['m', 'b'], 'm.type': 'peaucellier', 'b.type': 'jansen'},
                   ['m/markers', 'm/joint_states', 'b/joint_states'])
     end = scene.node.scene.machines['m'].reach[0][1]

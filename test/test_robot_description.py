@@ -19,7 +19,6 @@ from linkage_ros import scene  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.urdf_command import main  # noqa: E402
 from linkage_ros.robot_model import urdf  # noqa: E402
-from rcl_interfaces.msg import Log  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from robots import in_frame, Pinocchio, Yourdfpy  # noqa: E402
 from ros_harness import Process  # noqa: E402
@@ -103,7 +102,7 @@ def test_one_robot_state_publisher_sees_all_loops_of_the_scene_closed(graph):
 
 
 def test_frames_of_another_robot_make_no_robot_of_the_scene(graph):
-    heard = graph.listen(Log, '/rosout')
+    heard = graph.log()
     graph.until(lambda: graph.node.count_publishers('/rosout'))
     graph.start(Kinematics, {**ROBOT, 'foot.only_named': False})
     own = graph.listen(String, 'foot/robot_description', LATCHED)
@@ -137,6 +136,7 @@ def test_a_new_dimension_makes_a_new_description(graph):
     assert ends == pytest.approx([2.0 * math.acos(5.0 / (2.0 * r)) for r in (3.0, 3.1)])
 
 
+@pytest.mark.slow
 def test_the_command_prints_the_robot_of_a_scene():
     code, printed = Process('urdf', CATALOGUE).end()
     found = scene.load(str(CATALOGUE))
@@ -214,6 +214,7 @@ def test_what_is_not_understood_is_refused_in_one_line(capsys, arguments, compla
     assert printed.out == '' and printed.err.count('\n') == 1 and complaint in printed.err
 
 
+@pytest.mark.slow
 def test_a_scene_is_described_without_ros():
     code = ('import sys; sys.modules["rclpy"] = None; '
             'from linkage_ros.robot_model.command import main; sys.exit(main(sys.argv[1:]))')

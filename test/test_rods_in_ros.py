@@ -76,7 +76,7 @@ def test_a_stream_of_pitch_and_roll_becomes_commands_of_the_motors(graph, capfd)
     last = {source: (position, 0.0) for source, (position, _) in command.items()}
     for pitch, roll in ((0.6, 0.05), (0.0, 0.3), (math.nan, 0.0)):
         assert stream.want(names, [pitch, 0.1 - roll], [1.0, 1.0]) == last
-    assert 'cannot be 0.6, 0.05: pitch, roll at 0.6, 0.05 is nowhere in the reach' \
+    assert 'cannot be 0.6, 0.05: pitch, roll at 0.6, 0.05 is outside the reach' \
         in capfd.readouterr().err
 
 
@@ -92,12 +92,12 @@ def test_a_service_gives_all_motors_of_a_pose_and_the_nearest_first(graph):
         back = linkage.joint_angles(answer, ['pitch', 'roll'])
         np.testing.assert_allclose([*back.values()], pose['values'], atol=1e-14)
         near = (answer + [0.3 + 2.0 * math.pi, -0.3]).tolist()
-        first = node.answer_together(InputsFor.Request(near=near, **pose), InputsFor.Response())
+        first = node.answer_inputs_for(InputsFor.Request(near=near, **pose), InputsFor.Response())
         np.testing.assert_allclose(first.positions[:2], answer + [2.0 * math.pi, 0.0], atol=1e-12)
     for values in ((0.6, 0.0), (0.0, -0.3)):
         refused = graph.call(client, InputsFor.Request(**{**pose, 'values': values}))
         assert not refused.success and not refused.positions
-        assert 'is nowhere in the reach' in refused.message
+        assert 'is outside the reach' in refused.message
 
 
 def test_the_example_s_rods_are_closed_in_its_own_urdf(graph):

@@ -188,12 +188,13 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
         '<world/>', 'w\u200bw', '\u2028', 'w\u2028', 'w\x85', 'w\ud800')],
     ({'frame_prefix': '/left'}, 'frame_prefix must be a text .* up to 100 characters'),
     ({'jansen.frame_id': 'my\nthigh'}, 'jansen.frame_id must be a text .* up to 100 characters'),
-    *[({'jansen.joint_names': [text]}, 'jansen.joint_names must be texts such as .* each about '
-       'another of crank, BC, .*, not ') for text in (
+    *[({'jansen.joint_names': [text]}, 'jansen.joint_names must be texts such as .* each for a '
+       'different one of crank, BC, .*, not ') for text in (
         '', 'BC', 'BC=', '=shin', 'BC=3', 'BC=left shin', 'ZZ=shin', 'left0_BC=shin', 'BC=shin+',
         'BC=""', 'BC="', 'BC="shin', 'BC="sh"in"', r'BC="\x"',
         'BC=shin+x', 'BC=shin+1+1', 'BC==shin', 'BC=--shin', 'BC=' + 'x' * 900 + '!')],
-    ({'jansen.joint_names': ['BC=a', 'BC=b']}, "jansen.joint_names must be .* another .*'BC=b'"),
+    ({'jansen.joint_names': ['BC=a', 'BC=b']},
+     "jansen.joint_names must be .* different one .*'BC=b'"),
     ({'jansen.joint_names': ['BC=knee', 'EF=-knee']}, 'jansen.joint_names must give each joint '
      'of the scene a name of its own: jansen.BC and jansen.EF are both knee'),
     ({'jansen.joint_names': ['BC=water_drop_CB']}, 'jansen.joint_names must give .* '
@@ -211,7 +212,8 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'jansen.pose': [0.0] * 10 ** 6}, 'jansen.pose must be'),
     ({'mechanisms': ['custom']}, 'custom.joints: joints must be a list of lines'),
     ({**OWN, 'own.joints': ['A qq O 1']}, 'own.joints: joint line "A qq O 1": expected NAME and'),
-    ({**OWN, 'own.joints': ['A crunk O 1']}, r'.* is no construction; did you mean crank\?$'),
+    ({**OWN, 'own.joints': ['A crunk O 1']},
+     r".* unknown construction 'crunk'; did you mean crank\?$"),
     ({'jansen.dimension.m': 1.0}, r'.*; did you mean jansen.dimensions.m\?$'),
     ({'jansen.Crank.speed': 1.0}, r'.*; did you mean jansen.crank.speed\?$'),
     ({'mechanism': ['jansen']}, r'.*; did you mean mechanisms\?$'),

@@ -103,7 +103,7 @@ def test_many_angles_out_of_reach_are_not_all_named(call):
     (None, {'lever_angle': [0.1], 'mechanism': 'arm'},
      "no mechanism 'arm'; allowed: slotted_lever"),
     (None, {'lever_angle': [0.1], 'mechanism': 'jansen'},
-     'jansen is a jansen, not a slotted lever; name an output, or take one of: slotted_lever'),
+     'jansen is a jansen, not a slotted lever; name an output, or use one of: slotted_lever'),
     (TWO, {'lever_angle': [0.1]}, 'may be empty only .* allowed: left, right'),
     ({'mechanisms': ['jansen']}, {'lever_angle': [0.1]}, 'no slotted_lever'),
 ])
@@ -122,7 +122,7 @@ def test_any_output_of_any_mechanism_is_put_where_it_is_wanted(call):
         assert slope == pytest.approx(0.1 * 65.0 / 12.0 / math.cos(servo / 2.0) ** 2)
     assert response.message == (
         'values of C.y 5 cannot be reached; C.y reaches [-0.718602, 0.718602] m, its '
-        'greatest at the crank angle 1.17137 rad, the upper end of the reach')
+        'maximum at the crank angle 1.17137 rad, the upper end of the reach')
 
 
 def test_a_link_is_turned_to_an_angle_by_the_answer_nearest_to_a_servo(call):
@@ -135,7 +135,7 @@ def test_a_link_is_turned_to_an_angle_by_the_answer_nearest_to_a_servo(call):
 
 
 @pytest.mark.parametrize('parameters, request_, message', [
-    (None, {'output': 'C.y', 'lever_angle': [0.1]}, 'may be empty only where there is one;'),
+    (None, {'output': 'C.y', 'lever_angle': [0.1]}, 'only if the scene has a single one;'),
     (None, {'mechanism': 'arm', 'output': 'C.y', 'lever_angle': [0.1]}, "no mechanism 'arm'"),
     (None, {'mechanism': 'jansen', 'output': 'Z.y', 'lever_angle': [0.1]}, 'Z'),
     (None, {'mechanism': 'jansen', 'output': 'O.x', 'lever_angle': [0.1]}, 'O.x'),
@@ -152,6 +152,7 @@ FIVE_BAR = {'mechanisms': ['leg', 'drop'], 'leg.type': 'five_bar', 'leg.scale': 
 FOOT = {'outputs': ['P.x', 'P.y'], 'values': [0.12, 0.3]}
 
 
+@pytest.mark.slow
 def test_all_working_modes_of_a_foot_are_told_and_the_nearest_comes_first(graph):
     node = graph.start(ServoInverse, FIVE_BAR)
     client = graph.node.create_client(InputsFor, 'inputs_for')
@@ -167,12 +168,12 @@ def test_all_working_modes_of_a_foot_are_told_and_the_nearest_comes_first(graph)
             np.exp(1j * np.array(expected[mode.rpartition(' ')[0]])), abs=1e-12)
     for answer, mode in zip(answers, response.modes):
         near = (answer + [2 * math.pi, -8 * math.pi]).tolist()
-        again = node.answer_together(InputsFor.Request(near=near, **FOOT), InputsFor.Response())
+        again = node.answer_inputs_for(InputsFor.Request(near=near, **FOOT), InputsFor.Response())
         assert again.positions[:2].tolist() == pytest.approx(near) and again.modes[0] == mode
 
 
 @pytest.mark.parametrize('request_, reason', [
-    ({**FOOT, 'values': [0.12, 3.0]}, 'P.x, P.y at 0.12, 3 is nowhere in the reach'),
+    ({**FOOT, 'values': [0.12, 3.0]}, 'P.x, P.y at 0.12, 3 is outside the reach'),
     ({**FOOT, 'values': [math.nan, 0.3]}, 'a value must be finite'),
     ({**FOOT, 'values': [0.12]}, 'values must have 2 numbers and near as many or none, not 1'),
     ({**FOOT, 'near': [0.0, 1e9]}, 'near must be finite and within 1e+06'),
@@ -183,7 +184,7 @@ def test_all_working_modes_of_a_foot_are_told_and_the_nearest_comes_first(graph)
     ({**FOOT, 'mechanism': 'drop'}, 'drop has 1 inputs')])
 def test_what_cannot_be_asked_of_several_inputs_gets_the_reason(graph, request_, reason):
     node = graph.start(ServoInverse, FIVE_BAR)
-    response = node.answer_together(InputsFor.Request(**request_), InputsFor.Response())
+    response = node.answer_inputs_for(InputsFor.Request(**request_), InputsFor.Response())
     assert not response.success and reason in response.message
 
 
@@ -235,7 +236,7 @@ def test_an_answer_lies_in_the_sweep_or_the_reason_says_which_end_forbids(graph)
     assert 'beyond its lower end' in ask(node, [-0.5]).message
     assert ask(node, [0.7]).message == (
         'lever angles 0.7 cannot be reached; the lever reaches [-0.422634, 0.272027] rad, its '
-        'greatest at the crank angle 0.8 rad, the upper end of crank.sweep [-1.3, 0.8]')
+        'maximum at the crank angle 0.8 rad, the upper end of crank.sweep [-1.3, 0.8]')
 
 
 def test_the_tutorial_s_gripper_is_answered_where_its_servo_can_stand(graph):
@@ -440,7 +441,7 @@ def test_a_cylinders_length_is_answered_in_metres(call):
                 'cylinder.sweep [1.5, 2]: beyond its upper end'),
     ('B.y', 2.19, 'values of B.y 2.19 cannot be reached; 2.19 needs the cylinder at 2.32829 m'),
     ('B.y', 9.0, 'values of B.y 9 cannot be reached; B.y reaches [1.272, 1.9984] m'),
-    ('B.y', 9.0, 'm, its greatest at the cylinder length 2 m, the upper end of cylinder.sweep')])
+    ('B.y', 9.0, 'm, its maximum at the cylinder length 2 m, the upper end of cylinder.sweep')])
 def test_a_length_that_cannot_be_had_is_explained_in_metres(call, output, wanted, text):
     response = call({**BOOM, 'boom.cylinder.sweep': [1.5, 2.0]}, output=output,
                     lever_angle=[wanted])

@@ -50,7 +50,8 @@ def test_a_five_bar_has_all_its_working_modes(count):
 
 
 @pytest.mark.parametrize('name, outputs, truth', [
-    ('excavator', BUCKET, excavator), ('parallelogram arm', ('W.x', 'W.y'), arm)])
+    pytest.param('excavator', BUCKET, excavator, marks=pytest.mark.slow),
+    ('parallelogram arm', ('W.x', 'W.y'), arm)])
 def test_an_arm_has_both_elbows(name, outputs, truth):
     rng, (linkage, numbers) = np.random.default_rng(3), made(name)
     for _ in range(5):
@@ -102,6 +103,7 @@ def test_whole_turns_are_kept_and_a_singular_pose_is_not_passed():
     np.testing.assert_allclose(back, near, atol=1e-9)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('seed', [0, *(
     pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 40))])
 @pytest.mark.parametrize('hung', ['zero O geared', 'zero Q geared', 'beside'])
@@ -131,6 +133,7 @@ def test_an_input_that_is_held_is_held_in_its_own_turn(hung, seed):
         assert nearest == pytest.approx(theta, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_two_dyads_beyond_the_ends_of_their_rockers_are_not_taken_for_the_other_sides():
     # A rocker turns back where its dyad stretches: next to that the other side is an answer, too.
     rng, beyond, found = np.random.default_rng(1), 3e-8, 0
@@ -210,7 +213,7 @@ def test_answers_lie_in_the_sweeps_or_the_reason_says_so():
     wanted = InverseRequest(scene.read(swept).machines['leg'], ('P.x', 'P.y'))
     assert wanted.answers((0.05, 0.15), (3.2, 0.0)) == []
     assert wanted.reason(0.05, 0.15) == (
-        'P.x, P.y at 0.05, 0.15 takes inputs outside crank.sweep [3, 3.5]')
+        'P.x, P.y at 0.05, 0.15 needs inputs outside crank.sweep [3, 3.5]')
 
 
 @pytest.mark.parametrize('held', [0.5, 0.5 + math.tau, 0.5 - math.tau])

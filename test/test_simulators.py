@@ -27,7 +27,7 @@ FOLDS = {'water_drop'}
 def simulated(name):
     """Return a mechanism of about a metre that starts in the middle of its reach."""
     one = {**MACHINES, **OWN}[name]()
-    given = {**one.given, 'm.scale': one.scale / bodies.size(one)}
+    given = {**one.values, 'm.scale': one.scale / bodies.size(one)}
     one = scene.read({'mechanisms': ['m'], **given}).machines['m']
     rows = drives(one)
     given.update((f'm.{key}.start', value) for key, value in zip(

@@ -18,6 +18,7 @@ import subprocess
 import sys
 from xml.etree import ElementTree
 
+from c_libraries import COMPILER, loaded, STRICT
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header, transmission
 from linkage_ros.c_code.axes import actuators, joints
@@ -28,12 +29,10 @@ from truth import random_linkages
 
 ROOT = Path(__file__).parents[1]
 STAND_IN = ROOT / 'test' / 'ros2_control'
-STRICT = ('-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wshadow', '-Werror', '-O2')
 SANITIZED = ('-g', '-O1', '-fsanitize=address,undefined', '-fno-sanitize-recover=all')
 COMPILERS = [pytest.param(name, marks=pytest.mark.skipif(
     not shutil.which(name), reason=f'{name} is not installed')) for name in ('g++', 'clang++')]
 SCENES = [*sorted((ROOT / 'config').glob('*.yaml')), ROOT / 'examples' / 'leg.yaml']
-COMPILER = shutil.which('cc') or shutil.which('gcc')
 
 # All that a scene may say of actuators and joints.
 SCENE = {
@@ -62,29 +61,10 @@ int {name}_sent(int side, const double *from, double *to)
 """
 
 
-@pytest.fixture(scope='module')
-def machines():
-    """Return the mechanisms of the scene."""
-    return scene.read(SCENE).machines
-
-
-@pytest.fixture(scope='module')
-def library(machines, tmp_path_factory):
-    """Return them in C."""
-    return compiled(tmp_path_factory.mktemp('c'), machines.values())
-
-
 def compiled(folder, machines, *names):
     """Return a library with the actuators and joints of mechanisms."""
-    if not COMPILER:
-        pytest.skip('there is no C compiler')
-    source = folder / 'all.c'
-    source.write_text(''.join(header.written(machine, joints=names) + CALLER.format(
+    return loaded(folder, ''.join(header.written(machine, joints=names) + CALLER.format(
         name=machine.name) for machine in machines))
-    built = folder / 'all.so'
-    subprocess.run([COMPILER, '-std=c99', *STRICT, '-shared', '-fPIC', source, '-o', built, '-lm'],
-                   check=True)
-    return ctypes.CDLL(str(built))
 
 
 class Memory:
@@ -152,7 +132,7 @@ def expected(machine, inputs):
 def test_both_ways_are_those_of_the_scene(library, machines, name):
     machine = machines[name]
     n = len(machine.inputs)
-    memory = Memory(library, name, n)
+    memory = Memory(library(name), name, n)
     for inputs in states(machine, 100):
         actuator, by, joint, turning = expected(machine, inputs)
         speeds, torques = np.arange(1.0, n + 1.0), np.arange(2.0, n + 2.0)
@@ -173,7 +153,7 @@ def test_both_ways_are_those_of_the_scene(library, machines, name):
 
 
 def test_a_command_beyond_the_sweep_is_held_and_stands_still(library, machines):
-    machine, memory = machines['lever'], Memory(library, 'lever', 1)
+    machine, memory = machines['lever'], Memory(library('lever'), 'lever', 1)
     (inside, *_), (outside, *_) = (expected(machine, [angle])[2] for angle in (0.3, 0.45))
     _, (good, *_) = memory.send(1, [inside], [1.0])
     status, (position, velocity, _) = memory.send(1, [outside], [1.0])
@@ -185,7 +165,7 @@ def test_a_command_beyond_the_sweep_is_held_and_stands_still(library, machines):
 
 
 def test_what_is_missing_is_held_and_said(library, machines):
-    machine, memory, nan = machines['rocker'], Memory(library, 'rocker', 1), math.nan
+    machine, memory, nan = machines['rocker'], Memory(library('rocker'), 'rocker', 1), math.nan
     actuator, _, joint, _ = expected(machine, [1.0])
     status, (position, velocity, effort) = memory.send(1, [nan], [1.0], [2.0])
     assert status == 4 and np.isnan(position) and velocity == 0.0 and effort == 0.0
@@ -198,7 +178,7 @@ def test_what_is_missing_is_held_and_said(library, machines):
 
 
 def test_a_singular_pose_is_said(library, machines):
-    machine, memory = machines['rocker'], Memory(library, 'rocker', 1)
+    machine, memory = machines['rocker'], Memory(library('rocker'), 'rocker', 1)
     dead = machine.linkage.extremes('QB')[0][0][1]
     _, (_, _, held) = memory.send(0, [1.0], [1.0], [1.0])
     status, (_, velocity, effort) = memory.send(0, [dead], [1.0], [2.0])
@@ -212,7 +192,7 @@ def test_a_singular_pose_is_said(library, machines):
 def test_nothing_that_comes_in_gets_out_as_no_number(library, machines, name):
     machine, rng = machines[name], np.random.default_rng(4)
     n = len(machine.inputs)
-    memory = Memory(library, name, n)
+    memory = Memory(library(name), name, n)
     assert memory.send(0, expected(machine, states(machine, 1)[0])[0])[0] == 0
     values = [math.nan, math.inf, -math.inf, 1e308, -1e300, 5e-324, 0.0, 1.0, 1e-3, 3.0]
     for _ in range(3000):
@@ -240,9 +220,9 @@ def test_the_joints_are_chosen_by_their_names(machines, tmp_path):
         np.testing.assert_allclose(position, expected(leg, inputs)[0], atol=1e-9)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize('seeds', [
-    range(3), pytest.param(range(3, 12), marks=pytest.mark.long),
+    pytest.param(range(3), marks=pytest.mark.slow),
+    pytest.param(range(3, 12), marks=pytest.mark.long),
     pytest.param(range(12, 100), marks=EXHAUSTIVE)])
 def test_random_linkages_go_both_ways(tmp_path, seeds):
     machines = []
@@ -293,7 +273,7 @@ def test_names_of_any_letters_are_texts(tmp_path):
         'mechanisms': ['int'], 'int.type': 'four_bar', 'int.crank.source': source,
         'int.joint_names': ['QB=while/1:x']}).machines.values()
     library = compiled(tmp_path, [machine])
-    text = (tmp_path / 'all.c').read_text()
+    text = (tmp_path / 'code.c').read_text()
     assert 'INT_JOINT_WHILE_1_X = 0' in text and 'INT_ACTUATOR_A_B_S' in text
     named = subprocess.run(
         [COMPILER, '-x', 'c', '-', '-o', tmp_path / 'names', '-lm'], check=True, input=(
@@ -334,7 +314,7 @@ def proved(package, name, compiler, count, *flags):
     assert tried == count and good > 0.9 * count
 
 
-@pytest.mark.sample(1)
+@pytest.mark.slow
 @pytest.mark.parametrize('compiler', COMPILERS)
 def test_a_transmission_is_proved(tmp_path, compiler):
     proved(written(tmp_path, ROOT / 'examples' / 'leg.yaml'), 'knee', compiler, 5000)
@@ -384,6 +364,7 @@ def test_what_cannot_be_configured_is_refused_in_words(refusals, words, said):
     assert said in ended.stdout
 
 
+@pytest.mark.slow
 def test_other_dimensions_are_those_of_another_linkage(refusals):
     for a, angle in ((90.0, 0.4), (80.0, 1.1), (120.0, -2.0)):
         ended = subprocess.run([refusals, 'parameter', 'a', str(a), str(angle)],
@@ -395,7 +376,6 @@ def test_other_dimensions_are_those_of_another_linkage(refusals):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
 def test_any_dimensions_are_those_of_python(tmp_path):
     given = {'mechanisms': [*mechanisms.TYPES, 'odd'],
              **{f'{name}.type': name for name in mechanisms.TYPES}, 'odd.type': 'custom',
@@ -403,8 +383,7 @@ def test_any_dimensions_are_those_of_python(tmp_path):
                  'O ground 0 0', 'H ground w 0', 'R carriage O along H 0.1*w 0.9*w',
                  'Q ground 0 w', 'B dyad R Q u+w 0.9 left', 'C rigid R B u w left']}
     machines = scene.read(given).machines
-    source, built = tmp_path / 'open.c', tmp_path / 'open.so'
-    source.write_text(''.join(header.opened(machine) + f"""
+    library = loaded(tmp_path, ''.join(header.opened(machine) + f"""
 const char *{name}_placed(const double *dimension, const double *q, double *position)
 {{
     static {name}_linkage c;
@@ -415,9 +394,7 @@ const char *{name}_placed(const double *dimension, const double *q, double *posi
     return wrong;
 }}
 """ for name, machine in machines.items()))
-    subprocess.run([COMPILER, '-std=c99', *STRICT, '-shared', '-fPIC', source, '-o', built, '-lm'],
-                   check=True)
-    library, rng, tried = ctypes.CDLL(str(built)), np.random.default_rng(7), 0
+    rng, tried = np.random.default_rng(7), 0
     for name, machine in machines.items():
         place, linkage = library[f'{name}_placed'], machine.linkage
         place.restype, output = ctypes.c_char_p, joints(machine)[0].output

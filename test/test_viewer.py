@@ -586,6 +586,7 @@ def test_a_node_that_is_silent_at_first_is_waited_for_and_not_guessed(show, monk
     assert answer['outputs']['G.x']['value'] == pytest.approx(g_x)
 
 
+@pytest.mark.slow
 def test_what_a_sensor_cannot_be_at_is_nowhere_on_the_page(show):
     lift = scene.load(str(ROOT / 'config' / 'scissor_lift.yaml'))
     running = show({**without_defaults(lift), 'rate': 0.0})
@@ -682,7 +683,7 @@ def test_a_saved_scene_names_all_that_defines_it_and_is_the_running_one(show, pa
     saved = tmp_path / 'saved.yaml'
     saved.write_text(asyncio.run(use(running.viewer.url)))
     assert scene.load(str(saved)).parameters == before.parameters
-    given = {key for part in scene.load(str(saved)).given.values() for key in part}
+    given = {key for part in scene.load(str(saved)).values.values() for key in part}
     for name, machine in before.machines.items():
         assert {'mechanisms', f'{name}.type', f'{name}.scale', *(
             f'{name}.dimensions.{key}' for key in machine.linkage.dimensions)} <= given
@@ -731,7 +732,7 @@ def test_nobody_is_listened_to_while_nobody_looks(show, monkeypatch):
 
 
 def test_a_browser_that_has_not_drawn_is_sent_no_more(show):
-    running = show({**LEG, 'leg.crank.speed': 1.0})
+    running = show({**LEG, 'leg.crank.speed': 1.0, 'rate': 200.0})
     heard = running.graph.listen(MarkerArray, 'leg/markers')
 
     async def use(url):
@@ -938,7 +939,8 @@ FLOODS = {
 
 @pytest.mark.skipif(not Path('/proc/self/statm').exists(), reason='memory is read from /proc')
 @pytest.mark.parametrize('what, seconds', [
-    ('answers', 0.5), *(pytest.param(what, 15.0, marks=pytest.mark.long) for what in FLOODS)])
+    pytest.param('answers', 0.5, marks=pytest.mark.slow),
+    *(pytest.param(what, 15.0, marks=pytest.mark.long) for what in FLOODS)])
 def test_a_client_that_does_not_read_costs_little_and_harms_nobody(show, what, seconds):
     running = show({**LEG, 'leg.crank.speed': 1.0})
     url = running.viewer.url
@@ -967,6 +969,7 @@ def test_a_client_that_does_not_read_costs_little_and_harms_nobody(show, what, s
     assert asyncio.run(use()) < 30.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('last', [b'', b'nonsense'])
 def test_a_client_that_does_not_read_is_sent_home(show, monkeypatch, last):
     monkeypatch.setattr(server, 'SECONDS_TO_READ', 0.3)

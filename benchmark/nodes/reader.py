@@ -39,7 +39,7 @@ class Quick:
 
     def __call__(self, text: bytes) -> Numbers:
         """Return what a message says."""
-        return self._reader.source(text).read(text)
+        return self._reader.sender(text).read(text)
 
 
 def texts(sources, joints):

@@ -91,7 +91,7 @@ class Point:
     place: Any
     home: str
     span: Real
-    stands_on: frozenset = frozenset()
+    depends_on: frozenset = frozenset()
     crank: Optional[planar.Crank] = None
 
 
@@ -213,7 +213,7 @@ class Builder:
         start = self.points[origin]
         self.points[name] = Point(
             start.place + planar.on_line(along, place), link, start.span + way, frozenset().union(
-                *({x} | self.points[x].stands_on for x in (origin, towards, *others))))
+                *({x} | self.points[x].depends_on for x in (origin, towards, *others))))
 
     def block(self, name: str, joint: str, along: Real, across: Real) -> None:
         """Add a joint to the block that slides with a joint: along its line, and to its left."""
@@ -512,7 +512,7 @@ class Builder:
     def _between(self, first: str, second: str) -> Complex:
         """Return the vector between two joints; bars from a common joint are more accurate."""
         ends = [self.points[end] for end in (first, second)]
-        shared = ends[0].stands_on & ends[1].stands_on
+        shared = ends[0].depends_on & ends[1].depends_on
         for name in self.points:
             bars = [self._vectors[name, end] for end in (first, second)
                     if (name, end) in self._vectors]
@@ -564,9 +564,10 @@ class Builder:
         A place that is known in a better way is given.
         """
         origin = self.points[start]
-        stands_on = frozenset().union(*({x} | self.points[x].stands_on for x in (start, *others)))
+        depends_on = frozenset().union(
+            *({x} | self.points[x].depends_on for x in (start, *others)))
         self.points[name] = Point(place or origin.place + vector, link, origin.span + length,
-                                  stands_on)
+                                  depends_on)
         self._bar(start, name, vector, length, link)
 
     def _bar(self, first: str, second: str, vector: Complex, length: Number,

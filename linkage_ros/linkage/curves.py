@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Curves over an input: where to sample them, where they change sign, where they turn round.
+Curves over an input: samples, sign changes and extremes.
 
-All that is looked for is refined at once, in brackets that are cut again and again, so that a
-curve is computed a few dozen times for however many results.
+All results are refined together, in brackets that are divided repeatedly: a curve is evaluated a
+few dozen times for any number of results.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ from typing import Callable, Tuple
 
 import numpy as np
 
-# Samples of a whole turn; and how often the distance to an end of an arc is halved for more.
+# Samples of a whole turn; halvings of the distance to each end of an arc, for more samples there.
 TURN_SAMPLES, END_HALVINGS = 360, 48
-# For extremes: samples of an arc, how many of the best are looked at, samples around each, zooms.
-EXTREME_SAMPLES, EXTREMES_KEPT, ZOOM_SAMPLES, ZOOMS = 385, 4, 17, 10
-# Where a bracket is cut; an odd number of places, so that one is its middle.
+# For extremes: samples of an arc, number of peaks that are refined, samples around each, zooms.
+EXTREME_SAMPLES, REFINED_PEAKS, ZOOM_SAMPLES, ZOOMS = 385, 4, 17, 10
+# Fractions at which a bracket is divided; an odd number of them, so that one is its middle.
 CUTS = np.arange(1, 16) / 16
-# Of a drawn curve: even samples to begin with, how often its pieces are halved, most samples.
+# For a drawn curve: even samples at first, rounds of division, maximum number of samples.
 DRAWN, DRAWN_ROUNDS, MOST_DRAWN = 181, 30, 4000
-# How far a drawn curve may be from the true one, as a part of its size and of its coordinates.
+# Tolerance of a drawn curve, as a fraction of its size and of its coordinates.
 CHORD, NOISE = 1 / 600, 1e-12
 # Angles below this [rad] are zero: the rounding of any other angle is coarser.
 LEAST = 1e-18
 
 
 def sampled(lo: float, hi: float, samples: int = TURN_SAMPLES, fewest: int = 9) -> np.ndarray:
-    """Return angles [rad] over an arc, evenly and ever denser towards both of its ends."""
+    """Return angles [rad] on an arc, evenly spaced, with more of them towards both ends."""
     even = np.linspace(lo, hi, max(fewest, math.ceil(samples * (hi - lo) / math.tau)))
     steps = (hi - lo) * 0.5 ** np.arange(2, END_HALVINGS)
     theta = np.concatenate([even, lo + steps, hi - steps])
@@ -58,14 +58,14 @@ def drawn(curve: Callable, lo: float, hi: float) -> np.ndarray:
         halved = bent > most
         if not halved.any() or len(at) > MOST_DRAWN:
             break
-        # All that is known of a piece that bends too much.
+        # A piece that bends too much gets its three inner points.
         at = np.insert(at, first[halved].repeat(3) + 1, inner[halved].ravel())
         places = np.insert(places, first[halved].repeat(3) + 1, between[halved].reshape(-1, 2), 0)
     return places[np.isfinite(places).all(axis=1)]
 
 
 def _from_chord(start: np.ndarray, end: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return how far points (n, m, 2) are from chords (n, 2)."""
+    """Return the distances of points (n, m, 2) from chords (n, 2)."""
     along = (end - start)[:, None]
     away = points - start[:, None]
     part = (away * along).sum(axis=-1) / np.maximum((along ** 2).sum(axis=-1), 1e-300)
@@ -74,10 +74,10 @@ def _from_chord(start: np.ndarray, end: np.ndarray, points: np.ndarray) -> np.nd
 
 def refined(test: Callable, lo: np.ndarray, hi: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """
-    Return, for each bracket, the last angle that is as its start is and the first that is not.
+    Return, for each bracket, the last angle that passes a test and the first that fails it.
 
-    The test takes angles [rad] (brackets, n) and returns whether each is as its start is. A
-    bracket may run backwards, from lo to hi; the answers are neighbouring floats.
+    The test takes angles [rad] (brackets, n) and returns whether each passes. It passes at `lo`
+    and fails at `hi`, which may be less than `lo`. The results are neighbouring floats.
     """
     lo, hi = np.array(lo, float), np.array(hi, float)
     row = np.arange(len(lo))
@@ -92,7 +92,7 @@ def refined(test: Callable, lo: np.ndarray, hi: np.ndarray) -> Tuple[np.ndarray,
 
 def lowest(curve: Callable, lo: np.ndarray, hi: np.ndarray, steps: int = 10) -> np.ndarray:
     """
-    Return, for each bracket, the angle [rad] at which a curve is least, to half of all digits.
+    Return, for each bracket, the angle [rad] of a curve's minimum, to half of all digits.
 
     The curve takes angles, shape (brackets, n), and returns as many values.
     """
@@ -108,9 +108,9 @@ def lowest(curve: Callable, lo: np.ndarray, hi: np.ndarray, steps: int = 10) -> 
 
 def near_misses(values: np.ndarray) -> np.ndarray:
     """
-    Return where samples may step over a pair of zeros, as an array over the inner ones.
+    Return whether a pair of zeros may lie next to a sample, for all samples but the outer ones.
 
-    There a curve has a least distance from zero that is small beside how much it bends.
+    There a curve's distance from zero has a minimum that is small compared with its bend.
     """
     before, inner, after = values[..., :-2], values[..., 1:-1], values[..., 2:]
     with np.errstate(invalid='ignore'):
@@ -122,39 +122,39 @@ def near_misses(values: np.ndarray) -> np.ndarray:
 
 def turns(values: np.ndarray, rates: np.ndarray, least: np.ndarray) -> np.ndarray:
     """
-    Return the samples after which a curve turns round, by more than what is least at each.
+    Return the samples after which a curve has an extreme.
 
-    Between samples with rates of opposite signs there is an extreme. One that a later extreme
-    takes back within rounding is none.
+    An extreme lies between samples with rates of opposite signs. Two successive ones that differ
+    by no more than the sum of `least` at both are rounding, and are omitted.
     """
     rising = np.asarray(rates) >= 0.0
-    kept: list = []
+    found: list = []
     for i in np.flatnonzero(rising[1:] != rising[:-1]).tolist():
-        if kept and abs(values[i] - values[kept[-1]]) <= least[i] + least[kept[-1]]:
-            kept.pop()
+        if found and abs(values[i] - values[found[-1]]) <= least[i] + least[found[-1]]:
+            found.pop()
         else:
-            kept.append(i)
-    return np.array(kept, np.intp)
+            found.append(i)
+    return np.array(found, np.intp)
 
 
 def extremes(curve: Callable, lo: float, hi: float, angular: np.ndarray) -> np.ndarray:
     """
-    Return of outputs on an arc the least value and where, then the greatest: (outputs, 2, 2).
+    Return each output's minimum on an arc and its place, then its maximum: (outputs, 2, 2).
 
     The curve takes values of an input (n,) and returns the outputs (outputs, n). Those that are
-    `angular` (outputs,) are angles [rad], followed past -pi and pi.
+    `angular` (outputs,) are angles [rad], continued past -pi and pi.
     """
     theta = np.linspace(lo, hi, EXTREME_SAMPLES)
     value = curve(theta)
     for i, known in zip(np.flatnonzero(angular), np.isfinite(value[angular])):
         value[i, known] = np.unwrap(value[i, known])
-    # One search for the greatest of minus each output, one for the greatest of each.
+    # Two searches for maxima: of each output's negative, and of each output.
     row, sign = np.tile(np.arange(len(value)), 2), np.repeat([-1.0, 1.0], len(value))[:, None]
     turn = np.where(angular, math.tau, 0.0)[row][:, None, None]
     height = np.where(np.isfinite(value), value, np.nan)[row] * sign
     beside = np.pad(np.nan_to_num(height, nan=-np.inf), ((0, 0), (1, 1)), constant_values=-np.inf)
     peaks = (beside[:, 1:-1] >= beside[:, :-2]) & (beside[:, 1:-1] >= beside[:, 2:])
-    best = np.argsort(np.where(peaks, -beside[:, 1:-1], np.inf), axis=1)[:, :EXTREMES_KEPT]
+    best = np.argsort(np.where(peaks, -beside[:, 1:-1], np.inf), axis=1)[:, :REFINED_PEAKS]
     top = np.take_along_axis(value[row], best, 1)
     at = theta[best]
     low, high = theta[(best - 1).clip(0)], theta[(best + 1).clip(max=EXTREME_SAMPLES - 1)]

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Where a linkage stretches or folds: values of an input at which a closure is zero, or nearly.
+Dead points: the values of an input at which a closure is zero or nearly zero.
 
-A closure is what vanishes there: the margin of a limit, or the area of a kite or parallelogram.
+A closure vanishes where a linkage stretches or folds. It is the margin of a limit, or the area of
+a kite or parallelogram.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from .curves import refined, sampled
 from .inputs import Arc, Input
 from .planar import TOLERANCE
 
-# How near to zero a closure comes, as a part of its size, for outputs to change quickly there.
+# Outputs change quickly where a closure is below this fraction of its size.
 NEAR = 1e-2
-# A closure whose size is less than so many times its rounding never leaves zero.
+# A closure whose size is below this multiple of its rounding is zero everywhere.
 FLAT = 256.0
 
 Places = Tuple[np.ndarray, ...]
@@ -37,20 +38,20 @@ class NearZero(NamedTuple):
 def near_zeros(curve: Callable, arc: Arc, input_: Input, rounding: np.ndarray,
                folds: np.ndarray) -> Iterator[NearZero]:
     """
-    Yield where closures come near to zero on an arc.
+    Yield the values on an arc at which closures come near to zero.
 
     Parameters
     ----------
     curve : callable
         From values of the input, shape (n,), to each closure and its rate, shape (2 closures, n).
     arc : (float, float)
-        Where the input may be, counted in its size.
+        The range of the input, in units of its size.
     input_ : Input
-        What is moved.
+        The input.
     rounding : float array (closures,)
-        What a closure is rounded to.
+        The rounding of each closure.
     folds : bool array (closures,)
-        Which of them change sign at a zero; others end the reach there, or turn back.
+        Whether a closure changes sign at a zero; the others end the reach there, or turn back.
 
     """
     def split(value: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
@@ -60,8 +61,8 @@ def near_zeros(curve: Callable, arc: Arc, input_: Input, rounding: np.ndarray,
     theta = sampled(*arc)
     values, rates = split(theta)
     size = np.fmax.reduce(np.abs(values), axis=1, initial=0.0)
-    # An arm vanishes where it is as short as rounding makes it. What is never more than rounding,
-    # as the area of a kite that always lies flat, tells nothing.
+    # A closure as small as its rounding counts as zero. One that is never larger, such as the area
+    # of a kite that is always flat, is ignored.
     rounding = np.where(size > FLAT * rounding, rounding + TOLERANCE ** 2 * size, -np.inf)
     for end in (0, -1):
         if input_.is_cut(theta[end]):
@@ -86,13 +87,13 @@ def near_zeros(curve: Callable, arc: Arc, input_: Input, rounding: np.ndarray,
         found, _ = refined(unchanged, theta[place], theta[place + 1])
         # A fold that changes sign vanishes between two neighbouring values.
         gaps = np.abs(split(found)[0][row, chosen]) if kind else np.zeros(len(row))
-        kept = rounding[row] > 0.0
-        yield from map(NearZero, found[kept].tolist(), gaps[kept].tolist(),
-                       rounding[row][kept].tolist(), size[row][kept].tolist())
+        relevant = rounding[row] > 0.0
+        yield from map(NearZero, found[relevant].tolist(), gaps[relevant].tolist(),
+                       rounding[row][relevant].tolist(), size[row][relevant].tolist())
 
 
 def _crossings(values: np.ndarray, folds: np.ndarray) -> Places:
-    """Return row and place of the samples after which one of the folds changes sign."""
+    """Return row and column of the samples after which one of the folds changes sign."""
     above = values >= 0.0
     return np.nonzero((above[:, 1:] != above[:, :-1]) & folds[:, None]
                       & np.isfinite(values[:, 1:]) & np.isfinite(values[:, :-1]))
@@ -100,11 +101,11 @@ def _crossings(values: np.ndarray, folds: np.ndarray) -> Places:
 
 def _approaches(theta: np.ndarray, values: np.ndarray, rates: np.ndarray,
                 near: np.ndarray) -> Places:
-    """Return row and place of the samples after which a closure turns away close to zero."""
+    """Return row and column of the samples after which a closure turns back close to zero."""
     sign = np.sign(values[:, :-1])
     with np.errstate(all='ignore'):
         before, after = sign * rates[:, :-1], sign * rates[:, 1:]
-        # Where the tangents meet a smooth curve between two samples is lower than it gets.
+        # The tangents at two samples meet below the lowest point of a smooth curve between them.
         ahead = (sign * (values[:, 1:] - values[:, :-1]) - after * np.diff(theta)) / (
             before - after)
         bound = sign * values[:, :-1] + before * ahead

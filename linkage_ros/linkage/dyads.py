@@ -2,12 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-A planar linkage of bodies, hinges and slides, taken apart into dyads.
+Decomposition of a planar linkage of bodies, hinges and slides into dyads.
 
-From the bodies that are placed, two others that meet in a joint, and are each joined to a placed
-one, are placed next by one joint line: RRR by `dyad`, RRP by `slider`, RPR by `slot`, RPP by
-`yoke` where its slides are square to each other. PRP has no word. Bodies that are left are an
-Assur group of class III or higher, or hang on one.
+One joint line places two bodies that share a joint and are each joined to a placed body: RRR by
+`dyad`, RRP by `slider`, RPR by `slot`, RPP by `yoke` if its slides are perpendicular. PRP has no
+word. The bodies that stay unplaced are an Assur group of class III or higher, or depend on one.
 
 Source: Assur's groups as in Norton, "Design of Machinery", sec. 2.13, and Galletti, "A note on
 modular approaches to planar linkage kinematic analysis", Mechanism and Machine Theory 21 (1986).
@@ -32,9 +31,9 @@ from typing import (
     Union,
 )
 
-# Of the size of a linkage, what is rounding.
+# Rounding of a coordinate, as a fraction of the linkage's size.
 ROUNDING = 1e-12
-# A joint on the line of a bar is told from it up to so many of its lengths away.
+# A joint collinear with a bar is placed from it within this many bar lengths of its first end.
 BESIDE = 1.0 + ROUNDING
 
 Pin = Tuple[str, complex]
@@ -42,9 +41,9 @@ Pin = Tuple[str, complex]
 
 class Slide(NamedTuple):
     """
-    Two bodies that slide on each other: on each a point of the line, and which way it goes.
+    Two bodies that slide on each other, with a point and the direction of the line on each.
 
-    Where the points meet, the slide is at zero. `joint` is what a caller knows it by.
+    The slide is zero where the two points coincide. `joint` is the caller's identifier.
     """
 
     bodies: Tuple[str, str]
@@ -55,9 +54,9 @@ class Slide(NamedTuple):
 
 class Hinge(NamedTuple):
     """
-    Two bodies that a motor turns: where on each.
+    Two bodies that a motor joins, with its place on each.
 
-    The second is turned by sign * position + zero [rad] as seen from the first.
+    The angle of the second body relative to the first is sign * position + zero [rad].
     """
 
     bodies: Tuple[str, str]
@@ -72,10 +71,10 @@ Motor = Union[Hinge, Slide]
 
 class Part(NamedTuple):
     """
-    A body that is placed: its link, and the joint that this hangs on.
+    A placed body: its link, and the joint that carries the link.
 
-    Angles on it are counted from `along`, as it is in the pose; a block is on a slide, which is
-    counted from `start`.
+    Angles on it are measured from the direction `along`. A block has a `slide`, whose position is
+    measured from the point `start`.
     """
 
     link: str
@@ -86,7 +85,7 @@ class Part(NamedTuple):
 
 
 def short(value: float, near: float = 2e-16) -> str:
-    """Return a number, and one of few digits where that is as near to it as rounding."""
+    """Return a number as text, with the fewest digits (up to 12) that are within `near` of it."""
     if abs(value) <= 5.0 * near:
         return '0'
     return next((text for text in (f'{value:.{digits}g}' for digits in range(1, 13))
@@ -94,39 +93,39 @@ def short(value: float, near: float = 2e-16) -> str:
 
 
 def bar_name(joint: str, tip: str) -> str:
-    """Return what the link of a bar is called."""
+    """Return the name of a bar's link."""
     return ('' if len(joint + tip) == 2 else '_').join((joint, tip))
 
 
 class Dyads:
     """
-    The joint lines that place bodies, one dyad after the other.
+    Joint lines that place bodies, one dyad after another.
 
     Parameters
     ----------
     ground : str
-        The body that is placed from the start.
+        The body that is placed first.
     bodies : sequence of str
-        All of them.
+        All bodies.
     pins : sequence of dict
-        Hinges: where each is on the bodies that it joins, as these have it.
+        Hinges: the place of each on every body that it joins, in that body's coordinates.
     slides : sequence of Slide
-        What slides on what, without a motor.
+        Slides without a motor.
     motors : sequence of Hinge or Slide
-        What is known of the others: an input places it.
+        Joints whose position is an input.
     size : float
-        About how large the linkage is [m].
+        Approximate size of the linkage [m].
     near : float
-        What is nearer than this [m] is at one place.
+        Points nearer to each other than this [m] coincide.
 
     Attributes
     ----------
     lines : list of str
         Joint lines so far.
     on : dict
-        For each body the joints of the lines that are on it, and where.
+        For each body, the joints of the lines on it and their places.
     parts : dict
-        The bodies that are placed.
+        The placed bodies.
 
     """
 
@@ -136,18 +135,18 @@ class Dyads:
         self.on: Dict[str, Dict[str, complex]] = {body: {} for body in bodies}
         self.parts: Dict[str, Part] = {}
         self.ground, self.size, self.near, self.farthest = ground, size, near, size
-        # The body that each joint of the lines was placed with: others turn against that.
+        # The body with which each joint was placed: other bodies turn relative to it.
         self.home: Dict[str, str] = {}
         self.pins, self.slides, self.motors = list(pins), list(slides), list(motors)
 
     def take_apart(self) -> None:
-        """Place what can be placed."""
+        """Place every body that can be placed."""
         self.place(self.ground, Part('', '', 1.0 + 0.0j))
         while any(rule() for rule in self.rules()):
             pass
 
     def rules(self) -> Iterator[Callable[[], bool]]:
-        """Yield what may place bodies next, each telling whether it has."""
+        """Yield the rules that may place bodies next; each returns whether it did."""
         for motor in self.motors:
             yield from (partial(self._crank, motor, way) if isinstance(motor, Hinge)
                         else partial(self._carriage, motor, way) for way in (0, 1))
@@ -163,51 +162,51 @@ class Dyads:
         """Return the bodies that are not placed."""
         return [body for body in self.on if body not in self.parts]
 
-    def seen(self, body: str, place: complex) -> complex:
-        """Return where a place on a body is in the pose that sides are told from."""
+    def place_in_pose(self, body: str, place: complex) -> complex:
+        """Return a place on a body, in the coordinates of the pose that determines the sides."""
         return place
 
-    def turned(self, body: str, along: complex) -> complex:
-        """Return a direction on a body as it is in the pose."""
+    def direction_in_pose(self, body: str, along: complex) -> complex:
+        """Return a direction on a body, in the coordinates of the pose."""
         return along
 
     def drive(self, word: str, joint: Any, ratio: float, offset: float) -> Tuple[str, str]:
         """
-        Note an input, ratio * position + offset of a joint.
+        Record an input whose value is ratio * position + offset of a joint.
 
-        Return its number, and what its line says of it if it is geared to another.
+        Return its number, and the option `geared` of its line; empty unless it is geared.
         """
         raise NotImplementedError
 
     def quarters(self, start: float) -> Optional[int]:
-        """Return the quarter turns, 0 to 3, that an angle [rad] is to be written as, if so."""
+        """Return an angle [rad] as 0 to 3 quarter turns; None if the line has the angle itself."""
         return None
 
     def position(self, joint: Any) -> float:
-        """Return about where the motor of a joint is."""
+        """Return the approximate position of a joint's motor."""
         return 0.0
 
-    def alike(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
-        """Return what a better line than `dyad` says of two bars, if there is one."""
+    def special_line(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
+        """Return a more specific line than `dyad` for two bars, or None."""
         return None
 
-    def said(self, value: float) -> str:
-        """Return a length in a line."""
+    def length_text(self, value: float) -> str:
+        """Return a length as a line has it."""
         return short(value, 1e-15 * self.size)
 
     def number(self, *words: str) -> str:
-        """Return what the next link or input of some words is called."""
+        """Return the number of the next link or input of these words; empty for the first."""
         count = sum(line.split()[1] in words for line in self.lines)
         return f'{count + 1 if count else ""}'
 
-    def called(self, place: complex, body: str) -> str:
+    def new_name(self, place: complex, body: str) -> str:
         """Return the name of a new joint at a place on a body."""
         count = len(self.lines)
         return 'ABCDEFGHIJKLMNPQRSTUVWXYZ'[count % 25] + str(count // 25 or '')
 
     def name(self, place: complex, body: str, line: str) -> str:
-        """Write the line that places a joint, and return its name."""
-        name = self.called(place, body)
+        """Add the line that places a joint, and return the joint's name."""
+        name = self.new_name(place, body)
         self.home[name] = body
         self.on[body][name] = place
         for pin in self.pins:
@@ -216,52 +215,52 @@ class Dyads:
         self.lines.append(f'{name} {line}')
         return name
 
-    def known(self, body: str, place: complex) -> Optional[str]:
-        """Return the joint at a place on a body, if there is one."""
+    def joint_at(self, body: str, place: complex) -> Optional[str]:
+        """Return the joint at a place on a body, or None."""
         return next((name for name, at in self.on[body].items()
                      if abs(at - place) < self.near), None)
 
     def fixed(self, body: str, place: complex) -> Pin:
-        """Return the joint at a place on a body that is placed, a new one if there is none."""
-        if name := self.known(body, place):
+        """Return the joint at a place on a placed body; add one if there is none."""
+        if name := self.joint_at(body, place):
             return name, self.on[body][name]
-        said, on, part = self.said, self.on[body], self.parts[body]
-        # On a bar on whose line it is, as near as that is long, or from which the triangle is the
-        # least flat.
+        text, on, part = self.length_text, self.on[body], self.parts[body]
+        # The best bar to place it from is collinear with it and near; else the one with which it
+        # makes the least flat triangle.
         bars = [(math.inf if abs(seen.imag * (end - start)) < self.near and abs(seen) < BESIDE
                  else abs(seen.imag), (first, start), (second, end))
                 for (first, start), (second, end) in combinations(on.items(), 2)
                 if abs(end - start) > self.near for seen in ((place - start) / (end - start),)]
         if body == self.ground:
-            line = f'ground {said(place.real)} {said(place.imag)}'
+            line = f'ground {text(place.real)} {text(place.imag)}'
         elif part.slide and [each.joint for each in self.parts.values() if each.slide].count(
                 part.joint) > 1:
-            raise ValueError(f'{part.joint} is on two blocks, of which `block` takes one')
+            raise ValueError(f'joint {part.joint} carries two blocks; `block` allows one')
         elif part.slide:
             seen = (place - on[part.joint]) / part.along
-            line = f'block {part.joint} {said(seen.real)} {said(seen.imag)}'
+            line = f'block {part.joint} {text(seen.real)} {text(seen.imag)}'
         elif not bars:
-            raise ValueError(f'{body} is a barrel with another joint, which no word can place')
+            raise ValueError(f'{body} is a barrel with a second joint, which no word can place')
         else:
             _, (first, start), (second, end) = max(bars)
             seen = (place - start) / (end - start) * abs(end - start)
             side = self._side(start, end, place)
-            line = (f'rigid {first} {second} {said(abs(place - start))} {said(abs(place - end))} '
+            line = (f'rigid {first} {second} {text(abs(place - start))} {text(abs(place - end))} '
                     f'{side}' if abs(seen.imag) >= self.near else
-                    f'line {first} {second} {said(seen.real)}')
+                    f'line {first} {second} {text(seen.real)}')
         return self.name(place, body, line), place
 
     def _side(self, first: complex, second: complex, place: complex) -> str:
         return 'left' if ((place - first) / (second - first)).imag > 0.0 else 'right'
 
     def other(self, body: str, name: str) -> Pin:
-        """Return another joint of a body that is placed."""
+        """Return another joint of a placed body; add one if there is none."""
         return next((pin for pin in self.on[body].items() if pin[0] != name), None) or self.fixed(
             body, self.on[body][name] + self.size * self.parts[body].along)
 
     def line(self, body: str, place: complex, axis: complex, but: str = ''
              ) -> Tuple[Pin, str, complex]:
-        """Return a joint at a place on a body, another on a line through it, and which way."""
+        """Return the joint at a place on a body, one further along an axis, and the direction."""
         origin, at = self.fixed(body, place)
         name, end = next(((name, end) for name, end in self.on[body].items()
                           if name not in (origin, but)
@@ -270,19 +269,19 @@ class Dyads:
         return (origin, at), name, (end - at) / abs(end - at)
 
     def _length(self, body: str, place: complex) -> float:
-        """Return how long a line through a place on a body is to be for the least rounding."""
+        """Return the length of a line through a place on a body that gives the least rounding."""
         away = [abs(end - place) for end in self.on[body].values()]
         if body == self.ground:
             return max(away) or self.size
-        # As long as a triangle's side that is known: such a triangle is the least flat.
+        # As long as the shortest known side of the triangle, which is then the least flat.
         return min((gap for gap in away if gap >= self.near), default=self.size)
 
     def end(self, body: str) -> Pin:
-        """Return the first joint of the lines on a body."""
+        """Return the first joint on a body."""
         return next(iter(self.on[body].items()))
 
     def place(self, body: str, part: Part) -> bool:
-        """Note a body that is placed, and place what else there is on it."""
+        """Record a placed body, and place its other joints."""
         self.parts[body] = part
         for pin in self.pins:
             if body in pin:
@@ -290,18 +289,18 @@ class Dyads:
         return True
 
     def hang(self, body: str, joint: str, tip: str, link: str = '') -> bool:
-        """Note a body that turns about a joint."""
+        """Record a placed body that turns about a joint."""
         on = self.on[body]
         return self.place(body, Part(link or bar_name(joint, tip), joint, on[tip] - on[joint]))
 
     def rods(self, body: str) -> Iterator[Tuple[str, Dict[str, complex]]]:
-        """Yield what hangs on a joint and shares a pin with a body, and the pin, not placed."""
+        """Yield unplaced bodies that have a joint and share an unplaced pin with a body."""
         return ((rod, pin) for pin in self.pins if body in pin for rod in pin
                 if rod != body and rod not in self.parts and self.on[rod]
-                and not self.known(rod, pin[rod]))
+                and not self.joint_at(rod, pin[rod]))
 
     def _crank(self, hinge: Hinge, way: int) -> bool:
-        """Place the body that a motor turns on one that is placed."""
+        """Place the body that a motor turns on a placed one."""
         base, body = hinge.bodies[way], hinge.bodies[1 - way]
         if base not in self.parts or body in self.parts:
             return False
@@ -312,8 +311,8 @@ class Dyads:
         centred = hinge.places[1 - way]
         origin, rail = next(self._rails(body), (centred, 1.0 + 0.0j))
         foot = origin + rail * ((centred - origin) / rail).real
-        # On the line that something slides on where that passes the hinge, before any far joint:
-        # a foot told from that would be rounded in the size of what is far.
+        # The pin is where a line that another body slides on passes nearest to the hinge. Seen
+        # from a distant joint, that place would be rounded in proportion to the distance.
         place = foot if abs(foot - centred) >= self.near else next(
             (pin[body] for pin in self.pins
              if body in pin and abs(pin[body] - centred) > self.near), centred + self.size * rail)
@@ -324,13 +323,13 @@ class Dyads:
             zero, start = quarters % 2 * ' up', 0.0
             place = centred + (place - centred) * (1.0 if quarters < 2 else -1.0)
         number, geared = self.drive('crank', hinge.joint, sign * hinge.sign, start)
-        name = self.name(place, body, f'crank {centre} {self.said(abs(place - centred))}{zero}'
-                         f'{geared}')
+        name = self.name(place, body, f'crank {centre} {self.length_text(abs(place - centred))}'
+                         f'{zero}{geared}')
         self.on[body].setdefault(centre, centred)
         return self.hang(body, centre, name, f'crank{number}')
 
     def _rails(self, body: str) -> Iterator[Tuple[complex, complex]]:
-        """Yield the lines of a body, a point and the way, that pins of others slide on."""
+        """Yield the lines of a body on which pins of others slide: a point and a direction."""
         for slide in (*self.slides, *self.motors):
             if isinstance(slide, Slide) and body in slide.bodies:
                 own = slide.bodies.index(body)
@@ -340,7 +339,7 @@ class Dyads:
                 yield slide.origins[own] + 1j * slide.axes[own] * aside, slide.axes[own]
 
     def _carriage(self, slide: Slide, way: int) -> bool:
-        """Place the body that a motor moves along one that is placed."""
+        """Place the body that a motor moves along a placed one."""
         base, body = slide.bodies[way], slide.bodies[1 - way]
         if base not in self.parts or body in self.parts:
             return False
@@ -353,31 +352,32 @@ class Dyads:
         number, geared = self.drive('carriage', slide.joint, sign, 0.0)
         low, high = (sign * self.position(slide.joint) + end for end in (
             -self.farthest, self.farthest))
-        name = self.name(place, body, f'carriage {origin} along {towards} {self.said(low)} '
-                         f'{self.said(high)}{geared}')
+        name = self.name(place, body, f'carriage {origin} along {towards} '
+                         f'{self.length_text(low)} {self.length_text(high)}{geared}')
         return self.place(body, Part(f'carriage{number}', name, slide.axes[1 - way] * on,
                                      slide.joint, start))
 
     def _cylinder(self, slide: Slide, way: int) -> bool:
-        """Place two bodies that a motor moves along each other, and a bar that hangs on them."""
+        """Place two bodies that a motor moves along each other, and the bar at their end."""
         barrel, rod = slide.bodies[way], slide.bodies[1 - way]
         if not self.on[barrel] or {barrel, rod} & self.parts.keys():
             return False
         base, start = self.end(barrel)
-        foot = self.seen(barrel, start)
+        foot = self.place_in_pose(barrel, start)
         back = (start - slide.origins[way]) / slide.axes[way]
         for bar, pin in self.rods(rod):
             ahead = (pin[rod] - slide.origins[1 - way]) / slide.axes[1 - way] - back
             if bar == barrel or base == self.end(bar)[0] or abs(ahead.imag) > self.near:
                 continue
-            sign = math.copysign(1.0, ((self.seen(rod, pin[rod]) - foot)
-                                       / self.turned(barrel, slide.axes[way])).real)
+            sign = math.copysign(1.0, ((self.place_in_pose(rod, pin[rod]) - foot)
+                                       / self.direction_in_pose(barrel, slide.axes[way])).real)
             number, geared = self.drive('cylinder', slide.joint, sign * (-1.0 if way else 1.0),
                                         sign * ahead.real)
             pivot, at = self.end(bar)
-            side = self._side(foot, self.seen(bar, at), self.seen(bar, pin[bar]))
+            side = self._side(foot, self.place_in_pose(bar, at),
+                              self.place_in_pose(bar, pin[bar]))
             name = self.name(pin[bar], bar, f'cylinder {base} {pivot} '
-                             f'{self.said(abs(pin[bar] - at))} {side}{geared}')
+                             f'{self.length_text(abs(pin[bar] - at))} {side}{geared}')
             axis = sign * slide.axes[1 - way]
             return self.place(barrel, Part(f'barrel{number}', base, sign * slide.axes[way])) \
                 and self.place(rod, Part(f'cylinder{number}', name, axis, slide.joint, start)) \
@@ -389,13 +389,13 @@ class Dyads:
             one, two = self.end(first), self.end(second)
             if one[0] == two[0] or any({first, second} == {*each.bodies} for each in self.motors):
                 continue
-            if abs(self.seen(first, one[1]) - self.seen(second, two[1])) < self.near:
-                raise ValueError(f'{first} and {second} are folded on each other')
-            side = self._side(*(self.seen(*seen) for seen in (
-                (first, one[1]), (second, two[1]), (first, pin[first]))))
-            line = self.alike(pin[first], pin[second], one, two) or (
-                f'dyad {one[0]} {two[0]} {self.said(abs(pin[first] - one[1]))} '
-                f'{self.said(abs(pin[second] - two[1]))} {side}')
+            ends = self.place_in_pose(first, one[1]), self.place_in_pose(second, two[1])
+            if abs(ends[0] - ends[1]) < self.near:
+                raise ValueError(f'{first} and {second} are folded onto each other')
+            side = self._side(*ends, self.place_in_pose(first, pin[first]))
+            line = self.special_line(pin[first], pin[second], one, two) or (
+                f'dyad {one[0]} {two[0]} {self.length_text(abs(pin[first] - one[1]))} '
+                f'{self.length_text(abs(pin[second] - two[1]))} {side}')
             name = self.name(pin[first], first, line)
             return self.hang(first, one[0], name) and self.hang(second, two[0], name)
         return False
@@ -409,10 +409,10 @@ class Dyads:
             (joint, at), length = self.end(rod), abs(pin[rod] - self.end(rod)[1])
             ahead = (pin[block] - slide.origins[1 - way]) / slide.axes[1 - way]
             (start, on_base), towards, along = self.line(base, origin + axis * ahead, axis, joint)
-            half = 'out' if (self.turned(rod, pin[rod] - at) / self.turned(
-                base, along)).real > 0.0 else 'in'
+            half = 'out' if (self.direction_in_pose(rod, pin[rod] - at)
+                             / self.direction_in_pose(base, along)).real > 0.0 else 'in'
             number = self.number('slider', 'yoke')
-            name = self.name(pin[rod], rod, f'slider {joint} {self.said(length)} {start} '
+            name = self.name(pin[rod], rod, f'slider {joint} {self.length_text(length)} {start} '
                              f'along {towards} {half}')
             on_block = slide.axes[1 - way] * (along / axis)
             return self.hang(rod, joint, name) and self.place(
@@ -427,14 +427,15 @@ class Dyads:
         if pivot == pin:
             return False
         axis, across = slide.axes[way], slide.axes[1 - way]
-        ahead = ((self.seen(block, end) - self.seen(lever, start))
-                 / self.turned(lever, axis)).real
+        ahead = ((self.place_in_pose(block, end) - self.place_in_pose(lever, start))
+                 / self.direction_in_pose(lever, axis)).real
         sign, length = math.copysign(1.0, ahead), abs(ahead)
         offset = sign * (((end - slide.origins[1 - way]) / across).imag
                          - ((start - slide.origins[way]) / axis).imag)
         number = self.number('slot')
         name = self.name(start + length * sign * axis, lever,
-                         f'slot {pivot} {pin} {self.said(offset)} out {self.said(length)}')
+                         f'slot {pivot} {pin} {self.length_text(offset)} out '
+                         f'{self.length_text(length)}')
         return self.hang(lever, pivot, name, f'lever{number}') and self.place(
             block, Part(f'slide{number}', pin, sign * across, slide.joint, start))
 

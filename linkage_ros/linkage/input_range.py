@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-With which values of its first input a linkage can be assembled.
+The reach: the values of its first input with which a linkage can be assembled.
 
-The ends of the reach are where a margin vanishes. For the dyad or slot of a crank they are closed
-forms of exactly rounded gaps; elsewhere they are bracketed. Between two neighbouring ends one pose
-decides for the whole arc, and at each end the linkage can still be assembled.
+The reach ends where a margin vanishes. For the dyad or slot of a crank the ends are closed forms
+of exactly rounded gaps; other ends are bracketed. Between two neighbouring ends one pose decides
+for the whole arc. At each end the linkage can still be assembled.
 """
 
 from __future__ import annotations
@@ -20,33 +20,35 @@ from .curves import lowest, near_misses, refined, sampled
 from .inputs import Arc, CRANK, Input, NARROWEST
 from .planar import Limit
 
-# Samples of a whole turn in search of ends without a closed form, samples of an arc at least, and
-# how often arcs inside arcs are searched.
+# In the search for ends without a closed form: samples of a whole turn, least samples of an arc,
+# and rounds of search inside the arcs that were found.
 SAMPLES, FEWEST, ROUNDS = 720, 33, 4
-# How often the step is halved towards a value at which a margin nearly vanishes.
+# Halvings of the step towards a value at which a margin nearly vanishes.
 HALVINGS = 12
-# Where an arc is looked at: in its middle, symmetric linkages may have an arm of no length.
+# Fraction at which an arc is tested: in the exact middle, an arm of a symmetric linkage may have
+# no length.
 INSIDE = 0.49
-# Poses that are compared with those a period later; by how much of their size places may differ.
+# Poses that are compared with those a period later. Their places are equal if they differ by at
+# most this fraction of their size.
 PERIODIC, ALIKE = 64, 1e-6
-# More ends than these are rounding, of the direction of an arm without length: between them there
-# is nothing to be looked for.
+# The search stops at more ends than these: they are rounding, of the direction of an arm without
+# length.
 MOST = 100
 
 
 def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Callable,
          places: Callable) -> List[Arc]:
     """
-    Return where every margin is at least zero: arcs of the first input, each (lo, hi).
+    Return the arcs (lo, hi) of the first input on which every margin is at least zero.
 
     Parameters
     ----------
     margins : callable
         From values of the input, shape (n,), to margins, shape (limits, n).
     input_ : Input
-        The first input, counted in its size.
+        The first input, in units of its size.
     limits : sequence of Limit
-        What the margins belong to.
+        The limits of the margins.
     value : callable
         From an expression of dimensions to its value.
     places : callable
@@ -60,7 +62,7 @@ def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Calla
     ends = [end + math.tau * turn for limit in closed for end in _crank_ends(limit, value)
             for turn in range(int(input_.period))]
     if input_.turns:
-        # What follows a turn later may be another assembly: the arcs are then those of [-pi, pi].
+        # The linkage may be assembled differently a turn later: the arcs then end at -pi and pi.
         ends.append(input_.low)
     if any(x.margin.varies and x not in closed for x in limits):
         ends += [end for arc in input_.between(ends) for end in _limits(margins, *arc)]
@@ -72,23 +74,23 @@ def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Calla
 
 
 def _failing(margins: Callable, theta: Any) -> Any:
-    """Return the number of the first limit that is not kept, that of all where none is."""
+    """Return the index of the first violated limit, the number of limits if none is violated."""
     return _first_below(margins(np.ravel(theta))).reshape(np.shape(theta))
 
 
 def _first_below(values: np.ndarray) -> np.ndarray:
-    """Return for each column of margins the first row that is not kept, else their number."""
+    """Return the first row with a negative margin in each column, the number of rows if none."""
     with np.errstate(invalid='ignore'):
-        kept = values >= 0.0
-    return np.vstack([kept, np.zeros(kept.shape[1:], bool)]).argmin(axis=0)
+        satisfied = values >= 0.0
+    return np.vstack([satisfied, np.zeros(satisfied.shape[1:], bool)]).argmin(axis=0)
 
 
 def _limits(margins: Callable, lo: float, hi: float) -> List[float]:
     """
-    Return the values on an arc next to which a limit stops or starts to be the first not kept.
+    Return the values on an arc next to which the first violated limit changes.
 
-    What stands on a limited joint may be limited itself on part of a narrow arc: each arc that is
-    found is searched again.
+    A joint that depends on a limited one may itself be limited on part of a narrow arc: each arc
+    that is found is searched again.
     """
     ends = [lo, hi]
     for _ in range(ROUNDS):
@@ -112,9 +114,10 @@ def _limits(margins: Callable, lo: float, hi: float) -> List[float]:
 
 def _touches(margins: Callable, theta: np.ndarray, values: np.ndarray) -> np.ndarray:
     """
-    Return where margins come nearest to zero between samples, and ever denser towards there.
+    Return the values at which margins come nearest to zero between samples, and values around.
 
-    An arm that nearly vanishes there turns fast, and with it what hangs on it.
+    These get denser towards the nearest one: an arm that nearly vanishes there turns fast, and so
+    do the bodies that it carries.
     """
     row, place = np.nonzero(near_misses(values))
     sign = np.sign(values[row, place + 1])[:, None]
@@ -131,7 +134,7 @@ def _touches(margins: Callable, theta: np.ndarray, values: np.ndarray) -> np.nda
 
 
 def _trimmed(assembled: Callable, lo: float, hi: float) -> Arc:
-    """Return an arc whose ends can be assembled."""
+    """Return an arc shortened to ends at which the linkage can be assembled."""
     ends = np.array([lo, hi])
     beyond = ~assembled(ends)
     middle = np.full(np.count_nonzero(beyond), lo + INSIDE * (hi - lo))
@@ -157,16 +160,16 @@ def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
                    input_: Input = CRANK,
                    joined: Callable[[], bool] = lambda: True) -> List[Arc]:
     """
-    Return the arcs between values where reachability may change, in one where they touch.
+    Return the reachable arcs between values at which reachability may change.
 
-    They are joined across -pi and pi as well, unless that is not to be.
+    Arcs that touch are merged; those that touch across -pi and pi, if `joined` returns True.
     """
     parts = input_.between(ends)
-    held = [arc for arc in parts if bool(reachable(arc[0] + INSIDE * (arc[1] - arc[0])))]
-    if held == parts:
+    reached = [arc for arc in parts if bool(reachable(arc[0] + INSIDE * (arc[1] - arc[0])))]
+    if reached == parts:
         return [(input_.low, input_.high)]
     found: List[Arc] = []
-    for lo, hi in held:
+    for lo, hi in reached:
         if found and lo - found[-1][1] <= NARROWEST:
             found[-1] = found[-1][0], hi
         else:
@@ -184,7 +187,7 @@ def _crank_ends(limit: Limit, value: Callable) -> List[float]:
         return []
     start, end, turn = map(value, limit.ends[:3])
     tolerance = value(limit.tolerance)
-    # A gap of nothing but rounding is a limit that is touched, and may be all there is.
+    # A gap within rounding is a limit that is only touched; it may be the whole reach.
     start, end = (0.0 if abs(gap) <= tolerance else gap for gap in (start, end))
     if start * end > 0.0:
         return []

@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The inverse linkage: what is left of a linkage where outputs are given their values.
+The inverse linkage: a linkage driven by the values of its outputs.
 
-A joint angle that is given makes a crank of its link, a slide a carriage or a cylinder, a distance
-one more cylinder; a coordinate puts a joint on a carriage, two of them on two. What had been the
-inputs' motors are free joints. If that comes apart into dyads it is written down in joint lines,
-and each of its assembly modes is a linkage whose poses tell the inputs. Where outputs are seen
-from moving links alone, it may stand on any of its bodies instead of the ground.
+The value of a joint angle makes its link a crank, that of a slide a carriage or a cylinder, that
+of a distance one more cylinder. A coordinate puts a joint on a carriage, two coordinates on two.
+The motors of the inputs become free joints. If the result decomposes into dyads, it is written in
+joint lines, and the poses of each assembly mode give the inputs. If the outputs are measured
+between moving links only, any body can be its ground.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ if TYPE_CHECKING:
 
 # Two to the power of this many assembly modes at most.
 MOST_SIDES = 5
-# Of the linkage's size, what is at one place; and how often it is looked for a pose.
+# Points nearer than this fraction of the linkage's size coincide; poses tried to find one.
 NEAR, TRIES = 1e-9, 400
-# What a sum of angles of quarter turns [rad] is rounded to.
+# Rounding of a sum of angles of quarter turns [rad].
 EXACT = 4 * 2.0 ** -51
-# Assembly modes, in all turns, at most.
+# Maximum number of assembly modes in all turns.
 MOST_MODES = 64
 
 
@@ -60,10 +60,10 @@ class Mode(NamedTuple):
     linkage : Structure
         Its joints, as expressions of its own inputs.
     inputs : tuple of Real
-        The values [rad or m] of the inputs of the linkage itself in this mode; one that is an
-        output, too, is that argument of the program.
+        The values [rad or m] of the original linkage's inputs in this mode. An input that is also
+        an output is that argument of the program.
     rates : tuple of tuple of Real
-        For each input its rate by each output.
+        For each input, its rate by each output.
 
     """
 
@@ -81,19 +81,19 @@ class InverseLinkage(NamedTuple):
     lines : tuple of str
         Its joint lines [m].
     drives : dict
-        For each of its inputs, by what its line places and in the order of the lines: an output,
-        and the ratio and offset that make it the input's value.
+        By the joint that an input's line places, in the order of the lines: the output that
+        drives it, and the ratio and offset from that output to the input's value.
     branches : tuple of str
         The joints whose dyads have two sides.
     modes : tuple of Mode
         One for each choice of these sides.
     turns : tuple of tuple of float
-        For each input what may be added to what a mode tells [rad]: 0, and whole turns of what it
-        is read from, until all comes round.
+        For each input, the angles [rad] that may be added to its value in a mode: 0, and whole
+        turns of the link that it is read from, up to the input's period.
     given : dict
-        What stands for the inputs of the modes: outputs, as arguments of a program.
+        The inputs of the modes, as expressions of the outputs, which are arguments of a program.
     is_own : bool
-        Whether the linkage itself has no other side: then all modes are its own.
+        Whether the original linkage has no branches; all modes are then its own.
 
     """
 
@@ -106,24 +106,24 @@ class InverseLinkage(NamedTuple):
     is_own: bool = False
 
     def __str__(self) -> str:
-        said = {}
+        comments = {}
         for place, (name, ratio, offset) in self.drives.items():
-            said[place] = f'    # at {name}' if (ratio, offset) == (1.0, 0.0) else (
+            comments[place] = f'    # at {name}' if (ratio, offset) == (1.0, 0.0) else (
                 f'    # at {ratio:g} {name} {"-" if offset < 0.0 else "+"} {abs(offset):.6g}')
-        return '\n'.join(line + said.get(line.split()[0], '') for line in self.lines)
+        return '\n'.join(line + comments.get(line.split()[0], '') for line in self.lines)
 
 
 def _of_sketch(outputs: Names, sketch: _Sketch) -> InverseLinkage:
-    """Return the inverse linkage that a sketch has come to; raise ValueError if it is none."""
+    """Return the inverse linkage of a sketch; raise ValueError if the sketch is incomplete."""
     lines = joint_lines.parse(sketch.lines)
     used = {name for read in sketch.reads for end in read.ends for name in end.joints}
     for line in lines[::-1]:
         if used & {*line.names}:
-            used |= {*line.stands_on}
+            used |= {*line.depends_on}
     lines = [line for line in lines if used & {*line.names}]
     drives = {line.names[0]: sketch.driving[line.names[0]] for line in lines if line.drives}
     if sorted(name for name, *_ in drives.values()) != sorted(outputs):
-        raise ValueError('these outputs do not tell the inputs')
+        raise ValueError('the inputs do not depend on all of these outputs')
     branches, turns = joint_lines.branches(lines), tuple(read.turns for read in sketch.reads)
     if len(branches) > MOST_SIDES:
         raise ValueError(f'more than {2 ** MOST_SIDES} assembly modes')
@@ -134,7 +134,7 @@ def _of_sketch(outputs: Names, sketch: _Sketch) -> InverseLinkage:
         *drives.values()]) for signs in product((1, -1), repeat=len(branches)))
     given = [ratio * argument(outputs.index(name)) + offset
              for name, ratio, offset in drives.values()]
-    # An argument is told from others by its place.
+    # Each mode has arguments of its own.
     return InverseLinkage(design.joints, drives, tuple(branches), modes, turns, {
         leaf: value for mode in modes for leaf, value in zip(mode.linkage.built.arguments, given)})
 
@@ -158,9 +158,9 @@ def _mode(structure: Structure, outputs: Names, reads: Sequence[_Read],
 
 class _End(NamedTuple):
     """
-    How a body of the linkage lies in the inverse: two joints, and where they are on the body.
+    The position of a body in the inverse linkage: two joints, and their places on the body.
 
-    What does not move has none.
+    A fixed body has no joints.
     """
 
     joints: Tuple[str, ...]
@@ -168,7 +168,7 @@ class _End(NamedTuple):
 
 
 class _Read(NamedTuple):
-    """How an input is read: a link and its parent; its value is ratio * input + offset."""
+    """The joint from which an input is read: its link and parent; ratio * input + offset."""
 
     name: str
     ends: Tuple[_End, ...]
@@ -179,7 +179,7 @@ class _Read(NamedTuple):
 
 def taken_apart(linkage: Mechanism, outputs: Names) -> Optional[InverseLinkage]:
     """Return the inverse linkage for outputs, None where no closed form is known."""
-    # Joint lines have their lengths in metres.
+    # Lengths in joint lines are in metres.
     if linkage.value(UNIT) != 1.0 or len(set(outputs)) < len(outputs):
         return None
     pose = _pose(linkage)
@@ -201,7 +201,7 @@ def _pair(output: str) -> Optional[Tuple[str, ...]]:
 
 
 def _pose(linkage: Mechanism) -> Optional[Dict[str, float]]:
-    """Return all joint angles and coordinates in some pose that has nothing special."""
+    """Return all joint angles and coordinates in a generic pose, away from dead points."""
     names = (*linkage.joints, *(f'{point}.{axis}' for point in linkage.points for axis in 'xy'))
     pose = linkage.posed((), names)
     if len(linkage.inputs) > 1:
@@ -219,14 +219,14 @@ def _pose(linkage: Mechanism) -> Optional[Dict[str, float]]:
 
 class _Sketch(Dyads):
     """
-    The bodies of a linkage whose outputs are given, each as seen from its own link.
+    The bodies of a linkage driven by its outputs, each in the coordinates of its own link.
 
     Attributes
     ----------
     driving : dict
         By the joint that a line places: the output that drives it, its ratio and offset.
     reads : list of _Read
-        How each input of the linkage is read.
+        Where each input of the linkage is read.
 
     """
 
@@ -235,7 +235,7 @@ class _Sketch(Dyads):
         self._links = {link.name: link for link in linkage.links}
         self.driving: Dict[str, Tuple[str, float, float]] = {}
         self._scaled: Dict[str, Tuple[float, float]] = {}
-        self._noted: Optional[Tuple[str, float, float]] = None
+        self._pending_drive: Optional[Tuple[str, float, float]] = None
         self._named: Dict[str, Dict[str, complex]] = {}
         self._at: Dict[str, Tuple[complex, complex]] = {}
         slides: List[Slide] = []
@@ -266,7 +266,7 @@ class _Sketch(Dyads):
         size = max(size, linkage.longest)
         bodies = [*self._frames, *(body for pin in self._named.values() for body in pin),
                   *(body for each in (*slides, *motors) for body in each.bodies)]
-        # A joint of one body alone is only needed where an input is read from it.
+        # A joint on a single body is needed only if an input is read from it.
         read = {end for name in (*linkage.geared, *(input_.name for input_ in linkage.inputs))
                 if self._links[name].kind == 'prismatic'
                 for end in (self._links[name].joint, self._links[name].tip)}
@@ -283,7 +283,7 @@ class _Sketch(Dyads):
         return float(np.asarray(link.zero))
 
     def _motion(self, link: Link) -> Motor:
-        """Return how a link moves against its parent."""
+        """Return the motion of a link relative to its parent."""
         bodies, hangs = (link.parent, link.name), self._frames[link.parent][link.joint]
         if link.kind == 'revolute':
             return Hinge(bodies, (hangs, self._frames[link.name][link.joint]), 1.0,
@@ -295,18 +295,18 @@ class _Sketch(Dyads):
         return complex(self._pose[f'{joint}.x'], self._pose[f'{joint}.y'])
 
     def _pin(self, joint: str, body: str, turn: complex = 1.0 + 0.0j) -> str:
-        """Add a body that hangs on a joint, and return its name."""
+        """Add a body that turns about a joint, and return its name."""
         self._named[joint][body] = 0.0j
         self._at[body] = self._place(joint), turn
         return body
 
     def _guided(self, joint: str, body: str, base: str, axis: complex,
                 turn: complex = 1.0 + 0.0j) -> Slide:
-        """Let a joint run on a line through the origin of a body, which is turned in the pose."""
+        """Put a joint on a line through the origin of a body; `turn` is the body's direction."""
         return Slide((base, self._pin(joint, body, turn)), (0.0j, 0.0j), (axis, axis), body)
 
     def _add(self, output: str, slides: List[Slide], motors: List[Motor]) -> None:
-        """Add the bodies that an output which is no joint's is measured with."""
+        """Add the bodies that measure an output other than a joint's value."""
         if pair := _pair(output):
             first, second = pair
             apart = self._place(second) - self._place(first)
@@ -324,7 +324,7 @@ class _Sketch(Dyads):
             part = along.real if axis == 'x' else along.imag
             if (link.tip, link.parent, link.kind) == (joint, GROUND, 'prismatic') and \
                     abs(part) > NEAR and joint in self._frames[link.name]:
-                # A block on a line of the ground: its slide tells its coordinates.
+                # The slide of a block on a fixed line determines the block's coordinates.
                 start = self._frames[GROUND][link.joint] + along * self._frames[link.name][joint]
                 self._scaled[output] = part, start.real if axis == 'x' else start.imag
                 motion = next(slide for slide in slides if slide.joint == link.name)
@@ -333,7 +333,7 @@ class _Sketch(Dyads):
                 return
         body, along = f'{joint}.xy', 1.0 + 0.0j if axis == 'x' else 1j
         if body in self._named[joint]:
-            # The other coordinate has put it on a line: along that it is driven, too.
+            # The other coordinate has put it on a line; this one drives it along that line.
             other = next(slide for slide in slides if slide.bodies[1] == body)
             slides.remove(other)
             motors.append(other._replace(joint=output))
@@ -344,8 +344,8 @@ class _Sketch(Dyads):
 
     def _aimed(self, output: str, first: str, second: str, along: complex,
                slides: List[Slide]) -> Hinge:
-        """Return the motor that an angle of two joints makes, seen from the ground."""
-        # Bodies that never turn: the ground, and what carries a joint whose coordinates are given.
+        """Return the motor for the angle of two joints, relative to the ground."""
+        # Bodies that never turn: the ground, and carriages of joints with known coordinates.
         level = {joint: body for joint, pin in self._named.items()
                  for body in (GROUND, f'{joint}.xy') if body in pin}
         for body in self._named[first].keys() & self._named[second].keys() & self._frames.keys():
@@ -360,31 +360,31 @@ class _Sketch(Dyads):
                 slides.append(self._guided(end, f'{output} pin', body, 1.0 + 0.0j, turn))
                 return Hinge((level[start], body), (self._named[start][level[start]], 0.0j), 1.0,
                              0.0 if start == first else math.pi, output)
-        raise ValueError(f'{output} is seen from no joint that is known')
+        raise ValueError(f'neither joint of {output} is on a body that never turns')
 
-    def seen(self, body: str, place: complex) -> complex:
-        """Return where a place on a body is in the pose."""
+    def place_in_pose(self, body: str, place: complex) -> complex:
+        """Return a place on a body, in the coordinates of the pose."""
         if body in self._at:
             start, turn = self._at[body]
             return start + turn * place
         joint, origin = next(iter(self._frames[body].items()))
         return self._place(joint) + self._turns[body] * (place - origin)
 
-    def turned(self, body: str, along: complex) -> complex:
-        """Return a direction on a body as it is in the pose."""
+    def direction_in_pose(self, body: str, along: complex) -> complex:
+        """Return a direction on a body, in the coordinates of the pose."""
         return (self._at[body][1] if body in self._at else self._turns[body]) * along
 
-    def said(self, value: float) -> str:
-        """Return a length as it is."""
+    def length_text(self, value: float) -> str:
+        """Return a length with all its digits."""
         return repr(float(value) + 0.0)
 
     def quarters(self, start: float) -> Optional[int]:
-        """Return quarter turns: what is added to an angle would cost it its last digits."""
+        """Return 0 to 3 quarter turns: an offset added to the angle would cost its last digits."""
         quarters = round(start / (0.5 * math.pi))
         return quarters % 4 if abs(start - 0.5 * math.pi * quarters) < EXACT else None
 
-    def called(self, place: complex, body: str) -> str:
-        """Return the linkage's own name of a joint, or a new one."""
+    def new_name(self, place: complex, body: str) -> str:
+        """Return the linkage's own name of a joint, or a new name."""
         for name, pin in self._named.items():
             if body in pin and abs(pin[body] - place) < self.near:
                 return name
@@ -393,20 +393,20 @@ class _Sketch(Dyads):
                                       for letter in 'XYZUVW') if name not in taken)
 
     def name(self, place: complex, body: str, line: str) -> str:
-        """Write the line that places a joint, and return its name."""
+        """Add the line that places a joint, and return the joint's name."""
         name = super().name(place, body, line)
-        if self._noted:
-            self.driving[name], self._noted = self._noted, None
+        if self._pending_drive:
+            self.driving[name], self._pending_drive = self._pending_drive, None
         return name
 
     def drive(self, word: str, joint: Any, ratio: float, offset: float) -> Tuple[str, str]:
-        """Note an input."""
+        """Record an input, whose joint the next line places."""
         part, start = self._scaled.get(joint, (1.0, 0.0))
-        self._noted = joint, ratio / part, offset - ratio * start / part
+        self._pending_drive = joint, ratio / part, offset - ratio * start / part
         return self.number(word), ''
 
     def _read(self, by: int, input_: Input) -> _Read:
-        """Return how an input is read, from its own link or from one that is geared to it."""
+        """Return where an input is read: from its own link, or from one that is geared to it."""
         counted = self._linkage.period(by) == input_.period or not input_.turns
         for name in (input_.name, *(self._linkage.geared_to(by) if counted else ())):
             try:
@@ -414,14 +414,14 @@ class _Sketch(Dyads):
             except ValueError:
                 continue
             ratio, offset = (1.0, 0.0) if name == input_.name else self._linkage.gear(name, by)
-            held = name in self._outputs and name == input_.name
-            count = round(abs(ratio) * input_.period) if input_.turns and not held else 1
+            is_output = name in self._outputs and name == input_.name
+            count = round(abs(ratio) * input_.period) if input_.turns and not is_output else 1
             return _Read(name, ends, ratio, offset, tuple(
                 turn * math.tau / abs(ratio) for turn in range(count)))
         raise ValueError(f'{input_.name} is not placed')
 
     def _ends(self, link: Link) -> Tuple[_End, ...]:
-        """Return how an input's link and its parent lie."""
+        """Return the positions of an input's link and its parent."""
         if link.kind == 'revolute':
             return (self._end_of(link.name, cmath.rect(1.0, 0.0)),
                     self._end_of(link.parent, cmath.rect(1.0, self._zero(link))))
@@ -429,20 +429,20 @@ class _Sketch(Dyads):
             (link.name, link.tip), (link.parent, link.joint)))
         parent = self._links.get(link.parent)
         if parent and len(self._frames[parent.name]) == 1 and parent.kind == 'revolute':
-            # A barrel: as long as its ends are apart.
+            # A cylinder: its length is the distance of its ends.
             return _End(tip), _End(origin)
         along = cmath.rect(1.0, self._zero(link))
         return _End(tip), _End(origin), self._end_of(link.parent, along)
 
     def _joint(self, body: str, joint: str) -> str:
-        """Return a joint that the lines place; raise ValueError if they do not."""
+        """Return the name of a joint in the lines; raise ValueError if no line places it."""
         for name, at in self.on[body].items():
             if abs(at - self._frames[body][joint]) < self.near:
                 return name
         raise ValueError(f'{joint} is not placed')
 
     def _end_of(self, body: str, along: complex) -> _End:
-        """Return two joints that show how a body lies; places are seen along a direction."""
+        """Return two joints that give a body's angle, their places relative to a direction."""
         if body == self.ground:
             return _End((), (along,))
         if body not in self.parts:
@@ -454,7 +454,7 @@ class _Sketch(Dyads):
 
 def _input_of(built: Any, one: _End, other: _End, line: Optional[_End] = None) -> Tuple[
         Real, Sequence[Tuple[float, Complex]]]:
-    """Return the value of an input, and the vectors of which its angle is the sum."""
+    """Return the value of an input, and the signed vectors whose angles add up to it."""
     if one.places:
         relative, turning = Complex(1.0, 0.0), []
         for end, sign in ((one, 1.0), (other, -1.0)):
@@ -478,7 +478,7 @@ def _input_of(built: Any, one: _End, other: _End, line: Optional[_End] = None) -
 
 
 def _constant(value: complex) -> Complex:
-    """Return a direction; what rounding leaves of zero is zero."""
+    """Return a direction with parts next to 0 and +-1 set to these."""
     exact = [0.0 if abs(part) < 1e-16 else math.copysign(1.0, part)
              if abs(abs(part) - 1.0) < 1e-16 else part for part in (value.real, value.imag)]
     return Complex(*exact)

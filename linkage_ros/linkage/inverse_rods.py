@@ -4,8 +4,8 @@
 """
 The inverse of a linkage of rods: the same linkage, driven by its outputs.
 
-What were motors are then hinges that a rod places, on either side of its crank: there is an
-assembly mode for each choice of sides, the first as drawn.
+A rod then places each former motor, now a hinge, on either side of its crank. Each choice of sides
+is an assembly mode; the first is the one that is drawn.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def taken_apart(linkage: Mechanism, outputs: Names) -> Optional[InverseLinkage]:
         rods = tuple(turning_rods(design.lines, outputs))
         if len(rods) > MOST_SIDES:
             return None
-        # Drawn once: sides are arguments, too, until each mode has its own.
+        # Solved once for all modes: the sides are arguments here, and constants in each mode.
         structure = Structure(design, {**linkage.branches, **{
             rod: argument(n + i) for i, rod in enumerate(rods)}})
         values = [structure.output(input_.name) for input_ in linkage.inputs]

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Linkages written down: one line a joint, in the order they are placed.
+Linkages as text: one line per joint, in the order in which the joints are placed.
 
     O ground 0 0              a joint fixed to the ground at x y
     A crank O m [up]          on the crank circle of radius m about O, zero to the right [or up]
@@ -14,35 +14,35 @@ Linkages written down: one line a joint, in the order they are placed.
     P line A B d              on the line of bar AB, d from A; negative: on the other side of A
     B mirror O A C            mirror image of O in the line AC: the far corner of a kite
     C parallelogram B A D     corner opposite B of a parallelogram on the bars BA and BD
-    Q image P O H             ground joint where P is seen in the mirror line O -> H of the ground
-    M mirrored O H            all of the above once more in that mirror: AM is the image of A
+    Q image P O H             ground joint at the mirror image of P in the ground's line O -> H
+    M mirrored O H            mirror image of all lines above in O -> H: AM is the image of A
     B C D inversor P A a b    Peaucellier cell from pole P to pin A: long bars a, rhombus b
     L slot Q A e out d        tip, d from Q, of a lever about Q; A in its slot, e to its left
     S slider A r G p out      block on a line through G in direction p [rad], on a rod r from A
     S slider A r G along H out    the same on the line G -> H of any link
     Y yoke A G along H        block on the line G -> H whose slot, square to it, A runs in
     T block S x y             on the block of S, x ahead of it and y to its left
-    C antiparallelogram B A D     corner opposite B where the bars cross that a parallelogram has
+    C antiparallelogram B A D     corner opposite B of a parallelogram whose long bars cross
 
-What drives is an input, `crank`, `crank2`, `cylinder` and so on, or what its line ends in:
+Each driven joint is an input, called `crank`, `crank2`, `cylinder` and so on, or as its line says:
 
     B cylinder P O r left called boom
 
-A joint's name begins with a letter, and a letter, digit or underscore follows; so does a
-dimension's. `left` and `right` are as seen along the first two joints; `out` is the half of a slot
-on the tip's side, or the block ahead of the pin; `in` the other. A number is a length [m], an
-angle [rad], a dimension's name, or arithmetic on them without spaces: + - * / and parentheses,
-max(a,b), sqrt(a), `pi`, and for angles degrees: 30deg or (a+b)deg. It is zero or between 1e-70
-and 1e70; an angle beyond a turn is written with `deg` or `pi`. A dimension that is the length of
-a bar must be positive; one that is not may be zero or negative.
+The name of a joint or dimension is a letter, followed by letters, digits and underscores. `left`
+and `right` are as seen along the first two joints; `out` is the half of a slot on the tip's side,
+or the block ahead of the pin; `in` the other. A number is a length [m], an angle [rad], a
+dimension's name, or arithmetic on them without spaces: + - * / and parentheses, max(a,b), sqrt(a),
+`pi`, and for angles degrees: 30deg or (a+b)deg. It is zero or between 1e-70 and 1e70; an angle
+beyond a turn is written with `deg` or `pi`. A dimension that is the length of a bar must be
+positive; other dimensions may be zero or negative.
 
-A dyad keeps to its side of first -> second for as long as it can be assembled. Only where it is
-hung between a ground joint and a crank pin, and stretches or folds just as the crank passes the
-ground line (a change point: the longest and shortest of the four bars together as long as the
-other two), it goes on smoothly, which changes sides: a parallelogram stays a parallelogram. The
-side written is then the one at a crank angle of a quarter turn. So does the block of a slider hung
-on a crank pin where the rod stands upright on the line; `out` and `in` are then as they are where
-the pin is farthest along it. With one change point in a turn the linkage is the same again only
+A dyad stays on its side of first -> second as long as it can be assembled. The exception is a
+change point: a dyad between a ground joint and a crank pin stretches or folds just as the crank
+passes the ground line (the longest and shortest of the four bars together are as long as the other
+two). There it continues smoothly and changes sides: a parallelogram stays a parallelogram. Its
+line then has the side at a crank angle of a quarter turn. The block of a slider on a crank pin
+continues smoothly, too, where the rod is square to the line; `out` and `in` are then as they are
+where the pin is farthest along the line. A linkage with one change point in a turn repeats only
 after two turns: its crank angle counts beyond a turn.
 """
 
@@ -64,11 +64,11 @@ _WORDS = {'left': LEFT, 'right': RIGHT, 'out': 1.0, 'in': -1.0}
 _JOINTS = ('CENTRE', 'BASE', 'FIRST', 'SECOND', 'POINT', 'CORNER', 'POLE', 'PIN', 'PIVOT',
            'ORIGIN', 'JOINT', 'TOWARDS')
 _NUMBERS = ('X', 'Y', 'Z', 'U', 'V', 'W', 'LENGTH', 'DISTANCE', 'OFFSET', 'ANGLE', 'RATIO')
-# What is no length: its power of one.
+# Numbers that do not scale with lengths.
 _PLAIN = ('ANGLE', 'RATIO', 'U', 'V', 'W')
 
-# What follows each word, in the order its construction takes it; in brackets what may follow. The
-# words of INPUTS add an input each, unless it is geared to another.
+# The arguments of each word, in the order of its construction's parameters; options in brackets.
+# Each word of INPUTS adds an input, unless that is geared to another.
 FORMS = {
     'ground': ('ground X Y',),
     'crank': ('crank CENTRE LENGTH [up] [zero JOINT] [geared INPUT RATIO ANGLE] [called NAME]',),
@@ -93,20 +93,20 @@ FORMS = {
 }
 INPUTS = 'crank', 'cylinder', 'carriage'
 _NAME = re.compile(r'[A-Za-z][A-Za-z0-9_]{0,63}')
-# What a dimension cannot be called: words of arithmetic, and what `mechanisms.create` takes.
-_TAKEN = (*ARITHMETIC_WORDS, 'joints', 'tracer', 'branches')
-# What an input cannot be called: other links, and groups of parameters.
-_GROUPS = 'ground', 'dimensions', 'branches'
-# Letters in a line, and in what is said about it.
-_LONGEST, _SAID = 10000, 240
-# An angle [rad] beyond this was meant in degrees, unless it is written with `deg` or `pi`.
+# Reserved names of dimensions: words of arithmetic, and parameters of `mechanisms.create`.
+_RESERVED = (*ARITHMETIC_WORDS, 'joints', 'tracer', 'branches')
+# Reserved names of inputs: the ground, and groups of parameters.
+_RESERVED_INPUTS = 'ground', 'dimensions', 'branches'
+# Maximum number of letters of a line, and of an error message.
+_LONGEST, _LONGEST_ERROR = 10000, 240
+# A larger angle [rad] must be written with `deg` or `pi`: otherwise degrees were probably meant.
 _TURN = 6.2832
 
 formula = cached(1024)(Formula)
 
 
 class Argument(NamedTuple):
-    """What follows a word: its kind, as in a form, and the option that it belongs to, if any."""
+    """An argument of a word: its kind in the form, its text, and its option, if any."""
 
     kind: str
     text: str
@@ -114,18 +114,18 @@ class Argument(NamedTuple):
 
 
 class Line(NamedTuple):
-    """One construction: the joints it places, its word, and what follows the word."""
+    """One construction: the joints it places, its word, and the word's arguments."""
 
     text: str
     names: Tuple[str, ...]
     word: str
     args: Tuple[str, ...]
     arguments: Tuple[Argument, ...] = ()
-    # The ground joints of the mirror lines that it is an image in, one after the other.
+    # The ground joints of each mirror line in which it is an image, in order.
     mirrors: Tuple[Tuple[str, ...], ...] = ()
 
     @property
-    def stands_on(self) -> Tuple[str, ...]:
+    def depends_on(self) -> Tuple[str, ...]:
         """Return the joints that it is constructed from."""
         return tuple(arg.text for arg in self.arguments if arg.kind in _JOINTS)
 
@@ -137,8 +137,8 @@ class Line(NamedTuple):
             arg.option == 'geared' for arg in self.arguments)
 
     @property
-    def called(self) -> str:
-        """Return the name that it gives its input or what is geared; empty: the usual one."""
+    def input_name(self) -> str:
+        """Return the name of its input, which may be geared; empty for the default name."""
         return next((arg.text for arg in self.arguments if arg.kind == 'NAME'), '')
 
     @property
@@ -148,7 +148,7 @@ class Line(NamedTuple):
                      for kind, _, _ in self.arguments if '|' in kind), ())
 
     def numbers(self) -> Iterable[Tuple[str, Formula]]:
-        """Yield its numbers, each with its kind; raise ValueError for what is none."""
+        """Yield its numbers, each with its kind; raise ValueError for an invalid one."""
         for kind, text, _ in self.arguments:
             if kind in _NUMBERS:
                 try:
@@ -162,11 +162,11 @@ class Line(NamedTuple):
 
 
 def _error(line: str, problem: object) -> ValueError:
-    return ValueError(elided(f'joint line "{elided(line)}": {problem}', _SAID))
+    return ValueError(elided(f'joint line "{elided(line)}": {problem}', _LONGEST_ERROR))
 
 
 def _hint(args: Iterable[str]) -> str:
-    """Return what is to be said about a slip that is likely in any line."""
+    """Return a hint for a frequent mistake, or an empty text."""
     for arg in args:
         if arg.count('(') != arg.count(')') or arg[0] in '+*/,)' or arg[-1] in '+-*/(':
             return '; arithmetic has no spaces: 2*r, not 2 * r'
@@ -178,7 +178,7 @@ def _hint(args: Iterable[str]) -> str:
 
 
 def parse(texts: Iterable[str]) -> List[Line]:
-    """Return the lines of a linkage; raise ValueError with the line that cannot be."""
+    """Return the lines of a linkage; raise ValueError that names an invalid line."""
     lines: List[Line] = []
     for text in texts:
         line = parsed(text)
@@ -188,34 +188,34 @@ def parse(texts: Iterable[str]) -> List[Line]:
 
 
 def _mirrored(lines: List[Line], mirror: Line) -> List[Line]:
-    """Return the images of lines in a mirror line: what stands on that alone is its own image."""
-    own = set(mirror.stands_on)
+    """Return the images of lines in a mirror line; lines placed from it alone have none."""
+    own = set(mirror.depends_on)
     count: Dict[str, int] = {}
     found = []
     for line in lines:
-        count[line.word] = count.get(line.word, 0) + (not line.called)
-        if own >= {*line.names} or line.stands_on and own >= {*line.stands_on} \
+        count[line.word] = count.get(line.word, 0) + (not line.input_name)
+        if own >= {*line.names} or line.depends_on and own >= {*line.depends_on} \
                 and line.word in ('line', 'carriage'):
             own |= {*line.names}
             continue
         if line.word == 'ground':
             found.append(parsed(f'{line.names[0]}{mirror.names[0]} image {line.names[0]} '
-                                f'{" ".join(mirror.stands_on)}')._replace(text=mirror.text))
+                                f'{" ".join(mirror.depends_on)}')._replace(text=mirror.text))
             continue
         args = [_image(line.word, arg, '' if arg.text in own else mirror.names[0])
                 for arg in line.arguments if arg.option not in ('geared', 'called')]
         if line.word in INPUTS:
             number = count[line.word] if count[line.word] > 1 else ''
             ratio = -1 if line.word == 'crank' else 1
-            args += [f'geared {line.called or line.word + str(number)} {ratio} 0']
+            args += [f'geared {line.input_name or line.word + str(number)} {ratio} 0']
         names = [name + mirror.names[0] for name in line.names[::-1]]
         found.append(parsed(f'{" ".join(names)} {line.word} {" ".join(args)}')._replace(
-            text=mirror.text, mirrors=(*line.mirrors, mirror.stands_on)))
+            text=mirror.text, mirrors=(*line.mirrors, mirror.depends_on)))
     return found
 
 
 def _image(word: str, arg: Argument, suffix: str) -> str:
-    """Return what stands for an argument in the image of a line."""
+    """Return the text of an argument in the image of a line."""
     if arg.kind in _JOINTS:
         text = arg.text + suffix
     elif arg.kind == 'left|right':
@@ -236,38 +236,40 @@ def parsed(text: str, forms: Mapping[str, Tuple[str, ...]] = FORMS) -> Line:
     if not found:
         for part in parts[1:]:
             if near := meant(part, forms):
-                raise _error(text, f'{quoted(part)} is no construction{near}')
+                raise _error(text, f'unknown construction {quoted(part)}{near}')
         raise _error(text, f'expected NAME and one of the constructions {", ".join(forms)}')
     at = found[0]
     line = Line(text, tuple(parts[:at]), parts[at], tuple(parts[at + 1:]))
     names = 3 if line.word == 'inversor' else 1
     fitting = [arguments for form in forms[line.word]
-               if (arguments := _fitted(form, line.args)) is not None]
+               if (arguments := _matched(form, line.args)) is not None]
     if len(line.names) != names or not fitting:
-        several = '; one line a joint' if len(found) > 1 else ''
+        several = '; one line per joint' if len(found) > 1 else ''
         expected = ' or '.join(f'"{"NAME " * names}{form}"' for form in forms[line.word])
         raise line.error(f'expected {expected}{several}')
     line = line._replace(arguments=tuple(fitting[-1]))
     for name in line.names:
         if not _NAME.fullmatch(name) or name in forms:
-            raise line.error(f'{quoted(name)} is no name for a joint: a letter, then up to 63 '
-                             'letters, digits and underscores, but none of the constructions')
-    if line.called and (not _NAME.fullmatch(line.called) or line.called in _GROUPS):
-        raise line.error(f'{quoted(line.called)} is no name for an input: a letter, then up to 63 '
-                         f'letters, digits and underscores, but not {", ".join(_GROUPS)}')
+            raise line.error(f'{quoted(name)} cannot name a joint: a name is a letter, then up to '
+                             '63 letters, digits and underscores, but not a construction')
+    if line.input_name and (
+            not _NAME.fullmatch(line.input_name) or line.input_name in _RESERVED_INPUTS):
+        raise line.error(f'{quoted(line.input_name)} cannot name an input: a name is a letter, '
+                         'then up to 63 letters, digits and underscores, but not '
+                         f'{", ".join(_RESERVED_INPUTS)}')
     for kind, arg, _ in line.arguments:
         if '|' in kind and arg not in kind.split('|'):
             raise line.error(f'{quoted(arg)} must be {kind.replace("|", " or ")}')
     for kind, number in line.numbers():
         if 'deg' in number.words and kind != 'ANGLE':
-            raise line.error(f'{quoted(number.text)} is in degrees, but {kind} is no angle')
+            raise line.error(f'{quoted(number.text)} is in degrees, but {kind} is not an angle')
         if not number.names:
             _check_number(line, kind, number, {})
     return line
 
 
-def _fitted(form: str, args: Tuple[str, ...]) -> Optional[List[Argument]]:
-    """Return what follows a word as a form has it; None if it does not fit."""
+def _matched(form: str, args: Tuple[str, ...]) -> Optional[List[Argument]]:
+    """Return a word's arguments according to a form; None if they do not match it."""
     required, *options = re.split(r' *\[|\] *\[', form.rstrip(']'))
     _, *kinds = required.split()
     if len(args) < len(kinds) or any(_is_literal(kind) and kind != arg
@@ -285,7 +287,7 @@ def _fitted(form: str, args: Tuple[str, ...]) -> Optional[List[Argument]]:
 
 
 def _is_literal(kind: str) -> bool:
-    """Return whether a part of a form stands for itself."""
+    """Return whether a part of a form is written literally."""
     return kind.islower() and '|' not in kind
 
 
@@ -293,9 +295,9 @@ def _check_order(lines: List[Line]) -> None:
     """Raise ValueError unless every joint is placed once, from joints placed before it."""
     placed: Dict[str, Line] = {}
     for line in lines:
-        if len(set(line.stands_on)) < len(line.stands_on):
-            raise line.error('the joints it stands on must differ')
-        for joint in line.stands_on:
+        if len(set(line.depends_on)) < len(line.depends_on):
+            raise line.error('the joints that it is placed from must differ')
+        for joint in line.depends_on:
             if joint not in placed:
                 raise line.error(_missing(lines, line, joint, placed))
         for name in line.names:
@@ -305,7 +307,7 @@ def _check_order(lines: List[Line]) -> None:
 
 
 def _missing(lines: List[Line], line: Line, joint: str, placed: Mapping[str, Line]) -> str:
-    """Return why a line cannot stand on a joint that is not placed before it."""
+    """Return why a joint that a line needs is not placed before it."""
     places = {name: each for each in lines for name in each.names}
     if joint not in places or joint in line.names:
         return (f'joint {elided(joint)} is not placed before; there are: {listed(placed)}'
@@ -313,18 +315,18 @@ def _missing(lines: List[Line], line: Line, joint: str, placed: Mapping[str, Lin
     after: Dict[str, Optional[str]] = {joint: None}
     waiting = [joint]
     for name in waiting:
-        for needed in places[name].stands_on:
+        for needed in places[name].depends_on:
             if needed in line.names:
-                return (f'joints {listed((needed, *_way(after, name)))} wait for each other: only '
-                        'groups of two bars, dyads, can be solved, one after the other, not Assur '
-                        'groups of class III, such as a platform on three bars')
+                return (f'joints {listed((needed, *_chain(after, name)))} depend on each other: '
+                        'only dyads, groups of two bars, can be solved, one after another, not '
+                        'Assur groups of class III, such as a platform on three bars')
             if needed in places and needed not in placed and needed not in after:
                 after[needed] = name
                 waiting.append(needed)
     return f'joint {joint} is placed later, in line {lines.index(places[joint]) + 1}: move it up'
 
 
-def _way(after: Mapping[str, Optional[str]], name: Optional[str]) -> Iterable[str]:
+def _chain(after: Mapping[str, Optional[str]], name: Optional[str]) -> Iterable[str]:
     while name:
         yield name
         name = after[name]
@@ -332,7 +334,7 @@ def _way(after: Mapping[str, Optional[str]], name: Optional[str]) -> Iterable[st
 
 def _check_number(line: Line, kind: str, number: Formula, dimensions: Mapping,
                   fixed: bool = False) -> None:
-    """Raise ValueError if a number is not what its kind can be, for dimensions or arrays."""
+    """Raise ValueError if a number is invalid for its kind, with dimensions or arrays of them."""
     value = number.value(dimensions)
     if not np.all(np.isfinite(value)):
         raise line.error(f'{quoted(number.text)} is not finite')
@@ -350,10 +352,10 @@ def _check_number(line: Line, kind: str, number: Formula, dimensions: Mapping,
 
 
 def check_numbers(lines: Iterable[Line], dimensions: Mapping) -> None:
-    """Raise ValueError, with its line, for a number that cannot be, for dimensions or arrays."""
+    """Raise ValueError that names the line of an invalid number, for dimensions or arrays."""
     fixed = has_literal_lengths(lines)
     if not fixed:
-        # Counted in a power of two, which changes no digit, no product is too large or small.
+        # A unit that is a power of two changes no digit, and no product overflows or underflows.
         longest = max((np.max(np.abs(length)) for length in dimensions.values()), default=1.0)
         unit = 2.0 ** np.frexp(longest)[1]
         dimensions = {name: length / unit for name, length in dimensions.items()}
@@ -374,11 +376,11 @@ def points(lines: Iterable[Line]) -> List[str]:
     return [name for line in lines for name in line.names]
 
 
-def check_name(called: str) -> None:
-    """Raise ValueError if a dimension cannot be called so."""
-    if not isinstance(called, str) or not _NAME.fullmatch(called) or called in _TAKEN:
-        raise ValueError(f'no dimension can be called {quoted(called)}: a letter, then up to '
-                         f'63 letters, digits and underscores, but not {", ".join(_TAKEN)}')
+def check_name(name: str) -> None:
+    """Raise ValueError if a name is not valid for a dimension."""
+    if not isinstance(name, str) or not _NAME.fullmatch(name) or name in _RESERVED:
+        raise ValueError(f'{quoted(name)} cannot name a dimension: a name is a letter, then up to '
+                         f'63 letters, digits and underscores, but not {", ".join(_RESERVED)}')
 
 
 def lengths(lines: Iterable[Line]) -> dict:
@@ -392,7 +394,7 @@ def lengths(lines: Iterable[Line]) -> dict:
 
 
 def has_literal_lengths(lines: Iterable[Line]) -> bool:
-    """Return whether any length does not grow as the dimensions do, or an angle does."""
+    """Return whether any length does not scale with the dimensions, or an angle does."""
     return any(number.degree not in (None, 0 if kind in _PLAIN else 1)
                for line in lines for kind, number in line.numbers())
 
@@ -418,7 +420,7 @@ def draw(builder: Builder, lines: Iterable[Line], symbols: Mapping[str, Real],
 
 def _value(line: Line, arg: Argument, symbols: Mapping[str, Real],
            signs: Mapping[str, int]) -> Union[str, Real, float, bool]:
-    """Return what a construction takes for one word of its line."""
+    """Return the value that a construction takes for an argument of its line."""
     if arg.kind in _NUMBERS:
         return formula(arg.text).expression(symbols)
     if '|' in arg.kind:

@@ -53,14 +53,14 @@ def _nearest_sample(linkage: Mechanism, joint: str, goal: np.ndarray, present: f
 
 def _descended(linkage: Mechanism, joint: str, goal: np.ndarray, value: np.ndarray,
                low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Return a local minimum of the distance between the ends of the inputs (Gauss-Newton)."""
+    """Return the inputs within their ends at a local minimum of the distance (Gauss-Newton)."""
     single = len(value) == 1
     sizes = np.array([input_.size for input_ in linkage.inputs])
 
-    def seen(inputs: np.ndarray) -> np.ndarray:
+    def gap_at(inputs: np.ndarray) -> np.ndarray:
         return goal - linkage.solve(inputs[0] if single else inputs, (joint,))[joint]
 
-    gap = seen(value)
+    gap = gap_at(value)
     for _ in range(GAUSS_NEWTON_STEPS):
         rates = np.stack([linkage.velocity(value[0] if single else value, (joint,), i)[joint]
                           for i in range(len(value))], axis=1) * sizes
@@ -74,9 +74,9 @@ def _descended(linkage: Mechanism, joint: str, goal: np.ndarray, value: np.ndarr
         step[~free] = 0.0
         for part in 0.5 ** np.arange(STEP_HALVINGS):
             tried = np.clip(value + part * step * sizes, low, high)
-            if np.hypot(*seen(tried)) < np.hypot(*gap):
+            if np.hypot(*gap_at(tried)) < np.hypot(*gap):
                 break
         else:
             break
-        value, gap = tried, seen(tried)
+        value, gap = tried, gap_at(tried)
     return value

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How far the inputs and the joints of a linkage go, for limits of a robot model."""
+"""Ranges of the inputs and the joints of a linkage, for the limits of a robot model."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .inputs import Arc
 from .mechanism import Mechanism
 from .walker import Assembly
 
-# What is added to each end of a travel, in parts of a radian or of the longest bar.
+# Margin at each end of a travel: [rad], for a slide as a fraction of the longest bar.
 SLACK = 1e-6
 
 Travel = Tuple[float, float]
@@ -32,7 +32,7 @@ def common_reach(assembly: Assembly) -> Sequence[Arc]:
 
 
 def ground_frame(linkage: Mechanism) -> Dict[str, Tuple[float, float]]:
-    """Return where the joints on the ground lie [m]."""
+    """Return the places (x, y) of the joints on the ground [m]."""
     return linkage.cache.get_or_make('ground', lambda: {
         name: tuple(place.ravel().tolist()) for name, place in linkage.solve(
             [0.0] * len(linkage.inputs), linkage.grounded).items()})
@@ -40,22 +40,22 @@ def ground_frame(linkage: Mechanism) -> Dict[str, Tuple[float, float]]:
 
 def travels(linkage: Mechanism, reach: Sequence[Arc]) -> Dict[str, Optional[Travel]]:
     """
-    Return how far each joint goes, the inputs left out.
+    Return the travel of each joint except the inputs.
 
     Parameters
     ----------
     linkage : Mechanism
-        What moves.
+        The linkage.
     reach : sequence of (float, float)
         Arcs of its input [rad or m].
 
     Returns
     -------
     dict
-        For each joint (lo, hi) [rad; a slide: m] that hold every value of `joint_angles`, no more
-        than SLACK beyond it; None for a joint that turns past +-pi. Where there are several
-        inputs, the reach of one depends on the others: then this is None for each joint that
-        turns, and for a slide more than any pose needs.
+        For each joint the bounds (lo, hi) of its values in `joint_angles` [rad; a slide: m],
+        wider by SLACK at most; None for a joint that turns past +-pi. With several inputs the
+        reach of one depends on the others: then None for each joint that turns, and bounds wider
+        than any pose for a slide.
 
     """
     inputs = {input_.name for input_ in linkage.inputs}
@@ -77,7 +77,7 @@ def travels(linkage: Mechanism, reach: Sequence[Arc]) -> Dict[str, Optional[Trav
 
 
 def _farthest(linkage: Mechanism) -> float:
-    """Return a length [m] that no two joints are ever apart."""
+    """Return an upper bound of the distance between any two joints [m]."""
     return float(sum(linkage.bar_lengths.values())
                  + sum(input_.high for input_ in linkage.inputs if not input_.turns)
                  + np.abs(list(ground_frame(linkage).values())).sum())

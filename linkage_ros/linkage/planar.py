@@ -4,10 +4,10 @@
 """
 Constructions in the plane, each written once for poses, arrays, rates and the accelerator.
 
-Points and vectors are `Complex`, lengths and angles `Real`. A construction that stands on two
-points takes the `Arm` between them: the vector, its square, and how far that is from the square
-of a radius. Where an arm runs from the ground to a crank pin these come from half-angle forms,
-which keep every digit at dead points and reach limits; elsewhere from coordinates.
+Points and vectors are `Complex`, lengths and angles `Real`. A construction on two points takes the
+`Arm` between them: the vector, its square, and the margin between that square and the square of a
+radius. For an arm from the ground to a crank pin these are half-angle forms, which keep every
+digit at dead points and reach limits; for other arms they are formed from coordinates.
 
 With theta' the crank angle from the ground line (foot to crank centre), g the ground line, m the
 crank, s = sin(theta'/2) and h = cos(theta'/2), the arm w and its square are, in the line's frame,
@@ -49,7 +49,7 @@ from ..formula.expression import (
 
 LEFT, RIGHT = 1.0, -1.0
 
-# A limit that is hit up to rounding counts as reached: eight half ulps of the scale.
+# A margin counts as zero within rounding: eight half ulps of the scale.
 TOLERANCE = 8 * 2.0 ** -53
 
 
@@ -58,7 +58,7 @@ class Crank:
     """
     A crank: its centre, length [m], direction of the angle zero, and the angle [rad].
 
-    That of a mirror image turns backwards.
+    The crank of a mirror image turns backwards.
     """
 
     centre: Complex
@@ -75,7 +75,7 @@ class Crank:
 
 
 class CrankEnds(NamedTuple):
-    """A crank's angles theta where start cos^2 + end sin^2 of (theta + turn) / 2 vanishes."""
+    """The crank angles theta at which start cos^2 + end sin^2 of (theta + turn) / 2 vanishes."""
 
     start: Real
     end: Real
@@ -84,7 +84,7 @@ class CrankEnds(NamedTuple):
 
 
 def unit(vector: Complex) -> Complex:
-    """Return the direction of a vector of constant length, itself as long as one exactly."""
+    """Return the unit vector along a vector of constant length, with its spin."""
     along = vector.direction()
     return with_spin(along, spin(vector)) if along.x.varies else along
 
@@ -97,8 +97,8 @@ def turned(along: Complex, theta: Real, length: Real) -> Complex:
 
 
 def on_line(along: Complex, place: Real) -> Complex:
-    """Return what is so far along a direction; where that has no value, neither part has one."""
-    # A product with zero is left out, and with it that it has no value.
+    """Return the vector of a length along a direction; both parts are NaN where the length is."""
+    # Generated code omits products with zero, which would carry the NaN.
     return Complex(*(gated(part * place, abs(place), real(0.0)) if part.value == 0.0
                      else part * place for part in (along.x, along.y)))
 
@@ -107,8 +107,8 @@ class Limit(NamedTuple):
     """
     A margin that is negative, by more than the tolerance, where a linkage cannot be assembled.
 
-    That of a crank arm vanishes at `ends`, and `smooth` is its root with the sign that carries on
-    through a change point.
+    The margin of a crank arm vanishes at `ends`, and `smooth` is its root, whose sign continues
+    smoothly through a change point.
     """
 
     margin: Real
@@ -122,24 +122,24 @@ class Limit(NamedTuple):
 
 
 class Arm:
-    """The arm between two points that both move, of constant length where that is given."""
+    """The arm between two moving points; a given length is constant."""
 
     def __init__(self, foot: Complex, vector: Complex, span: Real, length: Optional[Real] = None):
         self.foot = foot
         self.vector = vector
-        # A constant tells nothing of a point that cannot be assembled.
+        # A constant would have a value even where the points cannot be assembled.
         self.square = vector.squared() if length is None else gated(
             square(length), abs(vector.x), real(0.0))
         self._span, self._length = span, length
 
     @property
     def length(self) -> Optional[Real]:
-        """Its length, if that is constant."""
+        """Its length, if constant."""
         return self._length
 
-    def offset(self, point: Complex, seen: Complex) -> Real:
-        """Return the cross product of the arm and a point as seen from its foot."""
-        return cross(self.vector, seen)
+    def offset(self, point: Complex, relative: Complex) -> Real:
+        """Return the cross product of the arm and a point relative to its foot."""
+        return cross(self.vector, relative)
 
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
@@ -150,11 +150,11 @@ class Arm:
         return self._limit(radius, size, -1.0, self.square - square(radius))
 
     def stroke(self, first: Real, second: Real, size: Real) -> Tuple[Limit, Limit]:
-        """Return what `within` their sum and `beyond` their difference do; first varies."""
+        """Return `within` of their sum and `beyond` of their difference; first varies."""
         length = self._length
         if length is None:
             return self.within(first + second, size), self.beyond(first - second, size)
-        # What varies comes last, for what comes next to nothing by that is exact.
+        # The varying length is added last: a sum that it brings next to zero is exact.
         (near, near_lost), (far, far_lost) = sum_and_lost(second, -length), \
             sum_and_lost(second, length)
         margins = (((first + near) + near_lost) * (first + far),
@@ -173,8 +173,8 @@ class Arm:
 
     def _limit(self, radius: Real, size: Real, sign: float, margin: Real) -> Limit:
         margin = self._with_rate(margin, radius, sign)
-        # At the limit the length is the radius: the square moves by that times what lengths do.
-        # A tolerance is a constant: where a cylinder makes the radius, it is no longer than size.
+        # At the limit the length is the radius: an error of a length changes the square by the
+        # radius times that error. A tolerance is constant: size bounds a radius that varies.
         bound = (self._length or size) if radius.varies else abs(radius)
         return Limit(margin, TOLERANCE * bound * (size + self._span))
 
@@ -199,7 +199,7 @@ class CrankArm(Arm):
         vector = Complex(
             with_rate(vector.x, crank.angle, formula=lambda rate: -(rate * bar.y)),
             with_rate(vector.y, crank.angle, formula=lambda rate: rate * bar.x))
-        # An arm of two equal lengths bisects them, and still does where it has no length.
+        # The arm between two equal lengths bisects them, also where it has no length itself.
         turning = where(self._is_isosceles, 0.5,
                         m * ((m - g) + 2.0 * g * square(h)) / self.square)
         vector.spin = Rate((crank.angle,), lambda rate: rate * turning)
@@ -209,9 +209,9 @@ class CrankArm(Arm):
     def _is_isosceles(self) -> Real:
         return abs(self._g - self._m) <= 0.0
 
-    def offset(self, point: Complex, seen: Complex) -> Real:
-        """Return the cross product of the arm and a point as seen from its foot."""
-        return self._area if point is self._crank.centre else super().offset(point, seen)
+    def offset(self, point: Complex, relative: Complex) -> Real:
+        """Return the cross product of the arm and a point relative to its foot."""
+        return self._area if point is self._crank.centre else super().offset(point, relative)
 
     def across(self, point: Complex, offset: Real) -> Complex:
         """Return the vector from a point of this offset to its mirror image in the arm's line."""
@@ -241,8 +241,8 @@ class CrankArm(Arm):
         """
         Return the vector from a corner of an antiparallelogram to the opposite one.
 
-        Its bars first and second [m] from that corner end at the arm's end and its foot. Both are
-        the parallel sides of a trapezoid, whose product is |first^2 - second^2|.
+        The bars first and second [m] go from that corner to the arm's end and to its foot. Vector
+        and arm are the parallel sides of a trapezoid; their product is |first^2 - second^2|.
         """
         power = gated((first - second) * (first + second), self.square, real(0.0))
         return self.vector * (power / self.square)
@@ -250,7 +250,7 @@ class CrankArm(Arm):
     def _half_angle_limit(self, radius: Real, size: Real, sign: float, start: Real,
                           end: Real) -> Limit:
         gm, s, h = 4.0 * self._g * self._m, self._s, self._h
-        # The smaller gap is the one next to which the margin can vanish.
+        # The margin can vanish only next to the smaller gap.
         margin = where(abs(start) <= abs(end), start + sign * gm * square(s),
                        end - sign * gm * square(h))
         margin = self._with_rate(margin, radius, sign)
@@ -263,10 +263,10 @@ class CrankArm(Arm):
 
     def beyond_kite(self, k: Real) -> Complex:
         """
-        Return pin + k (pin - image), the image being the crank centre's in the line of the arm.
+        Return pin + k (pin - image), where image mirrors the crank centre in the arm's line.
 
-        The cross component is one product: next to a cusp, where its leading terms cancel, it
-        keeps every digit.
+        The component across the ground line is one product, which keeps every digit next to a
+        cusp, where the leading terms of a sum cancel.
         """
         g, m, s, sin = self._g, self._m, self._s, 2.0 * self._s * self._h
         lead = (g + m) * ((g + m) + k * (m - g))
@@ -282,7 +282,7 @@ class CrankArm(Arm):
         return where(-TOLERANCE <= self._turn.x, ahead, beyond)
 
     def inverse_of_isosceles(self) -> Optional[Complex]:
-        """Return 1 / conjugate(arm) where foot and pin are as far from the centre, else None."""
+        """Return 1 / conjugate(arm) if foot and pin are equally far from the centre, or None."""
         if self._g is not self._m:
             return None
         return self._along * Complex(1.0, self._s / self._h) / (2.0 * self._m)
@@ -304,7 +304,7 @@ def _half_angle(theta: Real, turn: Complex) -> Tuple[Real, Real]:
 
 
 class Dyad(NamedTuple):
-    """Two bars that meet in a joint: the bars from each end to it, and what limits them."""
+    """Two bars that meet in a joint: the vector from each end to the joint, and the limits."""
 
     first: Complex
     second: Complex
@@ -317,16 +317,16 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) 
 
     The joint is foot + w (u + i v) with u = 1/2 + (r1 - r2)(r1 + r2) / 2|w|^2 and
     v = side sqrt((r1 + r2)^2 - |w|^2) sqrt(|w|^2 - (r1 - r2)^2) / 2|w|^2; left of the arm for
-    side = +1. At a change point of a crank arm the branch goes on smoothly if `smooth`.
+    side = +1. At a change point of a crank arm the branch continues smoothly if `smooth`.
     """
     radius = first + second
     limits = arm.within(radius, radius), arm.beyond(first - second, radius)
     v = _height(arm, limits, side, smooth)
-    skew = _known_with(v, arm.vector, (first - second) * radius / (2.0 * arm.square))
+    skew = _nan_with(v, arm.vector, (first - second) * radius / (2.0 * arm.square))
     u, turning = 0.5 + skew, spin(arm.vector)
 
     def bar(along: Real, length: Real) -> Complex:
-        """Return the bar along + i v on the arm, which adds its own turning to the arm's."""
+        """Return the bar (along + i v) times the arm, whose spin it adds to its own."""
         return with_spin(arm.vector * Complex(along, v), Rate(
             (v, skew, *turning.of), lambda dv, dskew, *rates: turning.formula(*rates) + (
                 (along * dv - v * dskew) * arm.square / square(length))))
@@ -335,19 +335,19 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) 
 
 
 def _height(arm: Arm, limits: Sequence[Limit], side: float, smooth: bool) -> Real:
-    """Return how far the joint of a dyad is to the left of its arm, as a part of that."""
+    """Return the distance of a dyad's joint to the left of its arm, in lengths of the arm."""
     within, beyond = (x.smooth if smooth and x.smooth else x.root() for x in limits)
     return within * beyond / (2.0 * arm.square) * side
 
 
 def extended(arm: Arm, first: Real, second: Real, side: float, longest: Real) -> Dyad:
     """
-    Return the dyad whose first bar is a cylinder c, up to `longest` [m]; of that the direction.
+    Return the dyad whose first bar is a cylinder c, up to `longest` [m], as a unit vector.
 
-    With a bar r, u = (|w|^2 - r^2 + c^2) / 2|w|^2; r^2 is taken off the larger of the other two,
-    which leaves a part that the third side bounds. As the cylinder grows, both turn by c / (v
-    |w|^2) for each metre, the barrel by (1 - (|w|^2 - r^2) / c^2) / 2 of that: nothing cancels
-    where the bar is as long as the arm, and c and v vanish together.
+    With a bar r, u = (|w|^2 - r^2 + c^2) / 2|w|^2. There r^2 is subtracted from the larger of the
+    other two squares; the third side bounds the difference. For each metre of the cylinder the
+    bar turns by c / (v |w|^2), and the barrel by (1 - (|w|^2 - r^2) / c^2) / 2 of that. Nothing
+    cancels where the bar is as long as the arm, and c and v vanish together.
     """
     limits = arm.stroke(first, second, longest + second)
     length = arm.length
@@ -356,11 +356,11 @@ def extended(arm: Arm, first: Real, second: Real, side: float, longest: Real) ->
     v = _height(arm, limits, side, False)
     twice = where(square(first) <= arm.square, power + square(first),
                   (first - second) * (first + second) + arm.square)
-    u = _known_with(v, arm.vector, twice / (2.0 * arm.square))
+    u = _nan_with(v, arm.vector, twice / (2.0 * arm.square))
     growth, turning = _growth(arm, first, second, v), spin(arm.vector)
 
     def with_growing(bar: Complex, grown: Real, widened: Real) -> Complex:
-        """Add to the arm's turning a bar's, as the cylinder grows and the arm's square does."""
+        """Add a bar's spin to the arm's, from the rates of the cylinder and the arm's square."""
         return with_spin(bar, Rate(
             (first, arm.square, *turning.of), lambda dc, dw, *rates: turning.formula(*rates) - (
                 growth * (dc * grown + dw * widened / (4.0 * first * arm.square)))))
@@ -373,10 +373,10 @@ def extended(arm: Arm, first: Real, second: Real, side: float, longest: Real) ->
 
 def _growth(arm: Arm, first: Real, second: Real, v: Real) -> Real:
     """
-    Return how a cylinder's growing turns the other bar of its dyad: c / (v |w|^2).
+    Return the rotation of the other bar of a dyad per metre of its cylinder: c / (v |w|^2).
 
-    On an arm of constant length d that hardly changes where c and v vanish together, as they do
-    where the bar r is as long: what it changes by has nothing that cancels.
+    On an arm of constant length d, c and v vanish together if the bar r is as long as the arm.
+    The quotient hardly changes there; nothing cancels in the form of its rate.
     """
     growth = first / (v * arm.square)
     if (d := arm.length) is None:
@@ -387,9 +387,9 @@ def _growth(arm: Arm, first: Real, second: Real, v: Real) -> Real:
         - square(apart[0]) / (first * (first - apart[0]) * (first + apart[0]))))
 
 
-def _known_with(other: Real, vector: Complex, part: Real) -> Real:
-    """Return one part of a factor of a vector, NaN where the other is, for the product to be."""
-    # A product with zero is left out, and with it that it has no value.
+def _nan_with(other: Real, vector: Complex, part: Real) -> Real:
+    """Return one part of a factor of a vector, NaN where the other is, as their product is."""
+    # Generated code omits products with zero, which would carry the NaN.
     axial = 0.0 in (vector.x.value, vector.y.value)
     return gated(part, abs(other), real(0.0)) if axial else part
 
@@ -414,9 +414,9 @@ def mirror(arm: Arm, point: Complex, offset: Real, ends: Sequence[Complex],
     """
     Return the mirror image of a point in the line of an arm, and the bars from both ends to it.
 
-    The point's offset from the arm and, for each end of it, its foot first, the bar to the point
-    are given, and the image where it is known in a better way; a bar's image turns twice as fast
-    as the arm, less what the bar itself turns.
+    `offset` is the point's offset from the arm. `ends` are the bars to the point from the arm's
+    foot and from its end. `image` is a more accurate form of the image, if there is one. The spin
+    of a bar's image is twice the arm's minus the bar's own.
     """
     across, turning, bars = arm.across(point, offset), spin(arm.vector), []
     image = image or point + across
@@ -430,13 +430,13 @@ def mirror(arm: Arm, point: Complex, offset: Real, ends: Sequence[Complex],
 
 
 def parallel(bar: Complex, place: Complex) -> Complex:
-    """Return a bar like another one, NaN where its end has no place."""
-    def there(part: Real) -> Real:
+    """Return a bar equal to another one, NaN where the place of its end is NaN."""
+    def with_place(part: Real) -> Real:
         return gated(part, abs(place.x), real(0.0))
 
     turning = spin(bar)
-    same = Complex(there(bar.x), there(bar.y))
-    same.spin = Rate(turning.of, lambda *rates: there(turning.formula(*rates)))
+    same = Complex(with_place(bar.x), with_place(bar.y))
+    same.spin = Rate(turning.of, lambda *rates: with_place(turning.formula(*rates)))
     return same
 
 
@@ -518,7 +518,7 @@ def slot(arm: Arm, offset: Real, half: float) -> Slot:
 
 
 class Rail:
-    """A pin as seen from the line that a block slides on: how far along it, and how high above."""
+    """A pin relative to the line that a block slides on: its foot along it, its height above."""
 
     def __init__(self, pin: Complex, origin: Complex, along: Complex, span: Real):
         self.along = along
@@ -533,7 +533,7 @@ class Rail:
 
 class CrankRail(Rail):
     """
-    A crank pin as seen from the line that a block slides on, from half angles.
+    A crank pin relative to the line that a block slides on, by half angles.
 
     With the height h0 of the crank's centre, the crank m and its angle psi from the line, the
     margins are (rod + h0 - m) + 2 m s^2 and (rod - h0 - m) + 2 m h^2, where s and h are sine and
@@ -541,7 +541,7 @@ class CrankRail(Rail):
     """
 
     def __init__(self, crank: Crank, origin: Complex, along: Complex):
-        # Where the ground is does not matter: only how far the crank is from the line.
+        # Only the crank's distance from the line matters, not its place on the ground.
         span = (crank.centre - origin).length() + crank.length
         super().__init__(crank.centre + crank.bar(), origin, along, span)
         self._crank = crank
@@ -571,9 +571,9 @@ class CrankRail(Rail):
 
 class TurnedRail(CrankRail):
     """
-    A ground joint as seen from a line on a crank: as a pin that turns the other way about it.
+    A ground joint relative to a line on a crank: a pin that turns backwards about its centre.
 
-    `zero` and `origin` are the line's direction and a point of it as seen from the crank's bar.
+    `zero` and `origin` are the line's direction and a point of it, relative to the crank's bar.
     """
 
     def __init__(self, pin: Complex, crank: Crank, place: Complex, along: Complex, zero: Complex,
@@ -593,7 +593,7 @@ class Slider(NamedTuple):
     """
     A block on a fixed line: the rod to it, its place along the line [m], and the limits.
 
-    Also how far along the line the block is ahead of the pin [m].
+    `reach` is the distance along the line from the pin to the block [m].
     """
 
     rod: Complex
@@ -606,10 +606,10 @@ def slider(rail: Rail, rod: Real, side: float) -> Slider:
     """
     Return the RRP dyad: a rod [m] from a pin to a block on a line.
 
-    The block is ahead of the pin's foot on the line for side = +1; past a change point of a crank
-    it goes on smoothly.
+    The block is ahead of the pin's foot on the line for side = +1; it continues smoothly past a
+    change point of a crank.
     """
     limits = rail.limits(rod)
     reach = reduce(lambda x, y: x * y, (limit.smooth or limit.root() for limit in limits)) * side
-    height = _known_with(reach, rail.along, rail.height)
+    height = _nan_with(reach, rail.along, rail.height)
     return Slider(rail.along * Complex(reach, -height), rail.foot + reach, limits, reach)

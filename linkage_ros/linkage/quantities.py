@@ -109,10 +109,10 @@ class Structure:
 
     def _velocities(self, names: Names, by: int = 0) -> List[Real]:
         known: Dict[Real, Real] = {}
-        return [self._due(derivative(part, {by: 1.0}, known), part)
+        return [self._gated_rate(derivative(part, {by: 1.0}, known), part)
                 for part in self._points(names)]
 
-    def _due(self, rate: Real, value: Real) -> Real:
+    def _gated_rate(self, rate: Real, value: Real) -> Real:
         """Return a rate by one input, NaN where the value is NaN because of other inputs."""
         alone = len(self.built.inputs) == 1 and rate.value is None
         return rate if alone or not value.varies else gated(rate, abs(value), real(0.0))
@@ -137,8 +137,8 @@ class Structure:
         pair = PAIR.fullmatch(name)
         return self.built.arm(*pair.groups()) if pair else None
 
-    def _parts(self, wanted: Tuple[Names, Names, Names]) -> List[Real]:
-        points, joints, rates = wanted
+    def _parts(self, names: Tuple[Names, Names, Names]) -> List[Real]:
+        points, joints, rates = names
         turning = [self._rates(rates, by) for by in range(len(self.built.inputs))]
         return [*self._points(points), *self._angles(joints), *chain.from_iterable(turning)]
 
@@ -175,7 +175,7 @@ class Structure:
         return any(x.name == name and x.kind == 'prismatic' for x in self.built.links)
 
     def _rates(self, names: Names, by: int = 0) -> List[Real]:
-        return [self._due(rate, self.output(name))
+        return [self._gated_rate(rate, self.output(name))
                 for name, rate in zip(names, self._turning(names, {by: 1.0}))]
 
     def _point_accelerations(self, names: Names) -> List[Real]:

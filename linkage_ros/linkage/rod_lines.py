@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Linkages in space written down: hinges with axes anywhere, and rods with ball ends.
+Linkages in space as text: hinges with axes anywhere, and rods with ball ends.
 
     pitch hinge ground at 0 0 0 axis 0 1 0 within -50deg 30deg     turns on the ground
     roll hinge pitch at 0 0 -h axis 1 0 0 within -15deg 15deg      turns on pitch
@@ -12,14 +12,14 @@ Linkages in space written down: hinges with axes anywhere, and rods with ball en
     C cylinder ground 0 0 0 roll 0.02 0.02 -0.01                   a rod whose length is an input
     toe fixed roll                                                 another name for a link
 
-Each line but those of rods and cylinders adds a link to one that is written before it, or to the
-`ground`. All points [m] and axes are those of one drawing, in the frame of the ground, and in that
-drawing every angle and slide is zero, counted about or along the axis. A rod is as long as drawn
+Each line except those of rods and cylinders adds a link to an earlier link or to the `ground`. All
+points [m] and axes are those of one drawing, in the frame of the ground. In that drawing every
+angle and slide is zero; they are positive about and along the axis. A rod is as long as drawn
 unless it ends in `length LENGTH`. Numbers are written as in `linkage.joint_lines`.
 
-What is not driven is found in the order in which it can be: a rod across one hinge or slide that
-nothing else holds, on the side on which it is drawn; two rods across the same two hinges in a row,
-which both need `within`: inside these limits there is shown to be one pose at most.
+Rods place the joints that are not driven, in any order that is possible. One rod places one hinge
+or slide, on the side on which the rod is drawn. Two rods place two hinges in a row, which both
+need `within`: there is proved to be one pose at most inside these limits.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ from .spatial import (
     Vector,
     ZERO,
 )
-from .window import HeldBy, Window
+from .window import Window, WindowRod
 from ..formula.expression import Real, real
 from ..words import listed, quoted
 
@@ -65,34 +65,34 @@ FORMS = {
 }
 INPUTS = 'motor', 'cylinder'
 _JOINTS, _RODS = ('hinge', 'slide', 'motor'), ('rod', 'cylinder')
-# Lines of one linkage: the order of solution is looked for among all rods.
+# Maximum number of lines of a linkage: the order of solution is searched among all rods.
 MOST_LINES = 200
-# A rod whose drawn pose is nearer to a dead point than this has no side that can be seen.
+# A rod that is drawn nearer to a dead point than this (a sine) has no defined side.
 _SIDED = 1e-6
-# Two hinges in a row have to lean from each other by an angle of at least this sine.
+# Least sine of the angle between the axes of two hinges in a row.
 _LEANING = 1e-3
-# Without limits, the largest window is looked for up to this angle to each side [rad].
+# Without limits, the largest window is searched up to this angle to each side [rad].
 _WIDEST = 0.5 * math.pi
 
 
 class WindowError(ValueError):
-    """Limits that are none, or too wide; by hinge those that can be [rad], if there are."""
+    """Missing or too wide limits; `limits` has the largest valid ones by hinge [rad], if any."""
 
     def __init__(self, problem: ValueError, limits: Dict[str, Tuple[float, float]]):
         super().__init__(str(problem))
         self.limits = limits
 
 
-class HeldLink(NamedTuple):
-    """Two hinges in a row that two rods hold: what its window is made from, as expressions."""
+class TwoRodLink(NamedTuple):
+    """A link on two hinges in a row and two rods: the data of its window, as expressions."""
 
     lines: Tuple[Line, Line]
     limits: Tuple[Optional[Tuple[Real, ...]], ...]
-    rods: Tuple[HeldBy, ...]
+    rods: Tuple[WindowRod, ...]
 
 
 def parse(texts: Iterable[str]) -> List[Line]:
-    """Return the lines of a linkage; raise ValueError with the line that cannot be."""
+    """Return the lines of a linkage; raise ValueError that names an invalid line."""
     lines = [parsed(text, FORMS) for text in texts]
     if len(lines) > MOST_LINES:
         raise ValueError(f'a linkage in space has up to {MOST_LINES} lines, got {len(lines)}')
@@ -101,7 +101,7 @@ def parse(texts: Iterable[str]) -> List[Line]:
     for i, line in enumerate(lines, 1):
         name, ends = line.names[0], _links(line)
         if name == GROUND or places[name] < i:
-            raise line.error(f'there is a link or rod {name} already')
+            raise line.error(f'the name {name} is used by another link or rod')
         for end in ends:
             if end not in links:
                 later = places.get(end, 0)
@@ -134,23 +134,23 @@ def branches(lines: Iterable[Line]) -> dict:
 
 def draw(builder: Builder, lines: Iterable[Line], symbols: Mapping[str, Real],
          signs: Mapping[str, int], inputs: Collection[str] = ()) -> None:
-    """Place the links of a linkage; its inputs are what is driven, unless others are named."""
+    """Place the links of a linkage; its inputs are `inputs`, by default the driven joints."""
     builder.axes = 'xyz'
     _Drawing(builder, list(lines), symbols, signs, inputs).draw()
 
 
 def turning_rods(lines: List[Line], inputs: Collection[str]) -> List[str]:
-    """Return the rods that turn a hinge, which has two sides, where others are given."""
+    """Return the rods that place one joint each, on either of two sides, for these inputs."""
     return [rods[0].names[0] for rods, links in _Assembly(lines, inputs).order()
             if len(rods) == 1 and links]
 
 
-# What is solved together: rods, and the hinges or slide that they place.
+# Rods, and the hinges or slide that they place together.
 Group = Tuple[Tuple[Line, ...], Tuple[str, ...]]
 
 
 class _Assembly:
-    """The tree of links, and the order in which rods place what is not an input."""
+    """The tree of links, and the order in which rods place the joints that are not inputs."""
 
     def __init__(self, lines: List[Line], inputs: Collection[str] = ()):
         self.lines = {line.names[0]: line for line in lines}
@@ -160,7 +160,7 @@ class _Assembly:
                         if line.word not in _RODS}
 
     def chain(self, link: str) -> List[str]:
-        """Return a link and all that carry it, down to the ground."""
+        """Return a link and the links that carry it, down to the ground."""
         found = [link]
         while found[-1] != GROUND:
             found.append(self.parents[found[-1]])
@@ -173,7 +173,7 @@ class _Assembly:
             link for link in other if link not in one]
 
     def order(self) -> List[Group]:
-        """Return what is solved one after the other; raise ValueError for what cannot be."""
+        """Return the groups in the order of solution; raise ValueError if one has no solution."""
         unknown = {name for name, line in self.lines.items()
                    if line.word in _JOINTS and name not in self.inputs}
         left = [line for line in self.lines.values() if line.word in _RODS]
@@ -190,13 +190,13 @@ class _Assembly:
         return found
 
     def _next(self, left: List[Tuple[Line, Tuple[str, ...]]]) -> Group:
-        """Return what can be solved of rods, each with what it leaves open."""
+        """Return the next group of rods, each given with the unplaced joints between its ends."""
         free = [line for line, _ in left
                 if line.word == 'cylinder' and line.names[0] not in self.inputs]
         for line, links in left:
             if not links and line not in free:
-                raise line.error('nothing is left to move between its ends: one rod too many, or '
-                                 'one hinge too few')
+                raise line.error('all joints between its ends are placed already: one rod too '
+                                 'many, or one hinge too few')
             if len(links) == (line not in free):
                 return (line,), links
         for (one, links), (other, same) in combinations(left, 2):
@@ -207,9 +207,9 @@ class _Assembly:
         others = [other.names[0] for other, also in left
                   if other is not line and set(also) & set(links)]
         raise line.error(
-            f'between its ends {listed(links)} are open'
-            f'{f", as for {listed(others)}" if others else ""}: solved are rods across one open '
-            'hinge or slide, and two across the same two hinges in a row')
+            f'{listed(links)} between its ends are unplaced'
+            f'{f", as for {listed(others)}" if others else ""}: one rod places one hinge or '
+            'slide, and two rods place the same two hinges in a row')
 
     def _in_a_row(self, links: Tuple[str, ...]) -> bool:
         second, first = links
@@ -229,7 +229,7 @@ class _Joint:
             self.hinge = Hinge(Vector(*numbers[:3]), Vector(*numbers[3:6]))
 
     def moved(self, point: Vector, back: bool = False) -> Vector:
-        """Return a point of the link as its parent sees it, or the other way round."""
+        """Return a point of the link in its parent's coordinates, or the reverse if `back`."""
         if self.turn:
             return self.hinge.turned(point, self.turn.back() if back else self.turn)
         if self.shift is not None:
@@ -237,7 +237,7 @@ class _Joint:
         return point
 
     def gate(self, limits: Iterable[Limit]) -> None:
-        """Have it NaN beyond limits."""
+        """Make its value NaN beyond limits."""
         if self.turn:
             self.turn = Turn(*(gated_by(x, limits) for x in self.turn))
         elif self.shift is not None:
@@ -275,30 +275,31 @@ class _Drawing:
             self._drive(name)
         for rods, links in self._assembly.order():
             if len(links) == 2:
-                self._hold(rods, *(self._joints[link] for link in links))
+                self._place_hinges(rods, *(self._joints[link] for link in links))
             elif links:
-                self._fit(rods[0], self._joints[links[0]])
+                self._place_joint(rods[0], self._joints[links[0]])
             else:
                 first, second = self._ends(rods[0])
-                self._lengths[rods[0].names[0]] = self._seen(second, first.link).minus(
+                self._lengths[rods[0].names[0]] = self._on_link(second, first.link).minus(
                     first.point).length()
         for name, line in self._assembly.lines.items():
-            (self._show_rod if line.word in _RODS else self._show_joint)(name, line)
+            (self._add_rod if line.word in _RODS else self._add_joint)(name, line)
 
     def _check_joint(self, joint: _Joint) -> None:
         if joint.line.word == 'fixed':
             return
         length = joint.hinge.direction.length()
         if length.value is None or length.value <= 0.0:
-            self._demand(joint.line, length, 'its axis has no direction')
+            self._require(joint.line, length, 'its axis has no direction')
         for low, high in [joint.limits] if joint.limits else []:
-            self._demand(joint.line, high - low, 'within goes from a lower end to a higher one')
+            self._require(joint.line, high - low,
+                          'the first end of within must be less than the second')
             for end in (low, high) if joint.line.word == 'hinge' else ():
-                self._demand(joint.line, math.pi + EDGE - abs(end),
-                             'within is from -180deg to 180deg at most')
+                self._require(joint.line, math.pi + EDGE - abs(end),
+                              'within must be inside -180deg and 180deg')
 
-    def _demand(self, line: Line, amount: Real, problem: str) -> None:
-        """Have a line refused for dimensions that make an amount zero or negative."""
+    def _require(self, line: Line, amount: Real, problem: str) -> None:
+        """Refuse a line for dimensions with which an amount is zero or negative."""
         self._builder.demands.append((line, amount, problem))
 
     def _drive(self, name: str) -> None:
@@ -306,7 +307,7 @@ class _Drawing:
         joint, ends = self._joints.get(name), self._numbers[name][6:]
         if joint and joint.line.word != 'slide':
             joint.turn = Turn.by(self._builder.drive(Input(name, ANGLE), None))
-            limits = self._edges(joint, joint.turn.angle)
+            limits = self._add_limits(joint, joint.turn.angle)
             joint.turn = Turn.by(gated_by(joint.turn.angle, limits))
             return
         value = self._builder.drive(Input(name, LENGTH, *(
@@ -325,7 +326,7 @@ class _Drawing:
         first, second = self._ends(line)
         return second.point.minus(first.point).length()
 
-    def _seen(self, end: _End, link: str) -> Vector:
+    def _on_link(self, end: _End, link: str) -> Vector:
         """Return a point of one link in the coordinates of another."""
         up, down = self._assembly.chain(end.link), self._assembly.chain(link)
         point = end.point
@@ -338,11 +339,11 @@ class _Drawing:
         return point
 
     def _pivot(self, end: _End, link: str) -> Pivot:
-        """Return a point of one link in the coordinates of another, on a circle if it can be."""
+        """Return a point of one link in the coordinates of another, on a circle if possible."""
         moving = self._moving(end.link, link)
         joint = self._joints[moving[0]] if len(moving) == 1 else None
         if joint is None or joint.turn is None:
-            return Pivot(Circle(self._seen(end, link), ZERO, ZERO))
+            return Pivot(Circle(self._on_link(end, link), ZERO, ZERO))
         carries = moving[0] in self._assembly.chain(end.link)
         return Pivot(joint.hinge.circle(end.point), joint.turn if carries else joint.turn.back())
 
@@ -355,28 +356,28 @@ class _Drawing:
         first, second = self._ends(line)
         return (first, second) if link in self._assembly.chain(first.link) else (second, first)
 
-    def _fit(self, line: Line, joint: _Joint) -> None:
+    def _place_joint(self, line: Line, joint: _Joint) -> None:
         """Turn or slide a joint so that a rod fits."""
         (link,), (name,) = joint.line.names, line.names
         end, pivot = self._beyond(line, link)
         length, hinge = self._lengths[name], joint.hinge
-        base, seen = self._pivot(pivot, joint.parent), self._seen(end, link)
+        base, point = self._pivot(pivot, joint.parent), self._on_link(end, link)
         span = self._span + (length if not length.varies else real(0.0))
         side, sided = (drawn_ahead if joint.line.word == 'slide' else drawn_side)(
             hinge, pivot.point, end.point)
         side *= self._signs.get(name, 1)
         if joint.line.word == 'slide':
-            joint.shift, *limits = rod_on_slide(hinge.axis, base.place, seen, length, side, span)
+            joint.shift, *limits = rod_on_slide(hinge.axis, base.place, point, length, side, span)
         else:
             joint.turn, *limits, self._builder.transmissions[name] = rod_on_hinge(
-                hinge, base, seen, length, side, span)
-        self._demand(line, sided - _SIDED, f'as drawn it is at a dead point of {link}: its '
-                     'side cannot be seen; draw the linkage in another pose')
+                hinge, base, point, length, side, span)
+        self._require(line, sided - _SIDED, f'as drawn it is at a dead point of {link}, on '
+                      'neither side; draw the linkage in another pose')
         self._builder.limits += limits
-        joint.gate(self._edges(joint, joint.turn.angle if joint.turn else joint.shift))
+        joint.gate(self._add_limits(joint, joint.turn.angle if joint.turn else joint.shift))
 
-    def _edges(self, joint: _Joint, value: Any) -> List[Limit]:
-        """Return the limits of a joint, which the linkage has from now on."""
+    def _add_limits(self, joint: _Joint, value: Any) -> List[Limit]:
+        """Add the limits of a joint to the linkage, and return them."""
         if not joint.limits:
             return []
         slack = TOLERANCE * self._span if joint.line.word == 'slide' else real(EDGE)
@@ -384,47 +385,47 @@ class _Drawing:
         self._builder.limits += found
         return found
 
-    def _hold(self, lines: Tuple[Line, ...], first: _Joint, second: _Joint) -> None:
-        """Solve two hinges in a row for two rods."""
+    def _place_hinges(self, lines: Tuple[Line, ...], first: _Joint, second: _Joint) -> None:
+        """Turn two hinges in a row so that two rods fit."""
         frame, link = Frame.of(first.hinge, second.hinge), second.line.names[0]
-        self._demand(second.line, first.hinge.leaning(second.hinge) - _LEANING,
-                     f'its axis is nearly parallel to that of {first.line.names[0]}')
+        self._require(second.line, first.hinge.leaning(second.hinge) - _LEANING,
+                      f'its axis is nearly parallel to that of {first.line.names[0]}')
         rods = []
         for line in lines:
             end, base = self._beyond(line, link)
             pivot, length = self._pivot(base, first.parent), self._lengths[line.names[0]]
             if moving := self._moving(end.link, link):
-                raise line.error(f'{listed(moving)} moves between {link} and its end, '
-                                 'which must not be where two rods share two hinges')
-            if any(part.varies for part in pivot.way.centre) or pivot.turn and length.varies:
-                what = 'be on' if length.varies else 'turn about one axis on'
+                raise line.error(f'{listed(moving)} moves between {link} and its end; where two '
+                                 f'rods share two hinges, their ends must be fixed to {link}')
+            if any(part.varies for part in pivot.path.centre) or pivot.turn and length.varies:
+                what = 'be fixed to' if length.varies else 'turn about one axis on'
                 raise line.error(f'its end on {base.link} must {what} {first.parent}, which '
-                                 'carries the two hinges that it shares with another')
-            rods.append(Rod(pivot._replace(way=frame.seen(pivot.way)),
-                            frame.seen(second.hinge.circle(end.point)), length))
+                                 'carries the two hinges that it shares with another rod')
+            rods.append(Rod(pivot._replace(path=frame.transformed(pivot.path)),
+                            frame.transformed(second.hinge.circle(end.point)), length))
         limits = first.limits, second.limits
-        self._builder.windows.append(HeldLink(
+        self._builder.windows.append(TwoRodLink(
             (first.line, second.line), tuple(tuple(each) or None for each in limits),
-            tuple(HeldBy(rod.pivot.way, rod.end, None if rod.length.varies else rod.length)
+            tuple(WindowRod(rod.pivot.path, rod.end, None if rod.length.varies else rod.length)
                   for rod in rods)))
         first.turn, second.turn, limit = two_rods(rods, [
             0.5 * (each[0] + each[1]) if each else real(0.0) for each in limits])
         self._builder.limits.append(limit)
-        edges = [limit, *self._edges(first, first.turn.angle),
-                 *self._edges(second, second.turn.angle)]
+        edges = [limit, *self._add_limits(first, first.turn.angle),
+                 *self._add_limits(second, second.turn.angle)]
         for joint in (first, second):
             joint.gate(edges)
 
-    def _show_joint(self, name: str, line: Line) -> None:
-        """Add what users ask for of a joint: its angle or way, and its origin."""
+    def _add_joint(self, name: str, line: Line) -> None:
+        """Add the outputs of a joint: its angle or slide, and its origin."""
         joint = self._joints[name]
         if line.word != 'fixed':
             self._point(f'{name}_origin', _End(name, joint.hinge.origin))
-            self._answer(name, 'revolute' if joint.turn else 'prismatic', f'{name}_origin',
-                         joint.turn.angle if joint.turn else joint.shift)
+            self._add_value(name, 'revolute' if joint.turn else 'prismatic', f'{name}_origin',
+                            joint.turn.angle if joint.turn else joint.shift)
 
-    def _show_rod(self, name: str, line: Line) -> None:
-        """Add what users ask for of a rod: both ends, lines between them, and its length."""
+    def _add_rod(self, name: str, line: Line) -> None:
+        """Add the outputs of a rod: both ends, lines between them, and its length."""
         builder, ends = self._builder, self._ends(line)
         places = [f'{name}_{end.link}' for end in ends]
         for place, end in zip(places, ends):
@@ -434,53 +435,55 @@ class _Drawing:
                 builder.bars.append(Bar(f'{end.link}_origin', place, length))
         if line.word == 'rod':
             builder.bars.append(Bar(places[0], places[1], self._lengths[name]))
-            self._demand(line, self._lengths[name], 'it must be longer than zero')
+            self._require(line, self._lengths[name], 'it must be longer than zero')
         else:
-            self._answer(name, 'prismatic', places[0], self._lengths[name])
+            self._add_value(name, 'prismatic', places[0], self._lengths[name])
             builder.cylinders.append((places[0], places[1]))
 
-    def _answer(self, name: str, kind: str, place: str, value: Any) -> None:
+    def _add_value(self, name: str, kind: str, place: str, value: Any) -> None:
         parent = _links(self._assembly.lines[name])[0]
         self._builder.links.append(Link(name, parent, place, kind, real(0.0), place))
         self._builder.joint_values[name] = value
 
     def _point(self, name: str, end: _End) -> None:
         if name in self._builder.points:
-            raise self._assembly.lines[end.link].error(f'a point of a rod is called {name}, too')
-        self._builder.points[name] = Point(self._seen(end, GROUND), end.link, self._span)
+            raise self._assembly.lines[end.link].error(f'the name {name} is used by another point')
+        self._builder.points[name] = Point(self._on_link(end, GROUND), end.link, self._span)
 
 
 def check(lines: List[Line], linkage: Any) -> None:
-    """Raise ValueError, with its line, for dimensions that cannot be."""
+    """Raise ValueError that names the line if dimensions are invalid."""
     check_numbers(lines, linkage.dimensions)
     for line, amount, problem in linkage.demands():
         if not np.all(amount > 0.0):
             raise line.error(problem)
-    for held in linkage.windows():
-        _check_window(held)
+    for link in linkage.windows():
+        _check_window(link)
 
 
-def _check_window(held: HeldLink) -> None:
-    """Raise ValueError, with the largest window, unless it holds one pose at most."""
-    line = held.lines[1]
-    if any(np.ndim(part) for rod in held.rods for way in rod[:2] for vector in way
+def _check_window(link: TwoRodLink) -> None:
+    """Raise ValueError, with the largest window, unless one pose at most is proved."""
+    line = link.lines[1]
+    if any(np.ndim(part) for rod in link.rods for path in rod[:2] for vector in path
            for part in vector):
-        raise line.error('two rods on two hinges are shown to have one pose for one set of '
-                         'dimensions, not for arrays')
-    window = Window(held.rods, *zip(*(each or (-_WIDEST, _WIDEST) for each in held.limits)))
-    given = all(held.limits)
-    if given and window.is_right():
+        raise line.error('two rods on two hinges need one set of dimensions, not arrays: the '
+                         'proof of their single pose takes numbers')
+    window = Window(link.rods, *zip(*(each or (-_WIDEST, _WIDEST) for each in link.limits)))
+    limited = all(link.limits)
+    if limited and window.is_proved():
         return
-    problem = 'there may be a second pose in these limits' if given else 'both hinges need limits'
+    problem = 'there may be a second pose in these limits' if limited else \
+        'both hinges need limits'
     # In degrees, rounded to the inside.
     largest = window.largest()
     ends = np.transpose([np.ceil(10.0 * np.degrees(largest.low)),
                          np.floor(10.0 * np.degrees(largest.high))]) / 10.0
     if (ends[:, 0] >= ends[:, 1]).any():
-        raise WindowError(line.error(f'{problem}; there are none about their middle, which is '
-                                     'next to a singular pose'), {})
-    names = [each.names[0] for each in held.lines]
-    said = ', '.join(f'{name} within {a:g}deg {b:g}deg' for name, (a, b) in zip(names, ends))
+        raise WindowError(line.error(f'{problem}; their middle is next to a singular pose: no '
+                                     'limits about it are possible'), {})
+    names = [each.names[0] for each in link.lines]
+    largest_limits = ', '.join(
+        f'{name} within {a:g}deg {b:g}deg' for name, (a, b) in zip(names, ends))
     raise WindowError(
-        line.error(f'{problem}; the largest shown to have one at most: {said}'),
+        line.error(f'{problem}; the largest proved to have one at most: {largest_limits}'),
         {name: (a, b) for name, (a, b) in zip(names, np.radians(ends).tolist())})

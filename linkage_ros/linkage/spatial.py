@@ -11,9 +11,9 @@ frame, z its axis and B at (rho, 0, 0) at angle zero, A = (p, q, d) and w = sqrt
     psi = atan2(q, p) + side delta,       tan(delta/2) = sqrt(m1) / sqrt(m2),
     psi' = ((A - B).A' - L L') / (-side sqrt(m1) sqrt(m2) / 2).
 
-The two roots are at once the half angle, both limits and the denominator of the rate: nothing
-cancels next to a dead point. Two rods that hold a link on two hinges in a row have no such form;
-they are solved by a fixed number of Newton steps on (|A - B|^2 - L^2) / 2: formulas again.
+The two roots give the half angle, both limits and the denominator of the rate: nothing cancels
+next to a dead point. A link on two hinges in a row and two rods has no such form. It is solved by
+a fixed number of Newton steps on (|A - B|^2 - L^2) / 2, which are formulas, too.
 
 Sources: Chace, "Vector analysis of linkages", J. Eng. Ind. 85 (1963); Hartenberg and Denavit,
 "Kinematic Synthesis of Linkages" (RSSR).
@@ -42,9 +42,9 @@ from ..formula.expression import (
 Scalar = Any
 # Steps of Newton's method from the middle of a window: six are enough for five robots' ankles.
 STEPS = 8
-# After a last step [rad] of no more than this the rest is its square, less than rounding.
+# After a last step [rad] of this size or less, the error is its square, less than rounding.
 LAST_STEP = 1e-7
-# How far beyond its window [rad] a pose counts as on its edge; the proof holds for a wider one.
+# A pose beyond its window by no more than this [rad] is on its edge; the proof covers twice that.
 EDGE = 1e-9
 
 
@@ -107,7 +107,7 @@ class Turn(NamedTuple):
 
     @staticmethod
     def by(angle: Real) -> Turn:
-        """Return the turn by an angle that is given."""
+        """Return the turn by an angle."""
         return Turn(angle, cosine(angle), sine(angle))
 
     def back(self) -> Turn:
@@ -116,7 +116,7 @@ class Turn(NamedTuple):
 
 
 class Circle(NamedTuple):
-    """The way of a point that turns: centre + cos u + sin v."""
+    """The path of a point that turns: centre + cos u + sin v."""
 
     centre: Vector
     u: Vector
@@ -132,22 +132,22 @@ class Circle(NamedTuple):
 
 
 class Pivot(NamedTuple):
-    """A point on its way, which without a turn is the centre."""
+    """A point on its path; without a turn it is the path's centre."""
 
-    way: Circle
+    path: Circle
     turn: Optional[Turn] = None
 
     @property
     def place(self) -> Vector:
         """Where it is."""
-        return self.way.at(self.turn.cosine, self.turn.sine) if self.turn else self.way.centre
+        return self.path.at(self.turn.cosine, self.turn.sine) if self.turn else self.path.centre
 
     def along(self, axis: Vector, origin: Vector) -> Real:
-        """Return how far it is from an origin, along an axis; constants are joined first."""
-        centre = self.way.centre.minus(origin).dot(axis)
+        """Return its coordinate along an axis from an origin; constants are combined first."""
+        centre = self.path.centre.minus(origin).dot(axis)
         if not self.turn:
             return centre
-        u, v = self.way.u.dot(axis), self.way.v.dot(axis)
+        u, v = self.path.u.dot(axis), self.path.v.dot(axis)
         return centre + u * self.turn.cosine + v * self.turn.sine
 
 
@@ -168,21 +168,21 @@ class Hinge(NamedTuple):
             self.direction.length() * other.direction.length())
 
     def circle(self, point: Vector) -> Circle:
-        """Return the way of a point that turns about the axis; it is the point at angle zero."""
-        # Of the direction as given: a unit vector is rounded, and not quite of length one.
+        """Return the path of a point that turns about the axis; it is the point at angle zero."""
+        # By the direction as it is: the length of a rounded unit vector is not exactly one.
         across = self.direction.cross(point.minus(self.origin))
         u = across.cross(self.direction).over(self.direction.dot(self.direction))
         return Circle(point.minus(u), u, across.over(self.direction.length()))
 
     def turned(self, point: Vector, turn: Turn) -> Vector:
-        """Return where a turn takes a point."""
+        """Return the place of a point after a turn."""
         return self.circle(point).at(turn.cosine, turn.sine)
 
 
 def rated_turn(y: Real, x: Real, cos: Real, sin: Real, rate: Rate) -> Turn:
-    """Return the turn by the angle of (x, y), of which cosine and sine are known, and the rate."""
+    """Return the turn by the angle of (x, y), with its cosine, sine and rate."""
     of, formula = rate
-    # These need the turn as it is returned, so that it is differentiated no further than that.
+    # The rates refer to the returned turn: a second derivative then uses them again.
     turn = Turn(with_rate(arctangent(y, x), *of, formula=formula),
                 with_rate(cos, *of, formula=lambda *rates: -(formula(*rates) * turn.sine)),
                 with_rate(sin, *of, formula=lambda *rates: formula(*rates) * turn.cosine))
@@ -194,12 +194,12 @@ def rod_on_hinge(hinge: Hinge, pivot: Pivot, end: Vector, length: Real, side: Re
     """
     Return the turn of a hinge with which a rod fits, its limits, and the transmission angle [rad].
 
-    The rod's ends are as seen from the hinge's parent, and from its child at angle zero. Seen from
-    the axis the end turns off to the left of the pivot, where the side is 1, or right, where it is
-    -1. The span is the size of the numbers that all this is made from [m].
+    The rod's pivot is in the coordinates of the hinge's parent, its end in those of the child at
+    angle zero. Seen from the axis, the end is to the left of the pivot if the side is 1, to the
+    right if it is -1. The span is the size of all coordinates [m], for the tolerance.
     """
     across = hinge.axis.cross(end.minus(hinge.origin))
-    # Of an end next to the axis this is square to the axis no more than to rounding, so once more.
+    # Rounding tilts this vector against the axis if the end is next to the axis: once more.
     along = across.unit().cross(hinge.axis).unit()
     rho = across.length()
     p = pivot.along(along, hinge.origin)
@@ -212,7 +212,7 @@ def rod_on_hinge(hinge: Hinge, pivot: Pivot, end: Vector, length: Real, side: Re
         room - square(w - rho), square(w + rho) - room))
     r1, r2 = near.root(), far.root()
     area = r1 * r2
-    # The direction of the pivot, turned by delta: of the square of a length, as the margins are.
+    # The direction of the pivot, turned by delta; a square of a length [m^2], as the margins are.
     x, y, px, py = far.margin - near.margin, 2.0 * side * area, p / w, q / w
     x, y = px * x - py * y, px * y + py * x
     size = square_root(square(x) + square(y))
@@ -245,7 +245,7 @@ def rod_on_slide(axis: Vector, pivot: Vector, end: Vector, length: Real, side: R
 
 
 class Rod(NamedTuple):
-    """A rod in the frame of the first of two hinges: the ways of its ends, and its length [m]."""
+    """A rod in the frame of the first of two hinges: paths of its ends, and its length [m]."""
 
     pivot: Pivot
     end: Circle
@@ -253,7 +253,11 @@ class Rod(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """The frame of the first of two hinges in a row: z its axis, x next to that of the second."""
+    """
+    The frame of the first of two hinges in a row.
+
+    z is its axis, x the direction of the second axis' part square to z.
+    """
 
     origin: Vector
     axes: Tuple[Vector, Vector, Vector]
@@ -264,13 +268,13 @@ class Frame(NamedTuple):
         x = first.direction.cross(second.direction).cross(first.direction).unit()
         return Frame(first.origin, (x, first.axis.cross(x), first.axis))
 
-    def _seen(self, vector: Vector) -> Vector:
+    def _rotated(self, vector: Vector) -> Vector:
         return Vector(*(vector.dot(axis) for axis in self.axes))
 
-    def seen(self, way: Circle) -> Circle:
-        """Return the way of a point in this frame."""
-        return Circle(self._seen(way.centre.minus(self.origin)), self._seen(way.u),
-                      self._seen(way.v))
+    def transformed(self, path: Circle) -> Circle:
+        """Return the path of a point in this frame."""
+        return Circle(self._rotated(path.centre.minus(self.origin)), self._rotated(path.u),
+                      self._rotated(path.v))
 
 
 class Row(NamedTuple):
@@ -286,7 +290,7 @@ Pose = Tuple[Scalar, Scalar, Scalar, Scalar]
 
 
 def row(pivot: Vector, end: Circle, pose: Pose) -> Row:
-    """Return a rod between a place and the end that both angles turn."""
+    """Return the row of a rod from the end that both angles turn to a pivot."""
     c1, s1, c2, s2 = pose
     place, ahead = end.at(c2, s2).turned(c1, s1), end.ahead(c2, s2).turned(c1, s1)
     rod = pivot.minus(place)
@@ -294,13 +298,13 @@ def row(pivot: Vector, end: Circle, pose: Pose) -> Row:
 
 
 def gap(rod: Vector, length: Scalar) -> Scalar:
-    """Return half of what the square of a rod is too large by."""
+    """Return half of the difference between a rod's square and its length's."""
     return 0.5 * (rod.dot(rod) - length * length)
 
 
 def newton_step(rods: Sequence[Tuple[Vector, Circle, Scalar]],
                 pose: Pose) -> Tuple[Pose, Scalar]:
-    """Return the pose a step nearer to where two rods fit, and the step [rad]."""
+    """Return the pose after a Newton step towards the fit of two rods, and the step [rad]."""
     rows = [row(pivot, end, pose) for pivot, end, _ in rods]
     d1, d2 = _solution(rows, [-gap(each.rod, rod[2]) for each, rod in zip(rows, rods)])
     return (*_stepped(*pose[:2], d1), *_stepped(*pose[2:], d2)), abs(d1) + abs(d2)
@@ -308,7 +312,7 @@ def newton_step(rods: Sequence[Tuple[Vector, Circle, Scalar]],
 
 def two_rods(rods: Sequence[Rod], home: Sequence[Real]) -> Tuple[Turn, Turn, Limit]:
     """
-    Turn two hinges in a row so that two rods fit, in steps from home [rad].
+    Return the turns of two hinges in a row with which two rods fit, by steps from home [rad].
 
     In the frame of the first hinge the end of a rod is B = Rz(first angle) Q(second angle), with Q
     on a circle. The limit is below zero where no pose is found.
@@ -317,7 +321,7 @@ def two_rods(rods: Sequence[Rod], home: Sequence[Real]) -> Tuple[Turn, Turn, Lim
     pose: Pose = cosine(home[0]), sine(home[0]), cosine(home[1]), sine(home[1])
     for _ in range(STEPS - 1):
         pose, _step = newton_step(bars, pose)
-    # What the steps before have added to the length of both.
+    # The steps before have changed the length of both unit vectors by rounding.
     pose, step = newton_step(bars, (*_on_circle(*pose[:2]), *_on_circle(*pose[2:])))
     final: List[Row] = []
 
@@ -336,10 +340,10 @@ def two_rods(rods: Sequence[Rod], home: Sequence[Real]) -> Tuple[Turn, Turn, Lim
     return first, second, Limit(with_rate(LAST_STEP - step, formula=lambda: real(0.0)), real(0.0))
 
 
-def _solution(rows: Sequence[Row], wanted: Sequence[Scalar]) -> Tuple[Scalar, Scalar]:
-    """Return what both angles change by, to change half the squares of the rods as wanted."""
+def _solution(rows: Sequence[Row], changes: Sequence[Scalar]) -> Tuple[Scalar, Scalar]:
+    """Return the steps of both angles that make these changes to half the rods' squares."""
     (_, a, b), (_, c, d) = rows
-    e, f = wanted
+    e, f = changes
     det = a * d - b * c
     return (e * d - b * f) / det, (a * f - e * c) / det
 
@@ -353,7 +357,7 @@ def _stepped(c: Scalar, s: Scalar, step: Scalar) -> Tuple[Scalar, Scalar]:
 
 
 def _on_circle(c: Real, s: Real) -> Tuple[Real, Real]:
-    """Return a cosine and a sine, of which rounding has moved the squares' sum from one."""
+    """Return a cosine and a sine corrected for the rounding of the sum of their squares."""
     by = 1.5 - 0.5 * (square(c) + square(s))
     return c * by, s * by
 
@@ -367,9 +371,9 @@ def gated_by(value: Real, limits: Iterable[Limit]) -> Real:
 
 def drawn_side(hinge: Hinge, pivot: Vector, end: Vector) -> Tuple[Real, Real]:
     """
-    Return the side of a rod as `rod_on_hinge` takes it, from both ends as they are at angle zero.
+    Return a rod's side for `rod_on_hinge`, from both ends at angle zero.
 
-    With it comes by how much it is on that side: 0 at a dead point, up to 1.
+    Also return the sine of the angle between end and pivot: 0 at a dead point, 1 at most.
     """
     foot, arm = (hinge.axis.cross(x.minus(hinge.origin)) for x in (pivot, end))
     area = hinge.axis.dot(foot.cross(arm))
@@ -377,7 +381,7 @@ def drawn_side(hinge: Hinge, pivot: Vector, end: Vector) -> Tuple[Real, Real]:
 
 
 def drawn_ahead(slide: Hinge, pivot: Vector, end: Vector) -> Tuple[Real, Real]:
-    """Return what `drawn_side` does, of a rod on a slide, as `rod_on_slide` takes it."""
+    """Return a rod's side for `rod_on_slide`, and the cosine of its angle to the slide."""
     rod = end.minus(pivot)
     ahead = slide.axis.dot(rod)
     return where(ahead < 0.0, -1.0, 1.0), abs(ahead) / rod.length()

@@ -101,8 +101,8 @@ class Assembly:
 
     Left legs of pairs are evenly spread over a turn of the crank; each has a right leg if
     `mirrored`. Several legs need a single crank. `scale` is a factor of every length,
-    `reach` the result of `linkage.reach()`, if known. `legs` are by the prefix of their joints'
-    names; `joints` are the moving links other than the inputs.
+    `reach` the result of `linkage.reach()`, if known. The keys of `legs` are the prefixes of
+    their joints' names; `joints` are the moving links except the inputs.
     """
 
     def __init__(self, linkage: Mechanism, leg_pairs: int = 1, mirrored: bool = False,
@@ -153,7 +153,7 @@ class Assembly:
         return Solution(layout, values, batch)
 
     def within_reach(self, value: float) -> np.ndarray:
-        """Return which legs can be assembled at an input [rad or m], by the reach alone."""
+        """Return which legs can be assembled at a value [rad or m] of the input, by its reach."""
         first = self.linkage.inputs[0]
         if not first.turns:
             return first.on(self.reach, [value / self._scale])

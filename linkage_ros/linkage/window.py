@@ -5,15 +5,15 @@
 A proof that a link on two hinges and two rods has one pose at most inside its joint limits.
 
 A rod from its pivot A, which a motor turns, to its end B, which both angles of the link turn, fits
-where f = (|A - B|^2 - L^2) / 2 is zero. Suppose that two poses had the same motors. On the line
-from one to the other each rod's f has a gradient that is square to the line (Rolle), somewhere in
-the convex hull of the poses that this rod allows at this motor angle. So there are no two poses,
-and none is singular, where the directions of one rod's gradients in its hull and those of the
-other's have none in common, up to sign.
+where f = (|A - B|^2 - L^2) / 2 is zero. Suppose two poses at the same motor angles. On the line
+from one to the other, each rod's f has a gradient that is square to the line (Rolle), somewhere in
+the convex hull of the poses that this rod allows at this motor angle. So there is one pose, or
+none, and it is not singular, if the gradients of one rod in its hull and those of the other rod
+have no direction in common, up to sign.
 
 Rectangle and motor angles are divided into cells. In a cell, f and its gradient differ from those
 in the middle by at most their first derivatives there times half the cell, and a bound of the
-second derivatives times half the square of that: all of the cell is proved, not its middle.
+second derivatives times half the square of that: the proof covers the whole cell.
 """
 
 from __future__ import annotations
@@ -26,38 +26,37 @@ import numpy as np
 
 from .spatial import Circle, EDGE, gap, LAST_STEP, newton_step, Pose, row, STEPS, Vector
 
-# Cells on each side of the rectangle, of all motor angles, and again of each of these that is
-# needed: at first, and where limits that are this part as wide are proved, though they are not.
+# Cells per side of the rectangle, cells of all motor angles, and parts into which the needed ones
+# of these are divided. The fine cells are tried if the coarse ones prove this part of the size.
 COARSE, FINE, NEARLY = (10, 36, 2), (20, 48, 4), 0.8
-# What directions [rad] have to be apart, and what rounding may do to f, as a part of its terms.
+# Least angle [rad] between directions, and the rounding of f as a fraction of its terms.
 APART, ROUNDING = 1e-6, 1e-14
-# Poses on each side of the rectangle to which the steps have to come back, one step before the
-# last, and how near [rad]: what is left is the last step, which is to be below its limit between
-# these poses, too.
-POSES, BACK = 33, 0.01 * LAST_STEP
-# Halvings on the way to the largest rectangle; how much smaller it becomes if steps do not do.
+# Newton's method is tried for this many poses per side of the rectangle. Its error [rad] one step
+# before the last is well below LAST_STEP, so that it converges between these poses, too.
+POSES, CONVERGED = 33, 0.01 * LAST_STEP
+# Halvings in the search for the largest rectangle; its factor while Newton's method fails in it.
 HALVINGS, SMALLER = 7, 0.9
-# The hull is taken to be a polygon of 16 sides: directions in units of cells.
-SIDES = [(math.cos(angle), math.sin(angle)) for angle in np.arange(8) * math.pi / 8.0]
+# Normals of the polygon of 16 sides that bounds the hull, in units of cells.
+NORMALS = [(math.cos(angle), math.sin(angle)) for angle in np.arange(8) * math.pi / 8.0]
 
 
 class Cells(NamedTuple):
-    """Cells of one size: their middles (..., n), and half of their sides."""
+    """Cells of one size: their middles (..., n), and half the length of their sides."""
 
     middle: np.ndarray
     half: np.ndarray
 
 
 class Directions(NamedTuple):
-    """By cells of a motor (k,): which cells of poses each allows (k, n), directions [rad]."""
+    """For cells of a motor (k,): whether each allows cells of poses (k, n), directions [rad]."""
 
     allowed: np.ndarray
     middle: np.ndarray
     half: np.ndarray
 
 
-class HeldBy(NamedTuple):
-    """A rod in the frame of the first hinge; its length [m] is None where it is an input."""
+class WindowRod(NamedTuple):
+    """A rod in the frame of the first hinge; its length [m] is None if it is an input."""
 
     pivot: Circle
     end: Circle
@@ -65,11 +64,11 @@ class HeldBy(NamedTuple):
 
     @property
     def sides(self) -> Tuple[float, ...]:
-        """Return the sides of a crank on which a pose may have it; one where no crank turns."""
+        """Return the sides on which a crank may be in a pose; 0 if no crank turns the pivot."""
         return (1.0, -1.0) if self.length is not None and any(self.pivot.u) else (0.0,)
 
     def pivots(self, poses: np.ndarray, side: float) -> Vector:
-        """Return where the pivot is for poses (2, n); NaN where the rod does not reach."""
+        """Return the place of the pivot for poses (2, n); NaN where the rod does not reach."""
         centre, u, v = self.pivot
         if self.length is None or not side:
             return Vector(*(x + np.zeros(poses.shape[1]) for x in centre))
@@ -111,7 +110,7 @@ class HeldBy(NamedTuple):
         return Cells(low + half * np.arange(1, 2 * count, 2), half)
 
     def _pivots(self, motors: Cells) -> Tuple[Vector, Vector, float]:
-        """Return where the pivot is, its derivative by the motor's angle, and half of a cell."""
+        """Return the pivot's place, its derivative by the motor's angle, and half of a cell."""
         turn = 0.0 if self.length is None else float(motors.half)
         angle = motors.middle[:, None] * (turn > 0.0)
         return (self.pivot.at(np.cos(angle), np.sin(angle)),
@@ -120,17 +119,17 @@ class HeldBy(NamedTuple):
     def _allowed(self, motors: Cells, poses: Cells) -> np.ndarray:
         """Return whether f may be zero somewhere in cells of a motor and of poses (k, n)."""
         pivot, moved, turn = self._pivots(motors)
-        length, way = (self.length, 0.0) if self.length is not None else (
+        length, half = (self.length, 0.0) if self.length is not None else (
             motors.middle[:, None], motors.half)
         rod, by_p, by_r = row(pivot, self.end, _pose(poses.middle))
         *bounds, size = self._bounds()
         halves = turn, *poses.half
-        terms = sum(abs(x) * half for x, half in zip((rod.dot(moved), by_p, by_r), halves))
-        slack = 0.5 * max(bounds) * sum(halves) ** 2 + way * (length + 0.5 * way)
+        terms = sum(abs(x) * each for x, each in zip((rod.dot(moved), by_p, by_r), halves))
+        slack = 0.5 * max(bounds) * sum(halves) ** 2 + half * (length + 0.5 * half)
         return ~(abs(gap(rod, length)) > terms + slack + ROUNDING * (size + length) ** 2)
 
     def _gradients(self, motors: Cells, poses: Cells) -> Tuple[np.ndarray, np.ndarray]:
-        """Return gradients in the middle of cells as x + iy, and by how much [rad] they turn."""
+        """Return gradients in the middles of cells as x + iy, and bounds of their turn [rad]."""
         pose, (pivot, moved, turn) = _pose(poses.middle), self._pivots(motors)
         rod, by_p, by_r = row(pivot, self.end, pose)
         centre, end, ahead = (each.turned(*pose[:2]) for each in (
@@ -143,16 +142,17 @@ class HeldBy(NamedTuple):
         halves = turn, *poses.half
         gradient = by_p + 1j * by_r
         steep = abs(gradient)
-        seen = [change * gradient.conj() * (half / steep) for change, half in zip(changes, halves)]
+        parts = [change * gradient.conj() * (half / steep)
+                 for change, half in zip(changes, halves)]
         rest = 0.5 * math.hypot(*self._bounds()[:2]) * sum(halves) ** 2
-        along, aside = steep - rest - sum(abs(x.real) for x in seen), rest + sum(
-            abs(x.imag) for x in seen)
+        along, aside = steep - rest - sum(abs(x.real) for x in parts), rest + sum(
+            abs(x.imag) for x in parts)
         return gradient, np.where(along > 0.0, np.arctan2(aside, along), np.pi)
 
     def _bounds(self) -> Tuple[float, float, float, float]:
-        """Return bounds of derivatives of f by the first, second angle, motor; of A and B."""
-        (pivot, rho), (end, radius) = ((_norm(way.centre), _norm(way.u))
-                                       for way in (self.pivot, self.end))
+        """Return bounds of the derivatives of f by both angles and the motor, and of |A| + |B|."""
+        (pivot, rho), (end, radius) = ((_norm(path.centre), _norm(path.u))
+                                       for path in (self.pivot, self.end))
         return (_flat(self.pivot) * _flat(self.end), (pivot + rho + end) * radius,
                 (pivot + end + radius) * rho, pivot + rho + end + radius)
 
@@ -160,7 +160,7 @@ class HeldBy(NamedTuple):
 class Window:
     """A rectangle [rad] of both angles of a link on two hinges in a row, held by two rods."""
 
-    def __init__(self, rods: Sequence[HeldBy], low: Sequence[float], high: Sequence[float]):
+    def __init__(self, rods: Sequence[WindowRod], low: Sequence[float], high: Sequence[float]):
         self.rods = rods
         self.low, self.high = np.asarray(low, float), np.asarray(high, float)
         self.middle = 0.5 * (self.low + self.high)
@@ -171,22 +171,22 @@ class Window:
         return Window(self.rods, self.middle - half, self.middle + half)
 
     def largest(self) -> Window:
-        """Return the largest rectangle of this shape, up to its size, that is right."""
+        """Return the largest rectangle of this shape, up to its size, that is proved."""
         size, step = 0.0, 0.5
         for _ in range(HALVINGS):
             size += step * self.scaled(size + step).is_single(COARSE)
             step *= 0.5
-        while size > step and not self.scaled(size).comes_back():
+        while size > step and not self.scaled(size).converges():
             size *= SMALLER
         return self.scaled(size if size > step else 0.0)
 
-    def is_right(self) -> bool:
-        """Return whether it holds one pose at most for any motor angles, and all are found."""
+    def is_proved(self) -> bool:
+        """Return whether it has one pose at most, by proof, and Newton's method finds it."""
         return (self.is_single(COARSE) or self.scaled(NEARLY).is_single(COARSE)
-                and self.is_single(FINE)) and self.comes_back()
+                and self.is_single(FINE)) and self.converges()
 
     def is_single(self, cells: Tuple[int, int, int]) -> bool:
-        """Return whether it is proved that it holds one pose at most for any motor angles."""
+        """Return whether it is proved to contain one pose at most, for any motor angles."""
         count = cells[0]
         # A little beyond the edges.
         low, half = self.low - 2.0 * EDGE, (0.5 * (self.high - self.low) + 2.0 * EDGE) / count
@@ -199,38 +199,38 @@ class Window:
         shared = np.packbits(one.allowed, axis=1)[:, None] & np.packbits(other.allowed, axis=1)
         return bool((apart | ~shared.any(axis=2)).all())
 
-    def comes_back(self) -> bool:
-        """Return whether the steps find all poses of a grid, whichever sides cranks are on."""
+    def converges(self) -> bool:
+        """Return whether Newton's method finds all poses of a grid, for all sides of cranks."""
         axes = [np.linspace(low, high, POSES) for low, high in zip(self.low, self.high)]
         poses = np.stack(np.meshgrid(*axes)).reshape(2, -1)
         with np.errstate(all='ignore'):
-            return all(self._steps_back(poses, sides)
+            return all(self._finds(poses, sides)
                        for sides in product(*(rod.sides for rod in self.rods)))
 
-    def _steps_back(self, poses: np.ndarray, sides: Sequence[float]) -> bool:
+    def _finds(self, poses: np.ndarray, sides: Sequence[float]) -> bool:
         pivots = [rod.pivots(poses, side) for rod, side in zip(self.rods, sides)]
-        there = ~np.isnan([pivot.x for pivot in pivots]).any(axis=0)
+        assembled = ~np.isnan([pivot.x for pivot in pivots]).any(axis=0)
         rods = []
         for rod, pivot in zip(self.rods, pivots):
-            pivot = Vector(*(x[there] for x in pivot))
-            off = pivot.minus(_place(rod.end, poses[:, there]))
+            pivot = Vector(*(x[assembled] for x in pivot))
+            off = pivot.minus(_place(rod.end, poses[:, assembled]))
             rods.append((pivot, rod.end, np.sqrt(off.dot(off))))
         pose = _pose(self.middle)
         for _ in range(STEPS - 1):
             pose, _step = newton_step(rods, pose)
-        left = [np.angle((pose[2 * i] + 1j * pose[2 * i + 1]) * np.exp(-1j * poses[i, there]))
-                for i in (0, 1)]
-        # NaN is nowhere near.
-        return bool((np.abs(left) < BACK).all())
+        errors = [np.angle((pose[2 * i] + 1j * pose[2 * i + 1])
+                           * np.exp(-1j * poses[i, assembled])) for i in (0, 1)]
+        # A NaN fails this comparison.
+        return bool((np.abs(errors) < CONVERGED).all())
 
 
 def _hull(cells: np.ndarray) -> np.ndarray:
-    """Return which cells (k, n) of a square a polygon about some of them touches."""
+    """Return whether the polygon that bounds some cells (k, n) of a square touches each cell."""
     count = round(cells.shape[1] ** 0.5)
     hull = np.ones(cells.shape, bool)
-    for cos, sin in SIDES:
+    for cos, sin in NORMALS:
         middles = np.add.outer(cos * np.arange(count), sin * np.arange(count)).ravel()
-        # From middle to middle of cells whose corners touch.
+        # The distance of the middles of two cells whose corners touch.
         size = abs(cos) + abs(sin)
         low = np.where(cells, middles, np.inf).min(axis=1, keepdims=True) - size
         high = np.where(cells, middles, -np.inf).max(axis=1, keepdims=True) + size
@@ -242,9 +242,9 @@ def _norm(vector: Vector) -> float:
     return float(np.linalg.norm(vector))
 
 
-def _flat(way: Circle) -> float:
-    """Return how far a point may be from the first hinge."""
-    return math.hypot(*way.centre[:2]) + _norm(way.u)
+def _flat(path: Circle) -> float:
+    """Return a bound of a point's distance from the axis of the first hinge."""
+    return math.hypot(*path.centre[:2]) + _norm(path.u)
 
 
 def _pose(poses: np.ndarray) -> Pose:

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Actuator commands for requested outputs, from single messages or trajectories."""
+"""Convert requested outputs to commands for actuators, one by one or as trajectories."""
 
 from __future__ import annotations
 
@@ -29,46 +29,48 @@ from ..words import elided, listed
 
 # Shortest time between two searches for a first command [s].
 SECONDS_BETWEEN_SEARCHES = 0.5
-# Cached arrangements of commands, reported unknown names, and points of a trajectory, which take
-# the worker some seconds.
-ARRANGEMENTS, UNKNOWN_NAMES, MOST_POINTS = 100, 1000, 10_000
+# Maximum numbers of cached publishers, of logged unknown names, and of points of a trajectory,
+# which take the worker some seconds.
+PUBLISHERS, UNKNOWN_NAMES, MOST_POINTS = 100, 1000, 10_000
 
 
 class Target(NamedTuple):
-    """Requested outputs of a mechanism, with their names in messages and their solver."""
+    """The requested outputs of a mechanism, and their solver."""
 
+    # Names of the outputs in the message, for texts.
     named: str
     machine: SceneMechanism
     request: InverseRequest
-    places: tuple[int, ...]
+    # Index in the message, and published name with sign and offset, of each output.
+    indices: tuple[int, ...]
     names: tuple[JointName, ...]
 
     @property
     def actuators(self) -> list[str]:
-        """Return the actuators' names: each input's source, or the input if it is derived."""
+        """The actuator of each input: its source joint or, if that is a sensor, the input."""
         return [f'{self.machine.name}_{drive.input.name}' if drive.measures else drive.source
                 for drive in self.machine.inputs.values()]
 
     def command(self, positions: Sequence[float], speeds: Optional[Sequence[float]],
                 near: Sequence[float], jumps: bool) -> Any:
-        """Solve a message's positions and speeds [rad or m]; see `InverseRequest.command`."""
+        """Solve for the positions and speeds in a message; see `InverseRequest.command`."""
         return self.request.command(
             self._values(positions),
-            speeds and [name.sign * speeds[place] for name, place in zip(self.names, self.places)],
+            speeds and [name.sign * speeds[i] for name, i in zip(self.names, self.indices)],
             near, jumps)
 
     def reason(self, positions: Sequence[float]) -> str:
-        """Explain why positions have no solution."""
-        values = ', '.join(f'{positions[place]:.6g}' for place in self.places)
+        """Explain why the positions in a message are out of reach."""
+        values = ', '.join(f'{positions[index]:.6g}' for index in self.indices)
         return f'{self.named} cannot be {values}: {self.request.reason(*self._values(positions))}'
 
     def _values(self, positions: Sequence[float]) -> list[float]:
-        return [name.sign * (positions[place] - name.offset)
-                for name, place in zip(self.names, self.places)]
+        return [name.sign * (positions[index] - name.offset)
+                for name, index in zip(self.names, self.indices)]
 
 
 class Command(NamedTuple):
-    """Actuator positions, speeds if known, and the corresponding inputs [rad or m]."""
+    """Actuators' positions [rad or m] and, if known, speeds; the inputs at these positions."""
 
     target: Target
     inputs: Sequence[float]
@@ -77,7 +79,7 @@ class Command(NamedTuple):
 
     @property
     def efforts(self) -> list[float]:
-        """Return the actuators' static efforts against the loads [N m or N], 0 without loads."""
+        """The static efforts of the actuators that balance the loads [N m or N]."""
         machine = self.target.machine
         if not machine.loads:
             return [0.0] * len(self.inputs)
@@ -91,8 +93,8 @@ class CommandStream:
 
     Requests arrive on `wanted_states` and `wanted_trajectory`. Each solution continues the last
     one; if an output is out of reach, its actuator holds the last valid command. A trajectory is
-    computed in a worker thread; a newer one replaces it.
-    `present` returns the inputs of a SceneMechanism; infinite where unknown.
+    solved in a worker thread; a newer one replaces it. `present(mechanism)` returns the present
+    inputs of a SceneMechanism [rad or m], inf where they are unknown.
     """
 
     def __init__(self, node: Any, mechanisms: Iterable[str],
@@ -113,8 +115,8 @@ class CommandStream:
 
     def adopt(self, machines: Mapping[str, SceneMechanism]) -> None:
         """Replace the mechanisms."""
-        self._machines, self._publishers = machines, Cache(self._publisher, ARRANGEMENTS)
-        # With several inputs, the last pose may not exist in the new geometry.
+        self._machines, self._publishers = machines, Cache(self._publisher, PUBLISHERS)
+        # With several inputs, the changed geometry may have no pose that continues the last one.
         self._last = {name: last for name, last in self._last.items() if len(last.inputs) == 1
                       or last.target.machine is machines.get(name)}
         self._reader = joint_state_reader.Reader(self._interpret)
@@ -124,7 +126,7 @@ class CommandStream:
         self._worker.end()
 
     def _output(self, named: str) -> Optional[tuple[SceneMechanism, str, JointName]]:
-        """Return the mechanism, output and published name that match a name in messages."""
+        """Return the mechanism, output and published name for a name in messages, or None."""
         for machine in self._machines.values():
             own = {name.name: (joint, name) for joint, name in machine.joints.items()}
             joint, name = own.get(named) or (
@@ -134,46 +136,51 @@ class CommandStream:
         return None
 
     def _targets(self, names: Sequence[str]) -> tuple[list[Target], list[str], list[str]]:
-        """Return the targets of names, the unknown names, and reasons for omitted mechanisms."""
+        """
+        Return the targets for the output names in a message.
+
+        The second list has the names that are no outputs. The third has the reasons why mechanisms
+        with named outputs have no target.
+        """
         found: dict[str, list[tuple]] = {}
         targets, unknown, reasons = [], [], []
-        for place, named in enumerate(names):
+        for index, named in enumerate(names):
             if output := self._output(named):
-                found.setdefault(output[0].name, []).append((place, *output[1:]))
+                found.setdefault(output[0].name, []).append((index, *output[1:]))
             else:
                 unknown.append(named)
         for mechanism, outputs in found.items():
             machine = self._machines[mechanism]
             n = len(machine.inputs)
-            called = ' and '.join(elided(names[place]) for place, *_ in outputs)
+            called = ' and '.join(elided(names[index]) for index, *_ in outputs)
             try:
                 if len(outputs) > n == 1:
                     reasons.append(f'{called} are moved by one input: name one of them')
                 elif len(outputs) != n:
-                    raise ValueError(f'{mechanism} has {n} inputs: name as many outputs of it, '
-                                     f'not {called}')
-                places, joints, own = zip(*outputs[:n])
-                targets.append(Target(' and '.join(elided(names[place]) for place in places),
-                                      machine, InverseRequest(machine, joints), places, own))
+                    raise ValueError(f'{mechanism} has {n} inputs: name {n} of its outputs, not '
+                                     f'{called}')
+                indices, joints, own = zip(*outputs[:n])
+                targets.append(Target(' and '.join(elided(names[index]) for index in indices),
+                                      machine, InverseRequest(machine, joints), indices, own))
             except ValueError as error:
                 reasons.append(str(error))
         return targets, unknown, reasons
 
     def _interpret(self, message: JointState) -> tuple[list[Target], bool]:
-        """Return the targets of a message, and whether it has speeds."""
+        """Return the targets of a sender's messages, and whether these have velocities."""
         targets, unknown, reasons = self._targets(message.name[:len(message.position)])
         for reason in reasons:
             self._logger.warning(f'wanted_states: {reason}')
         if unknown := self._unknown.new(unknown):
-            self._logger.warning(f'wanted_states: {_nothing(unknown)}{self._unknown.ending}')
+            self._logger.warning(f'wanted_states: {_no_output(unknown)}{self._unknown.ending}')
         return targets, len(message.velocity) == len(message.name)
 
-    def _receive(self, text: bytes) -> None:
+    def _receive(self, data: bytes) -> None:
         if not self._commands.has_subscribers and not any(
                 one.has_subscribers for one in self._arrays.values()):
             return
-        source = self._reader.source(text)
-        (targets, known), (stamp, positions, speeds) = source.meaning, source.read(text)
+        sender = self._reader.sender(data)
+        (targets, known), (stamp, positions, speeds) = sender.meaning, sender.read(data)
         commands = [self._command(target, positions, speeds if known else None)
                     for target in targets]
         if found := [command for command in commands if command]:
@@ -181,7 +188,7 @@ class CommandStream:
             self._send(now or stamp, found)
 
     def _near(self, target: Target) -> Sequence[float]:
-        """Return the inputs of the last command, else the present ones, else their starts."""
+        """Return the inputs to continue from: of the last command, else present, else starts."""
         if last := self._last.get(target.machine.name):
             return last.inputs
         return [position if math.isfinite(position) else drive.start for position, drive in zip(
@@ -189,10 +196,10 @@ class CommandStream:
 
     def _command(self, target: Target, positions: Sequence[float],
                  speeds: Optional[Sequence[float]]) -> Optional[Command]:
-        """Return the command for outputs, else the last valid one, else None."""
+        """Return the command for a target or, out of reach, the last valid one, if any."""
         name, now = target.machine.name, time.monotonic()
         last = self._last.get(name)
-        # The first command has no predecessor and needs a search, whose rate is limited.
+        # Only the first command, which continues no other, may jump; its search is rate-limited.
         jumps = not last and now > self._searches.get(name, -math.inf)
         command = Command(target, *target.command(positions, speeds, self._near(target), jumps))
         if jumps:
@@ -213,7 +220,7 @@ class CommandStream:
                 efforts = [effort for command in commands for effort in command.efforts]
                 self._commands.publish(joint_states(
                     unpack(stamp), names, values, speeds if moving else (),
-                    () if any(map(math.isnan, efforts)) else efforts))
+                    efforts if all(map(math.isfinite, efforts)) else ()))
             else:
                 self._publishers[names, moving].publish(
                     stamp, [np.array(values + speeds * moving)])
@@ -237,7 +244,7 @@ class CommandStream:
                 raise ValueError(f'it has {len(message.points)} points; send up to {MOST_POINTS}')
             targets, unknown, reasons = self._targets(message.joint_names)
             if unknown or reasons:
-                raise ValueError(_nothing(unknown) if unknown else reasons[0])
+                raise ValueError(_no_output(unknown) if unknown else reasons[0])
         except ValueError as error:
             self._refuse(error)
             return
@@ -251,7 +258,7 @@ class CommandStream:
 
     def _solve(self, message: JointTrajectory, targets: Sequence[Target],
                near: list[Sequence[float]], jumps: list[bool]) -> Optional[Callable[[], None]]:
-        """Solve a trajectory; return its publisher, or None if a newer one has arrived."""
+        """Solve a trajectory; return a function to publish it, or None if it is dropped."""
         solved = JointTrajectory(header=message.header, joint_names=[
             name for target in targets for name in target.actuators])
         try:
@@ -269,7 +276,7 @@ class CommandStream:
 
 def _solved_point(i: int, point: JointTrajectoryPoint, n: int, targets: Sequence[Target],
                   near: list[Sequence[float]], jumps: Sequence[bool]) -> JointTrajectoryPoint:
-    """Return the actuators' trajectory point, and update `near` with its inputs."""
+    """Return trajectory point `i` of the actuators, and update `near` to its inputs."""
     if len(point.positions) != n or len(point.velocities) not in (0, n):
         raise ValueError(f'point {i} must have {n} positions, and as many velocities or '
                          f'none, not {len(point.positions)} and {len(point.velocities)}')
@@ -280,8 +287,8 @@ def _solved_point(i: int, point: JointTrajectoryPoint, n: int, targets: Sequence
         if not all(map(math.isfinite, near[k])):
             raise ValueError(f'point {i}: {target.reason(point.positions)}')
         if not all(map(math.isfinite, actuator[1])):
-            raise ValueError(f'point {i}: {target.named} turns back there and cannot have '
-                             'a speed other than zero')
+            raise ValueError(f'point {i}: the motion of {target.named} reverses there; its speed '
+                             'must be zero')
         found.append(actuator)
     positions, speeds = (list(chain.from_iterable(part)) for part in zip(*found))
     return JointTrajectoryPoint(positions=positions,
@@ -289,6 +296,6 @@ def _solved_point(i: int, point: JointTrajectoryPoint, n: int, targets: Sequence
                                 time_from_start=point.time_from_start)
 
 
-def _nothing(unknown: Sequence[str]) -> str:
-    return (f'nothing is called {listed(unknown, 150)}; an output is called '
+def _no_output(unknown: Sequence[str]) -> str:
+    return (f'no output is called {listed(unknown, 150)}; an output is called '
             '<mechanism>_<link>, <mechanism>_<joint>.x, or as joint_names has it')

@@ -21,21 +21,21 @@ from .. import scene
 from ..scene.motion import Motion
 from ..words import listed
 
-# Largest advance of the clock over steady time between two messages that counts as slewing [ns].
+# If system time gains more than this on steady time between two messages [ns], it has jumped.
 JUMP = 10 ** 8
 
-# Longest timer period [ns], thirty years, instead of an overflow.
+# Longest period of a timer that does not overflow [ns]: thirty years.
 LONGEST_PERIOD = 1e18
 
 
 class CrankDriver(scene_node.SceneNode):
     """
-    Publishes every input as a function of the node's time, on `crank_states`.
+    Publishes the scene's source joints on `crank_states`, as functions of the node's time.
 
-    Nodes `in_process` receive the messages directly unless there are other subscribers.
+    `in_process` are nodes of this process that subscribe to them; see InProcessPublisher.
     """
 
-    # The time [ns], unless it is simulated.
+    # System time [ns], used unless `use_sim_time` is set.
     system_time = staticmethod(time_ns)
 
     def __init__(self, in_process: Sequence[Any] = (), **kwargs: Any):
@@ -51,13 +51,13 @@ class CrankDriver(scene_node.SceneNode):
         self._publisher = InProcessPublisher(self, 'crank_states', in_process)
         self._timer = self.create_timer(1.0, self.guarded('a crank message', self._tick))
         # After system time is set back, a timer would sleep until the old time returns.
-        self.create_timer(1.0, self.guarded('a look at the clock', self._wake),
+        self.create_timer(1.0, self.guarded('the check of the clock', self._restart_timer),
                           clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.begin()
 
     def adopt(self, new: scene.Scene) -> None:
-        """Continue every input by the new scene, from its present value or from a new start."""
-        now = 0 if self._now is None else self._settled()
+        """Adopt a scene; an input continues from its value, or from its start if that is new."""
+        now = 0 if self._now is None else self._follow_clock()
         drives = {(name, input_): drive for name, machine in new.machines.items()
                   for input_, drive in machine.inputs.items()}
         for key, drive in drives.items():
@@ -67,14 +67,13 @@ class CrankDriver(scene_node.SceneNode):
             elif (old.speed, old.sweep) != (drive.speed, drive.sweep):
                 self._motions[key] = self._motions[key].changed(drive.speed, drive.sweep, now)
         self._drives, self._machines = drives, new.machines
-        # If several inputs have one source, the last one is published.
+        # If several inputs have one source joint, it moves as the last of them.
         sent = {drive.source: (key, drive) for key, drive in drives.items()}
         self._sent = list(sent.values())
-        self._name(list(sent))
-        self._pace(new.rate)
+        self._set_names(list(sent))
+        self._set_rate(new.rate)
 
-    def _name(self, sources: List[str]) -> None:
-        """Replace the published joints."""
+    def _set_names(self, sources: List[str]) -> None:
         if sources == self._names:
             return
         n = len(sources)
@@ -83,7 +82,7 @@ class CrankDriver(scene_node.SceneNode):
             lambda stamp, values: joint_states(stamp, sources, values[:n], values[n:]),
             2 * n, self.get_logger())
 
-    def _pace(self, rate: float) -> None:
+    def _set_rate(self, rate: float) -> None:
         if not rate:
             self._timer.cancel()
             return
@@ -93,44 +92,45 @@ class CrankDriver(scene_node.SceneNode):
             self._timer.reset()
 
     def _time(self) -> Tuple[int, bool]:
-        """Return the time [ns] and whether it is simulated."""
+        """Return the node's time [ns] and whether it is simulated."""
         clock = self.get_clock()
         simulated = clock.ros_time_is_active
         return clock.now().nanoseconds if simulated else self.system_time(), simulated
 
-    def _settled(self) -> int:
-        """Return the time [ns]; after a jump of the clock, inputs continue from their values."""
+    def _follow_clock(self) -> int:
+        """Return the time [ns]; if it has jumped, shift the motions, so that no input jumps."""
         (now, simulated), steady = self._time(), monotonic_ns()
         reached = 0
         if self._now is not None:
             reached = self._now if simulated else self._now + steady - self._steady
         # Simulated time may advance by any amount.
-        leapt = now - reached > JUMP and not simulated
-        if self._now is None or now < self._now or leapt:
+        is_ahead = now - reached > JUMP and not simulated
+        if self._now is None or now < self._now or is_ahead:
             self._motions = {n: m.moved(reached, now) for n, m in self._motions.items()}
         self._now, self._steady = now, steady
         return now
 
     def _tick(self) -> None:
-        now = self._settled()
+        now = self._follow_clock()
         if self._publisher.has_subscribers:
             positions, speeds = zip(*[self._position(*sent, now) for sent in self._sent])
             self._message.publish(pack_time(now), [positions + speeds])
 
     def _position(self, key: Tuple[str, str], drive: scene.InputSettings,
                   now: int) -> Tuple[float, float]:
-        """Return the position [rad or m] and speed [per second] of an input's source."""
+        """Return position [rad or m] and speed [rad/s or m/s] of an input's source joint."""
         value, speed = self._motions[key].at(now)
         if drive.is_plain:
             return value, speed
         return self._machines[key[0]].to_source(drive, value, speed)
 
     def serves(self) -> str:
-        """Describe the inputs and their rate."""
+        """Return the source joints and their rate, in words."""
         sources = [drive.source for drive in self._drives.values()]
         return f'moves {listed(sources, 200)} on crank_states at {self.scene.rate:g} Hz'
 
-    def _wake(self) -> None:
+    def _restart_timer(self) -> None:
+        """Restart the timer if the clock was set back since the last message."""
         set_back = self._now is not None and self._time()[0] < self._now
         if set_back and self.scene.rate:
             self._timer.reset()
@@ -138,9 +138,10 @@ class CrankDriver(scene_node.SceneNode):
 
 class InProcessPublisher:
     """
-    Publishes joint states; `nodes` of this process receive them without the middleware.
+    Publishes joint states directly to the callbacks of `nodes`, which run in this process.
 
-    While there are other subscribers, all use the middleware, so each message arrives once.
+    While the topic `name` has other subscribers, too, the middleware delivers to all of them
+    instead, so that each message arrives once.
     """
 
     def __init__(self, node: Any, name: str, nodes: Sequence[Any]):
@@ -155,17 +156,17 @@ class InProcessPublisher:
         return self._others.has_subscribers or bool(self._subscriptions)
 
     def publish(self, message: Any) -> None:
-        """Publish a message, serialised or not."""
+        """Publish a JointState, or its serialised bytes."""
         if self._others.has_subscribers:
             self._others.publish(message)
             return
-        text = message if isinstance(message, bytes) else serialize_message(message)
+        data = message if isinstance(message, bytes) else serialize_message(message)
         for subscription in self._subscriptions:
-            subscription.callback(text)
+            subscription.callback(data)
 
 
 def main(args: Any = None) -> int:
-    """Run the node; return the exit code."""
+    """Run the node with command-line arguments `args`; return the exit code."""
     return scene_node.run(CrankDriver, scene.DRIVER, args)
 
 

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A mechanism of `kinematics`: the state of its inputs, its pose and its topics."""
+"""A mechanism of `kinematics`: the state of its inputs, its solution and its topics."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from . import messages
 from .log import Throttle
-from .mechanism_model import MechanismModel, Pose
+from .mechanism_model import MechanismModel, Validity
 from .publishers import LATCHED, PatchedPublisher, TrackedPublisher
 from .. import scene
 from ..linkage.walker import Solution
@@ -25,18 +25,20 @@ from ..linkage.walker import Solution
 
 class DrivenMechanism:
     """
-    State and topics of a mechanism; `changed` is called when subscribers come or go.
+    The state and the topics of a mechanism.
+
+    `changed` is called when a topic gets its first subscriber and when it loses its last one.
 
     Attributes
     ----------
     inputs : float array (2, inputs)
-        Last value [rad or m] and speed [per second] of each input.
+        Last positions [rad or m] of the inputs, and their speeds [rad/s or m/s].
     known : bool array (2, inputs)
-        Which of them have been received.
+        Which of these numbers have been received.
     stamp : int64 array (1,)
-        Stamp of the last message that set an input, as serialised.
-    pose : Pose, optional
-        Validity of the last solution; None: not solved yet.
+        The eight bytes of the stamp of the last message that set an input.
+    validity : Validity, optional
+        Which numbers of the last solution are valid; None: not solved yet.
 
     """
 
@@ -53,20 +55,20 @@ class DrivenMechanism:
         self.inputs = np.zeros((2, len(machine.inputs)))
         self.known = np.zeros((2, len(machine.inputs)), bool)
         self.stamp = np.zeros(1, np.int64)
-        self.pose: Optional[Pose] = None
-        # Markers that are displayed, whether the locus is, and the last robot model.
+        self.validity: Optional[Validity] = None
+        # Ids of the displayed markers, whether the locus is displayed, and the last robot model.
         self._displayed: AbstractSet[int] = frozenset()
         self._has_locus, self._described = False, ''
 
     @property
     def model(self) -> MechanismModel:
-        """The adopted model; there is one before the first message."""
+        """The adopted model; it exists before the first message arrives."""
         assert self._model
         return self._model
 
     @property
     def is_complete(self) -> bool:
-        """Whether every input has been received."""
+        """Whether a position of every input has been received."""
         return bool(self.known[0].all())
 
     @property
@@ -75,7 +77,7 @@ class DrivenMechanism:
         return any(self._subscribed())
 
     def solution(self, in_scene: bool) -> Solution:
-        """Return the solver that its subscribers need, and those of the scene's joint states."""
+        """Return a solver for its own subscribers and, if `in_scene`, for the scene's joints."""
         return self._solution(self.model, in_scene, self._subscribed())
 
     def _solution(self, model: MechanismModel, in_scene: bool, subscribed: Sequence[bool]
@@ -84,58 +86,58 @@ class DrivenMechanism:
         return model.solution(joints or in_scene, markers, bool(self.known[1].all()))
 
     def _subscribed(self) -> Tuple[bool, bool]:
-        """Return whether its joint states and its markers have subscribers."""
+        """Return whether the joint states have subscribers, and whether the markers have."""
         return self._joint_states.has_subscribers, self._markers.has_subscribers
 
     def conversion(self, i: int) -> Tuple[float, float]:
-        """Return the factor and the offset from a source's position to the input."""
-        source = self.model.inputs[i]
+        """Return the factor and the offset from the position of source joint `i` to input `i`."""
+        drive = self.model.inputs[i]
         # Adding -0.0 changes no number; adding 0.0 would change -0.0.
-        return source.ratio, -0.0 if source.is_plain else source.offset
+        return drive.ratio, -0.0 if drive.is_plain else drive.offset
 
     def receive(self, i: int, value: float, speed: Optional[float]) -> None:
-        """Set an input [rad or m] and, if known, its speed [per second]."""
+        """Set input `i` [rad or m] and its speed [rad/s or m/s]; None sets a speed of 0."""
         self.inputs[:, i] = value, 0.0 if speed is None else speed
 
     def measure(self, i: int, position: float, speed: Optional[float]) -> bool:
-        """Set an input from a sensor's value [rad or m]; return False if it has no solution."""
-        source = self.model.inputs[i]
+        """Set input `i` by a sensor's position and speed; return False if that is out of reach."""
+        drive = self.model.inputs[i]
         near = float(self.inputs[0, i]) if self.known[0, i] else None
-        value, speed = self.model.machine.from_source(source, position, speed, near)
+        value, speed = self.model.machine.from_source(drive, position, speed, near)
         if not math.isfinite(value):
-            self._throttle.warn(source.source, lambda: (
-                f'{source.measures} cannot be where {source.source} is {position:.6g}: it is '
+            self._throttle.warn(drive.source, lambda: (
+                f'{drive.source} is at {position:.6g}, out of reach of {drive.measures}: it is '
                 'ignored'))
             return False
         self.receive(i, value, speed)
         return True
 
     def solve(self, solution: Solution) -> None:
-        """Solve at the inputs."""
+        """Solve at the present inputs."""
         solution.solve(*self.inputs.tolist())
 
     def assess(self, solution: Solution, is_regular: bool) -> bool:
-        """Determine the pose from unconverted numbers; return whether it has changed."""
-        layout, before = solution.layout, self.pose
+        """Update `validity`, with a check unless `is_regular`; return whether it has changed."""
+        layout, before = solution.layout, self.validity
         if layout.efforts:
             layout.effort(solution.values)[:] = self.model.machine.efforts(self.inputs[0].tolist())
-        self.pose = self.model.regular(solution) if is_regular and not layout.efforts else (
-            self.model.pose(solution, self.inputs))
-        if self.pose.assembled is not None:
+        self.validity = self.model.regular(solution) if is_regular and not layout.efforts else (
+            self.model.validity(solution, self.inputs))
+        if self.validity.assembled is not None:
             self._throttle.warn('reach', self._out_of_reach)
-        if self.pose != before:
-            self._display(self.pose)
-        return self.pose != before
+        if self.validity != before:
+            self._display(self.validity.any_assembled)
+        return self.validity != before
 
-    def _display(self, pose: Pose) -> None:
-        """Record the markers that a pose displays; delete those of a mechanism without a pose."""
-        if not pose.exists:
+    def _display(self, any_assembled: bool) -> None:
+        """Record the displayed markers, or delete them if no leg is assembled."""
+        if not any_assembled:
             self._delete(self._displayed)
         elif self._markers.has_subscribers:
             self._displayed = self.model.marker_array.ids
 
     def convert(self, solution: Solution) -> None:
-        """Convert joint values to the robot's signs, offsets and turns."""
+        """Convert solved joint values, in place, to their published signs, offsets and turns."""
         if conversion := self.model.conversion(solution.layout):
             factors, offsets, wrapped = conversion
             values = solution.values
@@ -144,33 +146,33 @@ class DrivenMechanism:
             values[wrapped] -= math.tau * np.round(values[wrapped] / math.tau)
 
     def refresh(self, solution: Solution) -> None:
-        """Solve again for changed subscribers, at the present inputs."""
-        if self.pose is None or self.pose.solution is not solution:
+        """Solve at the present inputs and convert, unless this was the last solution."""
+        if self.validity is None or self.validity.solution is not solution:
             self.solve(solution)
             self.assess(solution, False)
             self.convert(solution)
 
     def publishers(self) -> Iterator[PatchedPublisher]:
-        """Yield the publishers of the pose whose topics have subscribers."""
-        if self.pose and self.pose.exists:
-            yield from self._publishers(self.model, self.pose, self._subscribed())
+        """Yield a publisher for each topic with subscribers; none if no leg is assembled."""
+        if self.validity and self.validity.any_assembled:
+            yield from self._publishers(self.model, self.validity, self._subscribed())
 
-    def _publishers(self, model: MechanismModel, pose: Pose, subscribed: Sequence[bool]
+    def _publishers(self, model: MechanismModel, validity: Validity, subscribed: Sequence[bool]
                     ) -> Iterator[PatchedPublisher]:
         for is_subscribed, topic, build in zip(
                 subscribed, (self._joint_states, self._markers),
                 (model.joint_message, model.marker_message)):
             if is_subscribed:
-                yield model.publisher(topic.publisher, build, pose, self._logger)
+                yield model.publisher(topic.publisher, build, validity, self._logger)
 
     def prepared(self, machine: scene.SceneMechanism, frame_id: str, prefix: str,
                  in_scene: bool) -> MechanismModel:
-        """Return the model of a mechanism, compiled for its subscribers; reuse an equal one."""
+        """Return a model of `machine`, compiled for its subscribers, or an equal present model."""
         before = self._model
         if before and before.made_of == (machine, frame_id, prefix):
             return before
         model = MechanismModel(machine, frame_id, prefix)
-        # This runs in the worker's thread: subscribers may change meanwhile.
+        # This runs in the worker's thread, while subscribers may change.
         subscribed = self._subscribed()
         if before and self.is_complete and (in_scene or any(subscribed)):
             solution = self._solution(model, in_scene, subscribed)
@@ -180,12 +182,12 @@ class DrivenMechanism:
         return model
 
     def adopt(self, model: MechanismModel) -> None:
-        """Replace the model, and delete the old one's markers."""
-        self._model, self.pose = model, None
+        """Replace the model, and delete those markers that the new model does not have."""
+        self._model, self.validity = model, None
         self._delete(self._displayed - model.marker_array.ids)
 
     def publish_latched(self, latched: Tuple[str, Optional[Marker]]) -> None:
-        """Publish a changed robot model, and publish or delete the locus."""
+        """Publish the robot model if it has changed; publish the locus, or delete it if None."""
         description, locus = latched
         if description != self._described:
             self._described = description
@@ -198,7 +200,7 @@ class DrivenMechanism:
         self._set_locus(None)
 
     def wait_for_deletions(self, deadline: float) -> None:
-        """Wait until subscribers have acknowledged the deletions, at most until `deadline` [s]."""
+        """Wait for subscribers to acknowledge deletions, up to a monotonic time [s]."""
         for publisher in (self._markers.publisher, self._locus):
             publisher.wait_for_all_acked(Duration(seconds=max(0.0, deadline - time.monotonic())))
 
@@ -214,7 +216,7 @@ class DrivenMechanism:
                 markers=[messages.deleted(self.name, id_) for id_ in sorted(ids)]))
 
     def _out_of_reach(self) -> str:
-        assembled = [*self.pose.legs()] if self.pose else []
+        assembled = [*self.validity.legs()] if self.validity else []
         legs = ', '.join(f'{self.name}_{prefix}'.rstrip('_') for leg, prefix in enumerate(
             self.model.assembly.legs) if leg not in assembled)
         inputs = self.model.inputs

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Read joint states from their bytes, at a tenth of the cost of deserialising them.
+Read the numbers of joint states from serialised messages, faster than by deserialising them.
 
-The messages of a source differ only in numbers. Its first message is deserialised, and the layout
-of that message gives the positions of the numbers in all others.
+The messages of one sender have the same joint names and differ only in numbers. The first message
+is deserialised; its layout gives the places of the numbers in all others.
 """
 
 from __future__ import annotations
@@ -22,16 +22,19 @@ from sensor_msgs.msg import JointState
 from .log import Throttle
 from .message_layout import deserialized, HEADER, MessageLayout, NoLayout, pack, Unreadable
 
-# Best effort matches every publisher; 100 messages arrive in 100 ms at 1000 Hz.
+# Best effort matches publishers of any reliability. At 1000 Hz, the queue holds 100 ms.
 ANY = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 
-# Cached sources; longest message of a cached source [bytes]; arrangements of names per length.
-# Beyond that, one message in SAMPLED is analysed.
-SOURCES, LONGEST, ARRANGEMENTS, SAMPLED = 256, 1 << 16, 4, 256
+# Maximum numbers of cached senders, and of masks for one length of messages.
+SENDERS, MASKS = 256, 4
+# Messages longer than this [bytes] are always deserialised.
+LONGEST = 1 << 16
+# While a cache is full, the layout of only one in SAMPLED unknown messages is determined.
+SAMPLED = 256
 
 
 class Numbers(NamedTuple):
-    """Content of a message: packed stamp, positions and velocities."""
+    """Stamp of a message (see `pack`), positions [rad or m] and velocities [rad/s or m/s]."""
 
     stamp: bytes
     positions: Tuple[float, ...]
@@ -41,20 +44,20 @@ class Numbers(NamedTuple):
 def subscribe(node: Any, topic: str, receive: Callable[[bytes], None],
               failed: Callable[[], None] = lambda: None) -> None:
     """
-    Subscribe a SceneNode to joint states as bytes.
+    Subscribe a SceneNode to joint states; `receive` is called with each serialised message.
 
-    If `receive` raises Unreadable, the message is ignored with a throttled warning. Any other
-    exception is reported, then `failed` is called.
+    If it raises Unreadable, a throttled warning is logged. Any other exception is reported, and
+    `failed` is called.
     """
     throttle = Throttle(node.get_logger())
 
-    def receive_or_ignore(text: bytes) -> None:
+    def receive_or_ignore(data: bytes) -> None:
         try:
-            receive(text)
+            receive(data)
         except Unreadable as error:
             reason = str(error)
-            throttle.warn(topic, lambda: (f'{topic}: {len(text)} bytes that are no joint states '
-                                          f'are ignored: {reason}'))
+            throttle.warn(topic, lambda: (f'{topic}: a message of {len(data)} bytes is ignored, '
+                                          f'since it is no JointState: {reason}'))
         except Exception as error:
             node.report(topic, error)
             failed()
@@ -64,97 +67,102 @@ def subscribe(node: Any, topic: str, receive: Callable[[bytes], None],
 
 class Reader:
     """
-    Identifies the sources of serialised joint states.
+    Cache of the senders of serialised joint states.
 
-    `interpret` returns the `meaning` of a message, which all messages of its source share.
+    `interpret` is called with the first message of each sender. Its result is the `meaning` of all
+    messages of this sender, so it must not depend on the numbers in the message.
     """
 
     def __init__(self, interpret: Callable[[JointState], Any]):
         self._interpret = interpret
-        # Masks of the significant bytes by message length; sources by masked bytes, least recently
-        # used first.
+        # Masks of the constant bytes, by message length. Senders by length, mask and masked
+        # bytes, the least recently used first.
         self._masks: Dict[int, Set[int]] = {}
-        self._sources: OrderedDict[Tuple[int, int, int], Source] = OrderedDict()
+        self._senders: OrderedDict[Tuple[int, int, int], Sender] = OrderedDict()
         self._missed = 0
 
-    def source(self, text: bytes) -> Source:
-        """Return the source of a message; raise Unreadable if the bytes are no joint states."""
-        size, masks = len(text), self._masks.get(len(text), set())
-        number = int.from_bytes(text, 'little') if masks else 0
+    def sender(self, data: bytes) -> Sender:
+        """Return the sender of a serialised message; raise Unreadable if it is no JointState."""
+        size, masks = len(data), self._masks.get(len(data), set())
+        number = int.from_bytes(data, 'little') if masks else 0
         for mask in masks:
-            if source := self._sources.get((size, mask, number & mask)):
-                self._sources.move_to_end((size, mask, number & mask))
-                return source
-        message = deserialized(text, JointState)
+            if sender := self._senders.get((size, mask, number & mask)):
+                self._senders.move_to_end((size, mask, number & mask))
+                return sender
+        message = deserialized(data, JointState)
         self._missed += 1
-        is_full = len(self._sources) == SOURCES or len(masks) == ARRANGEMENTS
-        source = Source(text, message, self._interpret(message),
+        is_full = len(self._senders) == SENDERS or len(masks) == MASKS
+        sender = Sender(data, message, self._interpret(message),
                         size <= LONGEST and not (is_full and self._missed % SAMPLED))
-        if source.size and (source.mask in masks or len(masks) < ARRANGEMENTS):
-            if len(self._sources) == SOURCES:
+        if sender.size and (sender.mask in masks or len(masks) < MASKS):
+            if len(self._senders) == SENDERS:
                 self._drop_oldest()
-            self._masks.setdefault(size, set()).add(source.mask)
-            self._sources[size, source.mask, source.same] = source
-        return source
+            self._masks.setdefault(size, set()).add(sender.mask)
+            self._senders[size, sender.mask, sender.same] = sender
+        return sender
 
     def _drop_oldest(self) -> None:
-        (size, mask, _), _ = self._sources.popitem(last=False)
-        if not any(key[:2] == (size, mask) for key in self._sources):
+        (size, mask, _), _ = self._senders.popitem(last=False)
+        if not any(key[:2] == (size, mask) for key in self._senders):
             self._masks[size].remove(mask)
             if not self._masks[size]:
                 del self._masks[size]
 
 
-class Source:
+class Sender:
     """
-    Identification of a source's messages, and the places of their numbers.
+    The constant bytes of a sender's messages, and the places of their numbers.
 
     Attributes
     ----------
-    size, same, mask : int
-        Length of its messages, 0 if each is deserialised; the bytes that they share and the mask
-        of these bytes, as integers.
+    meaning : object
+        What `interpret` returned for its first message.
+    size : int
+        Length of its messages [bytes]; 0: places are unknown, so that it reads its first message
+        only.
+    mask, same : int
+        Mask of the constant bytes, and their values, both as little-endian integers.
     positions, velocities : int
-        Offsets in a message.
+        Offsets of the first position and the first velocity in a message [bytes].
 
     """
 
-    def __init__(self, text: bytes, message: JointState, meaning: Any, is_lasting: bool):
+    def __init__(self, data: bytes, message: JointState, meaning: Any, has_layout: bool):
         self.meaning, self.size = meaning, 0
         numbers = Numbers(pack(message.header.stamp), tuple(message.position),
                           tuple(message.velocity))
-        self._only: Tuple[bytes, Optional[Numbers]] = text, numbers
-        if is_lasting:
+        self._first: Tuple[bytes, Optional[Numbers]] = data, numbers
+        if has_layout:
             with suppress(NoLayout):
-                self._lay_out(text, MessageLayout(text, message), numbers)
+                self._set_layout(data, MessageLayout(data, message), numbers)
 
-    def _lay_out(self, text: bytes, layout: MessageLayout, numbers: Numbers) -> None:
-        (self.positions, self._first), (self.velocities, count) = layout.numbers[:2]
-        end = self.positions + 8 * self._first
-        self._unpack = Struct(f'<{HEADER}x8s{self.positions - HEADER - 8}x{self._first}d'
+    def _set_layout(self, data: bytes, layout: MessageLayout, numbers: Numbers) -> None:
+        (self.positions, self._count), (self.velocities, count) = layout.numbers[:2]
+        end = self.positions + 8 * self._count
+        self._unpack = Struct(f'<{HEADER}x8s{self.positions - HEADER - 8}x{self._count}d'
                               f'{self.velocities - end}x{count}d').unpack_from
         # Integers are the fastest to compare and look up for messages this short.
         self.mask = int.from_bytes(layout.fixed, 'little')
-        self.same = int.from_bytes(text, 'little') & self.mask
-        if _bits(self._unpacked(text)) == _bits(numbers):
-            self.size, self._only = len(text), (b'', None)
+        self.same = int.from_bytes(data, 'little') & self.mask
+        if _bits(self._unpacked(data)) == _bits(numbers):
+            self.size, self._first = len(data), (b'', None)
 
-    def is_of(self, text: bytes) -> bool:
-        """Return whether a message is of this source."""
+    def has_sent(self, data: bytes) -> bool:
+        """Return whether a serialised message is one of this sender's."""
         if not self.size:
-            return text is self._only[0]
-        return len(text) == self.size and int.from_bytes(text, 'little') & self.mask == self.same
+            return data is self._first[0]
+        return len(data) == self.size and int.from_bytes(data, 'little') & self.mask == self.same
 
-    def read(self, text: bytes) -> Numbers:
-        """Read a message of this source."""
-        return self._only[1] or self._unpacked(text)
+    def read(self, data: bytes) -> Numbers:
+        """Return the numbers of one of this sender's messages."""
+        return self._first[1] or self._unpacked(data)
 
-    def _unpacked(self, text: bytes) -> Numbers:
-        numbers, end = self._unpack(text), 1 + self._first
+    def _unpacked(self, data: bytes) -> Numbers:
+        numbers, end = self._unpack(data), 1 + self._count
         return Numbers(numbers[0], numbers[1:end], numbers[end:])
 
 
 def _bits(numbers: Numbers) -> tuple:
-    """Return the numbers as bytes, in which NaN is equal to itself."""
+    """Return the numbers as bytes, because as a float, NaN is unequal to itself."""
     return numbers.stamp, *(array('d', each).tobytes()
                             for each in (numbers.positions, numbers.velocities))

@@ -25,32 +25,35 @@ from .. import scene
 from ..robot_model import bodies, urdf
 from ..words import listed
 
-# Time until missing inputs are reported [s], and number of unknown joint names that are.
+# Time from the first input received to a warning about the others [s]; most unknown joint names
+# that are logged.
 MISSING_AFTER, UNKNOWN_NAMES = 5.0, 1000
-# Longest wait for the deletion of markers when the node ends [s].
+# Longest wait for subscribers to delete markers when the node ends [s].
 DELETION_TIMEOUT = 0.1
 
 
 class Kinematics(scene_node.SceneNode):
-    """Solves the mechanisms at the inputs on `crank_states`, for the topics with subscribers."""
+    """Solves mechanisms at the inputs from `crank_states`, only for topics with subscribers."""
 
     def __init__(self, **kwargs: Any):
         self._mechanisms: Dict[str, DrivenMechanism] = {}
         self._models: Dict[str, MechanismModel] = {}
         super().__init__(scene.KINEMATICS, **kwargs)
+        # Mechanism and index of the inputs, by their source joint.
         self._inputs: Dict[str, List[Tuple[str, int]]] = {}
         for name, machine in self.scene.machines.items():
-            for i, input_ in enumerate(machine.inputs.values()):
-                self._inputs.setdefault(input_.source, []).append((name, i))
+            for i, drive in enumerate(machine.inputs.values()):
+                self._inputs.setdefault(drive.source, []).append((name, i))
         self._scene_joint_states = SceneJointStates(self, self._inputs, self._invalidate)
         self._mechanisms.update((name, DrivenMechanism(self, machine, self._invalidate))
                                 for name, machine in self.scene.machines.items())
         self._planner = Planner([*self._mechanisms.values()], self._scene_joint_states,
-                                joint_state_reader.Reader(self._interpret), self._now)
+                                joint_state_reader.Reader(self._interpret),
+                                lambda: pack_time(self.get_clock().now().nanoseconds))
         self._own: frozenset = frozenset()
         self._missing, self._unknown = set(self._inputs), Once(UNKNOWN_NAMES)
         self._missing_timer = self.create_timer(
-            MISSING_AFTER, self.guarded('the inputs that nobody sends', self._name_missing),
+            MISSING_AFTER, self.guarded('the check for missing inputs', self._warn_of_missing),
             clock=Clock(clock_type=ClockType.STEADY_TIME), autostart=False)
         self.begin()
         try:
@@ -61,32 +64,32 @@ class Kinematics(scene_node.SceneNode):
             self, 'crank_states', self._planner.process, self._planner.discard)
 
     def serves(self) -> str:
-        """Describe the mechanisms."""
+        """Return the mechanisms' names, in words."""
         return f'moves {listed(self.scene.machines, 200)} by crank_states'
 
     def check(self, new: scene.Scene) -> None:
-        """Raise SceneError for a mechanism without a robot model."""
+        """Raise SceneError if no robot model can be made of a planar mechanism."""
         for name, machine in new.machines.items():
             before = self.scene.machines[name]
             if machine.in_space:
                 continue
             if machine is not before:
                 bodies.size(machine)
-            # Dimensions and sweeps cannot make a robot model invalid; their travels are slow.
+            # Dimensions and sweeps cannot invalidate a robot model, whose limits take long.
             alike = replace(machine, linkage=before.linkage, reach=before.reach,
                             inputs=before.inputs)
             if alike != before or new.frame_id != self.scene.frame_id:
                 bodies.robot([alike], new.frame_id)
 
     def prepare(self, new: scene.Scene) -> Any:
-        """Return the model of each mechanism; those of unchanged mechanisms are reused."""
+        """Return a model of each mechanism by name; unchanged mechanisms keep their models."""
         in_scene = self._scene_joint_states.has_subscribers
         return {name: self._mechanisms[name].prepared(
             machine, machine.frame_id or new.frame_id, new.frame_prefix, in_scene)
             for name, machine in new.machines.items()}
 
     def adopt(self, models: Dict[str, MechanismModel]) -> None:
-        """Replace the models of the mechanisms."""
+        """Replace the models of the mechanisms, and publish those that have changed."""
         changed = [self._mechanisms[name] for name, model in models.items()
                    if model is not self._models.get(name)]
         is_first, self._models = not self._models, models
@@ -101,12 +104,12 @@ class Kinematics(scene_node.SceneNode):
                     partial(self._robot, models)])
 
     def _latched(self, one: DrivenMechanism, model: MechanismModel) -> Callable[[], None]:
-        """Build a mechanism's latched messages; return a function that publishes them."""
+        """Build a mechanism's latched messages; return a function to publish them."""
         latched = model.latched()
         return lambda: one.publish_latched(latched) if one.model is model else None
 
     def _robot(self, models: Dict[str, MechanismModel]) -> Callable[[], None]:
-        """Build the scene's robot model; return a function that publishes it."""
+        """Build the scene's robot model; return a function to publish it."""
         # With `only_named`, the joints belong to a robot model that is published elsewhere.
         robots = [model.robot for model in models.values()
                   if model.robot and not model.machine.only_named]
@@ -114,14 +117,14 @@ class Kinematics(scene_node.SceneNode):
         try:
             text = urdf.write(bodies.together(robots)) if robots else ''
         except scene.SceneError as error:
-            self.get_logger().info(f'no robot_description of the whole scene: {error}', once=True)
+            self.get_logger().info(f'the whole scene has no robot_description: {error}', once=True)
         return lambda: self._scene_joint_states.describe(text) if models is self._models else None
 
     def delete_displayed(self) -> None:
         """Delete all markers and loci."""
         for one in self._mechanisms.values():
             one.clear()
-        # Messages still in transit when a process ends are lost.
+        # The end of a process would drop messages that are still on their way.
         deadline = time.monotonic() + DELETION_TIMEOUT
         for one in self._mechanisms.values():
             one.wait_for_deletions(deadline)
@@ -129,44 +132,41 @@ class Kinematics(scene_node.SceneNode):
     def _invalidate(self) -> None:
         self._planner.invalidate()
 
-    def _now(self) -> bytes:
-        return pack_time(self.get_clock().now().nanoseconds)
-
     def _interpret(self, message: JointState) -> Tuple[Tuple[Route, ...], bool]:
-        """Return the inputs that a source sets, and whether its messages have velocities."""
-        places = dict(zip(message.name, range(len(message.position))))
-        routes = tuple(Route(self._mechanisms[mechanism], i, place)
-                       for name, place in places.items()
+        """Return the routes from a sender's joints, and whether it sends velocities."""
+        indices = dict(zip(message.name, range(len(message.position))))
+        routes = tuple(Route(self._mechanisms[mechanism], i, index)
+                       for name, index in indices.items()
                        for mechanism, i in self._inputs.get(name, ()))
-        self._note(message.name, places)
+        self._check_names(message.name, indices)
         return routes, len(message.velocity) == len(message.name)
 
-    def _note(self, names: Iterable[str], sent: Iterable[str]) -> None:
-        """Record which inputs are sent; warn once about each unknown name."""
-        if len(self._missing) == len(self._inputs) and not self._missing.isdisjoint(sent):
+    def _check_names(self, names: Iterable[str], received: Iterable[str]) -> None:
+        """Warn once of each unknown name; record source joints whose position is received."""
+        if len(self._missing) == len(self._inputs) and not self._missing.isdisjoint(received):
             self._missing_timer.reset()
-        self._missing.difference_update(sent)
+        self._missing.difference_update(received)
         unknown = self._unknown.new(name for name in names if name not in self._inputs
                                     and name not in self._own)
         if unknown:
             self.get_logger().warning(
-                f'crank_states: nothing is called {listed(unknown, 150)}; the inputs are '
+                f'crank_states: no input is called {listed(unknown, 150)}; the inputs are '
                 f'{listed(self._inputs, 150)}{self._unknown.ending}')
 
-    def _name_missing(self) -> None:
-        """Warn once about inputs that have not been received."""
+    def _warn_of_missing(self) -> None:
+        """Warn of source joints that have not been received."""
         self._missing_timer.cancel()
         if self._missing:
             waiting = [name for name in self._inputs if name in self._missing]
             stuck = dict.fromkeys(mechanism for name in waiting
                                   for mechanism, _ in self._inputs[name])
             self.get_logger().warning(
-                f'crank_states: nothing was received of {listed(waiting, 150)}, without which '
+                f'crank_states: no position of {listed(waiting, 150)} was received, without which '
                 f'{listed(stuck, 150)} cannot move')
 
 
 def main(args: Any = None) -> int:
-    """Run the node; return the exit code."""
+    """Run the node with command-line arguments `args`; return the exit code."""
     return scene_node.run(Kinematics, scene.KINEMATICS, args)
 
 

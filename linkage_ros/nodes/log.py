@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Logging of repeated events: throttled, once, and up to a limit."""
+"""Log repeated events: throttled, or once each up to a limit."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ import time
 import traceback
 from typing import Any, Callable, Hashable, Iterable, List, Set
 
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
 RCLError = rclpy_implementation.RCLError
 InvalidHandle = rclpy_implementation.InvalidHandle
-# Time between two warnings about one subject [s], cached subjects, and logged errors.
+# Shortest time between two warnings about one subject [s]; most subjects that are throttled; most
+# kinds of errors that are logged.
 SECONDS, SUBJECTS, ERRORS = 5.0, 1000, 100
 
 
 class Throttle:
-    """Warnings of a logger, each subject at most once in `SECONDS`."""
+    """Logs warnings, about each subject at most one in `SECONDS`."""
 
     def __init__(self, logger: Any):
         self._logger = logger
         self._logged: OrderedDict[Any, float] = OrderedDict()
 
     def warn(self, subject: Any, text: Callable[[], str]) -> None:
-        """Log the result of `text`, which is called only if needed."""
+        """Log the result of `text`, unless the subject was logged within the last `SECONDS`."""
         now = time.monotonic()
         if now < self._logged.get(subject, -math.inf) + SECONDS:
             return
@@ -41,34 +41,34 @@ class Throttle:
 
 
 class Once:
-    """Subjects that are logged once each, up to a limit."""
+    """A record of logged subjects, so that each is logged once and at most `most` are."""
 
     def __init__(self, most: int):
         self._most = most
-        # Names may be long: their hashes are enough.
-        self._seen: Set[int] = set()
+        # Hashes, because names may be long.
+        self._logged: Set[int] = set()
 
     def new(self, subjects: Iterable[Hashable]) -> List[Any]:
-        """Return the new subjects, up to the limit."""
-        room = self._most - len(self._seen)
-        new = [one for one in dict.fromkeys(subjects) if hash(one) not in self._seen][:room]
-        self._seen.update(map(hash, new))
+        """Return the subjects that no call has returned before; none after `most` subjects."""
+        room = self._most - len(self._logged)
+        new = [one for one in dict.fromkeys(subjects) if hash(one) not in self._logged][:room]
+        self._logged.update(map(hash, new))
         return new
 
     @property
     def ending(self) -> str:
-        """The ending of the last warning."""
-        return '; no more will be named' if len(self._seen) == self._most else ''
+        """Text that ends the warning which reaches the limit; empty before."""
+        return '; no more will be named' if len(self._logged) == self._most else ''
 
 
 class Incidents:
-    """Logs unexpected exceptions, each kind once; none while the context `is_ending`."""
+    """Logs unexpected exceptions once each, unless `is_ending` returns true."""
 
     def __init__(self, logger: Any, is_ending: Callable[[], bool]):
         self._logger, self._is_ending, self._once = logger, is_ending, Once(ERRORS)
 
     def report(self, what: str, error: Exception) -> None:
-        """Log an exception, what was being handled, and where it was raised."""
+        """Log an exception with the place where it was raised; `what` was being handled."""
         frame = traceback.extract_tb(error.__traceback__)[-1]
         if not self._is_ending() and self._once.new([
                 (what, type(error), frame.filename, frame.lineno)]):
@@ -86,15 +86,3 @@ class Incidents:
                 return None
 
         return guarded
-
-
-def refused(response: Any, reason: str) -> Any:
-    """Return a service's response to a request that failed."""
-    result = SetParametersResult(successful=False, reason=reason)
-    if hasattr(response, 'results'):
-        response.results.append(result)
-    elif hasattr(response, 'message'):
-        response.success, response.message = False, reason
-    elif isinstance(getattr(response, 'result', None), SetParametersResult):
-        response.result = result
-    return response

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The solvers, messages, locus and robot model of a mechanism."""
+"""What follows from a mechanism's parameters: solvers, messages, locus and robot model."""
 
 from __future__ import annotations
 
@@ -23,22 +23,26 @@ from ..linkage.quantities import LinkPoint
 from ..linkage.walker import Layout, Solution
 from ..robot_model import bodies, shapes, urdf
 
-# Cached arrangements of messages: the legs of a walker may leave their reach one by one.
-ARRANGEMENTS = 128
+# Cached publishers: a walker's legs may leave their reach one by one, each with another message.
+PUBLISHERS = 128
 
 
-class Pose(NamedTuple):
-    """Validity of a solution's numbers, which selects its messages."""
+class Validity(NamedTuple):
+    """
+    Which numbers of a solution are valid, and so belong into its messages.
+
+    A solution is regular if all legs are assembled and all numbers are finite.
+    """
 
     solution: Solution
-    # A byte for each leg; None if all are assembled.
+    # A byte for each leg, 1 if it is assembled; None if all legs are.
     assembled: Optional[bytes]
-    # Whether all velocities are finite, and all efforts.
-    moving: bool
-    loaded: bool
+    # Whether there are velocities, and efforts, and all of them are finite.
+    has_velocities: bool
+    has_efforts: bool
 
     @property
-    def exists(self) -> bool:
+    def any_assembled(self) -> bool:
         """Whether any leg is assembled."""
         return self.assembled is None or 1 in self.assembled
 
@@ -51,10 +55,10 @@ class Pose(NamedTuple):
 
 class MechanismModel:
     """
-    Everything needed to publish a mechanism; immutable but for its caches.
+    Everything needed to publish a mechanism; immutable except for its caches.
 
-    `frame_id` is the frame of its pose; `prefix` precedes it in markers. Raises SceneError if the
-    mechanism has no robot model.
+    `frame_id` is the frame of its pose; in markers, this name has the prefix `prefix`. Raises
+    SceneError if no robot model can be made of a planar mechanism.
     """
 
     def __init__(self, machine: scene.SceneMechanism, frame_id: str, prefix: str):
@@ -69,23 +73,23 @@ class MechanismModel:
         self._points, shown = _shown(machine)
         self._drawn = *drawn, bodies.size(machine), shown
         self._solutions, self._conversions = Cache(), Cache(self._conversion)
-        self._publishers = Cache(size=ARRANGEMENTS)
+        self._publishers = Cache(size=PUBLISHERS)
 
     @cached_property
     def marker_array(self) -> messages.Markers:
-        """The builder of marker messages."""
+        """The builder of its marker messages."""
         return messages.Markers(*self._drawn)
 
     def latched(self) -> Tuple[str, Optional[Any]]:
-        """Return the latched messages: the robot model and, if any, the locus."""
+        """Return the URDF, '' for a spatial linkage, and the locus's marker, None without one."""
         drawn, size = self._drawn[:3], self._drawn[3]
         curve = self.assembly.locus(self.machine.tracer)
         return (urdf.write(self.robot) if self.robot else '',
                 messages.locus(*drawn, curve, size) if len(curve) > 1 else None)
 
     def solution(self, joints: bool, markers: bool, moving: bool) -> Solution:
-        """Return the solver of all legs for the subscribed topics."""
-        # The reach of several inputs shows only in the solved angles.
+        """Return a solver for joint states, for markers and, if `moving`, for velocities."""
+        # With several inputs, only the joint angles show whether the linkage is assembled.
         joints = joints or len(self.inputs) > 1
         names = self.assembly.joints if joints else ()
         return self._solutions.get_or_make((joints, markers, moving), lambda: (
@@ -93,13 +97,13 @@ class MechanismModel:
                 self._points if markers else (), names, names if joints and moving else None,
                 len(self.inputs) if self.machine.loads else 0)))
 
-    def regular(self, solution: Solution) -> Pose:
-        """Return the pose of a solution whose numbers are finite and within reach."""
-        return Pose(solution, None, solution.layout.speeds > 0, solution.layout.efforts > 0)
+    def regular(self, solution: Solution) -> Validity:
+        """Return the validity of a regular solution."""
+        return Validity(solution, None, solution.layout.speeds > 0, solution.layout.efforts > 0)
 
-    def pose(self, solution: Solution, inputs: np.ndarray) -> Pose:
-        """Assess a solution at inputs and speeds of shape (2, inputs)."""
-        layout, values, pose = solution.layout, solution.values, self.regular(solution)
+    def validity(self, solution: Solution, inputs: np.ndarray) -> Validity:
+        """Return the validity of a solution at positions and speeds `inputs`, (2, inputs)."""
+        layout, values, validity = solution.layout, solution.values, self.regular(solution)
         assembled = None
         if self.assembly.is_limited:
             assembled = self.assembly.within_reach(inputs[0, 0])
@@ -110,16 +114,21 @@ class MechanismModel:
             finite &= bool(np.isfinite(inputs[0]).all())
             assembled = finite if assembled is None else assembled & finite
             rates = solution.rows[assembled, layout.posed:]
-            pose = pose._replace(
-                moving=pose.moving and bool(np.isfinite(rates).all()
-                                            and np.isfinite(inputs[1]).all()),
-                loaded=pose.loaded and bool(np.isfinite(layout.effort(values)).all()))
+            validity = validity._replace(
+                has_velocities=validity.has_velocities and bool(
+                    np.isfinite(rates).all() and np.isfinite(inputs[1]).all()),
+                has_efforts=validity.has_efforts and bool(
+                    np.isfinite(layout.effort(values)).all()))
         if assembled is None or assembled.all():
-            return pose
-        return pose._replace(assembled=assembled.tobytes())
+            return validity
+        return validity._replace(assembled=assembled.tobytes())
 
     def conversion(self, layout: Layout) -> Optional[Tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Return factors, offsets and wrapped joints of the robot's joints; None if trivial."""
+        """
+        Return factors (values,), offsets (values,) and indices of angles to wrap.
+
+        They convert solved to published values. None means that these are equal.
+        """
         return None if self._is_plain else self._conversions[layout]
 
     def _conversion(self, layout: Layout) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -128,23 +137,23 @@ class MechanismModel:
                 _arranged(layout, 0.0, self._offsets, none),
                 np.flatnonzero(_arranged(layout, 0.0, self._wrapped, none)))
 
-    def publisher(self, publisher: Any, build: Callable, pose: Pose, logger: Any
+    def publisher(self, publisher: Any, build: Callable, validity: Validity, logger: Any
                   ) -> PatchedPublisher:
-        """Return the publisher of the message that `build` makes from a pose's values."""
-        return self._publishers.get_or_make((publisher, pose), lambda: PatchedPublisher(
-            publisher, lambda stamp, values: build(pose, values, stamp),
-            pose.solution.layout.size, logger))
+        """Return a publisher that patches the message which `build` makes of a solution."""
+        return self._publishers.get_or_make((publisher, validity), lambda: PatchedPublisher(
+            publisher, lambda stamp, values: build(validity, values, stamp),
+            validity.solution.layout.size, logger))
 
-    def joint_message(self, pose: Pose, values: np.ndarray, stamp: Any) -> JointState:
-        """Build the joint states of the assembled legs."""
-        names, positions, velocities, efforts = self.joints(pose, values)
+    def joint_message(self, validity: Validity, values: np.ndarray, stamp: Any) -> JointState:
+        """Build the joint states of the assembled legs from a solution's values."""
+        names, positions, velocities, efforts = self.joints(validity, values)
         return messages.joint_states(
-            stamp, names.tolist(), positions, velocities if pose.moving else (),
-            efforts if pose.loaded else ())
+            stamp, names.tolist(), positions, velocities if validity.has_velocities else (),
+            efforts if validity.has_efforts else ())
 
-    def joints(self, pose: Pose, values: np.ndarray) -> List[np.ndarray]:
-        """Return names, positions and, if solved, velocities and efforts of published joints."""
-        layout, n, legs = pose.solution.layout, len(self.inputs), pose.legs()
+    def joints(self, validity: Validity, values: np.ndarray) -> List[np.ndarray]:
+        """Return published joints: names, positions, velocities (empty if unsolved), efforts."""
+        layout, n, legs = validity.solution.layout, len(self.inputs), validity.legs()
         chosen = self._published.copy()
         chosen[n:].reshape(layout.legs, -1)[np.isin(np.arange(layout.legs), legs, invert=True)] = 0
         rows, driven = layout.rows(values), layout.driven(values)
@@ -154,53 +163,53 @@ class MechanismModel:
         return [self._names[chosen], positions[chosen],
                 velocities[chosen] if layout.speeds else velocities[:0], efforts[chosen]]
 
-    def marker_message(self, pose: Pose, values: np.ndarray, stamp: Any) -> MarkerArray:
-        """Build the markers of the assembled legs."""
-        layout, legs = pose.solution.layout, pose.legs()
+    def marker_message(self, validity: Validity, values: np.ndarray, stamp: Any) -> MarkerArray:
+        """Build the markers of the assembled legs from a solution's values."""
+        layout, legs = validity.solution.layout, validity.legs()
         places = layout.rows(values)[legs, :layout.coordinates].reshape(
             len(legs), -1, len(self.machine.linkage.axes))
-        # Left and right legs alternate; each side has its own ground.
+        # Left and right legs alternate. The first leg of each side draws the ground of that side.
         _, grounded = np.unique(legs % (1 + self.machine.mirrored), return_index=True)
         return self.marker_array.message(stamp, places, sorted(grounded))
 
 
 def _shown(machine: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
-    """Return the points of the markers, and the indices of each marker's points."""
-    linkage, wanted = machine.linkage, machine.points
+    """Return the markers' points and, by marker id, the point indices of each line or plate."""
+    linkage, names = machine.linkage, machine.points
     if machine.in_space:
-        return _in_space(linkage, wanted)
-    cranks, plates = shapes.cranks(linkage), shapes.plates(linkage, wanted)
-    # A plate replaces its bars, which makes the message smaller.
+        return _shown_spatial(linkage, names)
+    cranks, plates = shapes.cranks(linkage), shapes.plates(linkage, names)
+    # The edges of a plate are not drawn as bars, too: the message is smaller.
     edges = {frozenset(edge) for plate in plates for edge in combinations(plate, 2)}
     bars = [bar for bar in linkage.bars if bar not in cranks and frozenset(bar) not in edges]
     pieces: Dict[int, list] = {
         messages.LINKS_ID: [*bars, *linkage.cylinders],
-        messages.JOINTS_ID: [(name,) for name in wanted],
+        messages.JOINTS_ID: [(name,) for name in names],
         messages.GUIDES_ID: [], messages.BODIES_ID: [], messages.CRANKS_ID: cranks,
         messages.DRIVEN_ID: [], messages.PLATES_ID: plates,
-        messages.GROUND_ID: shapes.marks(linkage, wanted)}
-    for shape in shapes.drawn(machine, wanted):
+        messages.GROUND_ID: shapes.marks(linkage, names)}
+    for shape in shapes.drawn(machine, names):
         id_ = (messages.GUIDES_ID if shape.kind == shapes.GUIDE else messages.DRIVEN_ID
                if shape.slide.name in machine.inputs else messages.BODIES_ID)
         pieces[id_].append((shape.start, shape.end))
-    spots = [point for several in pieces.values() for piece in several for point in piece
-             if isinstance(point, LinkPoint)]
-    place = {point: i for i, point in enumerate((*wanted, *spots))}
-    return (*wanted, *spots), {
-        id_: [[place[point] for point in piece] for piece in several if place.keys() >= set(piece)]
+    points = (*names, *(point for several in pieces.values() for piece in several
+                        for point in piece if isinstance(point, LinkPoint)))
+    index = {point: i for i, point in enumerate(points)}
+    return points, {
+        id_: [[index[point] for point in piece] for piece in several if index.keys() >= set(piece)]
         for id_, several in pieces.items()}
 
 
-def _in_space(linkage: Mechanism, wanted: Sequence[str]) -> Tuple[Sequence, Dict[int, list]]:
-    """Return the same as `_shown` for a linkage of rods, drawn as lines."""
-    place = {point: i for i, point in enumerate(wanted)}
-    return wanted, {messages.LINKS_ID: [
-        [place[end] for end in line] for line in (*linkage.bars, *linkage.cylinders)
-        if place.keys() >= {*line}], messages.JOINTS_ID: [[i] for i in place.values()]}
+def _shown_spatial(linkage: Mechanism, names: Sequence[str]) -> Tuple[Sequence, Dict[int, list]]:
+    """Return the same as `_shown` for a spatial linkage, whose bars and cylinders are lines."""
+    index = {point: i for i, point in enumerate(names)}
+    return names, {messages.LINKS_ID: [
+        [index[end] for end in line] for line in (*linkage.bars, *linkage.cylinders)
+        if index.keys() >= {*line}], messages.JOINTS_ID: [[i] for i in index.values()]}
 
 
 def _arranged(layout: Layout, rest: float, joints: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Arrange values: joints with inputs first, then velocities, efforts and the rest."""
+    """Return an array in a solution's layout: `joints` and `rates` in their places, or `rest`."""
     values, n = np.full(layout.size, rest), layout.inputs
     rows, driven = layout.rows(values), layout.driven(values)
     driven[:n] = joints[:n]

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Positions of numbers in serialised messages, to read and write them in place.
+Places of the numbers in serialised messages, to read and write them there.
 
 Consecutive messages of a publisher differ only in stamps and in the float64 of sequences. Their
-positions follow from the lengths of strings and sequences (CDR encoding). A layout is verified
-before use: its numbers must equal those of an ordinary message.
+places follow from the lengths of strings and sequences (CDR encoding). A layout is verified before
+use, against a message that rclpy serialises or deserialises.
 """
 
 from __future__ import annotations
@@ -18,101 +18,101 @@ from builtin_interfaces.msg import Time
 import numpy as np
 from rclpy.serialization import deserialize_message, serialize_message
 
-# Length of the encapsulation header; alignment counts from its end.
+# Length of the encapsulation header [bytes]; alignment counts from its end.
 HEADER = 4
 LEAD = bytes(8 - HEADER)
 LITTLE_ENDIAN = b'\0\1'
-# Shorter texts are refused. A middleware that trusts the padding length in the header reads beyond
-# their end, and may crash.
+# Shorter messages [bytes] are refused: a middleware that trusts the padding length in the header
+# reads beyond their end, and may crash.
 SHORTEST = 8
-# The stamp of a message without one.
+# The packed stamp of a message whose publisher has not set it: time zero.
 NEVER = bytes(8)
 
 _STAMP, _COUNT = struct.Struct('<iI'), struct.Struct('<I')
 _SIZES = {'boolean': 1, 'octet': 1, 'uint8': 1, 'int8': 1, 'uint16': 2, 'int16': 2, 'uint32': 4,
           'int32': 4, 'float': 4, 'uint64': 8, 'int64': 8, 'double': 8}
-# Types made of float64 alone, with their number.
+# Types that consist of float64 only, and of how many.
 _DOUBLES = {'double': 1, 'geometry_msgs/Point': 3}
 
 
 def pack(stamp: Time) -> bytes:
-    """Serialise a stamp."""
+    """Return a Time as eight bytes, little-endian: int32 seconds, uint32 nanoseconds."""
     return _STAMP.pack(stamp.sec, stamp.nanosec)
 
 
 def pack_time(nanoseconds: int) -> bytes:
-    """Serialise a time [ns] as a stamp."""
+    """Return a time [ns] as `pack` does."""
     return _STAMP.pack(*divmod(nanoseconds, 10 ** 9))
 
 
 def unpack(stamp: bytes) -> Time:
-    """Deserialise a stamp."""
+    """Return the Time that `pack` has packed."""
     sec, nanosec = _STAMP.unpack(stamp)
     return Time(sec=sec, nanosec=nanosec)
 
 
 class Unreadable(ValueError):
-    """A message that cannot be deserialised; the text has the reason."""
+    """A message that cannot be deserialised; the exception's text has the reason."""
 
 
-def deserialized(text: bytes, kind: type) -> Any:
-    """Deserialise a message; raise Unreadable if the bytes are not of its type."""
-    if len(text) < SHORTEST:
-        raise Unreadable(f'there must be {SHORTEST} at least')
+def deserialized(data: bytes, kind: type) -> Any:
+    """Deserialise a message of type `kind`; raise Unreadable if `data` is none."""
+    if len(data) < SHORTEST:
+        raise Unreadable(f'it must have at least {SHORTEST} bytes')
     try:
-        return deserialize_message(text, kind)
+        return deserialize_message(data, kind)
     except Exception as error:
         # Each middleware has its own error types.
         raise Unreadable(' '.join(str(error).split())[:200]) from None
 
 
 class NoLayout(Exception):
-    """A message whose numbers cannot be accessed in place; the text has the reason."""
+    """A message whose numbers cannot be accessed in place; the exception's text has the reason."""
 
 
 class MessageLayout:
     """
-    Positions of the numbers in a message, and a mask of its constant bytes.
+    Places of the numbers in a serialised message, and a mask of its constant bytes.
 
-    Its arguments are the message, serialised and not. Its type has no fixed-size arrays and no
-    wide strings. Raises NoLayout for another encoding.
+    `data` is the serialised `message`. Fixed-size arrays and wide strings are not supported.
+    Raises NoLayout if the encoding is not little-endian CDR.
 
     Attributes
     ----------
     stamps : list of int
-        Offsets of the stamps.
+        Offsets of the stamps [bytes].
     numbers : list of (int, int)
-        Offset and count of the numbers of each sequence of float64 or points.
-    fixed : uint8 array
-        Mask of the bytes that are neither numbers nor padding.
+        Offset [bytes] and count of the float64 numbers of each sequence of numbers or points.
+    fixed : uint8 array (bytes,)
+        Mask of the constant bytes: 0 at stamps, numbers and padding, 255 elsewhere.
 
     """
 
-    def __init__(self, text: bytes, message: Any):
-        if text[:len(LITTLE_ENDIAN)] != LITTLE_ENDIAN:
-            raise NoLayout('its encoding is another')
+    def __init__(self, data: bytes, message: Any):
+        if data[:len(LITTLE_ENDIAN)] != LITTLE_ENDIAN:
+            raise NoLayout('its encoding is not little-endian CDR')
         self.stamps: List[int] = []
         self.numbers: List[Tuple[int, int]] = []
-        self._fixed, self._text, self._place = bytearray(len(text)), text, 0
-        self._pass(1, HEADER)
+        self._fixed, self._data, self._place = bytearray(len(data)), data, 0
+        self._advance(1, HEADER)
         self._walk(message)
-        self._bytes, self.fixed = (np.frombuffer(each, np.uint8) for each in (text, self._fixed))
+        self._bytes, self.fixed = (np.frombuffer(each, np.uint8) for each in (data, self._fixed))
 
-    def fits(self, text: bytes) -> bool:
-        """Return whether a message differs only in stamps, numbers and padding."""
-        return len(text) == len(self._text) and not (
-            (np.frombuffer(text, np.uint8) ^ self._bytes) & self.fixed).any()
+    def fits(self, data: bytes) -> bool:
+        """Return whether a serialised message has this layout and the same constant bytes."""
+        return len(data) == len(self._data) and not (
+            (np.frombuffer(data, np.uint8) ^ self._bytes) & self.fixed).any()
 
-    def is_same(self, text: bytes, other: bytes) -> bool:
-        """Return whether two messages fit and differ only in padding."""
+    def is_same(self, data: bytes, other: bytes) -> bool:
+        """Return whether two serialised messages fit and differ only in padding."""
         places = [(place, _STAMP.size) for place in self.stamps] + [
             (place, 8 * count) for place, count in self.numbers]
-        return self.fits(text) and self.fits(other) and all(
-            text[place:place + size] == other[place:place + size] for place, size in places)
+        return self.fits(data) and self.fits(other) and all(
+            data[place:place + size] == other[place:place + size] for place, size in places)
 
-    def read(self, text: bytes) -> List[np.ndarray]:
-        """Read the numbers of a message that fits, one array per sequence."""
-        return [np.frombuffer(text, '<f8', count, place) for place, count in self.numbers]
+    def read(self, data: bytes) -> List[np.ndarray]:
+        """Return the numbers of a serialised message that fits, one array per sequence."""
+        return [np.frombuffer(data, '<f8', count, place) for place, count in self.numbers]
 
     def _walk(self, message: Any) -> None:
         for name, kind in message.get_fields_and_field_types().items():
@@ -120,11 +120,11 @@ class MessageLayout:
 
     def _field(self, kind: str, value: Any) -> None:
         if kind == 'string':
-            self._pass(1, self._count())
+            self._advance(1, self._count())
         elif kind in _SIZES:
-            self._pass(_SIZES[kind], _SIZES[kind])
+            self._advance(_SIZES[kind], _SIZES[kind])
         elif kind == 'builtin_interfaces/Time':
-            self.stamps.append(self._pass(4, _STAMP.size, b'\0'))
+            self.stamps.append(self._advance(4, _STAMP.size, b'\0'))
         elif kind.startswith('sequence<'):
             self._sequence(kind[len('sequence<'):-1], value)
         else:
@@ -133,24 +133,24 @@ class MessageLayout:
     def _sequence(self, kind: str, values: Any) -> None:
         count = self._count()
         if count != len(values):
-            raise NoLayout('its bytes are another message')
+            raise NoLayout('its bytes are not those of the message')
         if kind in _DOUBLES:
             count *= _DOUBLES[kind]
-            self.numbers.append((self._pass(8 if count else 1, 8 * count, b'\0'), count))
+            self.numbers.append((self._advance(8 if count else 1, 8 * count, b'\0'), count))
         elif kind in _SIZES:
-            self._pass(_SIZES[kind], count * _SIZES[kind])
+            self._advance(_SIZES[kind], count * _SIZES[kind])
         else:
             for value in values:
                 self._field(kind, value)
 
     def _count(self) -> int:
-        return _COUNT.unpack_from(self._text, self._pass(4, 4))[0]
+        return _COUNT.unpack_from(self._data, self._advance(4, 4))[0]
 
-    def _pass(self, alignment: int, size: int, mask: bytes = b'\xff') -> int:
-        """Advance by some aligned bytes; return their offset."""
+    def _advance(self, alignment: int, size: int, mask: bytes = b'\xff') -> int:
+        """Mask the next `size` bytes, advance to their end, and return their aligned offset."""
         place = self._place + (HEADER - self._place) % alignment
         self._place = end = place + size
-        if end > len(self._text):
+        if end > len(self._data):
             raise NoLayout('it ends too early')
         self._fixed[place:end] = mask * size
         return place
@@ -158,24 +158,25 @@ class MessageLayout:
 
 class Template:
     """
-    A serialised message whose stamp and float64 values are patched in place.
+    A serialised message whose stamps and float64 values are patched in place.
 
-    `build` makes a message from a stamp and an array of `count` floats. Numbers in its sequences
-    are these values or zero. Raises NoLayout if a patched message differs from a built one.
+    `build(stamp, values)` makes the message of a Time and an array (count,); each number in its
+    sequences of float64 is one of these values or zero. Raises NoLayout if a patched message
+    differs from a built one.
     """
 
     def __init__(self, build: Callable, count: int):
         # In a message built from 1, 2, 3, ... each number is the index of its value.
         message = build(Time(sec=1), np.arange(1.0, count + 1.0))
-        text = serialize_message(message)
-        layout = MessageLayout(text, message)
+        data = serialize_message(message)
+        layout = MessageLayout(data, message)
         # Numbers are aligned to 8 bytes after the header; LEAD aligns them in memory, too.
-        self._bytes = bytearray(LEAD + text + bytes(-(len(text) - HEADER) % 8))
-        self.message = memoryview(self._bytes)[len(LEAD):len(LEAD) + len(text)]
+        self._bytes = bytearray(LEAD + data + bytes(-(len(data) - HEADER) % 8))
+        self.message = memoryview(self._bytes)[len(LEAD):len(LEAD) + len(data)]
         self._stamps = [slice(len(LEAD) + place, len(LEAD) + place + _STAMP.size)
-                        for place in layout.stamps if any(text[place:place + _STAMP.size])]
+                        for place in layout.stamps if any(data[place:place + _STAMP.size])]
         self._numbers = np.frombuffer(self._bytes, float, offset=len(LEAD) + HEADER)
-        # All numbers come from one table: zero, the values, then the message's constants.
+        # A table of all numbers of the message: zero, the values, then its other eight-byte words.
         self._table = np.concatenate([np.zeros(count + 1), self._numbers])
         self._values = self._table[1:count + 1]
         self._sources = np.arange(count + 1, len(self._table))
@@ -185,7 +186,7 @@ class Template:
         self._check(build, layout, count)
 
     def patched(self, stamp: bytes, values: Any) -> bytes:
-        """Return the serialised message with a packed stamp and values."""
+        """Return the serialised message with a packed stamp and values (count,)."""
         self._values[:] = values
         self._table.take(self._sources, out=self._numbers, mode='clip')
         for place in self._stamps:
@@ -193,7 +194,7 @@ class Template:
         return bytes(self.message)
 
     def places(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the offsets of values in `message`, their indices, and the stamps' offsets."""
+        """Return arrays: byte offsets of values in `message`, their indices, offsets of stamps."""
         own = np.flatnonzero((self._sources > 0) & (self._sources <= len(self._values)))
         return HEADER + 8 * own, self._sources[own] - 1, np.array(
             [place.start - len(LEAD) for place in self._stamps], int)
@@ -202,4 +203,4 @@ class Template:
         stamp, values = Time(sec=12, nanosec=345), np.linspace(-1.5, 7.25, count)
         if not layout.is_same(self.patched(pack(stamp), values),
                               serialize_message(build(stamp, values))):
-            raise NoLayout('a patched message does not read back as it was written')
+            raise NoLayout('a patched message differs from one that rclpy serialises')

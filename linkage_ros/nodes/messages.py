@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Build joint states and markers from solved numbers."""
+"""Build joint states and markers from solved positions and points."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from .. import palette
 
 (LINKS_ID, JOINTS_ID, LOCUS_ID, GUIDES_ID, BODIES_ID, CRANKS_ID, DRIVEN_ID, PLATES_ID,
  GROUND_ID) = range(9)
-# Type, colour, width as a fraction of the longest bar, and layer of each marker, by id. Layers
-# have different heights, so that coplanar markers do not flicker.
+# Type, colour, width as a fraction of the longest bar, and layer of each marker, by its id. Layers
+# have different heights above the linkage's plane, so that markers do not flicker in RViz.
 LOOKS = (
     (Marker.LINE_LIST, palette.BAR, 1 / 40, 0),
     (Marker.SPHERE_LIST, palette.JOINT, 1 / 20, 0),
@@ -39,13 +39,13 @@ def _rgba(colour: str) -> ColorRGBA:
     return ColorRGBA(**dict(zip('rgb', palette.rgb(colour))), a=1.0)
 
 
-# Colour of a plate; its marker's own colour is that of its edges.
+# Colour of the faces of plates, which is another than that of their marker.
 FACE = _rgba(palette.PLATE)
 
 
 def joint_states(stamp: Any, names: Sequence[str], positions: Any, velocities: Any = (),
                  efforts: Any = ()) -> JointState:
-    """Build a message of joints [rad or m] with velocities and efforts, if known."""
+    """Build joint states: positions [rad or m], velocities [rad/s or m/s], efforts [N m or N]."""
     message = JointState(name=names, position=array('d', positions),
                          velocity=array('d', velocities), effort=array('d', efforts))
     message.header.stamp = stamp
@@ -59,11 +59,11 @@ class Markers:
     Parameters
     ----------
     name : str
-        Name of the mechanism, the markers' namespace.
+        Name of the mechanism, which is the namespace of its markers.
     frame_id, pose, size
-        Frame of the pose; x, y, z [m], roll, pitch, yaw [rad]; longest bar [m].
+        Frame of the pose; the pose x, y, z [m], roll, pitch, yaw [rad]; longest bar [m].
     shown : mapping
-        Indices of each marker's points, by its id: joints, ends of lines or corners.
+        By marker id, the point indices of each joint, line or triangle.
 
     """
 
@@ -76,10 +76,10 @@ class Markers:
     def message(self, stamp: Any, places: np.ndarray, grounded: Sequence[int] = (0,)
                 ) -> MarkerArray:
         """
-        Build the markers of legs.
+        Return the markers with the points of all legs; they are the same objects at each call.
 
-        `places` (legs, points, 2 or 3) are the points' coordinates [m], `grounded` the legs whose
-        ground is drawn.
+        `places` are the points' coordinates [m], (legs, points, 2 or 3). `grounded` are the legs
+        whose ground is drawn.
         """
         for marker, points in self._shown:
             marker.header.stamp = stamp
@@ -95,14 +95,15 @@ class Markers:
 
 def locus(name: str, frame_id: str, pose: Sequence[float], places: np.ndarray,
           size: float) -> Marker:
-    """Build the curve through places [m], shape (n, 2); a zero stamp is valid at any time."""
+    """Build the marker of the curve through points [m], (n, 2); see Markers."""
+    # Its stamp is zero: RViz uses the latest pose of the frame.
     marker = _marker(name, LOCUS_ID, frame_id, pose, size)
     marker.points = [Point(**dict(zip('xyz', place))) for place in places.tolist()]
     return marker
 
 
 def deleted(name: str, id_: int) -> Marker:
-    """Build the marker that deletes another."""
+    """Build the marker that deletes marker `id_` of the namespace `name`."""
     return Marker(ns=name, id=id_, action=Marker.DELETE)
 
 

@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-One owner of the parameters that several nodes use: types, dimensions, branches, scale and sweep.
+Parameters that several nodes use have one owner: types, dimensions, branches, scale, sweep.
 
-`kinematics` announces its values on `scene_parameters`; the other nodes follow while it runs.
-Without it, each node uses its own values. An announcement with the names of the mechanisms has all
-values; the others have only changed ones. A late subscriber receives the last full announcement
-and all after it.
+The owner is `kinematics`. It announces its values on `scene_parameters`, and the other nodes adopt
+them while it runs; without it, each node uses its own values. A full announcement has all values,
+among them `mechanisms`; the following ones have only what has changed. A late subscriber receives
+the last full announcement and those after it.
 """
 
 from __future__ import annotations
@@ -28,30 +28,30 @@ LATCHED = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Announcer:
-    """Publishes the parameters that several nodes use."""
+    """Publishes the owner's values of parameters that several nodes use."""
 
     def __init__(self, node: Any):
         self._node = node
         self._publisher = node.create_publisher(ParameterEvent, TOPIC, LATCHED)
-        # Number of announcements that the topic holds for late subscribers.
+        # Number of announcements since the last full one, including that.
         self._announced = 0
 
     def first(self) -> Callable[[], None]:
-        """Return a function that publishes all values, unless they have been published before."""
-        of, values = self._node.scene, _messages(self._node.scene.parameters)
+        """Return a function that makes the first announcement, with all values."""
+        read, values = self._node.scene, _messages(self._node.scene.parameters)
 
         def publish() -> None:
             if not self._announced:
                 self._announced = 1
-                self._publish(new_parameters=values if of is self._node.scene else _messages(
+                self._publish(new_parameters=values if read is self._node.scene else _messages(
                     self._node.scene.parameters))
         return publish
 
     def announce(self, changed: Iterable[scene.Parameter]) -> None:
-        """Publish the changed values that several nodes use."""
+        """Publish those changed values that several nodes use; nothing before the first."""
         values = _messages(changed)
         if self._announced and values:
-            # The full announcement must stay within the depth of the topic.
+            # A late subscriber receives DEPTH messages, and needs the full one among them.
             self._announced = 1 if self._announced == DEPTH else self._announced + 1
             self._publish(changed_parameters=values if self._announced > 1 else _messages(
                 self._node.scene.parameters))
@@ -63,7 +63,7 @@ class Announcer:
 
 
 class Follower:
-    """Sets the parameters of a node to the owner's values."""
+    """Sets a node's parameters to the values that their owner announces."""
 
     def __init__(self, node: Any, parameters: SceneParameters):
         self._node, self._parameters = node, parameters
@@ -75,16 +75,16 @@ class Follower:
             ParameterEvent, TOPIC, node.guarded(TOPIC, self._receive), LATCHED)
 
     def owner_of(self, name: str) -> Optional[str]:
-        """Return the full name of the node that owns a parameter, while it runs."""
-        there = name in self._owned and self._node.count_publishers(self._subscription.topic_name)
-        return self._owner if there else None
+        """Return the full name of the running node that owns a parameter; None if none does."""
+        owned = name in self._owned and self._node.count_publishers(self._subscription.topic_name)
+        return self._owner if owned else None
 
     def _receive(self, event: ParameterEvent) -> None:
         fields = self._parameters.fields
         values, wrong = _read((*event.new_parameters, *event.changed_parameters), fields)
         if 'mechanisms' in values or event.node != self._owner:
             self._compare(event, values)
-        # Values that were refused before may be valid now.
+        # Values that this node has refused may be valid together with the new ones.
         changed = {name: value for name, value in {**self._refused, **values}.items()
                    if name in self._owned and not fields[name].read_only
                    and value != self._present(name)}
@@ -96,7 +96,7 @@ class Follower:
         return scene.plain(self._node.get_parameter_or(name).value)
 
     def _compare(self, event: ParameterEvent, values: Mapping[str, Any]) -> None:
-        """Decide which mechanisms to follow, from a full announcement."""
+        """Compare a full announcement with this node's mechanisms: equal ones are followed."""
         fields, machines = self._parameters.fields, self._parameters.scene.machines
         started = event.node != self._owner or event.new_parameters
         self._owner, self._refused = event.node, {}
@@ -109,7 +109,7 @@ class Follower:
         self._warn('unlike', [f'{name} is {quoted(here[name])} here and '
                               f'{quoted(values[name])} there' for name in unlike.values()],
                    'another mechanism, which is not followed')
-        self._warn('missing', sorted(missing), 'other mechanisms')
+        self._warn('missing', sorted(missing), 'other mechanisms; only one of the nodes has')
         if started:
             self._warned.pop('values', None)
             self._warn('values', [
@@ -118,7 +118,7 @@ class Follower:
                 'other values, which are followed')
 
     def _warn(self, kind: str, particulars: Sequence[str], what: str) -> None:
-        """Warn once, and again if the particulars change."""
+        """Warn that the owner has `what`; repeat it only when the particulars have changed."""
         if particulars and particulars != self._warned.get(kind):
             self._node.get_logger().warning(
                 f'{elided(self._owner)} has {what}: {listed(particulars, 1000)}')
@@ -131,7 +131,7 @@ def _messages(parameters: Iterable[scene.Parameter]) -> List:
 
 
 def _read(messages: Iterable, fields: Mapping[str, Any]) -> Tuple[Dict[str, Any], List[str]]:
-    """Return the values of known fields, and errors for the others."""
+    """Return the valid values of known parameters by name, and the errors of invalid ones."""
     values: Dict[str, Any] = {}
     wrong: List[str] = []
     for message in messages:
@@ -142,5 +142,5 @@ def _read(messages: Iterable, fields: Mapping[str, Any]) -> Tuple[Dict[str, Any]
             except scene.SceneError as error:
                 wrong.append(str(error))
             except RuntimeError:
-                wrong.append(f'{name} has a type that there is not')
+                wrong.append(f'{name} has an unknown type')
     return values, wrong

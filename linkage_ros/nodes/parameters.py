@@ -26,7 +26,7 @@ from ..words import elided, quoted
 
 
 class Undeclared(ParameterNotDeclaredException):
-    """An unknown parameter name."""
+    """A parameter is unknown; unlike that of rclpy, this exception has any text."""
 
     __init__ = Exception.__init__
 
@@ -35,28 +35,29 @@ class SceneParameters:
     """
     Declares the parameters that a node uses, and validates every change.
 
-    The node is created with `automatically_declare_parameters_from_overrides`. `role`, one of
-    scenes.ALL, selects its parameters. `check` raises SceneError for a scene that the node does
-    not support; `changed` is called with the changed parameters, after `scene` is replaced.
-    Raises SceneError if the node's initial values are invalid.
+    The `node` is created with `automatically_declare_parameters_from_overrides`. `role`, one of
+    scenes.ALL, selects its parameters. `check(scene)` raises SceneError for a scene that the node
+    does not support. `changed(parameters)` is called with the changed ones, after `scene` is
+    replaced. Raises SceneError if the node's initial values are invalid.
 
     Attributes
     ----------
     scene : Scene
         The scene of the present values.
     fields : dict
-        The Field of each parameter.
+        The Field of each declared parameter, by name.
     is_given : bool
-        Whether the node was started with any of the scene's parameters.
+        Whether the node was started with any parameter of a scene.
 
     """
 
     def __init__(self, node: Any, role: str, check: Callable[[scenes.Scene], None],
                  changed: Callable[[list[scenes.Parameter]], None]):
         self._node, self._role, self._check, self._changed = node, role, check, changed
-        # The node that owns a parameter, and whether its values are being followed.
+        # Full name of the node that owns a parameter, or None.
         self.owner_of: Callable[[str], Optional[str]] = lambda name: None
-        self._is_followed = self._is_derived = False
+        # Whether values from their owner are being set, and whether changed defaults are.
+        self._from_owner = self._is_derived = False
         # An empty list in a parameter file has neither type nor value.
         given = {name: () if one.value is None else scenes.plain(one.value)
                  for name, one in node.get_parameters_by_prefix('').items()}
@@ -70,40 +71,40 @@ class SceneParameters:
             node.undeclare_parameter(name)
         self._declare(own)
         self._candidate = self.scene
-        # By name: mechanism, value and the range computed for them.
+        # Requested slider ranges by name: mechanism, value, and the range computed from them.
         self._ends: dict[str, tuple[Any, Any, Any]] = {}
         node.add_pre_set_parameters_callback(self._typed_alike)
         node.add_on_set_parameters_callback(self._validate)
         node.add_post_set_parameters_callback(self._adopt)
 
-    def set_readable(self, messages: Sequence[ParameterMessage]) -> dict[int, SetParametersResult]:
-        """Set the readable parameters of a request; return results by index."""
-        readable = {}
+    def set_valid(self, messages: Sequence[ParameterMessage]) -> dict[int, SetParametersResult]:
+        """Set together those parameters that are valid by themselves; return results by index."""
+        valid = {}
         for i, one in enumerate(messages):
             with suppress(scenes.SceneError, KeyError, ValueError):
                 parameter = Parameter.from_parameter_msg(one)
                 if not self.fields[one.name].read_only:
                     self._value(parameter)
-                    readable[i] = parameter
-        return dict(zip(readable, self._set_together([*readable.values()])))
+                    valid[i] = parameter
+        return dict(zip(valid, self._set_together([*valid.values()])))
 
     def follow(self, values: Mapping[str, Any]) -> dict[str, str]:
-        """Set values that another node owns; return the errors by name."""
-        self._is_followed = True
+        """Set parameters to their owner's values; return the reasons of refusals by name."""
+        self._from_owner = True
         try:
             results = self._set_together([
                 Parameter(name, value=value) for name, value in values.items()])
         finally:
-            self._is_followed = False
+            self._from_owner = False
         return {name: result.reason for name, result in zip(values, results)
                 if not result.successful}
 
     def _set_together(self, parameters: list[Parameter]) -> list[SetParametersResult]:
         """
-        Set parameters, all at once or else half by half; return a result for each.
+        Set parameters atomically; if that is refused, each half of them. Return a result for each.
 
-        Setting them one by one would fail: a leg with some old and some new sizes may not be
-        assembled. If a name is repeated, only its last value is validated and set.
+        One by one would fail: a leg with some old and some new dimensions may not be assembled. If
+        a name is repeated, only its last value is validated and set.
         """
         if not parameters:
             return []
@@ -130,7 +131,7 @@ class SceneParameters:
         return descriptor
 
     def renew_ranges(self) -> None:
-        """Compute the requested ranges again; it may run in another thread."""
+        """Recompute the requested slider ranges; this may run in another thread."""
         for name in list(self._ends):
             self._slider_ends(name)
 
@@ -158,7 +159,7 @@ class SceneParameters:
                 self._node.set_descriptor(one.name, descriptors[one.field])
 
     def _typed_alike(self, parameters: list[Parameter]) -> list[Parameter]:
-        """Convert parameters to their declared types, such as 3 to 3.0, and empty lists."""
+        """Convert parameters to their declared types: 3 to 3.0, an empty list to a typed one."""
         for one in parameters:
             if not self._node.has_parameter(one.name):
                 raise Undeclared(f'{elided(one.name)} is not a parameter of '
@@ -172,7 +173,7 @@ class SceneParameters:
                 Parameter(parameter.name, _kind(field), field.checked(
                     parameter.name, parameter.value)))
         except scenes.SceneError:
-            # Validation refuses it with an explanation.
+            # `_validate` refuses it with an explanation.
             return parameter
 
     def _validate(self, parameters: list[Parameter]) -> SetParametersResult:
@@ -181,7 +182,7 @@ class SceneParameters:
         try:
             values = {one.name: self._value(one) for one in parameters
                       if one.name in self.fields}
-            strict = not self._is_followed and self._role in scenes.START.readers
+            strict = not self._from_owner and self._role in scenes.START.readers
             candidate = scenes.changed(self.scene, values, strict) if values else self.scene
             self._check(candidate)
         except scenes.SceneError as error:
@@ -198,7 +199,7 @@ class SceneParameters:
         if parameter.type_ == Parameter.Type.NOT_SET:
             raise scenes.SceneError(f'{name} cannot be removed; it must be {field.allowed}')
         value = field.checked(name, parameter.value)
-        owner = None if self._is_followed else self.owner_of(name)
+        owner = None if self._from_owner else self.owner_of(name)
         if owner:
             raise scenes.SceneError(
                 f'{name} belongs to {owner} while it runs: ros2 param set {owner} {name} '
@@ -213,7 +214,7 @@ class SceneParameters:
             return
         self.scene = self._candidate
         given = {one.name for one in parameters}
-        # Defaults may depend on other parameters.
+        # The defaults of some parameters depend on the values of others.
         derived = [_parameter(one) for one in changed if one.name in self.fields
                    and one.name not in given and not one.field.read_only]
         if derived:

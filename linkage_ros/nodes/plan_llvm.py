@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Plans in machine code: one call reads a message, solves, and patches all other messages."""
+"""The backend of plans in machine code: one call reads a message, solves and patches messages."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from ..formula import llvm_pipeline as native
 from ..linkage.walker import Solution
 
 
-def executor(plan: Any) -> Any:
-    """Return the machine-code executor of a plan; None until it is compiled."""
-    ready = plan.source and plan.source.size and native.code().done() and all(
+def backend(plan: Any) -> Any:
+    """Return a plan's LlvmBackend, or None as long as code is being compiled."""
+    ready = plan.sender and plan.sender.size and native.code().done() and all(
         solution.batch.code for _, solution in plan.solved)
-    return LlvmExecutor(plan) if ready else None
+    return LlvmBackend(plan) if ready else None
 
 
-class LlvmExecutor:
+class LlvmBackend:
     """Runs a plan in one native call, with precomputed tables of addresses."""
 
     def __init__(self, plan: Any):
         self._plan = plan
-        source = plan.source
+        sender = plan.sender
         self._stamp = np.zeros(2, np.int64)
         copies = [row for moved in plan.solved for row in _copies(*moved)]
         loops = [(*solution.batch.code, solution.values.size - solution.layout.efforts)
                  for _, solution in plan.solved]
         limits = [row for i, (mechanism, solution) in enumerate(plan.solved)
                   for row in _limits(i, mechanism, solution)]
-        same, mask = (number.to_bytes(source.size, 'little')
-                      for number in (source.same, source.mask))
+        same, mask = (number.to_bytes(sender.size, 'little')
+                      for number in (sender.same, sender.mask))
         self._pipeline = native.Pipeline(
             same, mask, self._stamp, plan, [*_readings(plan)], copies, loops, limits)
         self._solved = [mechanism for mechanism, _ in plan.solved]
@@ -44,16 +44,16 @@ class LlvmExecutor:
         conversions = [_conversion(mechanism, solution) for mechanism, solution in plan.solved]
         self._changes = np.concatenate([np.zeros(0, native.CHANGE), *conversions])
 
-    def run(self, text: bytes, output: Any) -> Union[None, bool, AbstractSet]:
-        """See `PythonExecutor.run`."""
+    def run(self, data: bytes, output: Any) -> Union[bool, AbstractSet]:
+        """Read a serialised message, solve, and publish `output`; see `PythonBackend.run`."""
         ending = output and (output.compiled or self._ending(output))
-        failed = self._pipeline.run(text, ending)
+        failed = self._pipeline.run(data, ending)
         if failed == native.UNSTAMPED:
             self._stamp[1:] = np.frombuffer(self._plan.now(), np.int64)
-            failed = self._pipeline.run(text, ending)
+            failed = self._pipeline.run(data, ending)
             self._stamp[1] = 0
         if failed < 0:
-            return None
+            return False
         if not failed and ending:
             ending.publish()
             return True
@@ -61,7 +61,7 @@ class LlvmExecutor:
                 if wrong} if failed else frozenset()
 
     def publish(self, output: Any) -> None:
-        """See `PythonExecutor.publish`."""
+        """Convert the solutions, and publish the messages of an Output."""
         ending = output.compiled or self._ending(output)
         ending.run()
         ending.publish()
@@ -72,7 +72,7 @@ class LlvmExecutor:
 
 
 class _Ending(native.Ending):
-    """The messages of one output, with their address tables."""
+    """The native call that converts the solutions and writes them into an output's messages."""
 
     def __init__(self, plan: Any, output: Any, stamps: np.ndarray, changes: np.ndarray):
         puts = [_puts(message) for message in output.messages if message.publisher.template]
@@ -82,7 +82,7 @@ class _Ending(native.Ending):
         self._built = [one for one in output.messages if not one.publisher.template]
 
     def publish(self) -> None:
-        """Publish the patched messages."""
+        """Publish the patched messages, and build those that cannot be patched."""
         for publish, message in self._patched:
             publish(message.tobytes())
         for publisher, values, stamp in self._built:
@@ -90,16 +90,16 @@ class _Ending(native.Ending):
 
 
 def _readings(plan: Any) -> Iterator[tuple]:
-    """Yield the numbers to read: offset in the message, destination, factor and offset."""
-    for mechanism, i, place in plan.readings:
+    """Yield rows of numbers to read: byte offset in the message, address, factor, addend."""
+    for mechanism, i, index in plan.readings:
         state, (factor, plus) = native.addresses(mechanism.inputs), mechanism.conversion(i)
-        yield plan.source.positions + 8 * place, state[0, i], factor, plus
-        if plan.is_moving:
-            yield plan.source.velocities + 8 * place, state[1, i], factor, -0.0
+        yield plan.sender.positions + 8 * index, state[0, i], factor, plus
+        if plan.has_velocities:
+            yield plan.sender.velocities + 8 * index, state[1, i], factor, -0.0
 
 
 def _copies(mechanism: Any, solution: Solution) -> Iterator[tuple]:
-    """Yield source and destination of inputs and speeds, copied to every solved leg."""
+    """Yield pairs of addresses, from and to, that copy inputs and speeds to every leg."""
     driven = native.addresses(solution.layout.driven(solution.values))
     state = native.addresses(mechanism.inputs).ravel()
     for start, given, own in zip(state, native.addresses(solution.batch.given), driven):
@@ -108,7 +108,7 @@ def _copies(mechanism: Any, solution: Solution) -> Iterator[tuple]:
 
 
 def _limits(loop: int, mechanism: Any, solution: Solution) -> Iterator[tuple]:
-    """Yield, for each leg, limits well inside its widest reach."""
+    """Yield a row for each leg: its input must be in the widest interval of the reach."""
     assembly = mechanism.model.assembly
     if not assembly.is_limited:
         return
@@ -121,6 +121,7 @@ def _limits(loop: int, mechanism: Any, solution: Solution) -> Iterator[tuple]:
 
 
 def _conversion(mechanism: Any, solution: Solution) -> np.ndarray:
+    """Return the table of a solution's conversions; see `MechanismModel.conversion`."""
     conversion = mechanism.model.conversion(solution.layout)
     rows = np.zeros(solution.values.size if conversion else 0, native.CHANGE)
     if conversion:
@@ -131,7 +132,7 @@ def _conversion(mechanism: Any, solution: Solution) -> np.ndarray:
 
 
 def _puts(message: Any) -> np.ndarray:
-    """Return the table of values to write into a message."""
+    """Return the table of values and stamps to write into a message, as pairs of addresses."""
     template = message.publisher.template
     numbers, sources, stamps = template.places()
     start = native.address(np.frombuffer(template.message, np.uint8))

@@ -1,54 +1,55 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Plans in plain Python and numpy: the executor without optional packages."""
+"""The backend of plans in Python and numpy, which needs no optional package."""
 
 from __future__ import annotations
 
-from typing import AbstractSet, Any, Optional
+from typing import AbstractSet, Any, Union
 
 import numpy as np
 
 from .message_layout import NEVER
 
 
-class PythonExecutor:
+class PythonBackend:
     """Runs the steps of a plan one by one."""
 
     def __init__(self, plan: Any):
         self._plan, self._solved = plan, frozenset(mechanism for mechanism, _ in plan.solved)
-        self._readings = [(one.mechanism, one.input, one.place,
+        self._readings = [(one.mechanism, one.input, one.source_index,
                            *one.mechanism.conversion(one.input))
                           for one in plan.readings]
 
-    def run(self, text: bytes, _: Any) -> Optional[AbstractSet]:
+    def run(self, data: bytes, output: Any) -> Union[bool, AbstractSet]:
         """
-        Read a message and solve.
+        Read a serialised message and solve; this backend leaves `output` to `publish`.
 
-        Return the mechanisms whose numbers may be irregular; None if the message is from another
-        source; True if the executor has published the output, too.
+        Return False, without any effect, if the message is from another sender. Return True if all
+        solutions are regular (see `Validity`) and `output` has been published. Otherwise return
+        the mechanisms whose solutions may be irregular.
         """
         plan = self._plan
-        if plan.source:
-            if not plan.source.is_of(text):
-                return None
-            self._read(text)
+        if plan.sender:
+            if not plan.sender.has_sent(data):
+                return False
+            self._read(data)
         for mechanism, solution in plan.solved:
             mechanism.solve(solution)
         return self._solved
 
-    def _read(self, text: bytes) -> None:
-        stamp, positions, velocities = self._plan.source.read(text)
+    def _read(self, data: bytes) -> None:
+        stamp, positions, velocities = self._plan.sender.read(data)
         stamp = np.frombuffer(self._plan.now() if stamp == NEVER else stamp, np.int64)
         self._plan.stamp[:] = stamp
         for mechanism in self._plan.mechanisms:
             mechanism.stamp[:] = stamp
-        for mechanism, i, place, factor, plus in self._readings:
-            mechanism.receive(i, factor * positions[place] + plus,
-                              factor * velocities[place] if self._plan.is_moving else None)
+        for mechanism, i, index, factor, plus in self._readings:
+            mechanism.receive(i, factor * positions[index] + plus,
+                              factor * velocities[index] if self._plan.has_velocities else None)
 
     def publish(self, output: Any) -> None:
-        """Convert the solutions and publish the messages."""
+        """Convert the solutions, and publish the messages of an Output."""
         for mechanism, solution in self._plan.solved:
             mechanism.convert(solution)
         for publisher, values, stamp in output.messages:

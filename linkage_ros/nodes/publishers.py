@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Publishers that track their subscriber count, and publishers that patch one message."""
+"""Publishers that track whether they have subscribers, and publishers that patch a message."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from .message_layout import NoLayout, Template, unpack
 
-# For messages published once, which later subscribers receive, too.
+# Later subscribers receive the last message, too.
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class TrackedPublisher:
     """
-    A publisher that updates `has_subscribers` on events, without a query for each message.
+    A publisher whose flag `has_subscribers` is updated by events, not by a query per message.
 
     `own` is the number of this process's subscriptions, which do not count. `changed` is called on
-    the executor's thread when the first subscriber comes and when the last one leaves.
+    the thread of rclpy's executor when the flag has changed.
     """
 
     def __init__(self, node: Node, type_: Any, name: str, qos: Any,
@@ -42,10 +42,10 @@ class TrackedPublisher:
 
 class PatchedPublisher:
     """
-    Publishes one message repeatedly with new values; `build` and `count` as for Template.
+    Publishes a message again and again with new values; `build` and `count` as for Template.
 
-    If the message cannot be patched, `template` is None, and ordinary messages are built, which is
-    logged once.
+    If the message cannot be patched, a warning is logged, `template` is None, and every message
+    is built.
     """
 
     def __init__(self, publisher: Any, build: Callable, count: int, logger: Any):
@@ -55,11 +55,11 @@ class PatchedPublisher:
         try:
             self.template = Template(build, count)
         except NoLayout as reason:
-            logger.warning(f'{publisher.topic_name}: {reason}; publishing ordinary messages',
-                           once=True)
+            logger.warning(f'{publisher.topic_name}: {reason}; each message is built anew, which '
+                           'takes longer', once=True)
 
     def publish(self, stamp: bytes, values: Sequence[Any]) -> None:
-        """Publish the message with a packed stamp and values, given as consecutive arrays."""
+        """Publish the message with a packed stamp and the numbers of all arrays `values`."""
         joined: Any = np.concatenate(values) if len(values) > 1 else values[0]
         if self.template:
             self.publisher.publish(self.template.patched(stamp, joined))

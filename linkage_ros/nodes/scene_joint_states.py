@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Topics of the whole scene for robot_state_publisher: all joints, and a robot model."""
+"""Topics of the whole scene, as robot_state_publisher uses them: joints and a robot model."""
 
 from __future__ import annotations
 
@@ -11,68 +11,70 @@ import numpy as np
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from .mechanism_model import MechanismModel, Pose
+from .mechanism_model import MechanismModel, Validity
 from .messages import joint_states
 from .publishers import LATCHED, PatchedPublisher, TrackedPublisher
 from ..cache import Cache
 
-# Cached arrangements of the message.
-ARRANGEMENTS = 16
+# Cached publishers, one for each combination of validities.
+PUBLISHERS = 16
 
 
 class SceneJointStates:
     """
     Publishes `joint_states` and `robot_description`.
 
-    `sources` are the joints on `crank_states`, which are omitted if that is the same topic.
-    `changed` is called when subscribers come or go.
+    If `crank_states` is remapped to `joint_states`, the source joints `sources` are on that topic
+    already, and are not published again. `changed` is called when the first subscriber comes and
+    when the last leaves.
     """
 
     def __init__(self, node: Any, sources: Iterable[str], changed: Callable[[], None]):
         same = node.resolve_topic_name('joint_states') == node.resolve_topic_name('crank_states')
-        # The node subscribes to its own joints there.
+        # If the topics are the same, the node's own subscription does not count.
         self._joint_states = TrackedPublisher(
             node, JointState, 'joint_states', 10, changed, int(same))
         self._descriptions = node.create_publisher(String, 'robot_description', LATCHED)
-        self._received = frozenset(sources if same else ())
+        self._omitted = frozenset(sources if same else ())
         self._logger = node.get_logger()
-        self._publishers = Cache(self._publisher, ARRANGEMENTS)
+        self._publishers = Cache(self._publisher, PUBLISHERS)
         self._description = ''
 
     @property
     def has_subscribers(self) -> bool:
-        """Whether the joints have subscribers other than the node itself."""
+        """Whether `joint_states` has subscribers other than the node itself."""
         return self._joint_states.has_subscribers
 
-    def describe(self, text: str) -> None:
+    def describe(self, urdf: str) -> None:
         """Publish a robot model, unless it is empty or unchanged."""
-        if text not in ('', self._description):
-            self._description = text
-            self._descriptions.publish(String(data=text))
+        if urdf not in ('', self._description):
+            self._description = urdf
+            self._descriptions.publish(String(data=urdf))
 
-    def message(self, members: Iterable[Any]) -> Optional[Tuple[PatchedPublisher, List]]:
-        """Return the publisher of mechanisms' joints, and the arrays of their values."""
-        poses = tuple((member.model, member.pose) for member in members
-                      if member.pose and member.pose.exists)
-        if not poses:
+    def message(self, mechanisms: Iterable[Any]) -> Optional[Tuple[PatchedPublisher, List]]:
+        """Return a publisher of assembled mechanisms' joints, and its arrays, or None."""
+        parts = tuple((one.model, one.validity) for one in mechanisms
+                      if one.validity and one.validity.any_assembled)
+        if not parts:
             return None
-        return self._publishers[poses], [pose.solution.values for _, pose in poses]
+        return self._publishers[parts], [one.solution.values for _, one in parts]
 
-    def _publisher(self, poses: Sequence[Tuple[MechanismModel, Pose]]) -> PatchedPublisher:
+    def _publisher(self, parts: Sequence[Tuple[MechanismModel, Validity]]) -> PatchedPublisher:
         return PatchedPublisher(
             self._joint_states.publisher,
-            lambda stamp, values: self._built(poses, values, stamp),
-            sum(pose.solution.layout.size for _, pose in poses), self._logger)
+            lambda stamp, values: self._build(parts, values, stamp),
+            sum(one.solution.layout.size for _, one in parts), self._logger)
 
-    def _built(self, poses: Sequence[Tuple[MechanismModel, Pose]], values: np.ndarray,
+    def _build(self, parts: Sequence[Tuple[MechanismModel, Validity]], values: np.ndarray,
                stamp: Any) -> JointState:
-        ends = np.cumsum([pose.solution.layout.size for _, pose in poses])
+        """Build the message from the consecutive values of the solutions."""
+        ends = np.cumsum([one.solution.layout.size for _, one in parts])
         names, positions, velocities, efforts = map(np.concatenate, zip(
-            *(model.joints(pose, part)
-              for (model, pose), part in zip(poses, np.split(values, ends)))))
-        chosen = [name not in self._received for name in names]
-        loaded = {pose.loaded for _, pose in poses if pose.solution.layout.efforts} == {True}
-        moving = all(pose.moving for _, pose in poses)
+            *(model.joints(one, own)
+              for (model, one), own in zip(parts, np.split(values, ends)))))
+        chosen = [name not in self._omitted for name in names]
+        moving = all(one.has_velocities for _, one in parts)
+        loaded = {one.has_efforts for _, one in parts if one.solution.layout.efforts} == {True}
         return joint_states(
             stamp, names[chosen].tolist(), positions[chosen], velocities[chosen] if moving else (),
             efforts[chosen] if loaded else ())

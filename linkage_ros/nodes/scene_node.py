@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Base of the three nodes: a scene as changeable parameters, and functions to run nodes."""
+"""Base class of the three nodes, whose parameters are a scene, and functions to run nodes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import gc
 import sys
 from typing import Any, Callable, Iterable, Iterator, List, Mapping, Optional
 
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rcl_interfaces.srv import SetParameters
 import rclpy
 from rclpy.clock import Clock, ClockType
@@ -23,7 +23,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args, try_shutdown
 
-from .log import Incidents, InvalidHandle, RCLError, refused
+from .log import Incidents, InvalidHandle, RCLError
 from .ownership import Announcer, Follower
 from .parameters import SceneParameters
 from .shutdown import ShutdownHandler
@@ -36,14 +36,16 @@ try:
 except ImportError:
     Executor = SingleThreadedExecutor
 
-# With an endless wait, some builds of the EventsExecutor spin busily and ignore signals [s].
+# Longest wait for an event [s]: some builds of the EventsExecutor do not wait without a limit.
+# They loop at full load and ignore signals.
 LONGEST_WAIT = 1.0
 
-# Longest delay of a message by the worker thread [s]. With a shorter interval, the worker also
-# interrupts messages, and more of them are late.
+# Longest time for which the worker thread delays a message [s]. At shorter intervals, it would
+# interrupt the processing of messages, and more of them would be late.
 SWITCH_INTERVAL = 0.0005
 
-SECONDS_BETWEEN_LOOKS = 2.0
+# Time between two checks for another node of the same name [s].
+SECONDS_BETWEEN_CHECKS = 2.0
 
 
 class SceneNode(Node):
@@ -51,14 +53,9 @@ class SceneNode(Node):
     Base class of the nodes of a scene.
 
     A subclass overrides `check`, `prepare` and `adopt`, and calls `begin` last in its constructor.
-    A change is validated and answered at once, prepared in a worker thread, then adopted. If
-    changes queue up, only the newest is prepared.
-
-    Raises
-    ------
-    SceneError
-        If the initial parameters are invalid.
-
+    A change of parameters is validated and answered at once; a worker thread prepares the changed
+    scene, then the node adopts it. If further changes arrive meanwhile, only the newest scene is
+    prepared. Raises SceneError if the initial parameters are invalid.
     """
 
     def __init__(self, name: str, **kwargs: Any):
@@ -73,7 +70,7 @@ class SceneNode(Node):
         self._role = name
         self._later: List[Job] = []
         self._first_spin = self.create_timer(
-            0.0, self.guarded('the first spin', self._start_later),
+            0.0, self.guarded('the start of the worker', self._start_later),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     @property
@@ -88,16 +85,16 @@ class SceneNode(Node):
 
     @property
     def fields(self) -> Mapping[str, scenes.Field]:
-        """The parameters that the node uses."""
+        """The Field of each parameter that the node uses, by name."""
         return self._parameters_of_scene.fields
 
     @property
     def is_settled(self) -> bool:
-        """Whether the newest scene has been adopted."""
+        """Whether the scene of the present parameters has been adopted."""
         return self._adopted is self.scene
 
     def begin(self) -> None:
-        """Adopt the first scene; follow or announce common parameters."""
+        """Adopt the first scene; then announce the parameters of several nodes, or follow them."""
         with self._or_destroyed():
             self.check(self.scene)
             prepared = self.prepare(self.scene)
@@ -109,54 +106,54 @@ class SceneNode(Node):
             follower = Follower(self, self._parameters_of_scene)
             self._parameters_of_scene.owner_of = follower.owner_of
         self._namesakes = self.create_timer(
-            SECONDS_BETWEEN_LOOKS, self.guarded('a look for namesakes', self._look_for_namesakes),
+            SECONDS_BETWEEN_CHECKS, self.guarded('a check of names', self._warn_of_namesake),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def check(self, new: scenes.Scene) -> None:
-        """Raise SceneError for a scene that the node does not support; must be fast."""
+        """Raise SceneError if the node does not support a scene. It delays messages: be fast."""
 
     def prepare(self, new: scenes.Scene) -> Any:
-        """Return all objects of a scene, without changes to the node; on the worker's thread."""
+        """Return what `adopt` needs of a scene; run in the worker's thread, do not change self."""
         return new
 
     def adopt(self, prepared: Any) -> None:
-        """Swap in the prepared objects, on the executor's thread; must be fast."""
+        """Use the result of `prepare` from now on. It delays messages: be fast."""
 
     def later(self, jobs: Iterable[Job]) -> None:
-        """Run jobs in the worker's thread, once the node spins."""
+        """Run jobs in the worker's thread, after the node has begun to spin."""
         if self._first_spin.is_canceled():
             self._worker.add(jobs)
         else:
             self._later.extend(jobs)
 
     def serves(self) -> str:
-        """Describe what the node does, for its first log message."""
+        """Return what the node does, in words, for its first log message."""
         return listed(self.scene.machines, 200)
 
     def declare_parameters(self, namespace: str, parameters: Any, ignore_override: bool = False
                            ) -> List[Parameter]:
-        """Declare parameters; an empty list in a parameter file has the default's type."""
+        """Declare parameters as rclpy does, and allow empty lists in a parameter file."""
         for _, *value, descriptor in (one for one in parameters if len(one) > 2):
             descriptor.dynamic_typing = descriptor.dynamic_typing or value == [None]
         return super().declare_parameters(namespace, parameters, ignore_override)
 
     def describe_parameter(self, name: str) -> ParameterDescriptor:
-        """Describe a parameter, with a slider range around its present value."""
+        """Return a parameter's descriptor, with a slider range around the present value."""
         return self._parameters_of_scene.ranged(name, super().describe_parameter(name))
 
     def create_service(self, srv_type: Any, srv_name: str, callback: Callable, **kwargs: Any
                        ) -> Any:
-        """Create a service that responds with the reason if its callback raises."""
+        """Create a service; if its callback raises, the response is a failure with a reason."""
         if srv_type is SetParameters:
-            callback = partial(self._set_readable, callback)
+            callback = partial(self._set_parameters, callback)
         return super().create_service(
             srv_type, srv_name, partial(self._respond, callback), **kwargs)
 
     def delete_displayed(self) -> None:
-        """Delete the node's markers before it ends."""
+        """Delete the markers that the node has displayed; a subclass overrides it."""
 
     def destroy_node(self) -> None:
-        """Delete displayed markers, end the worker, and destroy the node."""
+        """Delete displayed markers, stop the worker, and destroy the node."""
         with suppress(RCLError, InvalidHandle):
             self.delete_displayed()
         self._worker.end()
@@ -167,13 +164,13 @@ class SceneNode(Node):
             return callback(request, response)
         except Exception as error:
             self.report('a request', error)
-            return refused(response, elided(f'internal error: {error!r}', 299))
+            return _refused(response, elided(f'internal error: {error!r}', 299))
 
-    def _set_readable(self, callback: Callable, request: Any, response: Any) -> Any:
-        """Set several parameters together, and what cannot be read one by one."""
+    def _set_parameters(self, callback: Callable, request: Any, response: Any) -> Any:
+        """Set valid parameters together; `callback` of rclpy refuses the others one by one."""
         if len(request.parameters) < 2:
             return callback(request, response)
-        results = self._parameters_of_scene.set_readable(request.parameters)
+        results = self._parameters_of_scene.set_valid(request.parameters)
         response.results = [results.get(i) or self._respond(
             callback, SetParameters.Request(parameters=[one]),
             SetParameters.Response()).results[0]
@@ -181,7 +178,7 @@ class SceneNode(Node):
         return response
 
     def _changed(self, changed: List[scenes.Parameter]) -> None:
-        """Prepare the newest scene, and announce the changes."""
+        """Prepare the newest scene, and announce the changed parameters."""
         if type(self).prepare is SceneNode.prepare:
             self._adopt(self.scene, self.scene)
         else:
@@ -202,13 +199,13 @@ class SceneNode(Node):
         self._first_spin.cancel()
         self._worker.add(self._later)
 
-    def _look_for_namesakes(self) -> None:
+    def _warn_of_namesake(self) -> None:
         me = self.get_name(), self.get_namespace()
         if self.get_node_names_and_namespaces().count(me) > 1:
             self._namesakes.cancel()
             self.get_logger().warning(
-                f'there is another node {self.get_fully_qualified_name()}: what one of them '
-                'publishes or answers comes twice; give each a name or a namespace of its own')
+                f'there is another node {self.get_fully_qualified_name()}: both publish every '
+                'message and answer every request; give each its own name or namespace')
 
     @contextmanager
     def _or_destroyed(self) -> Iterator[None]:
@@ -219,15 +216,27 @@ class SceneNode(Node):
             raise
 
 
+def _refused(response: Any, reason: str) -> Any:
+    """Return a service's response to a request that failed."""
+    result = SetParametersResult(successful=False, reason=reason)
+    if hasattr(response, 'results'):
+        response.results.append(result)
+    elif hasattr(response, 'message'):
+        response.success, response.message = False, reason
+    elif isinstance(getattr(response, 'result', None), SetParametersResult):
+        response.result = result
+    return response
+
+
 def run(node_class: Callable[[], Node], name: str, args: Any = None,
         executor_class: Any = Executor) -> int:
-    """Run a node until it is interrupted; return the exit code of the process."""
+    """Run a node until SIGINT or SIGTERM; return the exit code. `name` is for early messages."""
     return run_together(lambda: [node_class()], name, args, executor_class)
 
 
 def run_together(make: Callable[[], Iterable[Node]], name: str, args: Any = None,
                  executor_class: Any = Executor) -> int:
-    """Run several nodes in one executor until interrupted; see `run`."""
+    """Run the nodes that `make` yields in one executor; see `run`."""
     with ShutdownHandler() as shutdown:
         return _run(make, name, args, executor_class, shutdown)
 
@@ -239,22 +248,22 @@ def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_clas
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         _refuse_arguments(args)
     except (RuntimeError, scenes.SceneError) as error:
-        # rclpy's message may quote a long argument.
+        # The message of rclpy may quote a long argument.
         try_shutdown()
         unknown = isinstance(error, rclpy_implementation.UnknownROSArgsError)
-        what = 'nothing after --ros-args is called ' if unknown else ''
+        what = 'unknown after --ros-args: ' if unknown else ''
         hint = '; allowed: -p, -r, --params-file, --log-level, ...' if unknown else ''
         return _failed(name, elided(f'bad arguments: {what}{error}', 240) + hint)
     nodes: List[Node] = []
     try:
-        # Nothing becomes garbage while nodes are created.
+        # The creation of nodes leaves no garbage; collecting would only delay it.
         gc.disable()
         for node in make():
             _refuse_namesake(node, nodes)
             nodes.append(node)
             if isinstance(node, SceneNode):
                 node.get_logger().info(f'ready: {node.serves()}')
-        # All objects so far are permanent: exclude them from garbage collection.
+        # All objects so far are permanent; collections need not visit them.
         gc.freeze()
         gc.enable()
         _spin(executor_class(), nodes, shutdown, Incidents(
@@ -267,7 +276,8 @@ def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_clas
         gc.enable()
         for node in nodes:
             node.destroy_node()
-        # `rclpy.try_shutdown` would put the default signal handlers in: the next signal kills.
+        # Unlike this function, `rclpy.try_shutdown` restores the default signal handlers, by which
+        # the next signal would kill the process.
         try_shutdown()
     return 0
 
@@ -303,15 +313,15 @@ def _refuse_namesake(node: Node, others: Iterable[Node]) -> None:
     name = node.get_name()
     if name in {other.get_name() for other in others}:
         node.destroy_node()
-        raise scenes.SceneError(f'two nodes would be called {name}; to rename one of them: '
+        raise scenes.SceneError(f'two nodes would be called {name}; rename one, such as by '
                                 '-r kinematics:__node:=NAME')
 
 
 def _refuse_arguments(args: Any) -> None:
     unknown = remove_ros_args(args)[1:]
     if unknown:
-        raise scenes.SceneError(f'unknown argument {quoted(unknown[0])}: there are none but '
-                                'those of ROS, after --ros-args')
+        raise scenes.SceneError(f'unknown argument {quoted(unknown[0])}: allowed are only those '
+                                'of ROS, after --ros-args')
 
 
 def _failed(name: str, error: Any) -> int:

@@ -16,7 +16,7 @@ NAME = 'scene'
 
 
 def nodes() -> Iterator[SceneNode]:
-    """Create the nodes: the owner of the geometry first, crank_driver last."""
+    """Create the nodes, `kinematics` first: the others start with its values of parameters."""
     kinematics = Kinematics()
     yield kinematics
     inverse = ServoInverse()
@@ -25,7 +25,7 @@ def nodes() -> Iterator[SceneNode]:
 
 
 def main(args: Any = None) -> int:
-    """Run the nodes; return the exit code."""
+    """Run the nodes with command-line arguments `args`; return the exit code."""
     return scene_node.run_together(nodes, NAME, args)
 
 

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Node that answers where inputs have to be for a lever, or any outputs, to have given values."""
+"""Node that solves values of a lever, or of any outputs, for the inputs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .message_layout import Unreadable
 from .. import scene
 from ..cache import Cache
 from ..robot_model import bodies
-from ..scene.inverse_request import InverseRequest, LEVER, present
+from ..scene.inverse_request import InverseRequest, LEVER, present_inputs
 from ..words import elided, listed, MESSAGE, quoted
 
 try:
@@ -34,9 +34,9 @@ except ImportError as error:
         'build in the workspace, which builds linkage_interfaces too, and source '
         'install/setup.bash') from error
 
-# More values than this at once would keep other callers waiting.
+# More values than this at once would delay other callers.
 MOST_VALUES = 1_000_000
-# Values named, and letters of names allowed, in a message.
+# Maximum number of values, and of letters of allowed names, in a message.
 MOST_NAMED, MOST = 5, 150
 
 
@@ -51,48 +51,48 @@ class ServoInverse(scene_node.SceneNode):
         self._reader = joint_state_reader.Reader(self._interpret)
         joint_state_reader.subscribe(self, 'crank_states', self._receive)
         self.create_service(ServoInverseType, 'servo_inverse', self.answer)
-        self.create_service(InputsFor, 'inputs_for', self.answer_together)
-        self._stream = CommandStream(self, self.scene.machines, lambda machine: present(
+        self.create_service(InputsFor, 'inputs_for', self.answer_inputs_for)
+        self._stream = CommandStream(self, self.scene.machines, lambda machine: present_inputs(
             machine, self._positions))
         self.begin()
 
     def serves(self) -> str:
-        """Say of which mechanisms it answers."""
+        """Describe the node for its first log message."""
         return f'answers servo_inverse for {listed(self.scene.machines, 200)}'
 
     def check(self, new: scene.Scene) -> None:
-        """Refuse lengths that `kinematics` could not publish; SceneError says which."""
+        """Raise SceneError for a length that `kinematics` could not publish."""
         for machine in new.machines.values():
             bodies.size(machine)
 
     def adopt(self, new: scene.Scene) -> None:
-        """Answer for a scene from now on."""
+        """Replace the scene for which requests are answered."""
         self._requests.clear()
         self._stream.adopt(new.machines)
         self._sources = frozenset(drive.source for machine in new.machines.values()
                                   for drive in machine.inputs.values())
 
     def destroy_node(self) -> None:
-        """End the trajectories too."""
+        """End the trajectories, and destroy the node."""
         if hasattr(self, '_stream'):
             self._stream.end()
         super().destroy_node()
 
     def answer(self, request: Any, response: Any) -> Any:
-        """Fill in a response; what cannot be done is said in it, never raised."""
+        """Answer a request of `servo_inverse`; the response names an error, if any."""
         return self._filled(lambda: solve(
             self._requests[request.mechanism, request.output], request, response), response)
 
-    def answer_together(self, request: Any, response: Any) -> Any:
-        """Fill in a response about several inputs; what cannot be done is said in it."""
-        return self._filled(lambda: solve_together(
-            _machine_together(self.scene, request.mechanism), request, response), response)
+    def answer_inputs_for(self, request: Any, response: Any) -> Any:
+        """Answer a request of `inputs_for`; the response names an error, if any."""
+        return self._filled(lambda: solve_inputs_for(
+            _machine_with_inputs(self.scene, request.mechanism), request, response), response)
 
     def _request(self, key: Tuple[str, str]) -> InverseRequest:
         machine = _machine(self.scene, *key)
         if len(machine.inputs) > 1:
-            raise ValueError(f'{machine.name} has several inputs; one output does not tell them: '
-                             'ask inputs_for')
+            raise ValueError(f'{machine.name} has several inputs, which one output does not '
+                             'determine; call the service inputs_for')
         return InverseRequest(machine, [key[1]])
 
     def _filled(self, fill: Callable[[], None], response: Any) -> Any:
@@ -104,21 +104,21 @@ class ServoInverse(scene_node.SceneNode):
         return response
 
     def _interpret(self, message: JointState) -> List[Tuple[str, int]]:
-        """Return the names of the scene's inputs in a message, and their places."""
+        """Return the names of the scene's sources in a message, and their places."""
         return [(name, place) for place, name in enumerate(message.name[:len(message.position)])
                 if name in self._sources]
 
     def _receive(self, text: bytes) -> None:
-        # `kinematics` says what is unreadable.
+        # `kinematics` logs unreadable messages.
         with suppress(Unreadable):
-            source = self._reader.source(text)
-            positions = source.read(text).positions
-            self._positions.update((name, positions[place]) for name, place in source.meaning)
+            sender = self._reader.sender(text)
+            positions = sender.read(text).positions
+            self._positions.update((name, positions[place]) for name, place in sender.meaning)
 
 
 def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
     """
-    Answer a request for values of an output: on the working branch, or near where it is asked.
+    Answer a request for values of an output, on the working branch or next to `servo_near`.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
     if len(near) not in (0, 1, n):
         raise ValueError(f'servo_near must be empty, have one angle, or one for each of the '
                          f'{n} in lever_angle, not {len(near)}')
-    # One angle is the usual question, and floats answer it sooner than arrays.
+    # Most requests have one angle, for which floats are faster than arrays.
     start = [np.array(near) if len(near) > 1 else near[0]] if near else None
     if start and not np.all(np.abs(start[0]) <= scene.FARTHEST):
         raise ValueError(f'servo_near must be finite and within {scene.FARTHEST:g} '
@@ -153,11 +153,11 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
         reachable = [success]
     response.success, response.reachable = success, reachable
     if not success:
-        response.message = elided(_complaint(inverse, [
+        response.message = elided(_unreachable(inverse, [
             value for value, reached in zip(values, reachable) if not reached]), MESSAGE)
 
 
-def solve_together(machine: scene.SceneMechanism, request: Any, response: Any) -> None:
+def solve_inputs_for(machine: scene.SceneMechanism, request: Any, response: Any) -> None:
     """Answer a request for several outputs; raise ValueError if it cannot be answered."""
     values, near, n = request.values, request.near, len(machine.inputs)
     if len(request.outputs) != n:
@@ -193,30 +193,31 @@ def _machine(scene_: scene.Scene, name: str, output: str) -> scene.SceneMechanis
     allowed = listed(machines, MOST) if machines else 'none: the scene has no slotted_lever'
     if name in scene_.machines:
         raise ValueError(f'{name} is a {scene_.machines[name].linkage.type}, not a slotted lever; '
-                         f'name an output, or take one of: {allowed}')
+                         f'name an output, or use one of: {allowed}')
     if name:
         raise ValueError(f'there is no mechanism {quoted(name)}; allowed: {allowed}')
     what = '' if output else ' slotted lever'
-    raise ValueError(f'mechanism may be empty only where there is one{what}; allowed: {allowed}')
+    raise ValueError(f'mechanism may be empty only if the scene has a single{what or " one"}; '
+                     f'allowed: {allowed}')
 
 
-def _machine_together(scene_: scene.Scene, name: str) -> scene.SceneMechanism:
+def _machine_with_inputs(scene_: scene.Scene, name: str) -> scene.SceneMechanism:
     """Return a mechanism by its name, or the only one with several inputs."""
     able = {key: machine for key, machine in scene_.machines.items() if len(machine.inputs) > 1}
     found = scene_.machines.get(name) or (
         next(iter(able.values())) if not name and len(able) == 1 else None)
     if found is None:
         raise ValueError(f'mechanism must be one of {listed(scene_.machines, MOST)}, or empty '
-                         f'where one has several inputs, not {quoted(name)}')
+                         f'if a single one has several inputs, not {quoted(name)}')
     return found
 
 
-def _complaint(inverse: InverseRequest, missed: Sequence[float]) -> str:
-    named = ', '.join(f'{value:.6g}' for value in missed[:MOST_NAMED])
-    more = f' and {len(missed) - MOST_NAMED} more' if len(missed) > MOST_NAMED else ''
-    # The reason is that of the first value that is one.
-    first = next(filter(math.isfinite, missed), math.nan)
-    return f'{inverse.what} {named}{more} cannot be reached; {inverse.reason(first)}'
+def _unreachable(inverse: InverseRequest, values: Sequence[float]) -> str:
+    """Return a message with unreachable values, and the reason for the first finite one."""
+    named = ', '.join(f'{value:.6g}' for value in values[:MOST_NAMED])
+    more = f' and {len(values) - MOST_NAMED} more' if len(values) > MOST_NAMED else ''
+    first = next(filter(math.isfinite, values), math.nan)
+    return f'{inverse.quantity} {named}{more} cannot be reached; {inverse.reason(first)}'
 
 
 def main(args: Any = None) -> int:

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Shutdown of the executables: they end within a second after SIGINT or SIGTERM."""
+"""Shutdown of the executables within a second of SIGINT or SIGTERM."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ import sys
 from threading import Event, Thread
 from typing import Any, Callable
 
-# Time after a signal until the process is ended by force [s].
+# Time from a signal to the forced end of the process [s].
 TIMEOUT = 0.6
 
 
 class ShutdownHandler:
     """
-    Handles SIGINT and SIGTERM in a thread, so that callbacks are not interrupted.
+    A context that handles SIGINT and SIGTERM in a thread, so that no callback is interrupted.
 
-    The first signal sets `is_over` and calls `wake`, so that spinning stops. If that takes longer
-    than TIMEOUT, `before_exit` is called, and the process ends with exit code 0.
+    The first signal sets `is_over` and calls `wake`, which is to stop rclpy's executor. If the
+    context is not left within TIMEOUT, `before_exit` is called, and the process ends with exit
+    code 0.
     """
 
     def __init__(self) -> None:
@@ -48,7 +49,7 @@ class ShutdownHandler:
         self._sent.close()
 
     def _wait(self) -> None:
-        # Stays open: without it, another signal would print an error.
+        # The socket stays open, because a further signal would print an error if it were closed.
         with self._received:
             if not self._received.recv(1):
                 return

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Command that prints a robot model; the scene may come as ROS parameters, too."""
+"""Command that prints a scene's URDF; the scene is a file or ROS parameters."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..robot_model.command import NAME, NEEDS, show
 
 
 def main(args: Optional[List[str]] = None) -> int:
-    """Print URDF; return the exit code."""
+    """Print the URDF of a scene; return the exit code. `args` are by default sys.argv[1:]."""
     return command.run(NAME, _show, sys.argv[1:] if args is None else args, NEEDS)
 
 
@@ -28,7 +28,7 @@ def _show(args: List[str]) -> None:
 
 
 def _without_ros(args: List[str]) -> List[str]:
-    """Return the arguments that are not for ROS; raise RequestError if ROS's are invalid."""
+    """Return the arguments without those for ROS; raise RequestError if these are invalid."""
     try:
         return remove_ros_args([NAME, *args])[1:]
     except RuntimeError as error:
@@ -38,25 +38,17 @@ def _without_ros(args: List[str]) -> List[str]:
 
 
 def _scene(args: List[str]) -> scene.Scene:
-    """Read the scene from the parameters in ROS arguments."""
+    """Read the scene from the parameters in the arguments for ROS."""
     rclpy.init(args=args)
     try:
-        reader = _Reader('--params-file' in args)
-        reader.destroy_node()
-        return reader.scene
+        node = scene_node.SceneNode(NAME)
+        node.destroy_node()
     finally:
         rclpy.try_shutdown()
-
-
-class _Reader(scene_node.SceneNode):
-    """A node that reads a scene; RequestError if it has no scene parameters."""
-
-    def __init__(self, promised: bool):
-        super().__init__(NAME)
-        if promised and not self.is_given:
-            self.destroy_node()
-            raise command.RequestError("the parameter file must have '/**:' and below it "
-                                       "'ros__parameters:' with a scene")
+    if '--params-file' in args and not node.is_given:
+        raise command.RequestError("the parameter file must have '/**:' and below it "
+                                   "'ros__parameters:' with a scene")
+    return node.scene
 
 
 if __name__ == '__main__':

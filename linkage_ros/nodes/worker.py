@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A thread for jobs that would delay messages on a node's executor."""
+"""A thread for jobs that would delay messages on the thread of rclpy's executor."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from typing import Any, Callable, Deque, Dict, Iterable, Optional, Tuple
 # Longest wait for the worker when a node ends [s].
 TIMEOUT = 0.1
 
-# What other jobs make.
-OTHER = 'what is published once'
-# A job runs in the worker's thread; the function that it returns runs on the executor's thread.
+# Kind of the jobs from `add`, for error messages.
+OTHER = 'a latched message'
+# A job runs in the worker's thread; the function that it returns runs on rclpy's executor.
 Job = Callable[[], Optional[Callable[[], None]]]
 
 
@@ -23,8 +23,8 @@ class Worker:
     """
     A thread that runs jobs one after the other, and ends when none is left.
 
-    A job's result is called on the thread of the node's executor. `failed` is called on the
-    worker's thread with the kind of job and its exception.
+    The function that a job returns is called on the thread of rclpy's executor. `failed` is called
+    with the kind of job and the exception that it or its function has raised.
     """
 
     def __init__(self, node: Any, failed: Callable[[str, Exception], None]):
@@ -35,27 +35,30 @@ class Worker:
         self._others: Deque[Job] = deque()
         self._thread: Optional[threading.Thread] = None
         self._ended = threading.Event()
+        # Set when rclpy's executor has called a job's result, or will not call it any more.
+        self._called = threading.Event()
 
     def replace(self, kind: str, job: Job) -> None:
-        """Queue a job in place of one of its kind that has not begun."""
+        """Queue a job; it replaces a job of the same kind that has not begun."""
         with self._lock:
             self._newest[kind] = job
             self._start()
 
     def add(self, jobs: Iterable[Job]) -> None:
-        """Queue jobs behind those of `replace`."""
+        """Queue jobs; they run when no job from `replace` is left."""
         with self._lock:
             self._others.extend(jobs)
             self._start()
 
     def is_newest(self, kind: str) -> bool:
-        """Return whether no newer job of a kind waits; otherwise long jobs should end."""
+        """Return whether a running job of this kind should go on: no newer one is queued."""
         return kind not in self._newest and not self._ended.is_set()
 
     def end(self) -> None:
-        """Cancel queued jobs, and wait up to TIMEOUT for the present one."""
+        """Drop the queued jobs, and wait up to TIMEOUT for the running one."""
         with self._lock:
             self._ended.set()
+            self._called.set()
             thread = self._thread
         if thread is not None and thread is not threading.current_thread():
             thread.join(TIMEOUT)
@@ -88,18 +91,20 @@ class Worker:
             return OTHER, self._others.popleft()
 
     def _hand_over(self, kind: str, act: Callable[[], None]) -> None:
-        """Call `act` on the executor's thread and wait: only one at a time delays messages."""
-        executor, done = self._node.executor, threading.Event()
-        if executor is not None:
-            executor.create_task(partial(self._act, kind, act, done))
-            while not done.wait(TIMEOUT) and not self._ended.is_set():
-                pass
+        """Call `act` on rclpy's executor and wait: a queue of such calls would delay messages."""
+        executor = self._node.executor
+        with self._lock:
+            if executor is None or self._ended.is_set():
+                return
+            self._called.clear()
+        executor.create_task(partial(self._act, kind, act))
+        self._called.wait()
 
-    def _act(self, kind: str, act: Callable[[], None], done: threading.Event) -> None:
+    def _act(self, kind: str, act: Callable[[], None]) -> None:
         try:
             if not self._ended.is_set():
                 act()
         except Exception as error:
             self._failed(kind, error)
         finally:
-            done.set()
+            self._called.set()

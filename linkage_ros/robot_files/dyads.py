@@ -92,7 +92,7 @@ class Drawing(Dyads):
             way = (self.on[block][part.joint] - part.start) / part.along
             return (part.link, sign if block == child else -sign, way.real) \
                 if part.slide is joint else None
-        pin = self.known(child, joint.places[1]) or ''
+        pin = self.joint_at(child, joint.places[1]) or ''
         base, body = (parent, child) if self.home[pin] == parent else (child, parent)
         if self.home[pin] != base:
             return None
@@ -100,8 +100,9 @@ class Drawing(Dyads):
         if hangs != pin or slide:
             # A triangle on its link shows how that turns against the one that the pin is on.
             start, (other, end) = self.on[body][pin], self.other(body, pin)
-            along, side = (end - start) * complex(0.5, 0.75 ** 0.5), self.said(abs(end - start))
-            tip = self.name(start + along, body, f'dyad {pin} {other} {side} {side} left')
+            along, side = (end - start) * complex(0.5, 0.75 ** 0.5), abs(end - start)
+            tip = self.name(start + along, body, f'dyad {pin} {other} {self.length_text(side)} '
+                            f'{self.length_text(side)} left')
             link = bar_name(pin, tip)
         return link, joint.axis if body == child else -joint.axis, phase(
             along / self.parts[base].along)
@@ -115,9 +116,9 @@ class Drawing(Dyads):
             if other.source == source and (word == 'crank') == (other.name[:5] == 'crank'):
                 gear = ratio / other.ratio
                 offset -= gear * other.offset
-                said = self.said(offset) if word != 'crank' else short(
+                angle_or_length = self.length_text(offset) if word != 'crank' else short(
                     math.remainder(offset, math.tau))
-                return number, f' geared {other.name} {gear!r} {said}'
+                return number, f' geared {other.name} {gear!r} {angle_or_length}'
         self.drives.append(Source(word + number, source, ratio, offset, ratio * (
             self._robot.positions.get(source) or 0.0) + offset, ends))
         return number, ''
@@ -126,7 +127,7 @@ class Drawing(Dyads):
         """Return the position of a joint's motor in the file."""
         return joint.position or 0.0
 
-    def alike(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
+    def special_line(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
         """Return what a line says of bars like those from a corner: they pass their flat poses."""
         (first, start), (second, end) = one, two
         for corner, at in self.places:

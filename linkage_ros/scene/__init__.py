@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Scenes: a set of mechanisms with their sizes, poses and input motions.
+A scene: a set of mechanisms with their sizes, poses and input motions.
 
-This room alone defines the parameters' names. `read` turns values into a Scene, or raises an error
-that names the wrong parameter and its allowed values. Nodes declare the scene's `parameters`. No
-ROS is needed.
+This package alone defines the names of parameters. `read` turns their values into a Scene, or
+raises an error that names the wrong parameter and its allowed values. Nodes declare the scene's
+`parameters`. No ROS is needed.
 """
 
 from __future__ import annotations
@@ -63,8 +63,10 @@ class Scene:
     frame_id: str
     frame_prefix: str
     rate: float
+    # Parameters that belong to no mechanism.
     general: Tuple[Parameter, ...]
-    given: Mapping[str, Mapping[str, Any]] = some(compare=False, repr=False)
+    # What it was read from, by mechanism ('' for general parameters) and full parameter name.
+    values: Mapping[str, Mapping[str, Any]] = some(compare=False, repr=False)
 
     @property
     def parameters(self) -> Tuple[Parameter, ...]:
@@ -73,7 +75,7 @@ class Scene:
                                  for parameter in machine.parameters))
 
     def changed_from(self, old: 'Scene') -> List[Parameter]:
-        """Return the parameters whose values differ from those of an older scene."""
+        """Return the parameters whose values differ from an older scene of the same mechanisms."""
         parts = [(self.general, old.general), *(
             (machine.parameters, old.machines[name].parameters)
             for name, machine in self.machines.items() if machine is not old.machines[name])]
@@ -87,39 +89,34 @@ def load(path: str) -> Scene:
     found = {node: overrides(path, f'/{node}') for node in ALL}
     if not any(own is not None for own in found.values()):
         raise SceneError(f"{path} must be YAML with '/**:' and below it 'ros__parameters:'")
-    given = {node: own or {} for node, own in found.items()}
-    merged = {name: value for node in (*ALL, OWNER) for name, value in given[node].items()}
+    values = {node: own or {} for node, own in found.items()}
+    merged = {name: value for node in (*ALL, OWNER) for name, value in values[node].items()}
     scene = read(merged)
-    if all(own == merged for own in given.values()):
+    if all(own == merged for own in values.values()):
         return scene
     # Each parameter has the value that the file gives to the parameter's owner.
     owners = {parameter.name: OWNER if OWNER in parameter.field.readers
               else parameter.field.readers[0] for parameter in scene.parameters}
-    return read({name: given[owner][name] for name, owner in owners.items()
-                 if name in given[owner]})
+    return read({name: values[owner][name] for name, owner in owners.items()
+                 if name in values[owner]})
 
 
-def read(given: Mapping[str, Any], before: Optional[Scene] = None, strict: bool = True) -> Scene:
+def read(values: Mapping[str, Any], before: Optional[Scene] = None, strict: bool = True) -> Scene:
     """
-    Read a scene from parameter values.
+    Read a scene from parameter values; raise SceneError if one is unknown or not allowed.
 
     Parameters
     ----------
-    given : mapping
+    values : mapping
         Values by full parameter name.
     before : Scene, optional
-        The previous scene: mechanisms whose values are unchanged are reused from it.
+        The previous scene, whose mechanisms are reused if their values are unchanged.
     strict : bool
-        Whether an input's start must lie in its sweep or reach. False while a scene runs: an
-        input that has left its start does not constrain a change of its sweep or reach.
-
-    Raises
-    ------
-    SceneError
-        If a parameter is unknown or its value is not allowed.
+        Whether an input's start must be in its sweep or reach. False for a scene that is running:
+        its inputs have left their starts, so sweep and reach may change regardless of these.
 
     """
-    parts = _parted(given)
+    parts = _by_mechanism(values)
     if 'mechanisms' not in parts.get('', {}):
         for name, scale in mechanisms.CATALOGUE.items():
             parts[name] = {f'{name}.scale': scale, **parts.get(name, {})}
@@ -128,12 +125,12 @@ def read(given: Mapping[str, Any], before: Optional[Scene] = None, strict: bool 
 
 def changed(before: Scene, values: Mapping[str, Any], strict: bool = True) -> Scene:
     """
-    Return a scene with some values changed, by full parameter name.
+    Return the scene `before` with some other values, by full parameter name.
 
-    Only the mechanisms concerned are read again. Raises SceneError as `read` does.
+    Mechanisms without a changed value are reused. `strict` and SceneError are those of `read`.
     """
-    parts = dict(before.given)
-    for name, part in _parted(values).items():
+    parts = dict(before.values)
+    for name, part in _by_mechanism(values).items():
         parts[name] = {**parts.get(name, {}), **part}
     return _read(parts, before, strict)
 
@@ -153,18 +150,19 @@ def _read(parts: Mapping[str, Mapping[str, Any]], before: Optional[Scene], stric
     if joints != {name: machine.joints for name, machine in known.items()}:
         check_distinct(joints)
     allowed = ['mechanisms', 'frame_id', 'frame_prefix', 'rate', *(f'{name}.*' for name in names)]
-    for left in (values.left(), *(part for name, part in parts.items()
-                                  if name and name not in machines)):
-        refuse_unknown(left, allowed)
+    for unused in (values.unused(), *(part for name, part in parts.items()
+                                      if name and name not in machines)):
+        refuse_unknown(unused, allowed)
     return Scene(machines, frame_id, frame_prefix, rate, tuple(values.parameters), parts)
 
 
-def _parted(given: Any) -> Dict[str, Dict[str, Any]]:
-    """Group values by mechanism; general parameters have an empty name."""
-    if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in given):
-        raise SceneError(f'a scene is values by the names of parameters, not {quoted(given)}')
+def _by_mechanism(values: Any) -> Dict[str, Dict[str, Any]]:
+    """Return {mechanism: {full name: value}}, with '' as the mechanism of general parameters."""
+    if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
+        raise SceneError('a scene must map names of parameters to their values, not be '
+                         f'{quoted(values)}')
     parts: Dict[str, Dict[str, Any]] = {}
-    for name, value in given.items():
+    for name, value in values.items():
         mechanism, dot, _ = name.partition('.')
         parts.setdefault(mechanism if dot else '', {})[plain_text(name)] = value
     return parts

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Settings of an input: its motion (speed, start, sweep) and its source in messages."""
+"""Settings of an input: its motion (speed, start, sweep) and its source joint in messages."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from ..linkage.inputs import Arc, Input
 from ..linkage.mechanism import Mechanism
 from ..words import quoted
 
-# Margin at each end of the reach of a default sweep, as a fraction of the reach.
+# Distance of a default sweep from each end of the reach, as a fraction of the reach.
 MARGIN = 0.01
-# Narrowest sweep [rad]; for a length, as a fraction of its size.
+# Narrowest sweep [rad]; of a length, as a fraction of `Input.size`.
 NARROWEST_SWEEP = 1e-6
 # Largest angle [rad] whose rounding error is negligible for a crank.
 FARTHEST = 1e6
@@ -27,13 +27,14 @@ SPEED = Field('double', 'Speed of the {0} [{1}/s].', -FASTEST, FASTEST, readers=
 TURNS = {'low': -4.0 * math.pi, 'high': 4.0 * math.pi}
 START = Field('double', 'Initial value of the {0} [{1}]; a new value moves it there.',
               readers=(DRIVER,))
-SOURCE = Field('string', 'Joint in messages that carries the {0}; empty: <mechanism>_ and the '
-               'name of the {0} or of the measured output.', readers=ALL, read_only=True)
-MEASURES = Field('string', 'Output that the source measures; empty: the {0} itself.',
+SOURCE = Field('string', 'Source joint, whose position in messages gives the {0}; empty: '
+               '<mechanism>_ and the name of the {0} or of the measured output.', readers=ALL,
+               read_only=True)
+MEASURES = Field('string', 'Output that the source joint measures; empty: the {0} itself.',
                  readers=ALL, read_only=True)
-RATIO = Field('double', 'Motion of the {0} per unit of its source [1].', readers=ALL,
+RATIO = Field('double', 'Motion of the {0} per unit of its source joint [1].', readers=ALL,
               rule='not zero')
-OFFSET = Field('double', 'Value of the {0} when its source is at zero [{1}].', readers=ALL)
+OFFSET = Field('double', 'Value of the {0} when its source joint is at zero [{1}].', readers=ALL)
 SWEEP = Field('double_array', "Ends of the {0}'s oscillation [{1}]; empty: its reach, or full "
               'rotation.', readers=ALL,
               rule=f'the lower end and the higher end, within {FARTHEST:g} of zero, or none')
@@ -42,28 +43,32 @@ SWEEP = Field('double_array', "Ends of the {0}'s oscillation [{1}]; empty: its r
 @dataclass(frozen=True)
 class InputSettings:
     """
-    Motion and source of an input, an angle [rad] or a length [m]; lengths include the scale.
+    Motion of an input, and the joint in messages that gives its position: its source joint.
+
+    Values of the input are in rad or m; lengths include the scale.
 
     Attributes
     ----------
     input : Input
         The input of the linkage.
     reach : tuple of (float, float)
-        Intervals in which the linkage can be assembled.
+        Intervals of the input in which the linkage can be assembled.
     speed, start : float
-        Speed [rad/s or m/s] and initial value.
+        Speed of the motion [rad/s or m/s], and its initial value.
     sweep : (float, float), optional
-        Ends of the oscillation; None: full rotation.
+        Interval in which the motion oscillates; None: it is a full rotation.
     ends : (float, float), optional
-        Sweep set by the user, which also limits the inverse; None: the whole reach.
+        The sweep if a user has set it. The inverse, too, is then limited to it. None: no limit
+        but the reach.
     source : str
-        Name of the joint in messages that carries the input.
+        Name of the source joint.
     ratio, offset : float
-        The input, or the measured output, is ratio * position + offset.
+        At a position p of the source joint, the input or the measured output is ratio * p + offset
+        [rad or m].
     measures : str
-        Output that the source measures; empty: the input itself.
+        Output that the source joint, a sensor, measures; empty: it is the input itself.
     period : int
-        Turns after which the pose repeats, as `Mechanism.period`.
+        Turns of a crank after which poses repeat: above one with fractional gears.
 
     """
 
@@ -81,23 +86,23 @@ class InputSettings:
 
     @cached_property
     def is_plain(self) -> bool:
-        """Whether the source's position is the input, without conversion."""
+        """Whether the position of the source joint is the input, without conversion."""
         return (self.ratio, self.offset, self.measures) == (1.0, 0.0, '')
 
     @property
     def actuator(self) -> Tuple[float, float]:
-        """Ratio and offset of the actuator: the source's, or (1, 0) if an output is measured."""
+        """Ratio and offset from the actuator to the input; (1, 0) if the source is a sensor."""
         return (1.0, 0.0) if self.measures else (self.ratio, self.offset)
 
 
 def in_words(arcs: Iterable[Arc]) -> str:
-    """Format intervals for messages."""
+    """Return intervals as text, such as '[0, 1] or [2, 3]'."""
     return ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in arcs)
 
 
 def _scaled(input_: Input, linkage: Mechanism, reach: Tuple[Arc, ...],
             scale: float) -> Tuple[Input, Tuple[Arc, ...]]:
-    """Return an input and its reach; lengths are scaled."""
+    """Return an input and its reach in the scene's units: lengths times the scale."""
     if len(linkage.inputs) > 1:
         # The reach of one of several inputs depends on the others.
         reach = ((input_.low, input_.high),)
@@ -110,7 +115,7 @@ def _scaled(input_: Input, linkage: Mechanism, reach: Tuple[Arc, ...],
 def read_settings(name: str, linkage: Mechanism, input_: Input, reach: Tuple[Arc, ...],
                   scale: float, values: Values, old: Optional[InputSettings],
                   strict: bool) -> InputSettings:
-    """Read the settings of an input; `old` are its previous settings, if any."""
+    """Read the settings of an input; its lengths are those of the linkage times `scale`."""
     drive = _read(name, *_scaled(input_, linkage, reach, scale), values, old, strict)
     _check_measures(name, linkage, drive)
     return replace(drive, period=linkage.period(linkage.inputs.index(input_)))
@@ -122,8 +127,8 @@ def _read(name: str, input_: Input, reach: Tuple[Arc, ...], values: Values,
         field.about(input_.name, input_.unit, **(TURNS if field is START and input_.turns else {}))
         for field in (SPEED, START, SWEEP))
     name = f'{name}.{input_.name}'
-    speed = values.take(f'{name}.speed', speed_field, _usual_speed(input_, reach))
-    chosen = values.left(f'{name}.start')
+    speed = values.take(f'{name}.speed', speed_field, _default_speed(input_, reach))
+    has_start = values.unused(f'{name}.start')
     start = values.take(f'{name}.start', start_field, 0.0)
     sweep = values.take(f'{name}.sweep', sweep_field, ())
     source = _source(name, input_, values)
@@ -132,20 +137,20 @@ def _read(name: str, input_: Input, reach: Tuple[Arc, ...], values: Values,
     elif input_.is_whole(reach):
         return InputSettings(input_, reach, speed, start, None, None, *source)
     arcs = [sweep] if sweep else reach
-    home = [arc for arc in arcs if input_.holds(arc, start, start)]
-    low, high = (home or arcs)[0]
-    trimmed = 0.0 if sweep else MARGIN * (high - low)
-    drive = InputSettings(input_, reach, speed, start, (low + trimmed, high - trimmed),
+    around_start = [arc for arc in arcs if input_.holds(arc, start, start)]
+    low, high = (around_start or arcs)[0]
+    margin = 0.0 if sweep else MARGIN * (high - low)
+    drive = InputSettings(input_, reach, speed, start, (low + margin, high - margin),
                           tuple(sweep) or None, *source)
-    settled = not strict or old and (old.start, old.sweep) == (drive.start, drive.sweep)
-    if chosen and not home and not settled:
+    is_free = not strict or old and (old.start, old.sweep) == (drive.start, drive.sweep)
+    if has_start and not around_start and not is_free:
         raise SceneError(f'{name}.start must be inside the {"sweep" if sweep else "reach"} '
                          f'{in_words(arcs)} {input_.unit}, not {start}')
     return drive
 
 
 def _source(name: str, input_: Input, values: Values) -> Tuple[str, float, float, str]:
-    """Read the source, ratio, offset and measured output of an input."""
+    """Read source, ratio, offset and measures of an input."""
     source, measures, ratio, offset = (
         values.take(f'{name}.{key}', field.about(input_.name, input_.unit), default)
         for key, field, default in (('source', SOURCE, ''), ('measures', MEASURES, ''),
@@ -169,7 +174,7 @@ def _check_measures(name: str, linkage: Mechanism, drive: InputSettings) -> None
         raise SceneError(f'{key}: {error}') from None
 
 
-def _usual_speed(input_: Input, reach: Tuple[Arc, ...]) -> float:
+def _default_speed(input_: Input, reach: Tuple[Arc, ...]) -> float:
     """Return the default speed: 1 rad/s, or about three seconds for a stroke."""
     if input_.turns:
         return 1.0

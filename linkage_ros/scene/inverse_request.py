@@ -1,10 +1,11 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Solve outputs for the positions of actuators, and explain why values cannot be had."""
+"""Solve outputs for the positions of actuators, and explain why values are unreachable."""
 
 from __future__ import annotations
 
+from concurrent.futures import Future
 from functools import cached_property
 import math
 from typing import Any, List, Mapping, NamedTuple, Optional, Sequence, Tuple
@@ -19,22 +20,22 @@ from ..linkage.inverse import CLOSE
 from ..words import listed
 
 LEVER = 'lever'
-# From so many values at once on it is worth to have machine code made for the next ones.
+# A request with this many values starts the compilation of machine code for later requests.
 MANY = 256
 
 
 class Command(NamedTuple):
     """
-    What actuators are to do, one number for each input.
+    A command to the actuators, one number for each input.
 
     Attributes
     ----------
     inputs : sequence of float
-        Where the inputs are then [rad or m]; NaN where there are none in the reach and sweeps.
+        The inputs [rad or m]; NaN if the reach and sweeps have none for the outputs' values.
     positions : sequence of float
-        What their sources tell then.
+        The actuators' positions.
     speeds : sequence of float, optional
-        Of the sources, if they are known; infinite where an output that moves would turn back.
+        The actuators' speeds, if known; infinite where an output that moves would turn back.
 
     """
 
@@ -51,8 +52,8 @@ class SceneAnswer(NamedTuple):
     is_singular: bool
 
 
-def present(machine: SceneMechanism, positions: Mapping[str, float]) -> List[float]:
-    """Return where the inputs are [rad or m], from the last position of each source, else inf."""
+def present_inputs(machine: SceneMechanism, positions: Mapping[str, float]) -> List[float]:
+    """Return the inputs [rad or m] at the last position of each source; inf if unknown."""
     known = [machine.from_source(drive, positions[drive.source], None, None)[0]
              if drive.source in positions else math.inf for drive in machine.inputs.values()]
     return [value if math.isfinite(value) else math.inf for value in known]
@@ -60,25 +61,25 @@ def present(machine: SceneMechanism, positions: Mapping[str, float]) -> List[flo
 
 class InverseRequest:
     """
-    Outputs of a mechanism in a scene, as many as inputs, and what these have to be for them.
+    The inverse of a scene's mechanism for some outputs, as many as it has inputs.
 
-    Outputs are links by their joint angle or slide, coordinates, distances and angles, as
-    `Mechanism.has_output` names them; an empty name is the lever. All values are those of the
-    scene: lengths [m] times its scale, positions as their sources tell them. Whatever is answered
-    lies inside the sweeps and the reach, on the linkage's own assembly.
+    Outputs are joint angles, slides, coordinates, distances and angles, named as in
+    `Mechanism.has_output`; an empty name is the lever. All values are those of the scene: lengths
+    [m] include its scale, positions are those of the actuators. Every answer lies inside the
+    sweeps and the reach, on the linkage's own assembly.
 
-    - `positions(values)`: for arrays of values positions and rates. Without `near` the first
-      value is answered on the working branch, whatever the inputs do; with one `near` next to
-      that. Then the answers go on from value to value. With a `near` for each value each is
-      answered next to its own.
+    - `positions(values)`: positions and rates for arrays of values. Without `near` the first
+      value is solved on the working branch, independently of the present inputs; with one `near`,
+      next to it. Each further value continues from the one before. With a `near` for each value,
+      each is solved next to its own.
     - `answers(values, near)`: all answers to one value of each output, the nearest first.
-    - `command(values, speeds, near)`: the answer that goes on from the last without a jump.
-    - `reason(values)`: why a value cannot be had; that costs much, and is asked only to be said.
+    - `command(values, speeds, near)`: the answer that continues from the last without a jump.
+    - `reason(values)`: why values are unreachable; expensive, and only for messages.
 
     Raises
     ------
     ValueError
-        If these outputs do not tell the inputs.
+        If these outputs do not determine the inputs.
 
     """
 
@@ -86,30 +87,29 @@ class InverseRequest:
         self._machine, self._drives = machine, list(machine.inputs.values())
         self.outputs = [output or LEVER for output in outputs]
         self._inverse = machine.linkage.inverse(tuple(self.outputs))
-        self.what = 'lever angles' if self.outputs == [LEVER] else \
+        self.quantity = 'lever angles' if self.outputs == [LEVER] else \
             f'values of {listed(self.outputs)}'
         self.sources = [drive.source for drive in self._drives]
         self.units = [drive.input.unit for drive in self._drives]
         self._units = [machine.scale_of(name) for name in self.outputs]
         self._scales = [machine.scale_of(name) for name in machine.inputs]
         self._actuators = [drive.actuator for drive in self._drives]
-        # The rate of each output by the first actuator, by the second and so on, of its own.
+        # Factors of the linkage's rates: of each output by the first actuator, by the second, ...
         self._rate_units = [unit / scale * ratio
                             for scale, (ratio, _) in zip(self._scales, self._actuators)
                             for unit in self._units]
-        # The ends of the sweeps as the linkage counts them.
+        # The ends of the sweeps, without the scale.
         self._ends = [drive.ends and (drive.ends[0] / scale, drive.ends[1] / scale)
                       for drive, scale in zip(self._drives, self._scales)]
-        self._many: Any = None
-        self._quicker: Any = None
+        self._compilation: Optional[Future] = None
 
     def inputs_of(self, positions: Sequence[Any]) -> List[Any]:
-        """Return the inputs [rad or m] of their actuators' positions."""
+        """Return the inputs [rad or m] at their actuators' positions."""
         return [ratio * position + offset
                 for (ratio, offset), position in zip(self._actuators, positions)]
 
     def positions_of(self, inputs: Sequence[Any]) -> List[Any]:
-        """Return the positions of the actuators of inputs [rad or m]."""
+        """Return the actuators' positions at inputs [rad or m]."""
         return [(input_ - offset) / ratio if offset or ratio != 1.0 else input_
                 for (ratio, offset), input_ in zip(self._actuators, inputs)]
 
@@ -121,15 +121,15 @@ class InverseRequest:
         Parameters
         ----------
         values : sequence of float or array (n,)
-            For each output what it is to be.
+            For each output its values.
         near : sequence of float or array (n,), optional
-            For each actuator a position that the first answer is to be next to, or one for each.
+            For each actuator a position next to the first answer, or one for each value.
 
         Returns
         -------
         (list of float or array, list of float or array)
-            For each actuator its positions; the rate of each output by the first actuator, by the
-            second and so on; NaN where a value cannot be had.
+            For each actuator its positions; the rates of each output by the first actuator, then
+            by the second and so on; NaN where a value is unreachable.
 
         """
         inverse, many = self._inverse, isinstance(values[0], np.ndarray)
@@ -138,38 +138,37 @@ class InverseRequest:
         if near is not None:
             near = [input_ / scale for input_, scale in zip(self.inputs_of(near), self._scales)]
         if many and np.size(values[0]) >= MANY:
-            inverse = self._quicker or self._accelerated()
+            inverse = self._accelerated()
         found, rates = (inverse.path if many and not each else inverse.nearest)(
             values, near, self._ends)
         return self.positions_of(_times(found, self._scales)), _times(rates, self._rate_units)
 
     def _accelerated(self) -> Any:
-        """Return the inverse in machine code as soon as it is there, for which nobody waits."""
-        if self._many is None:
+        """Return the inverse in machine code once it is compiled; until then in Python."""
+        if self._compilation is None:
             def make() -> Any:
                 inverse = self._machine.linkage.accelerated().inverse(tuple(self.outputs))
                 inverse.path([np.zeros(MANY)] * len(self.outputs))
                 return inverse
 
-            self._many = compile_in_background(make)
-        if self._many.done() and not self._many.exception():
-            self._quicker = self._many.result()
-        return self._quicker or self._inverse
+            self._compilation = compile_in_background(make)
+        done = self._compilation.done() and not self._compilation.exception()
+        return self._compilation.result() if done else self._inverse
 
     def command(self, values: Sequence[float], speeds: Optional[Sequence[float]],
                 near: Sequence[float], jumps: bool = False) -> Command:
         """
-        Return what actuators are to do for values of the outputs and their speeds.
+        Return the command for values of the outputs and their speeds.
 
         Parameters
         ----------
         values, speeds : sequence of float
-            Of each output [rad or m, per second]; the speeds if they are known.
+            For each output [rad or m, per second]; speeds only if known.
         near : sequence of float
-            Where the inputs were [rad or m], from which they go on without a jump.
+            The last inputs [rad or m], from which the answer continues without a jump.
         jumps : bool
-            Whether several inputs may jump to the nearest answer if they cannot go on from there;
-            one always may.
+            Whether several inputs may jump to the nearest answer if none continues from the last;
+            a single input always may.
 
         """
         own = [value / unit for value, unit in zip(values, self._units)]
@@ -186,7 +185,7 @@ class InverseRequest:
                    for end, value in zip(self._ends, inputs))
 
     def _speeds(self, speeds: Sequence[float], rates: Sequence[float]) -> List[float]:
-        """Return the actuators' speeds for those of the outputs, at rates of the linkage."""
+        """Return the actuators' speeds for speeds of the outputs, at the linkage's rates."""
         n = len(speeds)
         if n == 1:
             rate = rates[0] * (self._units[0] / self._scales[0]) * self._actuators[0][0]
@@ -202,26 +201,25 @@ class InverseRequest:
     def answers(self, values: Sequence[float], near: Optional[Sequence[float]] = None
                 ) -> List[SceneAnswer]:
         """
-        Return all answers to one value of each output, inputs [rad or m] as the scene has them.
+        Return all answers to one value of each output, as inputs [rad or m] of the scene.
 
-        The nearest to the inputs `near` [rad or m] is the first; by default to their start.
+        They are sorted by their distance from the inputs `near` [rad or m], by default the start.
         """
         near = [drive.start for drive in self._drives] if near is None else near
         found = []
         for answer in self._inverse.all(np.divide(values, self._units),
                                         np.divide(near, self._scales)):
-            inputs = [_inside(drive, input_, value * scale) for drive, input_, value, scale in zip(
-                self._drives, self._inverse.inputs, answer.inputs, self._scales)]
+            inputs = [_between_ends(drive, input_, value * scale)
+                      for drive, input_, value, scale in zip(
+                          self._drives, self._inverse.inputs, answer.inputs, self._scales)]
             if not any(map(math.isnan, inputs)):
                 found.append(SceneAnswer(tuple(inputs), answer.mode, answer.is_singular))
         sizes = [drive.input.size for drive in self._drives]
         return sorted(found, key=lambda answer: math.dist(
             np.divide(answer.inputs, sizes), np.divide(near, sizes)))
 
-    # Why not.
-
     def reason(self, *values: float) -> str:
-        """Return in words why values cannot be had."""
+        """Return in words why values are unreachable."""
         if not all(map(math.isfinite, values)):
             return 'a value must be finite'
         own = [value / unit for value, unit in zip(values, self._units)]
@@ -233,10 +231,10 @@ class InverseRequest:
         if self.answers(values):
             return f'the way to {what} leads through a singular pose, out of the reach or a sweep'
         if not answers or not any(drive.ends for drive in self._drives):
-            return f'{what} is nowhere in the reach'
+            return f'{what} is outside the reach'
         sweeps = (f'{drive.input.name}.sweep {in_words([drive.ends])}'
                   for drive in self._drives if drive.ends)
-        return f'{what} takes inputs outside {listed(sweeps)}'
+        return f'{what} needs inputs outside {listed(sweeps)}'
 
     def _reason(self, value: float, inputs: Sequence[float]) -> str:
         drive = self._drives[0]
@@ -244,18 +242,18 @@ class InverseRequest:
             beyond = min((self._beyond(end, input_, name) for input_ in inputs
                           for end, name in zip(drive.ends, ('lower', 'upper'))))
             return (f'{value:.6g} needs the {drive.input.name} at {beyond[1]:.6g} '
-                    f'{self.units[0]}, outside {self._where}: beyond its {beyond[2]} end')
+                    f'{self.units[0]}, outside {self._range_name}: beyond its {beyond[2]} end')
         return self._out_of_range(value)
 
     def _beyond(self, end: float, input_: float, name: str) -> Tuple[float, float, str]:
-        """Return how far beyond an end an input is, where that is, and the end's name."""
+        """Return an input's distance beyond an end, its value there, and the end's name."""
         sign, own = 1.0 if name == 'upper' else -1.0, self._inverse.inputs[0]
         gap = sign * (input_ - end)
         gap = gap % own.turn if own.turns else gap if gap > 0.0 else math.inf
         return gap, end + sign * gap, name
 
     @property
-    def _where(self) -> str:
+    def _range_name(self) -> str:
         drive = self._drives[0]
         return f'{drive.input.name}.sweep {in_words([drive.ends])}' if drive.ends else 'the reach'
 
@@ -268,16 +266,16 @@ class InverseRequest:
         (_, at), arc = self._spans[nearest // 2][nearest % 2], self._arcs[nearest // 2]
         ends = [end for end, limit in zip(('lower', 'upper'), arc)
                 if abs(limit - at) < CLOSE * input_.size and not input_.is_whole([arc])]
-        end = f', the {ends[0]} end of {self._where}' if ends else ''
+        end = f', the {ends[0]} end of {self._range_name}' if ends else ''
         spans = in_words((low, high) for (low, _), (high, _) in self._spans)
         what = 'the lever' if name == LEVER else name
         return (f'{what} reaches {spans} {"rad" if turns else "m"}, its '
-                f'{("least", "greatest")[nearest % 2]} at the {input_.quantity} {at:.6g} '
+                f'{("minimum", "maximum")[nearest % 2]} at the {input_.quantity} {at:.6g} '
                 f'{self.units[0]}{end}')
 
     @property
     def _arcs(self) -> Sequence[Arc]:
-        """Where the input may be, no more than a period."""
+        """The allowed arcs of the input, one period at most."""
         drive = self._drives[0]
         if not drive.ends:
             return drive.reach
@@ -286,7 +284,7 @@ class InverseRequest:
 
     @cached_property
     def _spans(self) -> List[List[Tuple[float, float]]]:
-        """Return the least and the greatest value on each arc, with the input there."""
+        """Return the minimum and the maximum on each arc, each with the input there."""
         scale = self._scales[0]
         found = self._machine.linkage.extremes(self.outputs[0], [
             (low / scale, high / scale) for low, high in self._arcs])
@@ -297,8 +295,8 @@ def _times(values: Sequence[Any], factors: Sequence[float]) -> List[Any]:
     return [value if factor == 1.0 else value * factor for value, factor in zip(values, factors)]
 
 
-def _inside(drive: InputSettings, input_: Input, value: float) -> float:
-    """Return an input between its ends, where a crank's whole periods are one; else NaN."""
+def _between_ends(drive: InputSettings, input_: Input, value: float) -> float:
+    """Return an input between its ends, a crank after whole periods if needed; else NaN."""
     low, high = drive.ends or (value, value)
     if input_.turns and not low <= value <= high:
         turn = input_.turn

@@ -24,9 +24,10 @@ _LINE = re.compile(rf'(\w+)=(-?)({_PLAIN}|"(?:[^"\\]|\\.)+")'
 
 class JointName(NamedTuple):
     """
-    Published name of a joint, whose value is sign * position + offset [rad or m].
+    Published name of a joint. Its published value is sign * position + offset [rad or m].
 
-    An angle with its own zero is wrapped to [-pi, pi].
+    `published` tells whether it is in joint states, `wraps` whether the value is wrapped to
+    [-pi, pi].
     """
 
     name: str
@@ -36,12 +37,12 @@ class JointName(NamedTuple):
     wraps: bool = False
 
     def of(self, position: Any) -> Any:
-        """Convert a position, a number or an array, to the published value."""
+        """Return the published value of a position [rad or m], a number or an array."""
         value = self.sign * position + self.offset
         return value - math.tau * np.round(value / math.tau) if self.wraps else value
 
     def travel(self, ends: Tuple[float, float]) -> Optional[Tuple[float, float]]:
-        """Convert limits to published ones; None for an angle that wraps between them."""
+        """Return limits of the published value from those of the position; None if it wraps."""
         low, high = sorted(self._replace(wraps=False).of(end) for end in ends)
         if not self.wraps:
             return low, high
@@ -53,29 +54,31 @@ class JointName(NamedTuple):
 def read_joint_names(mechanism: str, joints: Mapping[str, bool], lines: Iterable[str],
                      only_named: bool) -> Dict[str, JointName]:
     """
-    Return the published names of all joints; raise SceneError if a line matches none.
+    Return the published names of all joints, by joint.
 
-    `joints` maps each joint to whether it is an angle published without whole turns.
+    `joints` tells for each joint whether it is an angle, which wraps if it has an offset. `lines`
+    are those of the parameter joint_names. `only_named` leaves the other joints unpublished.
+    Raises SceneError if a line is malformed, or its joint is unknown or has another line.
     """
-    usual = {joint: JointName(f'{mechanism}_{joint}', published=not only_named)
-             for joint in joints}
+    default = {joint: JointName(f'{mechanism}_{joint}', published=not only_named)
+               for joint in joints}
     own: Dict[str, JointName] = {}
     for line in lines:
         match = _LINE.fullmatch(line)
         name = _unquoted(match[3]) if match else ''
-        if not match or not name or match[1] not in usual or match[1] in own:
+        if not match or not name or match[1] not in default or match[1] in own:
             raise SceneError(
                 f"{mechanism}.joint_names must be texts such as 'BC=left_shin' or "
-                f"'EF=-\"ankle-2\"+0.35', each about another of {listed(joints, 90)}, not "
+                f"'EF=-\"ankle-2\"+0.35', each for a different one of {listed(joints, 90)}, not "
                 f'{elided(line)!r}')
         offset = float(match[4] or 0.0)
         own[match[1]] = JointName(name, -1.0 if match[2] else 1.0, offset,
                                   wraps=joints[match[1]] and offset != 0.0)
-    return {**usual, **own}
+    return {**default, **own}
 
 
 def quoted_name(name: str) -> str:
-    """Return a name as written in `joint_names`: quoted unless plain."""
+    """Return a published name as it is written in joint_names: quoted if it must be."""
     plain = re.fullmatch(_PLAIN, name, re.ASCII)
     return name if plain else json.dumps(name, ensure_ascii=False)
 
@@ -88,12 +91,12 @@ def _unquoted(text: str) -> str:
 
 
 def check_distinct(names: Mapping[str, Mapping[str, JointName]]) -> None:
-    """Raise SceneError if two joints of the scene have one published name."""
+    """Raise SceneError if two joints of the scene are published by one name."""
     owners: Dict[str, str] = {}
     for mechanism, joints in names.items():
-        for joint, called in joints.items():
-            own = f'{mechanism}.{joint}'
-            other = owners.setdefault(called.name, own) if called.published else own
-            if other != own:
+        for joint, own in joints.items():
+            full_name = f'{mechanism}.{joint}'
+            other = owners.setdefault(own.name, full_name) if own.published else full_name
+            if other != full_name:
                 raise SceneError(f'{mechanism}.joint_names must give each joint of the scene a '
-                                 f'name of its own: {other} and {own} are both {called.name}')
+                                 f'name of its own: {other} and {full_name} are both {own.name}')

@@ -12,7 +12,7 @@ from .parameters import SceneError
 from ..linkage.mechanism import Mechanism
 from ..words import elided, listed
 
-# A moment [N m], or a force x, y and, in space, z [N].
+# A moment [N m], or a force [N]: x, y and, in a spatial linkage, z.
 Load = Union[float, Tuple[float, ...]]
 
 _FIGURE = r'[+-]?(?:\d{1,99}\.?\d{0,99}|\.\d{1,99})(?:[eE][+-]?\d\d?)?'
@@ -20,7 +20,7 @@ _LINE = re.compile(rf'(\w+)=({_FIGURE})(?: +({_FIGURE}))?(?: +({_FIGURE}))?', re
 
 
 def read_loads(mechanism: str, linkage: Mechanism, lines: Iterable[str]) -> Dict[str, Load]:
-    """Return loads by joint or link; raise SceneError for a line that is not a load."""
+    """Return forces by joint and moments by link; raise SceneError if a line is neither."""
     loads: Dict[str, Load] = {}
     for line in lines:
         match = _LINE.fullmatch(line)
@@ -28,11 +28,11 @@ def read_loads(mechanism: str, linkage: Mechanism, lines: Iterable[str]) -> Dict
                 linkage.points if match[3] else linkage.joints):
             raise SceneError(
                 f"{mechanism}.loads must be texts such as 'C=0 -9.81', a force [N] at a joint, or "
-                f"'EF=2.5', a moment [N m] on a link, each about another of "
+                f"'EF=2.5', a moment [N m] on a link, each for a different one of "
                 f'{listed((*linkage.points, *linkage.joints), 90)}, not {elided(line)!r}')
         first, *others = (float(figure) for figure in match.groups()[1:] if figure)
         if others and len(others) + 1 != len(linkage.axes):
-            raise SceneError(f'{mechanism}.loads: a force has as many parts as a place: '
+            raise SceneError(f'{mechanism}.loads: a force must have the components '
                              f'{", ".join(linkage.axes)}, not {elided(line)!r}')
         loads[match[1]] = (first, *others) if others else first
     return loads

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-An input as a function of time.
+Inputs as functions of time.
 
-Angles are integers in units of 2^-160 rad, lengths of 2^-160 m, and time in nanoseconds, so errors
-never accumulate: only the result is rounded.
+Angles are integers in units of 2^-160 rad, lengths in units of 2^-160 m, and times in nanoseconds.
+Only the result is rounded, so that errors do not accumulate.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ class Motion:
     sweep : (float, float), optional
         Ends of the oscillation [rad or m]; None: full rotation.
     start : float
-        Value at the time `since` [rad or m], clipped to the sweep.
+        Value at the time `since` [rad or m]; outside the sweep, the nearer end is used.
     since : int
-        Time [ns].
+        Time of the start [ns].
     turns : bool
-        Whether the input is an angle, the same after a turn.
+        Whether the input is an angle, so that `start` may be off by whole turns.
     period : int
-        Turns after which a full rotation returns to 0.
+        Turns after which the value of a full rotation returns to 0.
 
     """
 
@@ -60,7 +60,7 @@ class Motion:
         self._since = since
 
     def at(self, now: int) -> Tuple[float, float]:
-        """Return the value, in [0, period) or in the sweep, and the speed at a time [ns]."""
+        """Return value and speed at a time [ns]; a rotation's value is in [0, 2 pi period)."""
         travelled, ahead = self._fold((self._phase + self._rate * (now - self._since))
                                       % self._period)
         # Multiplication by a power of two is exact.
@@ -76,7 +76,7 @@ class Motion:
         return cls(drive.speed, drive.sweep, drive.start, since, drive.input.turns, drive.period)
 
     def changed(self, speed: float, sweep: Optional[Arc], now: int) -> Motion:
-        """Return the motion that continues this one without a jump from `now` [ns]."""
+        """Return a motion with another speed and sweep, which continues this one at `now` [ns]."""
         motion = Motion(speed, sweep, since=now, turns=self._turns, period=self._round // TURN)
         phase = self._phase_at(now)
         if sweep == self._sweep:
@@ -88,7 +88,7 @@ class Motion:
         return motion
 
     def moved(self, before: int, now: int) -> Motion:
-        """Return this motion, delayed so that its value at `before` [ns] is reached at `now`."""
+        """Return this motion shifted in time: its value at `before` [ns] becomes that at `now`."""
         motion = self.changed(self._speed, self._sweep, before)
         motion._since = now
         return motion
@@ -97,12 +97,12 @@ class Motion:
         return (self._phase + self._rate * (now - self._since)) % self._period
 
     def _fold(self, phase: int) -> Tuple[int, bool]:
-        """Return the distance of a phase from the low end, and whether it is rising."""
+        """Return how far the value at a phase is above the low end, and whether it rises there."""
         ahead = phase < self._width
         return (phase, ahead) if ahead else (2 * self._width - phase, ahead)
 
     def _place(self, angle: int) -> int:
-        """Return the rising phase of an angle."""
+        """Return the phase at which the rising value is `angle`, or nearest to it."""
         if self._sweep is None:
             return angle % self._round
         half = self._width // 2

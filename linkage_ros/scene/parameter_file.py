@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Read parameter files as rclpy does, without ROS. Needs PyYAML.
+Read ROS parameter files without ROS. Needs PyYAML.
 
-Numbers, sections, their order and error messages follow rcl_yaml_param_parser
+Numbers, sections, their order and error messages are those of rcl_yaml_param_parser
 (https://github.com/ros2/rcl).
 """
 
@@ -20,7 +20,7 @@ from .parameters import SceneError
 from ..words import quoted
 
 KEY = 'ros__parameters'
-# If a parameter has values of several kinds, the first kind in this order wins.
+# Kinds of values. If a parameter is given values of several kinds, the first of these wins.
 KINDS = {bool: 'bool', int: 'integer', float: 'double', str: 'string'}
 TRUE = {'Y', 'y', *(word for low in ('yes', 'true', 'on')
                     for word in (low, low.title(), low.upper()))}
@@ -38,13 +38,10 @@ _TOKEN = re.compile(r'\*\*?|[A-Za-z_]\w*', re.ASCII)
 
 def overrides(path: str, node: str) -> Optional[Dict[str, Any]]:
     """
-    Return a node's parameter values from a file; None if no section matches the node.
+    Return the parameter values in a file for a node, by parameter name.
 
-    Raises
-    ------
-    SceneError
-        If rcl would refuse the file; the text has rcl's reason.
-
+    `node` is its full name, such as '/kinematics'. None means that no section matches it. Raises
+    SceneError with the reason of rcl if rcl would refuse the file.
     """
     import yaml
 
@@ -58,14 +55,14 @@ def overrides(path: str, node: str) -> Optional[Dict[str, Any]]:
         reason = str(error)
     else:
         return reader.values_of(node)
-    raise SceneError(f'{path} is no parameter file as ROS reads them: {reason}')
+    raise SceneError(f'{path} is not a valid ROS parameter file: {reason}')
 
 
 class _Reader:
-    """Parser state: the nodes' parameters, and the position in the nested names."""
+    """State of the parser: the parameters so far, and where it is in the nested names."""
 
     def __init__(self) -> None:
-        # Each parameter is its name and its values by kind.
+        # Parameters by section: the name of each, and its values by kind.
         self.nodes: Dict[str, List[Tuple[str, Dict[Any, Any]]]] = {}
         self.line = 0
         self._at_key, self._in_list = True, False
@@ -77,7 +74,7 @@ class _Reader:
         self._place = 0
 
     def values_of(self, node: str) -> Optional[Dict[str, Any]]:
-        """Merge the parameters of all sections that match a node, in file order."""
+        """Return the values in all sections that match a node, of which later ones win."""
         found = [own for name, own in self.nodes.items() if _pattern(name).fullmatch(node)]
         if not found:
             return None
@@ -149,7 +146,7 @@ class _Reader:
             self._in_parameters = True
 
     def _parameter(self, key: str) -> None:
-        """Enter a parameter; if its value is a mapping, it becomes the mapping's first one."""
+        """Begin a parameter; one whose value is a mapping becomes the first in this mapping."""
         if self._is_new:
             self._space, self._is_new = self._own[self._place][0], False
             self._spaces += 1
@@ -179,7 +176,7 @@ def _list_of(kind: type) -> str:
 
 
 def _read(event: Any, line: int) -> Any:
-    """Return the value of a scalar; raise ValueError if it is empty."""
+    """Return the value of a YAML scalar event; raise ValueError if it is empty."""
     text = event.value
     is_quoted = event.style in ('"', "'")
     if not text and not is_quoted:
@@ -188,7 +185,7 @@ def _read(event: Any, line: int) -> Any:
 
 
 def plain(text: str) -> Any:
-    """Return the value of unquoted text: a bool, an int, a float or the text."""
+    """Return the value that rcl reads from unquoted text: bool, int, float or str."""
     if text in TRUE or text in FALSE:
         return text in TRUE
     if _WHOLE.fullmatch(text):
@@ -201,7 +198,7 @@ def plain(text: str) -> Any:
 
 
 def _number(text: str) -> Optional[float]:
-    """Parse a number as C's strtod does; None if invalid, or out of range."""
+    """Parse a number as C's strtod does; return None if it is invalid or out of range."""
     if _DOTTED.fullmatch(text):
         return float(text.replace('.', ''))
     if _SPECIAL.fullmatch(text):

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Parameters: descriptions and validation, with errors that name the parameter; without ROS."""
+"""Description and validation of parameters. Errors name the parameter. No ROS is needed."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ from typing import Any, Iterable, List, Optional, Tuple, Type
 from ..cache import cached
 from ..words import elided, listed, meant, MESSAGE, quoted
 
-# The nodes that use parameters; OWNER's value counts for parameters that several nodes use.
+# The nodes that use parameters; OWNER decides the value of a parameter that several nodes use.
 DRIVER, KINEMATICS, INVERSE = ALL = 'crank_driver', 'kinematics', 'servo_inverse'
 OWNER = KINEMATICS
 
 # Parameters that rclpy declares.
 _ROS = re.compile(r'(use_sim_time|start_type_description_service)$')
 
+# Python type of a value or of the items of a list, and its description, by kind.
 KINDS = {
     'bool': (bool, 'true or false'),
     'integer': (int, 'a whole number'),
@@ -39,7 +40,7 @@ LONGEST_LIST = 10000
 
 
 class SceneError(ValueError):
-    """An invalid parameter; the text names it and says what is allowed."""
+    """A parameter is invalid; the text names it and says what is allowed."""
 
     def __init__(self, text: str):
         super().__init__(elided(text, MESSAGE))
@@ -55,17 +56,17 @@ class Field:
     kind : str
         One of KINDS.
     meaning : str
-        Description with the unit.
+        Description, with the unit in brackets.
     low, high : float, optional
-        Ends of the range.
+        Ends of the allowed range; None: no range.
     positive : bool
-        Whether it must be above zero.
+        Whether the value must be above zero.
     rule : str
         Further requirement, in words.
     pattern : re.Pattern
-        Pattern that a text must match.
+        Pattern that the whole of a text must match.
     readers : tuple of str
-        Nodes that use it.
+        Nodes that use the parameter.
     read_only : bool
         Whether a change needs a restart.
 
@@ -82,17 +83,17 @@ class Field:
     read_only: bool = False
 
     def about(self, *words: str, **other: Any) -> Field:
-        """Return a copy with words put into its meaning, and other attributes replaced."""
+        """Return a copy with `words` for {0}, {1}, ... in the meaning, and `other` attributes."""
         return _with(self, ('meaning', self.meaning.format(*words)), *other.items())
 
     @property
     def shared(self) -> bool:
-        """Whether several nodes use it."""
+        """Whether several nodes use the parameter."""
         return len(self.readers) > 1
 
     @property
     def allowed(self) -> str:
-        """Describe the allowed values."""
+        """The allowed values, in words."""
         words = [KINDS[self.kind][1]]
         if self.positive:
             words.append('above 0')
@@ -102,9 +103,9 @@ class Field:
 
     def checked(self, name: str, value: Any) -> Any:
         """
-        Return a valid value, lists as tuples; raise SceneError if it is not allowed.
+        Return an allowed value, a list as a tuple; raise SceneError if it is not allowed.
 
-        An integer is accepted as a float; an empty list may be of any kind.
+        `name` is the parameter's. An integer becomes a float where the kind requires it.
         """
         several = self.kind.endswith('_array')
         # rclpy represents an empty list as None.
@@ -112,12 +113,12 @@ class Field:
         if isinstance(value, tuple) != several:
             raise self.error(name, value)
         items = [self._converted(one) for one in (value if several else [value])]
-        if len(items) > LONGEST_LIST or not all(map(self._holds, items)):
+        if len(items) > LONGEST_LIST or not all(map(self._allows, items)):
             raise self.error(name, value)
         return tuple(items) if several else items[0]
 
     def error(self, name: str, value: Any) -> SceneError:
-        """Return the error that states the allowed values and the actual one."""
+        """Return the error that parameter `name` must have an allowed value, not this one."""
         shown = list(value) if isinstance(value, tuple) else value
         return SceneError(f'{elided(name, 100)} must be {self.allowed}, not {quoted(shown)}')
 
@@ -131,7 +132,7 @@ class Field:
     def _type(self) -> Type[Any]:
         return KINDS[self.kind][0]
 
-    def _holds(self, value: Any) -> bool:
+    def _allows(self, value: Any) -> bool:
         if type(value) is not self._type:
             return False
         if isinstance(value, str):
@@ -146,7 +147,7 @@ class Field:
 
 @cached(2048)
 def _with(field: Field, *other: Tuple[str, Any]) -> Field:
-    """Return a field with attributes replaced, cached: mechanisms of a type share it."""
+    """Return a cached copy with attributes replaced, which mechanisms of one type share."""
     return replace(field, **dict(other))
 
 
@@ -160,25 +161,25 @@ class Parameter:
 
 
 class Values:
-    """Values by full parameter name, consumed one by one."""
+    """Values by full parameter name; `take` validates one and adds it to `parameters`."""
 
-    def __init__(self, given: Mapping[str, Any]):
-        self._left = dict(given)
+    def __init__(self, values: Mapping[str, Any]):
+        self._unused = dict(values)
         self.parameters: List[Parameter] = []
 
-    def left(self, prefix: str = '') -> List[str]:
-        """Return the names with a prefix whose values are not consumed yet."""
-        return sorted(name for name in self._left if name.startswith(prefix))
+    def unused(self, prefix: str = '') -> List[str]:
+        """Return the sorted names that begin with `prefix` and have not been taken."""
+        return sorted(name for name in self._unused if name.startswith(prefix))
 
     def take(self, name: str, field: Field, default: Any) -> Any:
-        """Consume and validate a value, and add the parameter to `parameters`."""
-        value = field.checked(name, self._left.pop(name)) if name in self._left else default
+        """Return a valid value, `default` if there is none; raise SceneError if it is invalid."""
+        value = field.checked(name, self._unused.pop(name)) if name in self._unused else default
         self.parameters.append(Parameter(name, field, value))
         return value
 
 
 def refuse_unknown(names: Iterable[str], known: List[str]) -> None:
-    """Raise SceneError for a name that is no parameter of the scene or of rclpy."""
+    """Raise SceneError unless all names are parameters of the scene or of rclpy."""
     for name in names:
         known = [f'{name}.type', *known] if f'{name}.*' in known else known
         if not _ROS.match(name):

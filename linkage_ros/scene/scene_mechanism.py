@@ -41,13 +41,13 @@ FRAME_RULE = 'up to 100 characters that can be seen, the first a letter, digit o
 
 TYPE = Field('string', 'Type of the mechanism.', readers=ALL, read_only=True,
              rule=f'one of {", ".join(TYPES)}')
-JOINTS = Field('string_array', 'The linkage, one line a joint.', readers=ALL, read_only=True)
+JOINTS = Field('string_array', 'The linkage, one line per joint.', readers=ALL, read_only=True)
 TRACER = Field('string', 'Joint whose curve is the locus; empty: the last.', readers=ALL,
                read_only=True)
 DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [m].', positive=True,
                   readers=ALL)
-BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the usual one.', -1, 1, readers=ALL)
-SCALE = Field('double', 'Factor of every length.', positive=True, readers=(KINEMATICS, INVERSE))
+BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the default.', -1, 1, readers=ALL)
+SCALE = Field('double', 'Factor of every length.', positive=True, readers=ALL)
 LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.', 1, 50,
                   readers=(KINEMATICS,))
 MIRRORED = Field('bool', 'Whether each leg has a mirror image on the other side; '
@@ -63,14 +63,22 @@ JOINT_NAMES = Field(
     rule="such as 'BC=left_shin', or 'EF=-left_ankle+0.35' for 0.35 minus its position")
 ONLY_NAMED = Field('bool', 'Whether only the joints in joint_names are published.',
                    readers=(KINEMATICS,))
-LOADS = Field('string_array', "Loads that the inputs hold, in the linkage's plane.",
+LOADS = Field('string_array', "Loads that the inputs balance, in the linkage's plane.",
               readers=(KINEMATICS, INVERSE),
               rule="such as 'C=0 -9.81', a force [N] at a joint, or 'EF=2.5', a moment [N m]")
 
 
 @dataclass(frozen=True)
 class SceneMechanism:
-    """One mechanism: the linkage of a leg, its reach, scale, copies, markers and inputs."""
+    """
+    A mechanism of a scene, which has one or more equal legs.
+
+    `linkage` is that of a leg, and `reach` the reach of its first input, both before `scale`, a
+    factor of all lengths. `points` are the joints that markers display; `pose` is x, y, z [m],
+    roll, pitch, yaw [rad] in `frame_id`, or in the scene's frame if that is empty. `inputs` are by
+    their names; `joints` are the published names by joint; `loads` are forces by joint, moments by
+    link. `values` are the values that the mechanism was read from.
+    """
 
     name: str
     linkage: Mechanism
@@ -85,34 +93,34 @@ class SceneMechanism:
     joints: Mapping[str, JointName]
     only_named: bool
     loads: Mapping[str, Load]
-    given: Mapping[str, Any] = some(compare=False, repr=False)
+    values: Mapping[str, Any] = some(compare=False, repr=False)
     parameters: Tuple[Parameter, ...] = some(compare=False, repr=False)
 
-    def is_of(self, given: Mapping[str, Any]) -> bool:
-        """Return whether it was read from exactly these values."""
-        return self.given is given or self.given.keys() == given.keys() and all(
-            self.given[key] is value for key, value in given.items())
+    def is_from(self, values: Mapping[str, Any]) -> bool:
+        """Return whether it was read from the same objects, and so is unchanged."""
+        return self.values is values or self.values.keys() == values.keys() and all(
+            self.values[key] is value for key, value in values.items())
 
     @property
     def in_space(self) -> bool:
-        """Whether it is a linkage of rods, which has no picture, page or robot model."""
+        """Whether the linkage is spatial; only planar ones have pictures and robot models."""
         return len(self.linkage.axes) > 2
 
     @property
     def first(self) -> InputSettings:
-        """The first input; most linkages have only one."""
+        """The settings of the first input; most linkages have only one."""
         return next(iter(self.inputs.values()))
 
     def scale_of(self, output: str) -> float:
-        """Return the factor of an output: the scale for a length, 1 for an angle."""
+        """Return the factor from the linkage to the scene: the scale for a length, else 1."""
         return 1.0 if self.linkage.is_angle(output) else self.scale
 
     def measured(self, output: str, value: float, near: float) -> Tuple[float, float]:
         """
-        Return the input for a measured output [rad or m], and d output / d input.
+        Return the input at which an output has a value [rad or m], and d output / d input.
 
-        Of several solutions it is the continuous one, or else the nearest, to `near`; NaN outside
-        the reach or the user's sweep.
+        Of several solutions it is the one that continues from the input `near`, or else the
+        nearest. It is NaN if there is none in the reach and in the sweep that a user has set.
         """
         drive, own, unit = self.first, self.scale_of(self.first.input.name), self.scale_of(output)
         ends = drive.ends and (drive.ends[0] / own, drive.ends[1] / own)
@@ -124,7 +132,12 @@ class SceneMechanism:
 
     def from_source(self, drive: InputSettings, position: float, speed: Optional[float],
                     near: Optional[float]) -> Tuple[float, Optional[float]]:
-        """Convert a source's position and speed to an input's, continuous from `near`."""
+        """
+        Return an input and its speed, from those of its source joint [rad or m, per second].
+
+        If the source joint measures an output, the input continues from `near`, by default its
+        start, and is NaN if there is none. The speed is None if it is unknown.
+        """
         value = drive.ratio * position + drive.offset
         speed = None if speed is None else drive.ratio * speed
         if not drive.measures:
@@ -133,7 +146,7 @@ class SceneMechanism:
         return found, speed / rate if speed is not None and rate else None
 
     def to_source(self, drive: InputSettings, value: float, speed: float) -> Tuple[float, float]:
-        """Convert an input and its speed to its source's position and speed."""
+        """Return position and speed of an input's source joint, from those of the input."""
         if output := drive.measures:
             own, unit = self.scale_of(drive.input.name), self.scale_of(output)
             rate = float(self.linkage.joint_rates(value / own, [output])[output]) * unit / own
@@ -142,31 +155,31 @@ class SceneMechanism:
         return (value - drive.offset) / drive.ratio, speed / drive.ratio
 
     def efforts(self, values: Sequence[float]) -> Tuple[float, ...]:
-        """Return each input's effort that balances the loads at these values [N m or N]."""
+        """Return the inputs' efforts [N m or N] that balance the loads at inputs `values`."""
         units = [self.scale_of(name) for name in self.inputs]
         own = [value / unit for value, unit in zip(values, units)]
-        # The scale lengthens the levers of forces; moments do not depend on it.
+        # The scale lengthens the lever arms of forces; moments do not depend on it.
         loads = {name: load if isinstance(load, float) else tuple(
             self.scale * part for part in load) for name, load in self.loads.items()}
         found = self.linkage.effort(own if len(own) > 1 else own[0], loads)
         return tuple(float(effort) / unit for effort, unit in zip(found, units))
 
     def assembly(self) -> Assembly:
-        """Return all legs as one assembly."""
+        """Return the solver of all legs."""
         return Assembly(self.linkage, self.leg_pairs, self.mirrored, self.scale, self.reach)
 
     @property
     def tracer(self) -> str:
-        """The joint of the locus: the linkage's tracer if it is among `points`, else the last."""
+        """The joint that draws the locus: the linkage's tracer if in `points`, else their last."""
         return self.linkage.tracer if self.linkage.tracer in self.points else self.points[-1]
 
 
-def read_machine(name: str, given: Mapping[str, Any], old: Optional[SceneMechanism],
+def read_machine(name: str, own: Mapping[str, Any], old: Optional[SceneMechanism],
                  strict: bool) -> SceneMechanism:
-    """Read a mechanism; return the old one if the values are unchanged."""
-    if old and old.is_of(given):
+    """Read a mechanism from its own values, or return `old` if they are unchanged."""
+    if old and old.is_from(own):
         return old
-    values = Values(given)
+    values = Values(own)
     type_ = values.take(f'{name}.type', TYPE, name)
     if type_ not in TYPES:
         raise SceneError(f'{name}.type must be {TYPE.rule}, not {quoted(type_)}'
@@ -175,9 +188,9 @@ def read_machine(name: str, given: Mapping[str, Any], old: Optional[SceneMechani
     scale = values.take(f'{name}.scale', SCALE, 1.0)
     leg_pairs, mirrored = _legs(name, linkage, values)
     points, pose = _points(name, linkage, values), _pose(name, values)
-    settled = old.inputs if old else {}
+    old_inputs = old.inputs if old else {}
     inputs = {input_.name: read_settings(name, linkage, input_, reach, scale, values,
-                                         settled.get(input_.name), strict)
+                                         old_inputs.get(input_.name), strict)
               for input_ in linkage.inputs}
     frame_id = values.take(f'{name}.frame_id', OWN_FRAME_ID, '')
     only_named = values.take(f'{name}.only_named', ONLY_NAMED, False)
@@ -189,10 +202,10 @@ def read_machine(name: str, given: Mapping[str, Any], old: Optional[SceneMechani
         values.take(f'{name}.joint_names', JOINT_NAMES, ()), only_named)
     loads = read_loads(name, linkage, values.take(f'{name}.loads', LOADS, ()))
     if loads and (leg_pairs > 1 or mirrored):
-        raise SceneError(f'{name}.loads must be empty where there is more than one leg')
-    refuse_unknown(values.left(), [parameter.name for parameter in values.parameters])
+        raise SceneError(f'{name}.loads must be empty for more than one leg')
+    refuse_unknown(values.unused(), [parameter.name for parameter in values.parameters])
     return SceneMechanism(name, linkage, reach, scale, leg_pairs, mirrored, points, pose, inputs,
-                          frame_id, joints, only_named, loads, given, tuple(values.parameters))
+                          frame_id, joints, only_named, loads, own, tuple(values.parameters))
 
 
 def _linkage(name: str, type_: str, values: Values) -> Tuple[Mechanism, Tuple[Arc, ...]]:
@@ -222,7 +235,7 @@ def _design(name: str, type_: str, values: Values) -> Design:
     joints = values.take(f'{name}.joints', JOINTS, ())
     tracer = values.take(f'{name}.tracer', TRACER, '')
     start = f'{name}.dimensions.'
-    dimensions = [key[len(start):] for key in values.left(start)]
+    dimensions = [key[len(start):] for key in values.unused(start)]
     try:
         return mechanisms.design(type_, joints, tracer or None, dimensions)
     except ValueError as error:
@@ -247,7 +260,7 @@ def _branches(name: str, design: Design, values: Values) -> Dict[str, int]:
 
 @cached(16, shared=True)
 def _built(design: Design, dimensions: tuple, branches: tuple) -> Mechanism:
-    """Build a linkage, cached by its dimensions."""
+    """Build a linkage, or return an equal one that is cached or in use."""
     own: Dict[str, Any] = {} if design.name in mechanisms.TYPES else {
         'joints': design.joints, 'tracer': design.tracer}
     return mechanisms.create(design.name, branches=dict(branches), **own, **dict(dimensions))
@@ -255,14 +268,14 @@ def _built(design: Design, dimensions: tuple, branches: tuple) -> Mechanism:
 
 def _legs(name: str, linkage: Mechanism, values: Values) -> Tuple[int, bool]:
     able = _can_have_more_legs(linkage)
-    # A parameter that cannot change has no slider.
+    # A parameter of which no other value is allowed is read-only, and so has no slider.
     pairs, mirrored = (field.about(read_only=not able) for field in (LEG_PAIRS, MIRRORED))
     pairs = values.take(f'{name}.leg_pairs', pairs, 1)
     mirrored = values.take(f'{name}.mirrored', mirrored, pairs > 1)
     if (pairs > 1 or mirrored) and not able:
         what, allowed = ('leg_pairs', '1') if pairs > 1 else ('mirrored', 'false')
         raise SceneError(f'{name}.{what} must be {allowed}: only a linkage whose one crank '
-                         'turns about x = 0, its angle counted from +x, can have more legs')
+                         'turns about x = 0, its angle measured from +x, can have more legs')
     return pairs, mirrored
 
 

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Useful ranges for sliders of parameters.
+Useful ranges for the sliders of parameters; values beyond them are allowed, too.
 
-Ranges are suggestions: values beyond them are allowed. The ends are multiples of the step, because
-sliders of rqt_reconfigure have a hundred steps counted from zero. No ROS is needed.
+The ends are multiples of a hundredth of the range, because the sliders of rqt_reconfigure have a
+hundred steps and count them from zero. No ROS is needed.
 """
 
 from __future__ import annotations
@@ -21,18 +21,19 @@ from ..cache import cached
 from ..linkage.inputs import Arc
 from ..linkage.mechanism import Mechanism
 
-STOPS = 100
-# Smallest and largest change tried, as fractions of the length, or of the longest bar if it is 0.
-LEAST, MOST = 1e-4, 9.0
-TRIED = 48
-# Smallest step, as a fraction of the value.
-FINEST = 1e-5
+# Steps of a slider, and the smallest step as a fraction of the value.
+STEPS, FINEST = 100, 1e-5
+# Smallest and largest change of a dimension that is tried, as fractions of it, or of the longest
+# bar if it is 0; and the number of changes tried at a time.
+LEAST, MOST, TRIED = 1e-4, 9.0, 48
+# Largest end of a range.
 LARGEST = 1e300
+# Values tried of a single input, and of each of several.
 ANGLES, FEW_ANGLES = 91, 13
 
 
 def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
-    """Return the lowest and highest value of a parameter's slider; None without a slider."""
+    """Return the lower and upper end of a parameter's slider; None if it has no slider."""
     field, value = parameter.field, parameter.value
     if field.low is not None and field.high is not None:
         return field.low, field.high
@@ -41,16 +42,16 @@ def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
     name, what, key = (parameter.name.split('.') + ['', ''])[:3]
     machine = scene.machines.get(name)
     if machine and what == 'dimensions':
-        return _length(machine.linkage, key, field.positive, _used(machine))
+        return _dimension_ends(machine.linkage, key, field.positive, _required_range(machine))
     if machine and what in machine.inputs and key == 'start':
         reach = machine.inputs[what].reach
         ends = [value, *(end for arc in reach for end in arc)]
-        return _whole_stops(value, min(ends), max(ends))
-    return _whole_stops(value, 0.1 * value, 10.1 * value)
+        return _in_whole_steps(value, min(ends), max(ends))
+    return _in_whole_steps(value, 0.1 * value, 10.1 * value)
 
 
-def _used(machine: SceneMechanism) -> Optional[Tuple[float, float]]:
-    """Return the crank's range in which it must be assembled; None: at one angle at least."""
+def _required_range(machine: SceneMechanism) -> Optional[Arc]:
+    """Return the angles [rad] that a fully rotatable crank passes; None for other inputs."""
     first, *others = machine.inputs.values()
     if others or not first.input.is_whole(first.reach):
         return None
@@ -58,23 +59,23 @@ def _used(machine: SceneMechanism) -> Optional[Tuple[float, float]]:
 
 
 @cached(16)
-def _length(linkage: Mechanism, key: str, positive: bool, used: Optional[Arc]) -> Arc:
-    """Return the range of a dimension in which the linkage can be assembled."""
+def _dimension_ends(linkage: Mechanism, key: str, positive: bool, required: Optional[Arc]) -> Arc:
+    """Return the slider's ends for a dimension; between them the linkage can be assembled."""
     value = float(linkage.dimensions[key])
     size = abs(value) or float(linkage.longest)
-    low, high = (_farthest(linkage, key, value, sign * size, used, positive)
+    low, high = (_farthest(linkage, key, value, sign * size, required, positive)
                  for sign in (-1.0, 1.0))
-    return _whole_stops(value, low, high)
+    return _in_whole_steps(value, low, high)
 
 
-def _farthest(linkage: Mechanism, key: str, value: float, size: float, used: Optional[Arc],
+def _farthest(linkage: Mechanism, key: str, value: float, size: float, required: Optional[Arc],
               positive: bool) -> float:
-    """Return the end of the range on one side: every sample up to it can be assembled."""
+    """Return the farthest value on one side: up to it, all values tried can be assembled."""
     most = 0.9 * abs(size) if positive and size < 0.0 else MOST * abs(size)
     steps = np.geomspace(LEAST * abs(size), most, TRIED) * math.copysign(1.0, size)
     good, bad = 0.0, None
     for _ in range(2):
-        able = _assembled(linkage, key, value + steps, used)
+        able = _are_assembled(linkage, key, value + steps, required)
         if able.all():
             good = steps[-1]
             break
@@ -84,29 +85,33 @@ def _farthest(linkage: Mechanism, key: str, value: float, size: float, used: Opt
     return float(value + good)
 
 
-def _assembled(linkage: Mechanism, key: str, values: np.ndarray,
-               used: Optional[Arc]) -> np.ndarray:
-    """Return for each value of a dimension whether the linkage can be assembled."""
+def _are_assembled(linkage: Mechanism, key: str, values: np.ndarray,
+                   required: Optional[Arc]) -> np.ndarray:
+    """
+    Return for each value of a dimension whether the linkage can be assembled, (values,).
+
+    It must be at all inputs tried in the range `required`, or at one input if that is None.
+    """
     try:
         tried = linkage.with_dimensions(**{key: values[:, None]})
     except ValueError:
         if len(values) == 1:
             return np.array([False])
-        return np.concatenate([_assembled(linkage, key, values[i:i + 1], used)
+        return np.concatenate([_are_assembled(linkage, key, values[i:i + 1], required)
                                for i in range(len(values))])
     many = ANGLES if len(linkage.inputs) == 1 else FEW_ANGLES
     samples = [np.linspace(low, high, many) for low, high in (
-        used or (input_.low, input_.high) for input_ in linkage.inputs)]
+        required or (input_.low, input_.high) for input_ in linkage.inputs)]
     theta = [each.ravel() for each in np.meshgrid(*samples)] if len(samples) > 1 else samples[0]
     placed = np.ones((len(values), 1), dtype=bool)
     for places in tried.solve(theta).values():
         placed = placed & np.isfinite(places).all(axis=-1)
-    return np.all(placed, axis=1) if used else np.any(placed, axis=1)
+    return np.all(placed, axis=1) if required else np.any(placed, axis=1)
 
 
-def _whole_stops(value: float, low: float, high: float) -> Tuple[float, float]:
-    """Round a range to a hundred whole steps that include the value."""
+def _in_whole_steps(value: float, low: float, high: float) -> Arc:
+    """Round the ends of a range to multiples of its step, so that the value lies between them."""
     low, value, high = (min(max(x, -LARGEST), LARGEST) for x in (low, value, high))
-    step = max((high - low) / (STOPS + 1), FINEST * abs(value), 1.0 / LARGEST)
+    step = max((high - low) / (STEPS + 1), FINEST * abs(value), 1.0 / LARGEST)
     first = min(math.ceil(low / step), math.floor(value / step))
-    return first * step, (first + STOPS) * step
+    return first * step, (first + STEPS) * step

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Write scenes as parameter files, for `load` and ROS. Needs PyYAML, no ROS."""
+"""Write scenes as parameter files, which `load` and ROS can read. Needs PyYAML, but no ROS."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from . import read, Scene, SceneError
 from .parameter_file import plain, TEXT
 
 
-def in_yaml(given: Mapping[str, Any]) -> str:
-    """Return the text of a parameter file with values by full parameter name."""
+def in_yaml(values: Mapping[str, Any]) -> str:
+    """Return the text of a parameter file; `values` are by full parameter name."""
     import yaml
 
     class Dumper(yaml.SafeDumper):
@@ -23,44 +23,41 @@ def in_yaml(given: Mapping[str, Any]) -> str:
     Dumper.add_representer(str, lambda dumper, text: dumper.represent_scalar(
         TEXT, text, None if isinstance(plain(text), str) else "'"))
     texts = ['/**:', '  ros__parameters:']
-    for name, value in given.items():
-        shown = list(value) if isinstance(value, tuple) else value
-        if shown == []:
+    for name, value in values.items():
+        written = list(value) if isinstance(value, tuple) else value
+        if written == []:
             # rcl cannot read an empty list, which is the default anyway.
             continue
-        numbers = isinstance(shown, list) and not any(isinstance(one, str) for one in shown)
-        text = yaml.dump({name: shown}, Dumper=Dumper, width=1000,
+        numbers = isinstance(written, list) and not any(isinstance(one, str) for one in written)
+        text = yaml.dump({name: written}, Dumper=Dumper, width=1000,
                          default_flow_style=numbers and None)
         texts.append(indent(text.rstrip(), '    '))
     return '\n'.join(texts) + '\n'
 
 
+# Matches no text.
 NOTHING = re.compile(r'(?!)')
 
 
 def without_defaults(scene: Scene, always: re.Pattern = NOTHING) -> Dict[str, Any]:
     """
-    Return a scene's values by name, without those that equal their defaults.
+    Return the values that differ from their defaults, by full parameter name.
 
-    Values whose whole name matches `always` are always included.
-
-    Raises
-    ------
-    SceneError
-        If nodes could not start with them: a start outside its input's sweep or reach.
-
+    A value whose whole name matches `always` is included even if it is the default. Raises
+    SceneError if nodes could not start with these values: an input starts outside its sweep or
+    reach.
     """
-    kept = {parameter.name: parameter.value for parameter in scene.parameters}
-    whole = dict(kept)
+    values = {parameter.name: parameter.value for parameter in scene.parameters}
+    whole = dict(values)
     for name in whole:
         if always.fullmatch(name):
             continue
-        fewer = {key: value for key, value in kept.items() if key != name}
+        fewer = {key: value for key, value in values.items() if key != name}
         try:
             same = read(fewer, scene, strict=False).parameters
         except SceneError:
             continue
         if {parameter.name: parameter.value for parameter in same} == whole:
-            kept = fewer
-    read(kept)
-    return kept
+            values = fewer
+    read(values)
+    return values
