@@ -1828,6 +1828,38 @@ def test_a_second_finger_neither_moves_the_joint_of_the_first_nor_takes_one(show
 
 @pytest.mark.long
 @needs_browser
+def test_what_is_refused_is_said_where_one_looks_and_leaves_the_picture_free(show, looked_at):
+    running = show({'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}, kinds=(Kinematics,))
+    crank_states = running.graph.node.create_publisher(JointState, 'crank_states', 10)
+
+    async def doing(seen):
+        page, notice = seen.page, 'document.getElementById("notice")'
+
+        async def moved():
+            crank_states.publish(JointState(name=['lever_crank'], position=[0.0]))
+            return await page.value(f'!!{seen.section("lever")}.querySelector("tbody tr")')
+
+        def reason():
+            return page.value(f'[...{seen.section("lever")}.querySelectorAll(".reason")].filter('
+                              'one => !one.hidden).map(one => one.textContent).join()')
+
+        await browser.until(moved)
+        (x, y), _ = await upright_lever(seen)
+        await page.drag((x, y), (x + 30.0, y))
+        why = 'nothing that is known here moves the crank: no crank_driver runs'
+        await browser.until(lambda: page.value(f'{notice}.textContent === "{why}"'))
+        assert await reason() == why
+        await browser.until(lambda: page.value(f'{notice}.hidden'))
+        assert await reason() == why
+        await page.write(f'{seen.section("lever")}.querySelector("td input")', 'foo')
+        await browser.until(reason)
+        assert await reason() == 'Refused: foo is not a number that can be set'
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
 def test_a_click_on_a_bar_goes_to_its_slider_and_a_drag_from_it_does_not(show, looked_at):
     running = show({**LEVER, 'lever.crank.speed': 0.0})
 

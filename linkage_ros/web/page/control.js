@@ -36,6 +36,9 @@ export async function typed(text, unit, factor) {
   return turns && unit?.startsWith('rad') ? value : value / factor;
 }
 
+/** Why a text is refused that says no number. */
+export const noNumber = text => `Refused: ${text} is not a number that can be set`;
+
 export function element(tag, properties = {}, ...children) {
   const made = Object.assign(document.createElement(tag), properties);
   made.append(...children);
@@ -154,7 +157,7 @@ export class Slider {
   async type(text) {
     const value = text ? await typed(text, this.unit, this.factor) : 0;
     this.mistyped = !Number.isFinite(value);
-    if (this.mistyped) this.explain(`Refused: ${text} is not a number that can be set`);
+    if (this.mistyped) this.explain(noNumber(text));
     else if (text) this.offer(value);
   }
 

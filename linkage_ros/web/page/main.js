@@ -12,6 +12,7 @@ import { Picture } from './picture.js';
 import { units } from './units.js';
 import { View } from './view.js';
 
+const REFUSED = 4000;
 const mechanisms = new Map();
 const at = id => document.getElementById(id);
 const [views, status, names, workshop, arrows, whole, notice] = [
@@ -20,6 +21,7 @@ const naming = names.closest('label');
 /** What a reload keeps. */
 const kept = { shown: '', from: {}, names: true, workshop: false, arrows: '', ...JSON.parse(sessionStorage.getItem('kept') ?? '{}') };
 let { shown } = kept;
+let fading = 0;
 let scheduled = false;
 let frames = 0;
 
@@ -53,7 +55,14 @@ function light(mechanism, dimension) {
 
 /** Say over the picture what keeps it from being shown or moved; nothing: all is well. */
 function say(words) {
+  clearTimeout(fading);
   put(notice, { textContent: words, hidden: !words });
+}
+
+/** Say for a while why a joint is not dragged; its part of the panel says so till it is. */
+function refuse(words) {
+  say(words);
+  fading = setTimeout(say, REFUSED, '');
 }
 
 const connection = new Connection({
@@ -121,7 +130,7 @@ const connection = new Connection({
 });
 arithmetic.ask = text => connection.ask({ op: 'read', text });
 
-const panel = new Panel(at('panel'), connection, light, say);
+const panel = new Panel(at('panel'), connection, light, refuse);
 
 /** Draw once before the next refresh of the screen, then do what is to be done after it. */
 function draw(after) {

@@ -3,7 +3,7 @@
 
 // How a mechanism moves: a slider for each input, play and step, and what its outputs are now.
 
-import { element, LINEAR, Newest, put, Reason, Slider, typed } from './control.js';
+import { element, LINEAR, Newest, noNumber, put, Reason, Slider, typed } from './control.js';
 import { figures, units } from './units.js';
 
 const STEP = Math.PI / 180;
@@ -64,7 +64,7 @@ class InputRow {
 
 /** An output: its value, which can be written where there is one input, and d output / d input. */
 class OutputRow {
-  constructor(name, editable, count, want) {
+  constructor(name, editable, count, want, say) {
     this.editable = editable;
     this.value = editable
       ? element('input', { type: 'text', autocomplete: 'off', ariaLabel: name })
@@ -75,9 +75,11 @@ class OutputRow {
       element('td', {}, this.value, ' ', this.unit), ...this.rates);
     this.value.onchange = async () => {
       const { unit } = this.output;
-      const value = await typed(this.value.value.trim(), unit, units.of(unit).factor);
+      const text = this.value.value.trim();
+      const value = text ? await typed(text, unit, units.of(unit).factor) : NaN;
       this.value.blur();
       if (Number.isFinite(value)) want({ output: name, value });
+      else say({ reason: text && noNumber(text) });
       this.render();
     };
     this.value.onblur = () => this.render();
@@ -105,7 +107,7 @@ class OutputRow {
 
 /** The part of the panel in which one mechanism is moved; calls `onshow` when it was heard where it is. */
 export class Motion {
-  constructor(mechanism, connection, open, sayInPicture) {
+  constructor(mechanism, connection, open, refuse) {
     this.mechanism = mechanism;
     this.connection = connection;
     this.speeds = new Map([...mechanism.settings.keys()].filter(name => name.endsWith('.speed')).map(name => [name, 0]));
@@ -121,7 +123,7 @@ export class Motion {
     this.dragged = new Newest(async want => {
       const answer = await this.want(want);
       this.say(answer);
-      if (this.connection.opened) sayInPicture(answer.reason);
+      if (this.connection.opened) refuse(answer.reason);
     });
     this.renderPlay();
   }
@@ -220,7 +222,7 @@ export class Motion {
     };
     const [all, one] = [Object.keys(inputs), Object.keys(inputs).length === 1];
     this.inputs = new Map(Object.entries(inputs).map(([name, input]) => [name, new InputRow(name, input, want)]));
-    this.outputs = new Map(Object.keys(outputs).map(name => [name, new OutputRow(name, one, all.length, want)]));
+    this.outputs = new Map(Object.keys(outputs).map(name => [name, new OutputRow(name, one, all.length, want, answer => this.say(answer))]));
     this.place.replaceChildren(...[...this.inputs.values()].map(({ slider }) => slider.row));
     this.table.replaceChildren(
       element('thead', {}, element('tr', {}, element('th', { scope: 'col', textContent: 'output' }),

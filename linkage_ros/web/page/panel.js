@@ -15,11 +15,11 @@ const LOOKS = 120;
 
 /** The part of one mechanism. A part is an element with render(), to be added to `parts`. */
 class Section {
-  constructor(mechanism, { connection, light, say }, folded) {
+  constructor(mechanism, { connection, light, refuse }, folded) {
     const { key, name, title } = mechanism;
     const type = mechanism.value('type') ?? '';
     this.mechanism = mechanism;
-    this.motion = new Motion(mechanism, connection, !folded, say);
+    this.motion = new Motion(mechanism, connection, !folded, refuse);
     this.plot = new Plot(mechanism, connection, this.motion);
     this.plot.element.hidden = mechanism.inSpace;
     this.motion.place.after(this.plot.element);
@@ -60,9 +60,9 @@ class Section {
 
 /** All sections that are shown. */
 export class Panel {
-  /** Calls `light`, and `say` with the reason why a joint is not dragged. */
-  constructor(place, connection, light, say) {
-    Object.assign(this, { place, connection, light, say });
+  /** Calls `light`, and `refuse` with the reason why a joint is not dragged. */
+  constructor(place, connection, light, refuse) {
+    Object.assign(this, { place, connection, light, refuse });
     this.sections = new Map();
     units.onchange(() => this.render());
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.render());
