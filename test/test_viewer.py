@@ -633,6 +633,18 @@ def test_arrows_are_how_the_joints_move_in_the_picture(name, kind):
         assert arrow == pytest.approx(slope, rel=1e-4, abs=1e-6)
 
 
+@pytest.mark.parametrize('scale', [1e-12, 1.0, 1e12])
+def test_an_output_is_what_it_is_however_small_and_rounding_is_zero(scale):
+    lift = without_defaults(scene.load(str(ROOT / 'config' / 'scissor_lift.yaml')))
+    del lift['lift.carriage.start']
+    machine = scene.read({**lift, 'lift.scale': scale}).machines['lift']
+    at = 1.2
+    outputs = poses.described(machine, [at * scale])['outputs']
+    truth = machine.linkage.solve(at, ('P',))['P'] * scale
+    assert [outputs[name]['value'] for name in ('P.x', 'P.y')] == pytest.approx(list(truth))
+    assert outputs['P.x']['rates'] == [0.0] and abs(outputs['P.y']['rates'][0]) > 0.1
+
+
 def test_arrows_of_force_are_the_loads_and_what_holds_them():
     machine = scene.read({'mechanisms': ['lever'], 'lever.type': 'slotted_lever',
                           'lever.loads': ['L=3 -4', 'lever=2']}).machines['lever']

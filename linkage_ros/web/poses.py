@@ -22,6 +22,8 @@ _, ACCELERATION, FORCE = ARROWS
 NUDGE = 1e-6
 # Tolerance of an input at its end.
 CLOSE = 1e-9
+# What is rounding, as a fraction of a linkage's size, or in rad.
+ROUNDING = 1e-12
 
 
 class Refused(Exception):
@@ -33,7 +35,7 @@ def described(machine: SceneMechanism, present: Sequence[float]) -> dict[str, An
     Describe a mechanism at inputs `present` [rad or m], in the scene's size.
 
     Each input has value, allowed arcs and unit; each output of the first leg has value, unit, and
-    d output / d input for each input.
+    d output / d input for each input, zero where it is rounding.
     """
     linkage, names = machine.linkage, [
         *(name for name in machine.linkage.joints if name not in machine.inputs),
@@ -42,14 +44,23 @@ def described(machine: SceneMechanism, present: Sequence[float]) -> dict[str, An
     theta = theta_of([value / size for value, size in zip(present, own)])
     values = linkage.joint_angles(theta, names)
     rates = [linkage.joint_rates(theta, names, i) for i in range(len(own))]
+    sizes = {name: machine.scale_of(name) * (1.0 if linkage.is_angle(name) else linkage.longest)
+             for name in names}
+    units = [machine.scale_of(name) * (1.0 if drive.input.turns else linkage.longest)
+             for name, drive in machine.inputs.items()]
     return {
         'inputs': {name: {'value': value, 'unit': drive.input.unit, 'arcs': arcs(drive)}
                    for (name, drive), value in zip(machine.inputs.items(), present)},
         'outputs': {name: {
-            'value': shown(float(values[name]) * machine.scale_of(name)),
+            'value': _rounded(float(values[name]) * machine.scale_of(name), sizes[name]),
             'unit': 'rad' if linkage.is_angle(name) else 'm',
-            'rates': [shown(float(by[name]) * machine.scale_of(name) / size)
-                      for by, size in zip(rates, own)]} for name in names}}
+            'rates': [_rounded(float(by[name]) * machine.scale_of(name) / size, sizes[name] / unit)
+                      for by, size, unit in zip(rates, own, units)]} for name in names}}
+
+
+def _rounded(value: float, size: float) -> Any:
+    """Return a value as JSON can say it; zero where it is rounding beside a size."""
+    return shown(0.0 if abs(value) < ROUNDING * size else value)
 
 
 def arrows(machine: SceneMechanism, present: Sequence[float], kind: str,

@@ -352,7 +352,9 @@ class SceneView:
         keys = [key for key in keys if LOCUS_TYPE in topics.get(f'{key}{LOCUS}', ())]
         marked = tuple((key, tuple(sorted(
             (_joined(info.node_namespace, info.node_name), bytes(info.endpoint_gid))
-            for info in node.get_publishers_info_by_topic(f'{key}{MARKERS}')))) for key in keys)
+            for info in node.get_publishers_info_by_topic(f'{key}{MARKERS}')
+            # Of a node that starts, the name is unknown at first.
+            if info.node_namespace.startswith('/')))) for key in keys)
         heard = {owner: self._heard_by(owner) for _, owners in marked for owner, _ in owners}
         nodes = tuple(sorted(name[:-len(LIST)] for name, types in services
                              if name.endswith(LIST) and LIST_TYPE in types))

@@ -9,7 +9,6 @@ import { figures, units } from './units.js';
 const STEP = Math.PI / 180;
 const STEPS_A_STROKE = 100;
 const SECONDS_A_STROKE = 3;
-const NOTHING = 1e-9;
 const FIGURES = 5;
 const FIGURES_OF_MANY = 3;
 
@@ -19,8 +18,7 @@ function button(textContent, ariaLabel, onclick) {
 
 function shown(value, unit, digits = FIGURES) {
   if (value === null) return '—';
-  const seen = value * units.of(unit).factor;
-  return figures(Math.abs(seen) < NOTHING ? 0 : seen, digits);
+  return figures(value * units.of(unit).factor, digits);
 }
 
 /** An input: its slider, which follows it, and buttons for a step back and on. */

@@ -6,6 +6,8 @@
 import { figures, units } from './units.js';
 
 const MARGIN = 44;
+/** What is seen is not smaller [m]. */
+const LEAST = 1e-33;
 const LEGEND = 64;
 const SLACK = 0.06;
 const SHRUNK = 10;
@@ -213,7 +215,7 @@ export class Picture {
       }
     }
     this.setAside(inFrames);
-    const span = [0, 1].map(i => Math.max(all.high[i] - all.low[i], 1e-9));
+    const span = [0, 1].map(i => Math.max(all.high[i] - all.low[i], LEAST));
     this.scale = Math.min((width - 2 * MARGIN) / span[0], (height - 2 * MARGIN) / span[1]);
     this.middle = [0, 1].map(i => (all.high[i] + all.low[i]) / 2);
     this.scale *= this.view.zoom;
