@@ -5,7 +5,7 @@
 Run a scene's nodes, listen to them from outside, check what they sent, and draw it.
 
 Ends with an error if anything is missing, if a bar's length is off, or if a node does not end
-well when it is interrupted.
+well when it is terminated.
 """
 
 import math
@@ -79,7 +79,7 @@ def observe(machines):
         answer = listener.servo_angles([math.radians(angle) for angle in LEVER_ANGLES])
         for name, code in nodes.stop().items():
             if code != 0:
-                raise DemoError(f'{name} ended with exit code {code} when it was interrupted')
+                raise DemoError(f'{name} ended with exit code {code} when it was terminated')
     return [Motion(machine, listener.joint_states[machine.name], listener.markers[machine.name],
                    listener.locus[machine.name][-1]) for machine in machines], answer
 

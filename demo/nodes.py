@@ -57,9 +57,10 @@ class Nodes:
                 raise DemoError(f'{name} died with exit code {process.returncode}')
 
     def stop(self) -> dict:
-        """Interrupt the nodes that still run; return the exit code of each."""
+        """End the nodes that still run; return the exit code of each."""
         for process in self._processes.values():
-            process.send_signal(signal.SIGINT)
+            # A Python that just starts would answer SIGINT with a traceback.
+            process.send_signal(signal.SIGTERM)
         for process in self._processes.values():
             try:
                 process.wait(SECONDS_TO_END)
