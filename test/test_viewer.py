@@ -1969,6 +1969,11 @@ def test_an_input_is_moved_with_the_keys_by_steps_and_in_degrees(show, looked_at
         before = servo()
         await seen.page.press('ArrowLeft')
         await browser.until(lambda: before - 0.02 < servo() < before)
+        await seen.page.write(f'{seen.section("lever")}.querySelector("td input")', '80')
+        end = math.degrees(math.asin(80.0 / 150.0))
+        await browser.until(lambda: seen.page.value(
+            f'{seen.section("lever")}.innerText.includes('
+            f'"lever reaches [-{end:.3f}, {end:.3f}] \N{DEGREE SIGN}")'))
         await seen.page.click(f'{seen.section("lever")}.querySelector("button")')
         await browser.until(lambda: running.values('lever.crank.speed') == [1.5])
 

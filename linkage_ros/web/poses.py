@@ -3,9 +3,10 @@
 
 """The page's requests to the library: requested poses, and ranges of dimensions."""
 
+from dataclasses import dataclass
 from itertools import combinations
 import math
-from typing import Any, Mapping, Sequence
+from typing import Any, Mapping, Optional, Sequence
 
 from .settings import is_number, shown
 from ..linkage.arithmetic import Formula
@@ -28,6 +29,18 @@ ROUNDING = 1e-12
 
 class Refused(Exception):
     """A refused request; the text has the reason."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """The values that an input or output reaches [unit], and what the page is told of them."""
+
+    name: str
+    arcs: tuple[Arc, ...]
+    unit: str
+
+    def __str__(self) -> str:
+        return f'{self.name} reaches {in_words(self.arcs)} {self.unit}'
 
 
 def described(machine: SceneMechanism, present: Sequence[float]) -> dict[str, Any]:
@@ -105,9 +118,9 @@ def number(text: str) -> dict[str, Any]:
 
 
 def reached(machine: SceneMechanism, present: Sequence[float],
-            want: Mapping[str, Any]) -> tuple[list[float], str]:
+            want: Mapping[str, Any]) -> tuple[list[float], Optional[Reach]]:
     """
-    Return the inputs [rad or m] for a request, or the nearest possible ones and the reason.
+    Return the inputs [rad or m] for a request, or the nearest possible ones and what is reached.
 
     Parameters
     ----------
@@ -128,7 +141,7 @@ def reached(machine: SceneMechanism, present: Sequence[float],
 
     """
     if 'joint' in want:
-        return _joint_at(machine, present, **want), ''
+        return _joint_at(machine, present, **want), None
     name, value = want['output'], want['value']
     if not is_number(value):
         raise ValueError(f'value must be a finite number, not {quoted(value)}')
@@ -140,7 +153,7 @@ def reached(machine: SceneMechanism, present: Sequence[float],
 
 
 def _input_at(machine: SceneMechanism, present: Sequence[float], name: str,
-              value: float) -> tuple[list[float], str]:
+              value: float) -> tuple[list[float], Optional[Reach]]:
     drive, ends = machine.inputs[name], arcs(machine.inputs[name])
     near = min((min(max(float(drive.input.beside(value, (low + high) / 2.0)), low), high)
                 for low, high in ends), key=lambda end: drive.input.apart(end, value))
@@ -152,24 +165,23 @@ def _input_at(machine: SceneMechanism, present: Sequence[float], name: str,
     if not all(math.isfinite(part) for place in places.values() for part in place):
         raise Refused(f'{machine.name} cannot be assembled there')
     missed = not whole and drive.input.apart(near, value) > CLOSE * drive.input.size
-    return inputs, f'{name} reaches {in_words(ends)} {drive.input.unit}' if missed else ''
+    return inputs, Reach(name, tuple(ends), drive.input.unit) if missed else None
 
 
 def _output_at(machine: SceneMechanism, present: float, name: str,
-               value: float) -> tuple[list[float], str]:
+               value: float) -> tuple[list[float], Optional[Reach]]:
     linkage, drive = machine.linkage, machine.first
     own, unit = machine.scale_of(drive.input.name), machine.scale_of(name)
     ends = drive.ends and (drive.ends[0] / own, drive.ends[1] / own)
     found = float(linkage.servo_for(name, value / unit, present / own, ends)[0])
     if math.isfinite(found):
-        return [found * own], ''
+        return [found * own], None
     spans = linkage.extremes(name, [(low / own, high / own) for low, high in arcs(drive)])
     turn = math.tau if linkage.is_angle(name) else math.inf
     _, nearest = min((abs(math.remainder(reached - value / unit, turn)), at)
                      for span in spans for reached, at in span)
-    reach = in_words((low * unit, high * unit) for (low, _), (high, _) in spans)
-    return [nearest * own], (f'{name} reaches {reach} '
-                             f'{"rad" if linkage.is_angle(name) else "m"}')
+    reach = tuple((low * unit, high * unit) for (low, _), (high, _) in spans)
+    return [nearest * own], Reach(name, reach, 'rad' if linkage.is_angle(name) else 'm')
 
 
 def _joint_at(machine: SceneMechanism, present: Sequence[float], joint: str, place: Any,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import partial
 import math
 import re
@@ -216,16 +216,19 @@ class SceneView:
         Describe a mechanism's pose; with a request, move it there first and hold it.
 
         Arguments are those of `poses.reached` and `poses.arrows`. The result is that of
-        `poses.described`, with requested arrows, and the reason if the request is not met exactly.
+        `poses.described`, with requested arrows, and the reason, and what is reached, if the
+        request is not met exactly.
         """
         mechanism = self._find(key)
-        (machine, inputs), reason = self._state(mechanism), ''
+        (machine, inputs), reach = self._state(mechanism), None
         if want is None:
             self._check_known(mechanism, machine)
         else:
-            inputs, reason = poses.reached(machine, inputs, dict(want))
+            inputs, reach = poses.reached(machine, inputs, dict(want))
             await self._hold(mechanism, machine, inputs)
-        found = {**poses.described(machine, inputs), 'reason': reason}
+        found = {**poses.described(machine, inputs), 'reason': str(reach or '')}
+        if reach:
+            found['reach'] = asdict(reach)
         if arrows:
             found['arrows'] = poses.arrows(machine, inputs, arrows, dict(speeds))
         return found

@@ -21,6 +21,12 @@ function shown(value, unit, digits = FIGURES) {
   return figures(value * units.of(unit).factor, digits);
 }
 
+/** What is reached, in the units that are shown. */
+function inWords({ name, arcs, unit }) {
+  const ends = arcs.map(([low, high]) => `[${shown(low, unit)}, ${shown(high, unit)}]`);
+  return `${name} reaches ${ends.join(' or ')} ${units.of(unit).name}`;
+}
+
 /** An input: its slider, which follows it, and buttons for a step back and on. */
 class InputRow {
   constructor(name, input, want) {
@@ -176,6 +182,7 @@ export class Motion {
   async want(want) {
     const answer = await this.connection.ask({ op: 'pose', mechanism: this.mechanism.key, want });
     if (answer.inputs) this.show(answer);
+    if (answer.reach) answer.reason = inWords(answer.reach);
     return answer;
   }
 
