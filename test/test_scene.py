@@ -218,6 +218,11 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'jansen.Crank.speed': 1.0}, r'.*; did you mean jansen.crank.speed\?$'),
     ({'mechanism': ['jansen']}, r'.*; did you mean mechanisms\?$'),
     ({'mechanisms': ['jansn']}, r'.*; did you mean jansen\?$'),
+    ({'jansen.joint_names': ['BCC=left_shin']}, r'.*; did you mean BC\?$'),
+    ({'jansen.loads': ['EFF=2.5']}, r'.*; did you mean EF\?$'),
+    ({'mechanisms': ['own'], 'own.type': 'rods', 'own.joints': [
+        'pitch hinge ground at 0 0 0 axis 0 1 0', 'roll hinge pich at 0 0 0 axis 1 0 0']},
+     r'.*; did you mean pitch\?.*'),
     ({**OWN, 'own.joints': ['Base ground 0 0', 'A crank base 1']}, r'.*; did you mean Base\?$'),
     ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O r']}, 'own.joints: .* dimension r'),
     ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O 1', 'B crank O 1'], 'own.mirrored': True},

@@ -14,7 +14,7 @@ import numpy as np
 from .robot import FIXED, HINGE, Robot
 from .spatial import Component, components, displaced, Poses, trees, turned
 from ..command import RequestError
-from ..words import listed
+from ..words import listed, meant
 
 # What is open by less, of the size of its loops, is rounding, and closed from where it is: files
 # have angles such as 1.5708.
@@ -33,7 +33,7 @@ def check_names(robot: Robot, names: Iterable[str]) -> None:
     for name in names:
         if name not in robot.positions:
             raise RequestError(f'there is no joint {name!r}; allowed: '
-                               f'{listed(robot.positions, 200)}')
+                               f'{listed(robot.positions, 200)}{meant(name, robot.positions)}')
 
 
 def posed(robot: Robot, values: Mapping[str, float]) -> Robot:

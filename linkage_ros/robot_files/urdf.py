@@ -20,6 +20,7 @@ import numpy as np
 from .elements import at, attribute, Element, numbers, once, origin, pose, text
 from .robot import BALL, FIXED, HINGE, Robot, UNIVERSAL
 from ..command import RequestError
+from ..words import meant
 
 # What a file of loops has one of.
 LOOPS = ('closures', 'closed_loop', 'pin_loops', 'ball_loops')
@@ -204,7 +205,8 @@ class Reader:
         """Change the type of a joint of the tree, with axes in its frame."""
         joint = next((joint for joint in self.robot.joints if joint.name == name), None)
         if joint is None:
-            raise RequestError(f'there is no joint {name!r} to be made {kind}')
+            names = [joint.name for joint in self.robot.joints]
+            raise RequestError(f'there is no joint {name!r} to be made {kind}{meant(name, names)}')
         joint.position, joint.limits = None, None
         joint.kind = {'SPHERICAL': BALL, 'FIXED': FIXED}.get(kind, kind)
         if kind.startswith('UJOINT'):
