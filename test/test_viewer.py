@@ -1040,6 +1040,15 @@ def test_the_page_is_served_with_nothing_from_outside(address, name):
                          'http://www.w3.org/2000/svg', 'https://github.com/leeoniya/uPlot'}
 
 
+def test_the_page_is_as_small_as_the_docs_say():
+    said = re.search(r'\| ([0-9]+) kB, and ([0-9]+) kB with the first plot',
+                     (ROOT / 'docs' / 'viewer.md').read_text())
+    for folder, kilobytes in zip((PAGE, PAGE / 'vendor'), said.groups()):
+        size = sum(file.stat().st_size for file in folder.iterdir()
+                   if file.suffix in ('.html', '.css', '.js', '.svg'))
+        assert size == pytest.approx(1000.0 * float(kilobytes), rel=0.1)
+
+
 @pytest.mark.parametrize('name', ['%2e%2e%2fserver.py', 'server.py', 'none.html', 'page/main.js'])
 def test_only_the_page_is_served(address, name):
     assert asyncio.run(status(address + name)) == 404
