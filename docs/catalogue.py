@@ -19,7 +19,7 @@ from linkage_ros.linkage import joint_lines, planar
 from linkage_ros.render import files
 from linkage_ros.render.command import parser
 from linkage_ros.render.cycle import Cycle
-from linkage_ros.render.parts import USUAL
+from linkage_ros.render.parts import DEFAULT
 from linkage_ros.render.picture import Picture
 from matplotlib.figure import Figure
 import numpy as np
@@ -315,7 +315,7 @@ def draw(type_, folder):
     still = Picture([one], SIZE)
     still.arrange([SHOWN_AT])
     files.still(still, SHOWN_AT, folder / f'{type_}.svg')
-    moving = Picture([one], SIZE, 'fading', USUAL - {'labels', 'title', 'axes'})
+    moving = Picture([one], SIZE, 'fading', DEFAULT - {'labels', 'title', 'axes'})
     turns = moving.panels[0].cycle.turns
     frames = round(turns * SECONDS * FPS)
     times = [turns * k / frames for k in range(frames)]

@@ -12,8 +12,8 @@ A function of hashable arguments is decorated; an object with results of its own
     self._sources = Cache(read_source)    # self._sources[text] is read_source(text)
     self._found = Cache()                 # self._found.get_or_make(key, make) is make()
 
-A `make` that is a method of whatever has the cache is a cycle, which only the garbage collector
-frees; `get_or_make` with a lambda is none.
+A `make` that is a method of the cache's owner is a reference cycle, which only the garbage
+collector frees; `get_or_make` with a lambda avoids that.
 """
 
 from __future__ import annotations
@@ -24,34 +24,34 @@ from typing import Any, Callable, cast, Dict, Hashable, Optional, TypeVar
 from weakref import WeakValueDictionary
 
 Function = TypeVar('Function', bound=Callable)
-# Unless said otherwise: a few times what nodes, pages and services ask one mechanism for.
+# Default size: a few times the results of one mechanism that nodes, pages and services request.
 SIZE = 128
 _MISSING = object()
 
 
 class Cache(Dict[Any, Any]):
     """
-    A dictionary that makes what it lacks, and drops its oldest entry where it grows too large.
+    A dictionary that makes missing values, and drops its oldest entry if it grows too large.
 
-    A look-up costs what it costs in a dictionary. Nothing is locked while a value is made, so no
-    thread waits for another's: where two make the same, both get the one that was first.
+    A look-up is as fast as in a dictionary. No lock is held while a value is made, so no thread
+    waits for another's. If two threads make the same value, both get the first one.
 
     Parameters
     ----------
     make : callable, optional
         From a key to its value, for `cache[key]`.
     size : int
-        How many entries it has at most.
+        Maximum number of entries.
     shared : bool
-        Whether an entry that was dropped is found again as long as its value is in use elsewhere.
-        Such values have to be objects that weak references can be made to.
+        Whether a dropped entry is found again as long as its value is in use elsewhere. Such
+        values must support weak references.
 
     """
 
     def __init__(self, make: Optional[Callable] = None, size: int = SIZE, shared: bool = False):
         super().__init__()
         self._make, self._size = make, size
-        # A finalizer may look up what is being put in, in the same thread.
+        # A finalizer may look up a value while the same thread stores one.
         self._lock = RLock()
         self._in_use: Any = WeakValueDictionary() if shared else {}
         self._shared = shared
@@ -68,7 +68,7 @@ class Cache(Dict[Any, Any]):
         return self._put(key, make) if value is _MISSING else value
 
     def clear(self) -> None:
-        """Forget all, so that everything is made anew."""
+        """Drop all entries."""
         with self._lock:
             super().clear()
             self._in_use.clear()

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the commands that are no nodes share: whatever is wrong is one sentence."""
+"""Shared parts of the commands other than nodes, which report an error in one sentence."""
 
 import argparse
 import os
@@ -14,7 +14,7 @@ from .words import meant
 
 
 class RequestError(Exception):
-    """What is wrong with a request, in one sentence."""
+    """An invalid request; the text is one sentence."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -35,18 +35,18 @@ class Parser(argparse.ArgumentParser):
 
 def run(name: str, work: Callable, args: Optional[Sequence[str]], needs: str) -> int:
     """
-    Do what a command line asks for; return the exit code.
+    Run a command; return the exit code.
 
     Parameters
     ----------
     name : str
-        The command.
+        The command's name.
     work : callable
-        Takes the arguments; raises RequestError, SceneError, OSError or ImportError if it cannot.
+        Takes the arguments; raises RequestError, SceneError, OSError or ImportError.
     args : list of str
         The arguments; None: those of this process.
     needs : str
-        How to install what may not be installed.
+        How to install packages that may be missing.
 
     """
     try:
@@ -54,7 +54,7 @@ def run(name: str, work: Callable, args: Optional[Sequence[str]], needs: str) ->
         sys.stdout.flush()
         return 0
     except BrokenPipeError:
-        # Who reads has enough; what is left is written nowhere, when Python ends.
+        # The reader has closed the pipe: Python discards the rest of the output at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except (RequestError, SceneError) as error:
@@ -78,7 +78,7 @@ def _beside(error: OSError) -> str:
 
 
 def chosen(machines: Mapping[str, SceneMechanism], names: Sequence[str]) -> List[SceneMechanism]:
-    """Return the machines that are named, or all; raise RequestError for one that is not there."""
+    """Return the named machines, or all; raise RequestError for an unknown name."""
     for name in names:
         if name not in machines:
             raise RequestError(f'there is no mechanism {name!r}; allowed: {", ".join(machines)}'

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The executables that run until a signal: it ends them quietly from this module's import on."""
+"""The executables that run until a signal, which ends them without a traceback at any time."""
 
 from collections.abc import Callable
 from importlib import import_module
@@ -12,11 +12,11 @@ import sys
 
 def _executable(module: str) -> Callable[[], None]:
     def start() -> None:
-        # Importing ROS takes longer than a signal may; `ShutdownHandler` takes over from here.
+        # Importing ROS is too slow for a signal to wait; `ShutdownHandler` replaces this later.
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: os._exit(0))
         code = import_module(f'{__package__}.{module}').main()
-        # A thread that compiles would hold up the end, and a second signal spoil the exit code.
+        # A compiling thread would delay the end, and a second signal would change the exit code.
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)

@@ -1,26 +1,26 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The colours of all that is drawn: markers, pictures, robot models and the viewer's page."""
+"""The colours of markers, pictures, robot models and the viewer's page."""
 
 from typing import Tuple
 
 # Colours that colour-blind people tell apart (Okabe and Ito, "Color Universal Design").
 BLUE, ORANGE, GREEN, VERMILION = '#0072b2', '#e69f00', '#009e73', '#d55e00'
 SKY, PURPLE = '#56b4e9', '#cc79a7'
-# From text to what is hardly seen.
+# From text to faint backgrounds.
 DARK, FAINT, GREY, FRAME, TRACK, GRID, SHADE = (
     '#222222', '#606060', '#8a8a8a', '#b0b0b0', '#d0d0d0', '#e6e6e6', '#f4f4f4')
 
-# Behind what is drawn in the dark: a page's paper, and its grid; RViz's background is DUSK too.
+# Backgrounds of dark mode: the page, and its grid; RViz's background is DUSK, too.
 NIGHT, DUSK = '#161616', '#303030'
 
-# What pictures, markers, robot models and the page show, each seen on white, NIGHT and DUSK.
+# Parts of pictures, markers, robot models and the page; visible on white, NIGHT and DUSK.
 BAR, DRIVEN, JOINT, LOCUS, SLOT, EARTH = '#0081c9', '#c87800', GREY, GREEN, GREY, '#998763'
 PLATE = '#5b8fae'
 # The floor of pictures.
 FLOOR = '#b5a27c'
-# Vermilion that can be read as text.
+# A vermilion that is legible as text.
 REFUSED = '#a84300'
 
 

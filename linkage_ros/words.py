@@ -1,13 +1,13 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Texts of others: plain, and short enough to be repeated in a message."""
+"""Texts of users and other programs: plain, and short enough to be quoted in a message."""
 
 from difflib import get_close_matches
 import reprlib
 from typing import Any, Iterable
 
-# Letters of a value, and of a whole message.
+# Maximum number of letters of a quoted value, and of a whole message.
 LONGEST, MESSAGE = 60, 299
 
 _short = reprlib.Repr()
@@ -22,7 +22,7 @@ def plain_text(value: Any) -> Any:
 
 
 def elided(text: str, most: int = LONGEST) -> str:
-    """Return a text in one line of at most so many letters, unprintable ones escaped."""
+    """Return a text as one line of limited length, with unprintable letters escaped."""
     start = ''.join(c if c.isprintable() else ascii(c)[1:-1] for c in text[:most + 1])
     return start if len(start) <= most else start[:most - 3] + '...'
 
@@ -37,7 +37,7 @@ def quoted(value: Any) -> str:
 
 
 def meant(word: Any, names: Iterable[str]) -> str:
-    """Return the end of a sentence that suggests the name that is nearly a word, if one is."""
+    """Return a suggestion, to end a sentence, of the name most similar to a word; '' if none."""
     by_case = {name.lower(): name for name in names}
     text = word[:LONGEST].lower() if isinstance(word, str) else ''
     near = get_close_matches(text, by_case, 1, 0.7)
@@ -45,12 +45,12 @@ def meant(word: Any, names: Iterable[str]) -> str:
 
 
 def listed(names: Iterable[str], most: int = LONGEST) -> str:
-    """Return names in a row; of many the first, and how many there are."""
+    """Return names separated by commas; of many, the first ones and the number of all."""
     names = list(names)
-    kept, text = [], ''
+    shown, text = [], ''
     for name in names:
-        kept.append(elided(name, most // 2))
-        text = ', '.join(kept)
+        shown.append(elided(name, most // 2))
+        text = ', '.join(shown)
         if len(text) > most:
-            return ', '.join((*kept[:-1], f'... ({len(names)})'))
+            return ', '.join((*shown[:-1], f'... ({len(names)})'))
     return text or 'none'

@@ -167,9 +167,9 @@ class Solver:
         rows = np.empty((len(legs), 2 * len(self._spots)))
         if self._spots:
             batch = self.machine.linkage.legs(self._spots, (), (), rows)
-            for given, value in zip(batch.given, values):
+            for given, value in zip(batch.arguments, values):
                 given.fill(value)
-            batch.given[2 * len(values):].T[:] = legs
+            batch.arguments[2 * len(values):].T[:] = legs
             batch.solve()
         return [dict(zip(self._spots, row.reshape(-1, 2).tolist())) for row in rows]
 

@@ -423,11 +423,11 @@ def test_a_rail_that_does_not_begin_at_its_joint_carries_a_motor():
 
 def test_what_drives_nothing_or_has_nowhere_to_go_is_refused():
     for lines, problem in {
-            ('R carriage O along X 0.2 0.2',): 'must have a way to go',
-            ('R carriage O along X 0.2 0.1',): 'must have a way to go',
+            ('R carriage O along X 0.2 0.2',): 'must be less than its upper end',
+            ('R carriage O along X 0.2 0.1',): 'must be less than its upper end',
             ('A crank O 1 geared crank 1 0',): 'a linkage needs a line that drives it',
             ('B cylinder O X 1 left', 'A crank O 1 geared cylinder 1 0'): 'cannot be geared',
-            ('A crank O 1', 'L block A 1 1'): 'A is no joint of a block'}.items():
+            ('A crank O 1', 'L block A 1 1'): 'A is not a joint of a block'}.items():
         with pytest.raises(ValueError, match=problem):
             mechanisms.create('custom', joints=('O ground 0 0', 'X ground 1 0', *lines))
 

@@ -238,7 +238,7 @@ def test_the_reach_of_one_crank_depends_on_the_other():
 
 def test_every_crank_is_asked_for():
     linkage = mechanisms.create('five_bar')
-    with pytest.raises(ValueError, match='five_bar has 2 inputs: the value of each but the first'):
+    with pytest.raises(ValueError, match='five_bar has 2 inputs: the values of all except'):
         linkage.reach()
     with pytest.raises(ValueError, match='theta must be a sequence of as many values'):
         linkage.solve(0.5)

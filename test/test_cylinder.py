@@ -216,7 +216,7 @@ def test_a_picture_follows_the_stroke_there_and_back():
     assert low <= min(lengths) < low + 0.03 and high - 0.03 < max(lengths) <= high
     assert np.isfinite(cycle.course).all()
     assert cycle.pose(cycle.first.turns_to(1.0)).inputs[0] == pytest.approx(1.0)
-    with pytest.raises(scene.SceneError, match='the cylinder length never is 9 m'):
+    with pytest.raises(scene.SceneError, match='the cylinder length never reaches 9 m'):
         cycle.first.turns_to(9.0)
 
 

@@ -43,21 +43,22 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P line A B b-b', 'the bar A-P must be longer than zero, got 0'),
     ('P mirror B O Q', 'O and B are not joints of one moving link'),
     ('P parallelogram O B Q', 'O and B are not joints of one moving link'),
-    ('P crank A 1', 'joint A must be on the ground; or its zero is towards a joint of its link'),
+    ('P crank A 1',
+     'joint A must be on the ground unless the line has zero and a joint of its link'),
     ('P slider B 3 A 0 out', 'joint A must be on the ground'),
     ('P slider B 3 O 0 up', "'up' must be out or in"),
     ('P crank A 1', 'joint A must be on the ground'),
     ('P crank O 1 down', 'expected "NAME crank CENTRE LENGTH [up] [zero JOINT] [geared'),
     ('P crank O 1 zero B', 'O and B are not joints of one moving link'),
-    ('P crank O 1 geared gear 2 0', 'it cannot be geared to gear; there are: crank'),
+    ('P crank O 1 geared gear 2 0', 'it cannot be geared to gear; allowed: crank'),
     ('P crank O 1 geared crank 2deg 0', "'2deg' is in degrees, but RATIO is not an angle"),
     ('P cylinder O A 1 left geared crank 2 0',
-     'it cannot be geared to crank; there are: none'),
+     'it cannot be geared to crank; allowed: none'),
     ('P carriage O Q 0 1', 'expected "NAME carriage ORIGIN along TOWARDS DISTANCE DISTANCE'),
     ('P carriage O along B 0 1', 'O and B are not joints of one moving link'),
     ('P carriage O along A 1 1',
-     'the carriage must have a way to go: from a lower end to a'),
-    ('P block A 1 1', 'A is no joint of a block'),
+     'the lower end of the carriage must be less than its upper end'),
+    ('P block A 1 1', 'A is not a joint of a block'),
     ('P slider A 1 O along A out', 'the joints that it is placed from must differ'),
     ('P inversor Q A 3 1', 'expected "NAME NAME NAME inversor POLE PIN LENGTH LENGTH"'),
     ('P R dyad A Q 1 1 left', 'expected "NAME dyad'),
@@ -67,10 +68,10 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P.x ground 0 0', "'P.x' cannot name a joint"),
     ('line ground 0 0', "'line' cannot name a joint"),
     ('P ground 0 zz', 'dimension zz has no value; given: g, m, b, c'),
-    ('P ground 0 g*', "'g*' is no number, dimension or arithmetic on them"),
-    ('P ground 0 g.real', "'g.real' is no number, dimension or arithmetic on them"),
-    ('P ground 0 g**2', "'g**2' is no number"),
-    ('P ground 0 max(g)', "'max(g)' is no number"),
+    ('P ground 0 g*', "'g*' is not a number, dimension or arithmetic on them"),
+    ('P ground 0 g.real', "'g.real' is not a number, dimension or arithmetic on them"),
+    ('P ground 0 g**2', "'g**2' is not a number"),
+    ('P ground 0 max(g)', "'max(g)' is not a number"),
     ('P ground 0 True', 'dimension True has no value; given: g, m, b, c'),
     ('P ground 0 1/0', 'divides by zero'),
     ('P ground 0 1e999', 'too large'),
@@ -79,13 +80,13 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P S P inversor Q A 3 1', 'joint P is placed already'),
     ('P Q S inversor Q A 3 1', 'joint Q is placed already'),
     ('P S T inversor P A 3 1', 'joint P is not placed before'),
-    ('P ground 0, 0', "'0,' is no number"),
+    ('P ground 0, 0', "'0,' is not a number"),
     ('P ground 0, 0', 'numbers are separated by spaces, without commas'),
     ('P ground 0,0', 'numbers are separated by spaces, without commas'),
     ('P ground 2 * m 0', 'arithmetic has no spaces: 2*r, not 2 * r'),
     ('P ground 2 *m', 'arithmetic has no spaces'),
     ('P ground max(m, g) 0', 'arithmetic has no spaces'),
-    ('P ground 0 sqrt(m-g', "'sqrt(m-g' is no number"),
+    ('P ground 0 sqrt(m-g', "'sqrt(m-g' is not a number"),
     ('P ground 0 sqrt(m-g)', "'sqrt(m-g)' is not finite"),
     ('P ground 0 sqrt(1-2)', "'sqrt(1-2)' is not real: a number is 0 or between 1e-70 and 1e70"),
     ('P ground 0 m/(g-4)', 'is not finite'),
@@ -123,7 +124,7 @@ def test_joints_at_the_same_place_have_no_direction(line):
 
 
 def test_a_name_that_calls_python_is_only_a_name():
-    with pytest.raises(ValueError, match='is no number, dimension or arithmetic on them'):
+    with pytest.raises(ValueError, match='is not a number, dimension or arithmetic on them'):
         made('P ground __import__("os") 0')
     with pytest.raises(ValueError, match='dimension exit has no value'):
         made('P ground exit 0')
@@ -170,7 +171,7 @@ def test_a_long_circle_and_a_long_list_are_elided():
     {'O ground 0 0'}, frozenset(FOUR_BAR), dict.fromkeys(FOUR_BAR), len, str, object(), iter(()),
     np.array('O ground 0 0'), np.array([])])
 def test_joints_are_a_list_of_lines(joints):
-    with pytest.raises(ValueError, match='joints must be a list of lines, one a joint'):
+    with pytest.raises(ValueError, match='joints must be a list of lines, one per joint'):
         mechanisms.create('custom', joints=joints)
 
 
@@ -197,7 +198,7 @@ def test_a_linkage_needs_a_crank():
 
 
 def test_a_tracer_must_be_a_joint():
-    with pytest.raises(ValueError, match="tracer 'X' is no joint; allowed: O, Q, A, B"):
+    with pytest.raises(ValueError, match="tracer 'X' is not a joint; allowed: O, Q, A, B"):
         mechanisms.create('custom', joints=FOUR_BAR, tracer='X', **LENGTHS)
 
 

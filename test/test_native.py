@@ -64,7 +64,7 @@ def by_batch(linkage, thetas):
     thetas = np.atleast_2d(thetas)
     rows = np.empty((thetas.shape[1], 2 * len(linkage.points)))
     batch = linkage.accelerated().posed().batch(rows)
-    batch.given[:] = thetas
+    batch.arguments[:] = thetas
     batch.finish()
     batch.solve()
     return rows

@@ -24,7 +24,7 @@ TRUTH = {
     'add': operator.add, 'subtract': operator.sub, 'multiply': operator.mul,
     'divide': operator.truediv, 'negative': operator.neg, 'absolute': abs, 'sqrt': gmpy2.sqrt,
     'sin': gmpy2.sin, 'cos': gmpy2.cos, 'atan2': gmpy2.atan2,
-    'lost': lambda x, y: x + y - gmpy2.mpfr(float(x) + float(y)),
+    'sum_error': lambda x, y: x + y - gmpy2.mpfr(float(x) + float(y)),
     'rint': lambda x: gmpy2.mpfr(round(gmpy2.mpq(x))),
     'less': lambda x, y: gmpy2.mpfr(x < y), 'less_equal': lambda x, y: gmpy2.mpfr(x <= y),
     'where': lambda c, x, y: x if c < 0 else y,
@@ -93,7 +93,7 @@ def by_loop(name, values):
     pytest.importorskip('llvmlite')
     rows = np.empty((values[0].size, 1))
     batch = bound(name, True).batch(rows)
-    batch.given[:] = values
+    batch.arguments[:] = values
     batch.finish()
     batch.solve()
     assert batch.code
@@ -170,7 +170,7 @@ def test_each_is_right_to_the_last_digit(name, back_end, column):
 @pytest.mark.parametrize('name', NAMES)
 def test_so_it_is_in_c(name, kind, c_library):
     values = [each.astype(kind) for each in numbers(name)]
-    if name == 'lost' and kind is np.float32:
+    if name == 'sum_error' and kind is np.float32:
         sums = values[0] + values[1]
         exact = (values[0].astype(float) + values[1]) - sums
         assert np.array_equal(c_library(name, values, kind), exact)

@@ -24,7 +24,7 @@ from linkage_ros.render import (  # noqa: E402
     main,  # noqa: E402
 )
 from linkage_ros.render.cycle import Cycle  # noqa: E402
-from linkage_ros.render.parts import PARTS, TRACES, USUAL  # noqa: E402
+from linkage_ros.render.parts import DEFAULT, PARTS, TRACES  # noqa: E402
 from linkage_ros.render.picture import Picture  # noqa: E402
 from matplotlib.colors import to_rgb  # noqa: E402
 from PIL import Image  # noqa: E402
@@ -261,7 +261,7 @@ def test_any_motion_is_drawn_in_place_of_the_solved_one():
 
 def test_the_floor_moves_as_the_foot_that_stands_on_it():
     walker = machine('jansen', leg_pairs=3)
-    picture = picture_of(walker, parts=USUAL | {'floor'})
+    picture = picture_of(walker, parts=DEFAULT | {'floor'})
     floor = next(la for la in picture.panels[0].moving if isinstance(la, layers.Floor))
     foot = walker.linkage.points.index('G')
 
@@ -373,7 +373,7 @@ def test_several_cranks_turn_as_fast_as_they_were_told_to():
     (['jansen.yaml', '--out', 'a.gif', '--loop', '-1'], 'from 0'),
     (['jansen.yaml', '--out', 'a.png', '--size', '7x7'], '64'),
     (['all.yaml', '--out', 'a.png', '--size', '99x99'], 'size is too small'),
-    (['jansen.yaml', '--out', 'a.png', '--hide', 'legs'], 'legs is no part'),
+    (['jansen.yaml', '--out', 'a.png', '--hide', 'legs'], 'unknown part legs'),
     (['jansen.yaml', '--out', 'a.png', '--trace', 'x'], 'growing'),
     (['jansen.yaml', '--out', 'a.png', '--mechanisms', 'x'], 'allowed: jansen'),
     (['peaucellier.yaml', '--out', 'a.png', '--angle', '180'], 'stays inside'),
@@ -457,7 +457,7 @@ def test_readings_are_written_beside_or_below_each_other():
 @pytest.mark.parametrize('name', scene.load(str(ROOT / 'pictures' / 'words.yaml')).machines)
 def test_no_name_is_on_a_joint_or_on_another(name):
     shown = scene.load(str(ROOT / 'pictures' / 'words.yaml')).machines[name]
-    picture = picture_of(shown, size=(360, 270), trace='none', parts=USUAL - {'axes', 'title'})
+    picture = picture_of(shown, size=(360, 270), trace='none', parts=DEFAULT - {'axes', 'title'})
     picture.show(0.0)
     names = picture.panels[0].moving[-1].artists
     boxes = [text.get_window_extent(picture.figure.canvas.get_renderer()) for text in names]

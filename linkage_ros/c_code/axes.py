@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The actuators and the joints of a mechanism, as many of each as it has inputs."""
+"""The actuators and the commanded joints of a mechanism, one of each for every input."""
 
 import math
 from typing import List, NamedTuple, Optional, Sequence
@@ -22,8 +22,9 @@ class Axis(NamedTuple):
     """
     An actuator or a joint, whose position [rad or m] is factor * output + offset.
 
-    `output` is one of the linkage, in its own units. A change of the position by `size` is large,
-    one by `turn` is none, if that is not 0. `wraps` if it is published within half a turn of zero.
+    `output` is one of the linkage, in its own units. `size` is the scale of its position; the
+    position has the period `turn`, if that is not 0. If it `wraps`, it is published within half a
+    turn of zero.
     """
 
     name: str
@@ -62,7 +63,7 @@ def joints(machine: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
         Its first leg is used.
     names : sequence of str
         Joints by their names in the scene, or outputs after the mechanism's name: 'leg_P.x'.
-        Default: a chain of links from the ground, those that `joint_names` names first.
+        Default: a chain of links from the ground, with preference for those in `joint_names`.
 
     Raises
     ------
@@ -73,7 +74,7 @@ def joints(machine: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
     for name in names:
         if output_of(machine, name) is None:
             raise ValueError(f'{machine.name} has no joint {name!r}; allowed: ' + listed(
-                (called.name for called in machine.joints.values()), 200))
+                (joint.name for joint in machine.joints.values()), 200))
     outputs = [output_of(machine, name) or '' for name in names] or _chain(machine)
     if len({*outputs}) != len(machine.inputs):
         raise ValueError(f'{machine.name} has {len(machine.inputs)} inputs: as many joints are '
@@ -81,15 +82,15 @@ def joints(machine: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
     machine.linkage.inverse(tuple(outputs))
     named = [machine.joints.get(_key(machine, output)) or JointName(f'{machine.name}_{output}')
              for output in outputs]
-    return [axis(machine, output, called.name, called.sign, called.offset, called.wraps)
-            for output, called in zip(outputs, named)]
+    return [axis(machine, output, joint.name, joint.sign, joint.offset, joint.wraps)
+            for output, joint in zip(outputs, named)]
 
 
 def output_of(machine: SceneMechanism, name: str) -> Optional[str]:
     """Return the output with a name in the scene, or None."""
     for link in machine.linkage.joints:
-        called = machine.joints.get(_key(machine, link))
-        if called and called.name == name:
+        joint = machine.joints.get(_key(machine, link))
+        if joint and joint.name == name:
             return link
     output = name.removeprefix(f'{machine.name}_')
     return output if output != name and machine.linkage.has_output(output) else None
@@ -114,15 +115,15 @@ def _chain(machine: SceneMechanism) -> List[str]:
 
     def rank(link: Link) -> tuple:
         key = _key(machine, link.name)
-        called = machine.joints.get(key, JointName(link.name))
-        return (not called.published, link.parent != (chosen[-1] if chosen else GROUND),
+        joint = machine.joints.get(key, JointName(link.name))
+        return (not joint.published, link.parent != (chosen[-1] if chosen else GROUND),
                 link.name in barrels, link.name in machine.inputs,
-                called.name == f'{machine.name}_{key}')
+                joint.name == f'{machine.name}_{key}')
 
-    while len(chosen) < len(machine.inputs) and (telling := [
+    while len(chosen) < len(machine.inputs) and (candidates := [
             link for link in links if link.name not in chosen
             and _tell(machine, [*chosen, link.name])]):
-        chosen.append(min(telling, key=rank).name)
+        chosen.append(min(candidates, key=rank).name)
     try:
         machine.linkage.inverse(tuple(chosen))
         return chosen

@@ -22,7 +22,7 @@ def main(args: Optional[List[str]] = None) -> int:
 
 
 def show(args: Optional[List[str]]) -> None:
-    """Print what a command line asks for."""
+    """Print the headers that a command line requests."""
     asked = arguments().parse_args(args)
     machines = command.chosen(scene.load(asked.scene).machines, asked.mechanism)
     try:
@@ -34,7 +34,7 @@ def show(args: Optional[List[str]]) -> None:
 
 def with_joints(machines: Sequence[SceneMechanism], names: Sequence[str]
                 ) -> List[Tuple[SceneMechanism, List[str]]]:
-    """Return each machine with those of some joints that are its own."""
+    """Return each machine with its own joints among those named."""
     own = [(machine, [name for name in names if output_of(machine, name)])
            for machine in machines]
     for name in names:
@@ -58,8 +58,8 @@ def parser(name: str, description: str) -> command.Parser:
 
 def arguments() -> command.Parser:
     """Return the parser of the command line."""
-    made = parser(NAME, 'Print the mechanisms of a scene as C99: a header each, one after the '
-                        'other, without heap and with no dependency but math.h.')
+    made = parser(NAME, 'Print the mechanisms of a scene as C99 headers, one after another, '
+                        'without heap and with no dependency except math.h.')
     made.add_argument('--output', nargs='+', default=[], metavar='OUTPUT',
                       help='an inverse for each of these: a link, A.x, distance(A,B), angle(A,B)')
     made.add_argument('--float', action='store_true', help='float instead of double')

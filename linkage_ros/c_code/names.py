@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Names of a scene as C identifiers, comments and texts, whatever letters they have."""
+"""Names of a scene, with any characters, as C identifiers, comments and texts."""
 
 import re
 from typing import Iterable, List, Mapping
@@ -40,7 +40,7 @@ def field(linkage: Mechanism, output: str) -> str:
 
 
 def comment(text: str) -> str:
-    """Return a text that ends no comment and no line."""
+    """Return a text without anything that would end a comment or a line."""
     return re.sub(r'[^ -~]', '?', text).replace('*/', '* /').replace('/*', '/ *').replace(
         '\\', '/').replace('??', '? ?')
 

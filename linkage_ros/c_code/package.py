@@ -26,11 +26,11 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
     Parameters
     ----------
     name : str
-        The package's.
+        The package's name.
     scene : str
         The name of the scene's file.
     machines : sequence of (SceneMechanism, sequence of str)
-        The mechanisms and the joints that are commanded of each; see `axes.joints`.
+        The mechanisms, each with its commanded joints; see `axes.joints`.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def _values(package_name: str, class_: str, machine: SceneMechanism,
         return ', '.join(f'{{{literal(axis.name)}, {literal(role)}}}'
                          for axis, role in zip(axes, own))
 
-    def said(axes: Sequence[Axis]) -> str:
+    def listed(axes: Sequence[Axis]) -> str:
         return escape(comment(', '.join(axis.name for axis in axes)))
 
     dimensions = machine.linkage.dimensions
@@ -88,10 +88,11 @@ def _values(package_name: str, class_: str, machine: SceneMechanism,
     return {
         'package': package_name, 'namespace': f'{package_name}_plugins', 'class': class_,
         'name': machine.name, 'n': str(len(driven)), 'actuators': rows(driven, roles[0]),
-        'joints': rows(commanded, roles[1]), 'said': f'{said(driven)} and {said(commanded)}',
+        'joints': rows(commanded, roles[1]),
+        'axes': f'{listed(driven)} and {listed(commanded)}',
         'lines': '\n'.join(lines),
         'dimension_count': str(len(dimensions)),
         'dimensions': dimensions and '{%s}' % ', '.join(
             f'{{"{key}", {value!r}}}' for key, value in dimensions.items()) or '',
-        'row': f'| `{package_name}/{class_}` | {said(driven)} | {said(commanded)} | '
+        'row': f'| `{package_name}/{class_}` | {listed(driven)} | {listed(commanded)} | '
                f'{", ".join(dimensions) or "none"} |'}

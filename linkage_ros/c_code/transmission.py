@@ -20,16 +20,16 @@ def main(args: Optional[List[str]] = None) -> int:
 
 
 def write(args: Optional[List[str]]) -> None:
-    """Write what a command line asks for."""
+    """Write the package that a command line requests."""
     asked = arguments().parse_args(args)
     out = Path(asked.out).absolute()
     if not PACKAGE.fullmatch(out.name):
         raise command.RequestError(
-            '--out must end in the name of a package, of 2 to 64 small letters, digits and single '
+            "--out must end in the package's name: 2 to 64 lower-case letters, digits and single "
             f'underscores, a letter first, not {out.name!r}')
     if out.exists() and any(out.iterdir()) and not is_ours(out):
-        raise command.RequestError('--out must be a new folder, or one that this command wrote, '
-                                   f'but there are other files in {out}')
+        raise command.RequestError('--out must be a new folder, or one written by this command, '
+                                   f'but {out} has other files')
     machines = command.chosen(scene.load(asked.scene).machines, asked.mechanism)
     try:
         files = package(out.name, Path(asked.scene).name, with_joints(machines, asked.joints))
@@ -52,7 +52,7 @@ def arguments() -> command.Parser:
     made = parser(NAME, 'Write the mechanisms of a scene as a ROS 2 package of transmissions for '
                         'ros2_control.')
     made.add_argument('--out', required=True, metavar='DIR',
-                      help='the folder; its name is that of the package')
+                      help='output folder; its name is the name of the package')
     return made
 
 

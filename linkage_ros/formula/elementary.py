@@ -33,7 +33,7 @@ ARCTANGENT = (3.33333333333329318027e-01, -1.99999999998764832476e-01, 1.4285714
               -1.11111104054623557880e-01, 9.09088713343650656196e-02, -7.69187620504482999495e-02,
               6.66107313738753120669e-02, -5.83357013379057348645e-02, 4.97687799461593236017e-02,
               -3.65315727442169155270e-02, 1.62858201153657823623e-02)
-# From the first slope on, angles are counted from the second's: its angle, and the digits after.
+# Above the first slope, angles are relative to that of the second: its angle, to two floats.
 ARCTANGENT_STARTS = ((0.4375, 0.5, 4.63647609000806093515e-01, 2.26987774529616870924e-17),
                      (0.6875, 1.0, 7.85398163397448278999e-01, 3.06161699786838301793e-17))
 # pi - math.pi.
@@ -47,7 +47,7 @@ def sine_and_cosine(x: Real) -> Tuple[Real, Real, Real]:
     quarters = _rounded(x * PER_QUARTER)
     angle, rest = _reduced(x, quarters)
     sine, cosine = _sine(angle, rest), _cosine(angle, rest)
-    # -2 to 2, both ends of which are half a turn.
+    # From -2 to 2; both ends are half a turn.
     quarter = quarters - 4.0 * _rounded(0.25 * quarters)
     crossed = abs(abs(quarter) - 1.0) < 0.5
     return (_signed(where(crossed, cosine, sine), abs(quarter - 0.5) < 1.0),
@@ -61,7 +61,7 @@ def _rounded(x: Real) -> Real:
 
 
 def _reduced(x: Real, quarters: Real) -> Tuple[Real, Real]:
-    """Return x minus quarter turns, to twice as many digits, as a sum of two numbers."""
+    """Return x minus quarter turns to twice the precision, as a sum of two numbers."""
     high, middle, low = (quarters * part for part in QUARTER)
     first = x - high
     second = first - middle
@@ -112,5 +112,5 @@ def arctangent(y: Real, x: Real) -> Tuple[Real, Real]:
     angle = where(steep, math.pi / 2 - (angle - REST_OF_PI / 2), angle)
     angle = where(x < 0.0, math.pi - (angle - REST_OF_PI), angle)
     # The C library handles infinities and signs of zeros.
-    usual = where(high > LEAST_HALVED, where(high < MOST_ADDED, height, 0.0), 0.0) > 0.0
-    return _signed(angle, y > 0.0), usual
+    valid = where(high > LEAST_HALVED, where(high < MOST_ADDED, height, 0.0), 0.0) > 0.0
+    return _signed(angle, y > 0.0), valid

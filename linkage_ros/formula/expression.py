@@ -69,7 +69,7 @@ class Real:
         other = real(other)
         if other.value == 0.0:
             return self
-        if self is other and not self.varies:  # what has no value has no difference either
+        if self is other and not self.varies:  # NaN - NaN is NaN, too
             return real(0.0)
         if self.value == 0.0:
             return -other
@@ -196,7 +196,7 @@ def root(x: Real, tolerance: Real) -> Real:
     """
     Return the root of a radicand that is negative if a linkage cannot be assembled.
 
-    Zero within the tolerance (a limit reached up to rounding), NaN below.
+    Zero within the tolerance (a limit that is reached within rounding), NaN below.
     """
     return operation('root', x, real(tolerance))
 
@@ -229,19 +229,19 @@ def exact_sum(*terms: Number) -> Real:
     return reduce(operator.add, parts, real(0.0))
 
 
-def sum_and_lost(first: Real, second: Real) -> Tuple[Real, Real]:
-    """Return a sum of two, and what rounding has lost of it, exactly."""
-    return first + second, operation('lost', first, second)
+def sum_and_error(first: Real, second: Real) -> Tuple[Real, Real]:
+    """Return the rounded sum of two terms, and its exact rounding error."""
+    return first + second, operation('sum_error', first, second)
 
 
 def _distilled(terms: List[Real]) -> List[Real]:
     """Return the rounding error of each addition of a sum, and last the sum."""
     total, *rest = terms
-    lost = []
+    errors = []
     for term in rest:
-        lost.append(operation('lost', total, term))
+        errors.append(operation('sum_error', total, term))
         total += term
-    return [*lost, total]
+    return [*errors, total]
 
 
 def _summands(x: Real) -> list:
@@ -372,7 +372,7 @@ def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
 
 
 def substituted(outputs: Sequence[Real], arguments: Sequence[Real]) -> List[Real]:
-    """Return expressions whose arguments are other expressions; rates of their own are lost."""
+    """Return expressions with expressions for their arguments, and without geometric rates."""
     known: dict = {}
     for x in (x for output in outputs for x in unknown(
             output, lambda x: x.operands if x.varies else (), known)):

@@ -25,13 +25,13 @@ from .llvm_code import address, append, Builder, compiled, COUNT, count, load, N
 from .program import Program
 from ..cache import cached
 
-# One register of AVX-512; with AVX2 and SSE2, too, eight are about as fast as any.
+# One register of AVX-512; eight are also about the fastest with AVX2 and SSE2.
 LANES = 8
 VECTOR = ir.VectorType(NUMBER, LANES)
-# Operations that justify another thread, some 0.15 ms.
+# Number of operations that justify another thread: some 0.15 ms.
 SHARE = 3 * 2 ** 19
-# The first pose and the one after the last, all poses, then addresses: of the addresses of the
-# arguments, of the constants and of the results.
+# First pose, the one after the last, number of all poses; then three addresses: of the table of
+# the arguments' addresses, of the constants and of the results.
 ARRAYS_SIGNATURE = ctypes.CFUNCTYPE(None, *3 * (ctypes.c_int64,), *3 * (ctypes.c_void_p,))
 
 
@@ -126,7 +126,7 @@ def _by_lane(builder: Builder, name: str, *operands: ir.Value) -> ir.Value:
     """Append a call of a function of numbers for each lane."""
     result = ir.Constant(VECTOR, ir.Undefined)
     for lane in map(count, range(LANES)):
-        value = builder.called(name, *(builder.extract_element(x, lane) for x in operands))
+        value = builder.call_by_name(name, *(builder.extract_element(x, lane) for x in operands))
         result = builder.insert_element(result, value, lane)
     return result
 

@@ -55,7 +55,7 @@ class Builder(ir.IRBuilder):
         """Return the code generators of operations, by name."""
         return {name: partial(row.llvm, self) for name, row in OPERATIONS.items()}
 
-    def called(self, name: str, *operands: ir.Value) -> ir.Value:
+    def call_by_name(self, name: str, *operands: ir.Value) -> ir.Value:
         """Append a call of a function of LLVM or the C library, all numbers of one kind."""
         kind = operands[0].type
         if name.startswith('llvm.'):

@@ -247,7 +247,7 @@ def _run_loops(write: _Writer, loops: Any, failed: ir.Value) -> None:
 
 
 def _check_limits(write: _Writer, limits: Any, failed: ir.Value) -> None:
-    size = partial(write.called, 'llvm.fabs')
+    size = partial(write.call_by_name, 'llvm.fabs')
     with write.rows(limits, LIMIT) as row:
         value = write.fadd(write.fmul(row['factor'], write.read(
             write.place(row['at'], NUMBER))), row['plus'])
@@ -267,7 +267,7 @@ def _change(write: _Writer, changes: Any) -> None:
 
 def _folded(write: _Writer, value: ir.Value, turn: ir.Value) -> ir.Value:
     """Return a value without its whole turns, if it turns."""
-    whole = partial(write.called, 'llvm.rint')
+    whole = partial(write.call_by_name, 'llvm.rint')
     turns = whole(write.fdiv(value, turn))
     return write.select(write.fcmp_ordered('>', turn, NUMBER(0.0)),
                         write.fsub(value, write.fmul(turn, turns)), value)

@@ -23,12 +23,12 @@ class Operation(NamedTuple):
 
     `python` is its code on floats, with its operands in braces, which may raise where IEEE 754 has
     inf or nan; `numpy` does the same on arrays. `llvm` appends it to a function, from a
-    `llvm_code.Builder` and its operands, numbers or vectors. `c` is C99: {f} is how functions of
-    its kind of number end, {name} the mechanism's; what is the same in Python is an operator, of
-    arrays too. `rate` is what it differentiates to, from `expression.operation`, the expression
-    and the rates of its operands; None: it stands still but for steps. `folded` returns what it
-    comes to at once, None where it has to be done. If the operands `positive` are, so is the
-    result; if it `commutes`, operands may change places.
+    `llvm_code.Builder` and its operands, numbers or vectors. `c` is C99: {f} is the suffix of
+    functions for a type of numbers, {name} the mechanism's name; if it equals `python`, it is an
+    operator, for arrays too. `rate` returns the derivative, from `expression.operation`, the
+    expression and the rates of its operands; None: piecewise constant. `folded` returns the
+    result if it needs no evaluation, else None. The result is positive if the operands with the
+    indices `positive` are. If it `commutes`, the order of operands has no effect.
     """
 
     name: str
@@ -43,13 +43,13 @@ class Operation(NamedTuple):
 
     @property
     def array(self) -> str:
-        """Code on arrays, as `python`; numpy's operators take over memory that is free again."""
+        """Code on arrays, as `python`; numpy's operators reuse the memory of temporary arrays."""
         operands = ', '.join(self.c.count('{}') * ['{}'])
         return self.python if self.c == self.python else f'{self.name}({operands})'
 
 
-# Its operands x and y, x + y, and what that has of y.
-LOST = '(({0} - (({0} + {1}) - (({0} + {1}) - {0}))) + ({1} - (({0} + {1}) - {0})))'
+# The rounding error of x + y: that of x's part of the sum, plus that of y's part.
+SUM_ERROR = '(({0} - (({0} + {1}) - (({0} + {1}) - {0}))) + ({1} - (({0} + {1}) - {0})))'
 
 
 def _root(x: Any, tolerance: Any) -> Any:
@@ -70,13 +70,13 @@ def _least(x: Any) -> Any:
     return np.minimum.reduce(x, axis=None, initial=math.inf)
 
 
-def _lost(x: Any, y: Any) -> Any:
+def _sum_error(x: Any, y: Any) -> Any:
     total = x + y
     added = total - x
     return (x - (total - added)) + (y - added)
 
 
-def _lost_in_llvm(b: Any, x: Any, y: Any) -> Any:
+def _sum_error_in_llvm(b: Any, x: Any, y: Any) -> Any:
     total = b.fadd(x, y)
     added = b.fsub(total, x)
     return b.fadd(b.fsub(x, b.fsub(total, added)), b.fsub(y, added))
@@ -84,7 +84,7 @@ def _lost_in_llvm(b: Any, x: Any, y: Any) -> Any:
 
 def _root_in_llvm(b: Any, x: Any, tolerance: Any) -> Any:
     reached = _gated_in_llvm(b, x.type(0.0), x, tolerance)
-    return b.select(b.fcmp_ordered('>', x, x.type(0.0)), b.called('llvm.sqrt', x), reached)
+    return b.select(b.fcmp_ordered('>', x, x.type(0.0)), b.call_by_name('llvm.sqrt', x), reached)
 
 
 def _gated_in_llvm(b: Any, x: Any, margin: Any, tolerance: Any) -> Any:
@@ -121,25 +121,26 @@ OPERATIONS = {row.name: row for row in (
     Operation('multiply', '({} * {})', operator.mul, lambda b, x, y: b.fmul(x, y), '({} * {})',
               _product_rule, _constants(operator.mul), (0, 1), True),
     # The exact rounding error of a sum. Source: Knuth, TAOCP 2, sec. 4.2.2, theorem B.
-    Operation('lost', LOST, _lost, _lost_in_llvm, LOST, folded=_constants(_lost)),
+    Operation('sum_error', SUM_ERROR, _sum_error, _sum_error_in_llvm, SUM_ERROR,
+              folded=_constants(_sum_error)),
     Operation('divide', '({} / {})', operator.truediv, lambda b, x, y: b.fdiv(x, y), '({} / {})',
               lambda do, n, dx, dy: (dx - n * dy) / n.args[1], None, (0, 1)),
     Operation('negative', '(-{})', operator.neg, lambda b, x: b.fneg(x), '(-{})',
               lambda do, n, dx: -dx, _constants(operator.neg)),
-    Operation('absolute', 'abs({})', np.absolute, lambda b, x: b.called('llvm.fabs', x),
+    Operation('absolute', 'abs({})', np.absolute, lambda b, x: b.call_by_name('llvm.fabs', x),
               'fabs{f}({})', lambda do, n, dx: do('where', n.args[0] < 0.0, -dx, dx),
               _constants(abs)),
-    Operation('sqrt', 'sqrt({})', np.sqrt, lambda b, x: b.called('llvm.sqrt', x), 'sqrt{f}({})',
-              lambda do, n, dx: dx / (2.0 * n), None, (0,)),
-    Operation('sin', 'sin({})', np.sin, lambda b, x: b.called('llvm.sin', x), 'sin{f}({})',
+    Operation('sqrt', 'sqrt({})', np.sqrt, lambda b, x: b.call_by_name('llvm.sqrt', x),
+              'sqrt{f}({})', lambda do, n, dx: dx / (2.0 * n), None, (0,)),
+    Operation('sin', 'sin({})', np.sin, lambda b, x: b.call_by_name('llvm.sin', x), 'sin{f}({})',
               lambda do, n, dx: do('cos', *n.args) * dx, _constants(math.sin)),
-    Operation('cos', 'cos({})', np.cos, lambda b, x: b.called('llvm.cos', x), 'cos{f}({})',
+    Operation('cos', 'cos({})', np.cos, lambda b, x: b.call_by_name('llvm.cos', x), 'cos{f}({})',
               lambda do, n, dx: -(do('sin', *n.args) * dx), _constants(math.cos)),
-    Operation('atan2', 'atan2({}, {})', np.arctan2, lambda b, y, x: b.called('atan2', y, x),
+    Operation('atan2', 'atan2({}, {})', np.arctan2, lambda b, y, x: b.call_by_name('atan2', y, x),
               'atan2{f}({}, {})', _angle_rule),
     # To the nearest integer, halves to the even one.
     Operation('rint', 'copysign({0} - remainder({0}, 1.0), {0})', np.rint,
-              lambda b, x: b.called('llvm.rint', x), 'rint{f}({})'),
+              lambda b, x: b.call_by_name('llvm.rint', x), 'rint{f}({})'),
     Operation('less', '({} < {})', operator.lt, lambda b, x, y: b.fcmp_ordered('<', x, y),
               '({} < {})'),
     Operation('less_equal', '({} <= {})', operator.le,
@@ -149,10 +150,10 @@ OPERATIONS = {row.name: row for row in (
               '({} ? {} : {})', lambda do, n, _, dx, dy: do('where', n.args[0], dx, dy),
               lambda c, x, y: x if x is y or x.value is not None and x.value == y.value else None,
               (1, 2)),
-    # The root of x, zero where x is down to -tolerance, NaN below.
+    # The root of x; zero for x from -tolerance to 0, NaN below.
     Operation('root', '(sqrt({0}) if {0} > 0.0 else 0.0 if {0} >= -{1} else nan)', _root,
               _root_in_llvm, '{name}_root({}, {})', lambda do, n, dx, _: dx / (2.0 * n)),
-    # A value where a margin is not below -tolerance, else NaN.
+    # A value where a margin is at least -tolerance, else NaN.
     Operation('gated', '({0} if {1} >= -{2} else nan)', _gated, _gated_in_llvm,
               '{name}_gated({}, {}, {})', lambda do, n, dx, *_: do('gated', dx, *n.args[1:])),
 )}

@@ -35,7 +35,7 @@ from ..cache import Cache
 BLOCK_OF_POSES = 4096
 # Below this many poses the float code in a loop beats numpy's cost per call.
 FEW_POSES = 32
-# Python's parser bounds how deep parentheses may nest.
+# Python's parser limits the nesting of parentheses.
 DEEPEST = 16
 _NUMBERS, _NAMED, _OPERANDS = count(), re.compile(r'\bv\d+'), attrgetter('operands')
 
@@ -87,17 +87,17 @@ ARRAYS = Dialect({name: row.array for name, row in OPERATIONS.items()}, {
 
 def evaluate(node: Real, dimensions: Mapping, known: dict) -> Any:
     """Evaluate an expression of dimensions alone; `known` is shared between calls."""
-    _work_out(map(_step, unknown(node, _OPERANDS, known)), dimensions, known)
+    _evaluate_steps(map(_step, unknown(node, _OPERANDS, known)), dimensions, known)
     return known[node]
 
 
 def _step(node: Real) -> _Step:
-    """Return an expression of dimensions with its function, None of a leaf, and operands."""
+    """Return an expression of dimensions, its function (None for a leaf) and its operands."""
     return node, OPERATIONS[node.op].numpy if node.operands else None, node.operands
 
 
 def _steps(nodes: Iterable[Real]) -> List[_Step]:
-    """Return all that expressions need, and these, in an order in which they can be worked out."""
+    """Return expressions and their operands, each once, in an order of evaluation."""
     known: Dict[Real, _Step] = {}
     for node in nodes:
         for x in unknown(node, _OPERANDS, known):
@@ -105,7 +105,7 @@ def _steps(nodes: Iterable[Real]) -> List[_Step]:
     return list(known.values())
 
 
-def _work_out(steps: Iterable[_Step], dimensions: Mapping, known: dict) -> None:
+def _evaluate_steps(steps: Iterable[_Step], dimensions: Mapping, known: dict) -> None:
     """Add the values of expressions to those that are known."""
     for node, function, operands in steps:
         if node in known:
@@ -204,8 +204,8 @@ def _with_releases(lines: Sequence[Tuple[str, str]], outputs: Sequence[str]) -> 
     """Drop each array after its last use, so that the next one reuses its cached memory."""
     reads = [set(_NAMED.findall(code)) for _, code in lines]
     last = {name: index for index, names in enumerate(reads) for name in names}
-    kept = set(_NAMED.findall(' '.join(outputs)))
-    done = [sorted(n for n in names - kept if last[n] == i) for i, names in enumerate(reads)]
+    returned = set(_NAMED.findall(' '.join(outputs)))
+    done = [sorted(n for n in names - returned if last[n] == i) for i, names in enumerate(reads)]
     return [text for (name, code), rest in zip(lines, done)
             for text in (f'{name} = {code}', *([f'del {", ".join(rest)}'] if rest else []))]
 
@@ -310,12 +310,12 @@ class Program:
         swept = any(np.ndim(v) for v in dimensions.values())
         with np.errstate(all='ignore'):
             if not swept:
-                _work_out(self._deciding, dimensions, known)
+                _evaluate_steps(self._deciding, dimensions, known)
             decisions = () if swept else tuple(bool(known[c]) for c in self._conditions)
             variant = self._variants.get_or_make(decisions, lambda: _Variant(
                 self._outputs, dict(zip(self._conditions, decisions)), self._replaced,
                 self._arguments))
-            _work_out(variant.steps, dimensions, known)
+            _evaluate_steps(variant.steps, dimensions, known)
         constants = [known[c] for c in variant.constants]
         if not swept:
             constants = list(map(float, constants))
@@ -325,11 +325,11 @@ class Program:
 
 def _conditions(outputs: Iterable[Real]) -> list:
     """Return the conditions on dimensions alone that varying operations use."""
-    seen: Dict[Real, None] = {}
+    visited: Dict[Real, None] = {}
     for output in outputs:
-        for node in unknown(output, lambda x: [a for a in x.operands if a.varies], seen):
-            seen[node] = None
-    return list(dict.fromkeys(node.args[0] for node in seen if node.varies
+        for node in unknown(output, lambda x: [a for a in x.operands if a.varies], visited):
+            visited[node] = None
+    return list(dict.fromkeys(node.args[0] for node in visited if node.varies
                               and node.op == 'where' and not node.args[0].varies))
 
 
@@ -384,7 +384,7 @@ class Pose:
         """Return the outputs over broadcast arrays, shape (outputs, *shape)."""
         arrays = [np.asarray(a, float) for a in arguments]
         return self._swept(arrays) if self.shape else self._flat(
-            self._natively if self._accelerate else self._plainly, arrays)
+            self._in_machine_code if self._accelerate else self._in_python, arrays)
 
     def searched(self, *arguments: Any) -> np.ndarray:
         """
@@ -399,7 +399,7 @@ class Pose:
         flat = [a.ravel() for a in (first, *others)]
         return solve(flat, first.size).reshape(self.variant.outputs, *first.shape)
 
-    def _natively(self, given: Sequence[np.ndarray], _: int) -> np.ndarray:
+    def _in_machine_code(self, given: Sequence[np.ndarray], _: int) -> np.ndarray:
         return self.variant.arrays.solve(given, self._given)
 
     def batch(self, rows: np.ndarray) -> Batch:
@@ -408,7 +408,7 @@ class Pose:
         return Batch(self._one_by_one, self.variant.loop if self._accelerate else None,
                      self._given, self.variant.arguments, rows)
 
-    def _plainly(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
+    def _in_python(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
         return self._one_by_one(given, size) if size < FEW_POSES else self._blocks(given, size)
 
     def _one_by_one(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
@@ -438,22 +438,22 @@ class Batch:
     """
     Poses that are solved repeatedly, in arrays at fixed addresses.
 
-    The user writes arguments to `given` (arguments, poses); `solve` writes outputs to `rows`
-    (poses, outputs).
+    The user writes `arguments` (arguments, poses); `solve` writes outputs to `rows` (poses,
+    outputs).
     """
 
-    def __init__(self, plainly: Callable, loop: Optional[Future], constants: np.ndarray,
+    def __init__(self, in_python: Callable, loop: Optional[Future], constants: np.ndarray,
                  arguments: int, rows: np.ndarray):
-        self.given, self.rows = np.zeros((arguments, len(rows))), rows
-        self._plainly = plainly
+        self.arguments, self.rows = np.zeros((arguments, len(rows))), rows
+        self._in_python = in_python
         self._loop, self._constants = loop, constants
         self._run: Optional[Callable] = None
 
     @property
     def code(self) -> Optional[tuple]:
         """Address and arguments of the machine code, see `Loop`; None until it is compiled."""
-        self._look()
-        return (self._code.address, *self._arguments) if self._run else None
+        self._adopt_code()
+        return (self._code.address, *self._code_arguments) if self._run else None
 
     def finish(self) -> None:
         """Wait for the machine code, if it is being compiled."""
@@ -462,19 +462,20 @@ class Batch:
 
     def solve(self) -> None:
         """Fill the rows, by plain Python until the machine code is compiled."""
-        self._look()
+        self._adopt_code()
         if self._run:
-            self._run(*self._arguments)
+            self._run(*self._code_arguments)
         else:
-            self.rows[:] = self._plainly(self.given, len(self.rows)).T
+            self.rows[:] = self._in_python(self.arguments, len(self.rows)).T
 
-    def _look(self) -> None:
+    def _adopt_code(self) -> None:
         if not self._loop or not self._loop.done():
             return
         loop, self._loop = self._loop, None
         if error := loop.exception():
-            warnings.warn(f'no machine code, so plain Python goes on: {error}', stacklevel=4)
+            warnings.warn(f'no machine code, plain Python is used: {error}', stacklevel=4)
             return
         self._code = loop.result()
-        self._arguments = self._code.arguments(self.given, self._constants, self.rows.T)
+        self._code_arguments = self._code.arguments(
+            self.arguments, self._constants, self.rows.T)
         self._run = self._code.run

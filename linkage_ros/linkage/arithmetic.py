@@ -188,5 +188,5 @@ class Formula:
         return ValueError(f'{quoted(word)} is {wrong}: a number is {IN_RANGE}')
 
     def _error(self) -> ValueError:
-        return ValueError(f'{quoted(self.text)} is no number, dimension or arithmetic on them; '
+        return ValueError(f'{quoted(self.text)} is not a number, dimension or arithmetic on them; '
                           'allowed: + - * / ( ) max(a,b) sqrt(a) pi 30deg')

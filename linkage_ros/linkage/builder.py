@@ -149,7 +149,7 @@ class Builder:
         link = called or self._numbered('crank')
         turning = self.drive(Input(link, ANGLE), geared)
         if zero is None:
-            self._on_ground(centre, '; or its zero is towards a joint of its link')
+            self._on_ground(centre, ' unless the line has zero and a joint of its link')
             parent, along = GROUND, Complex(0.0, 1.0) if up else Complex(1.0, 0.0)
             start = real(pi / 2 if up else 0.0)
             if self.mirrors:
@@ -220,7 +220,7 @@ class Builder:
         link = next((x.name for x in self.links
                      if x.kind == 'prismatic' and x.tip == joint and x.name in self._axes), None)
         if link is None:
-            raise ConstructionError(f'{joint} is no joint of a block')
+            raise ConstructionError(f'{joint} is not a joint of a block')
         offset = Complex(along, across)
         arm = planar.parallel(self._axes[link].vector * offset, self.points[joint].place)
         self._place(name, joint, arm, link, offset.length(), ())
@@ -237,7 +237,7 @@ class Builder:
             other, driving = self.driven.get(geared.input, (None, None))
             if other is None or driving is None or other.turns != input_.turns:
                 alike = [name for name, (x, _) in self.driven.items() if x.turns == input_.turns]
-                raise ConstructionError(f'it cannot be geared to {geared.input}; there are: '
+                raise ConstructionError(f'it cannot be geared to {geared.input}; allowed: '
                                         f'{", ".join(alike) or "none"}')
             value = geared.ratio * driving + geared.offset
         self.driven[input_.name] = input_, value
@@ -559,7 +559,7 @@ class Builder:
     def _place(self, name: str, start: str, vector: Complex, link: str, length: Real,
                others: Tuple[str, ...], place: Optional[Complex] = None) -> None:
         """
-        Place a joint at the end of a bar from another; it stands on others as well.
+        Place a joint at the end of a bar from another; it depends on others, too.
 
         A place that is known in a better way is given.
         """

@@ -528,8 +528,8 @@ class Mechanism:
         """Return the inverse of an output with all inputs but the first fixed."""
         self.check_output(output)
         if len(others) != len(self.inputs) - 1:
-            raise ValueError(f'{self.type} has {len(self.inputs)} inputs: the value of each but '
-                             f'the first is needed, got {len(others)}')
+            raise ValueError(f'{self.type} has {len(self.inputs)} inputs: the values of all '
+                             f'except the first are needed, got {len(others)}')
         return (self.inverse((output, *(input_.name for input_ in self.inputs[1:]))),
                 list(map(float, others)))
 
@@ -592,8 +592,8 @@ class Mechanism:
             raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
                              'not for arrays')
         if len(others) != len(self.inputs) - 1:
-            raise ValueError(f'{self.type} has {len(self.inputs)} inputs: the value of each but '
-                             f'the first is needed, got {len(others)}')
+            raise ValueError(f'{self.type} has {len(self.inputs)} inputs: the values of all '
+                             f'except the first are needed, got {len(others)}')
         first = self.inputs[0]
         return [(lo * first.size, hi * first.size) for lo, hi in arcs(
             lambda value: margins.searched(value * first.size, *others), first.counted(),

@@ -41,7 +41,7 @@ from ..formula.expression import (
     spin,
     square,
     square_root,
-    sum_and_lost,
+    sum_and_error,
     where,
     with_rate,
     with_spin,
@@ -155,10 +155,10 @@ class Arm:
         if length is None:
             return self.within(first + second, size), self.beyond(first - second, size)
         # The varying length is added last: a sum that it brings next to zero is exact.
-        (near, near_lost), (far, far_lost) = sum_and_lost(second, -length), \
-            sum_and_lost(second, length)
-        margins = (((first + near) + near_lost) * (first + far),
-                   ((far - first) + far_lost) * ((first - near) - near_lost))
+        (near, near_error), (far, far_error) = sum_and_error(second, -length), \
+            sum_and_error(second, length)
+        margins = (((first + near) + near_error) * (first + far),
+                   ((far - first) + far_error) * ((first - near) - near_error))
         longer, shorter = (gated(margin, self.square, real(0.0)) for margin in margins)
         return (self._limit(first + second, size, 1.0, longer),
                 self._limit(first - second, size, -1.0, shorter))
@@ -441,7 +441,7 @@ def parallel(bar: Complex, place: Complex) -> Complex:
 
 
 def with_velocity(place: Complex, start: Complex, bar: Complex) -> Complex:
-    """Return a place with the velocity of the end of a bar of constant length from a start."""
+    """Return a place with the velocity of the end of a bar of constant length on `start`."""
     turning = spin(bar)
     return Complex(
         with_rate(place.x, start.x, *turning.of,

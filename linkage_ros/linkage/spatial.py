@@ -278,7 +278,7 @@ class Frame(NamedTuple):
 
 
 class Row(NamedTuple):
-    """A rod from its end to its pivot, and the derivatives of half its square by both angles."""
+    """A rod's vector from its end to its pivot; derivatives of half its square by both angles."""
 
     rod: Vector
     by_first: Scalar
@@ -290,7 +290,7 @@ Pose = Tuple[Scalar, Scalar, Scalar, Scalar]
 
 
 def row(pivot: Vector, end: Circle, pose: Pose) -> Row:
-    """Return the row of a rod from the end that both angles turn to a pivot."""
+    """Return the row of a rod between a pivot and its end, which both angles turn."""
     c1, s1, c2, s2 = pose
     place, ahead = end.at(c2, s2).turned(c1, s1), end.ahead(c2, s2).turned(c1, s1)
     rod = pivot.minus(place)
@@ -298,7 +298,7 @@ def row(pivot: Vector, end: Circle, pose: Pose) -> Row:
 
 
 def gap(rod: Vector, length: Scalar) -> Scalar:
-    """Return half of the difference between a rod's square and its length's."""
+    """Return half the difference between the square of a rod's vector and of its length."""
     return 0.5 * (rod.dot(rod) - length * length)
 
 
@@ -341,7 +341,7 @@ def two_rods(rods: Sequence[Rod], home: Sequence[Real]) -> Tuple[Turn, Turn, Lim
 
 
 def _solution(rows: Sequence[Row], changes: Sequence[Scalar]) -> Tuple[Scalar, Scalar]:
-    """Return the steps of both angles that make these changes to half the rods' squares."""
+    """Return the steps of both angles for these changes of half the rods' squared lengths."""
     (_, a, b), (_, c, d) = rows
     e, f = changes
     det = a * d - b * c

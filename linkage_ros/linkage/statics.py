@@ -75,8 +75,8 @@ def _chain(linkage: Mechanism, name: str) -> Iterator[str]:
 def output_effort(linkage: Mechanism, output: str, theta: Inputs, effort: ArrayLike) -> Any:
     """Implement `Mechanism.output_effort`."""
     if len(linkage.inputs) > 1:
-        raise ValueError(f'{linkage.type} has several inputs; the effort of an output is there '
-                         'for one')
+        raise ValueError(f'{linkage.type} has several inputs; the effort of an output needs '
+                         'a linkage with one input')
     linkage.check_output(output)
     with np.errstate(divide='ignore', invalid='ignore'):
         return (numbers('effort', effort) / linkage.joint_rates(theta, (output,))[output])[()]

@@ -73,8 +73,8 @@ class Solution:
     def __init__(self, layout: Layout, values: np.ndarray, batch: Batch):
         self.layout, self.values, self.rows = layout, values, batch.rows
         self.batch = batch
-        self._inputs = list(batch.given[:layout.inputs])
-        self._speeds = list(batch.given[layout.inputs:2 * layout.inputs])
+        self._inputs = list(batch.arguments[:layout.inputs])
+        self._speeds = list(batch.arguments[layout.inputs:2 * layout.inputs])
         self._driven = layout.driven(values)
         self._pack: Callable = Struct(f'{self._driven.size}d').pack_into
 
@@ -149,7 +149,7 @@ class Assembly:
         values = np.zeros(layout.size)
         batch = self._fastest.legs(
             tuple(points), tuple(joints), rates, layout.rows(values))
-        batch.given[2 * layout.inputs:].T[:] = list(self.legs.values())
+        batch.arguments[2 * layout.inputs:].T[:] = list(self.legs.values())
         return Solution(layout, values, batch)
 
     def within_reach(self, value: float) -> np.ndarray:

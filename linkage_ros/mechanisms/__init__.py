@@ -27,27 +27,27 @@ from ..linkage.design import Design
 from ..linkage.mechanism import Mechanism
 from ..words import meant, plain_text, quoted
 
-# What a scene shows when it names no mechanism, and its scale: from 0.5 m to 1.5 m in size.
+# The mechanisms of a scene without names, and their scales: they are 0.5 m to 1.5 m in size.
 CATALOGUE = {'water_drop': 0.1, 'jansen': 0.005, 'peaucellier': 0.1, 'slotted_lever': 0.002}
 
 WRITTEN = tuple(custom.WORDS)
 
 
 def _found() -> Dict[str, ModuleType]:
-    """Return the modules of this folder by the type that each is: those of CATALOGUE first."""
+    """Return the modules of this folder by type, those of CATALOGUE first."""
     names = [module.name for module in pkgutil.iter_modules(__path__) if module.name != 'custom']
     return {name: _module(name) for name in dict.fromkeys((*CATALOGUE, *sorted(names)))}
 
 
 def _module(name: str) -> ModuleType:
-    """Import a mechanism; raise ImportError, with its name, for what is none."""
+    """Import a mechanism; raise ImportError with its name if the module is not one."""
     try:
         module = import_module(f'{__name__}.{name}')
-        called = module.DESIGN.name
+        type_ = module.DESIGN.name
     except Exception as error:
-        raise ImportError(f'{__name__}.{name} is no mechanism: {error}') from error
-    if called != name:
-        raise ImportError(f'{__name__}.{name} must have the name of its design, {quoted(called)}')
+        raise ImportError(f'{__name__}.{name} is not a mechanism: {error}') from error
+    if type_ != name:
+        raise ImportError(f'{__name__}.{name} must have the name of its design, {quoted(type_)}')
     return module
 
 
@@ -57,15 +57,15 @@ TYPES = MappingProxyType(_found())
 def design(type_: str, /, joints: Optional[Sequence[str]] = None, tracer: Optional[str] = None,
            dimensions: Iterable[str] = ()) -> Design:
     """
-    Return what a type is: its dimensions, joints, branches and tracer.
+    Return the design of a type: its dimensions, joints, branches and tracer.
 
-    For 'custom' and 'rods' these follow from the lines of `joints` and the names of the
-    dimensions given.
+    For 'custom' and 'rods' these follow from the lines of `joints` and the names of
+    `dimensions`.
 
     Raises
     ------
     ValueError
-        For an unknown type or a bad line; the text says what is allowed.
+        For an unknown type or an invalid line; the text names what is allowed.
 
     """
     if not isinstance(type_, str) or type_ not in (*TYPES, *WRITTEN):
@@ -73,7 +73,7 @@ def design(type_: str, /, joints: Optional[Sequence[str]] = None, tracer: Option
                          f'allowed: {", ".join((*TYPES, *WRITTEN))}'
                          f'{meant(type_, (*TYPES, *WRITTEN))}')
     if type_ in WRITTEN:
-        return custom.given(plain_text(type_), joints, tracer, dimensions)
+        return custom.checked_design(plain_text(type_), joints, tracer, dimensions)
     if joints is not None or tracer is not None:
         raise ValueError(f'joints and tracer are for type '
                          f'{" or ".join(WRITTEN)}, not for {type_}')
@@ -91,22 +91,22 @@ def create(type_: str, /, *, branches: Optional[Mapping[str, int]] = None,
            joints: Optional[Sequence[str]] = None, tracer: Optional[str] = None,
            **dimensions: ArrayLike) -> Mechanism:
     """
-    Make a mechanism.
+    Create a mechanism.
 
     Parameters
     ----------
     type_ : str
         One of TYPES, 'custom' or, for linkages in space, 'rods'.
     branches : mapping, optional
-        Assembly signs, +1 or -1, by joint; what is left out is as in the catalogue or as written.
+        Assembly signs, +1 or -1, by joint. Default: those of the catalogue or of the joint lines.
     joints : sequence of str, optional
-        One line a joint: for type 'custom' as `linkage.joint_lines` describes, for type 'rods' as
-        `linkage.rod_lines` does.
+        One line per joint: for type 'custom' as `linkage.joint_lines` describes, for type 'rods'
+        as `linkage.rod_lines` does.
     tracer : str, optional
         For type 'custom' or 'rods': the joint whose curve is the locus. Default: the last.
     **dimensions : float or array-like
-        Lengths [m]; what is left out is as in the catalogue. Arrays are broadcast against the
-        crank angle.
+        Lengths [m]. Default: those of the catalogue. Arrays are broadcast against the crank
+        angle.
 
     Returns
     -------
@@ -116,7 +116,7 @@ def create(type_: str, /, *, branches: Optional[Mapping[str, int]] = None,
     ------
     ValueError
         For an unknown type, dimension or branch, a dimension that is not a finite positive
-        number, and a line that is wrong; the text says what is allowed.
+        number, and an invalid line; the text names what is allowed.
 
     """
     chosen = design(type_, joints, tracer, dimensions)

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Linkages that users write down themselves; see `linkage.joint_lines` for the words."""
+"""Linkages written by users as joint lines; see `linkage.joint_lines` for the words."""
 
 from collections.abc import Mapping, Set
 from itertools import islice
@@ -16,7 +16,7 @@ from ..linkage.mechanism import check_bars, Mechanism
 from ..words import listed, meant, plain_text, quoted
 
 MOST_LINES = 2000
-# What users write down themselves, and who reads it.
+# The modules that read joint lines, by the type of the linkage.
 WORDS = {'custom': joint_lines, 'rods': rod_lines}
 
 
@@ -24,12 +24,12 @@ WORDS = {'custom': joint_lines, 'rods': rod_lines}
 def design(type_: str, joints: Tuple[str, ...], tracer: Optional[str],
            names: Tuple[str, ...]) -> Design:
     """
-    Return the design that lines of joints make.
+    Return the design of joint lines.
 
     Raises
     ------
     ValueError
-        With the line and what is allowed.
+        For an invalid line; the text has the line and what is allowed.
 
     """
     words = WORDS[type_]
@@ -46,7 +46,7 @@ def design(type_: str, joints: Tuple[str, ...], tracer: Optional[str],
     used = joint_lines.lengths(lines)
     placed = words.points(lines)
     if tracer is not None and tracer not in placed:
-        raise ValueError(f'tracer {quoted(tracer)} is no joint; allowed: {listed(placed)}'
+        raise ValueError(f'tracer {quoted(tracer)} is not a joint; allowed: {listed(placed)}'
                          f'{meant(tracer, placed)}')
     signed = frozenset(name for name, length in used.items() if not length)
     return Design(type_, dict.fromkeys(used, 1.0), joints, tracer or placed[-1], signed,
@@ -54,26 +54,26 @@ def design(type_: str, joints: Tuple[str, ...], tracer: Optional[str],
 
 
 def check(lines: List[joint_lines.Line], linkage: Mechanism) -> None:
-    """Raise ValueError, with its line, for a number, bar, triangle or stroke that cannot be."""
+    """Raise ValueError that names the line of an invalid number, bar, triangle or stroke."""
     joint_lines.check_numbers(lines, linkage.dimensions)
     check_bars(linkage)
     tips = {link.name: link.tip for link in linkage.links}
     for input_ in linkage.inputs:
         if not np.all(np.less(input_.low, input_.high)):
             raise linkage.line_of(tips[input_.name]).error(
-                f'the {input_.name} must have a way to go: from a lower end to a higher one')
+                f'the lower end of the {input_.name} must be less than its upper end')
     for line, exists in linkage.triangles().items():
         if not np.all(exists):
             raise line.error('no triangle has these sides: each must be shorter than the '
                              'other two together')
 
 
-def given(type_: str, joints: Optional[Iterable[str]], tracer: Optional[str],
-          dimensions: Iterable[str]) -> Design:
-    """Return the design of what a user gives; raise ValueError for what is none."""
+def checked_design(type_: str, joints: Optional[Iterable[str]], tracer: Optional[str],
+                   dimensions: Iterable[str]) -> Design:
+    """Return the design of a user's arguments; raise ValueError if they are invalid."""
     if tracer is not None and not isinstance(tracer, str):
         raise ValueError(f'tracer must be the name of a joint, got {quoted(tracer)}')
-    lines = given_lines(joints)
+    lines = checked_lines(joints)
     try:
         names = tuple(map(plain_text, dimensions))
     except TypeError:
@@ -84,8 +84,8 @@ def given(type_: str, joints: Optional[Iterable[str]], tracer: Optional[str],
     return design(type_, lines, plain_text(tracer), names)
 
 
-def given_lines(joints: Any) -> Tuple[str, ...]:
-    """Return the joints as a tuple of lines; raise ValueError if they are none."""
+def checked_lines(joints: Any) -> Tuple[str, ...]:
+    """Return the joints as a tuple of lines; raise ValueError if they are not lines."""
     try:
         # A set has no order, and of a mapping only the keys would be read.
         unfit = isinstance(joints, (str, bytes, Mapping, Set))
@@ -93,7 +93,7 @@ def given_lines(joints: Any) -> Tuple[str, ...]:
     except TypeError:
         lines = ()
     if not lines:
-        raise ValueError(f'joints must be a list of lines, one a joint, got {quoted(joints)}')
+        raise ValueError(f'joints must be a list of lines, one per joint, got {quoted(joints)}')
     if len(lines) > MOST_LINES:
         raise ValueError(f'joints must be up to {MOST_LINES} lines, got more')
     for number, line in enumerate(lines, 1):

@@ -36,28 +36,28 @@ class Mechanism(mechanism.Mechanism):
 
     def servo_angle(self, lever_angle: ArrayLike, near: Optional[ArrayLike] = None) -> Any:
         """
-        Return the crank angle that puts the lever where it is wanted.
+        Return the crank angle for a lever angle.
 
         Parameters
         ----------
         lever_angle : float or array-like
             Lever angle phi [rad], from +y.
         near : float or array-like, optional
-            The answer nearest to this angle is taken, whole turns included. Default: the working
-            branch, on which lever and crank turn the same way.
+            The result is the solution nearest to this angle, whole turns included. Default: the
+            working branch, on which lever and crank turn the same way.
 
         Returns
         -------
         float or array
             Crank angle [rad] in the shape of the arguments broadcast, in (-pi, pi] or, with
-            near, within half a turn of it; NaN where the lever cannot get there on this half of
-            the slot.
+            near, within half a turn of it; NaN where the lever angle is unreachable on this half
+            of the slot.
 
         """
         return self.servo(lever_angle, near)[0]
 
     def servo(self, lever_angle: ArrayLike, near: Optional[ArrayLike] = None) -> Sequence:
-        """Return what `servo_angle` does, and d lever / d servo there."""
+        """Return the result of `servo_angle`, and d lever / d servo there."""
         return self.servo_for('lever', lever_angle, near)
 
     def reduction(self, servo_angle: ArrayLike) -> Any:
@@ -65,7 +65,7 @@ class Mechanism(mechanism.Mechanism):
         return self.joint_rates(servo_angle, ('lever',))['lever'][()]
 
     def lever_reach(self) -> list:
-        """Return the arcs (lo, hi) [rad] of lever angles that the crank can bring about."""
+        """Return the arcs (lo, hi) [rad] of lever angles that the crank can reach."""
         a, b, e = (self.dimensions[name] for name in 'abe')
         sines = [(a - e) / b, (-a - e) / b]
         if e:

@@ -102,7 +102,7 @@ def _copies(mechanism: Any, solution: Solution) -> Iterator[tuple]:
     """Yield pairs of addresses, from and to, that copy inputs and speeds to every leg."""
     driven = native.addresses(solution.layout.driven(solution.values))
     state = native.addresses(mechanism.inputs).ravel()
-    for start, given, own in zip(state, native.addresses(solution.batch.given), driven):
+    for start, given, own in zip(state, native.addresses(solution.batch.arguments), driven):
         for end in (*given, own):
             yield start, end
 
@@ -114,7 +114,7 @@ def _limits(loop: int, mechanism: Any, solution: Solution) -> Iterator[tuple]:
         return
     first, (low, high) = assembly.linkage.inputs[0], max(
         assembly.reach, key=lambda arc: arc[1] - arc[0])
-    for at, (factor, plus) in zip(native.addresses(solution.batch.given)[0],
+    for at, (factor, plus) in zip(native.addresses(solution.batch.arguments)[0],
                                   assembly.own_inputs()):
         yield (loop, at, factor, plus, 0.5 * (low + high), 0.5 * (high - low),
                math.tau if first.turns else 0.0)

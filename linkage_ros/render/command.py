@@ -33,7 +33,7 @@ NEEDS = ('pip install matplotlib pyyaml tqdm, or apt install python3-matplotlib 
 
 
 def main(args=None) -> int:
-    """Draw what the command line asks for; return the exit code."""
+    """Run the command line; return the exit code."""
     return run('render', _draw, args, NEEDS)
 
 
@@ -43,7 +43,7 @@ def _draw(args):
 
 
 def parsed(args):
-    """Return what the command line asks for; raise RequestError if it cannot be."""
+    """Return the options of the command line; raise RequestError if they are invalid."""
     asked = parser().parse_args(args)
     ending = asked.out.suffix.lower()
     if ending not in STILL + MOVING:
@@ -84,9 +84,9 @@ def draw(asked, machines):
     for machine in machines:
         if machine.in_space:
             raise RequestError(f'{machine.name} is {IN_SPACE}')
-    usual = parts.USUAL_IN_MOTION if asked.moving else parts.USUAL
+    default = parts.DEFAULT_IN_MOTION if asked.moving else parts.DEFAULT
     with style.context('default', after_reset=True):
-        picture = Picture(machines, asked.size, asked.trace, (usual | asked.show) - asked.hide)
+        picture = Picture(machines, asked.size, asked.trace, (default | asked.show) - asked.hide)
         times = moments(asked, picture)
         try:
             picture.arrange(times)
@@ -132,8 +132,8 @@ def moments(asked, picture):
     turns = asked.turns or 1.0
     frames = asked.frames or max(round(turns * picture.period * (asked.fps or FPS)), 1)
     if frames > MOST_FRAMES:
-        raise RequestError(f'this takes {frames} frames, more than {MOST_FRAMES}: choose '
-                           '--frames, --turns or --fps')
+        raise RequestError(f'this would be {frames} frames, more than {MOST_FRAMES}: choose '
+                           'fewer with --frames, --turns or --fps')
     return [turns * k / frames for k in range(frames)]
 
 
@@ -144,19 +144,19 @@ def parser() -> Parser:
                   formatter_class=argparse.RawDescriptionHelpFormatter)
     made.add_argument('scene', metavar='SCENE', help='parameter file of the scene')
     made.add_argument('--out', metavar='FILE', type=Path, required=True,
-                      help=f'what to write; ends in {", ".join(STILL + MOVING)}')
+                      help=f'output file, which ends in {", ".join(STILL + MOVING)}')
     made.add_argument('--data', metavar='FILE', type=Path,
-                      help='write what is drawn as CSV too: time [s], inputs [rad or m] and '
-                      'joints [m], every digit')
+                      help='also write the drawn values as CSV: time [s], inputs [rad or m] and '
+                      'joints [m], with all digits')
     made.add_argument('--mechanisms', metavar='NAME,...', type=words, default=[],
                       help='draw only these of the scene')
     made.add_argument('--trace', choices=parts.TRACES, default='whole',
                       help="the traced joint's curve: whole (default), growing in the first turn, "
-                      'fading after 0.3 turns, a whole one whose stance, where a foot is on the '
-                      'ground, is bold, or none')
+                      'fading after 0.3 turns, stance (whole, and bold where the foot is on the '
+                      'ground), or none')
     made.add_argument('--show', metavar='PART,...', type=parts_of_a_picture, default=frozenset(),
-                      help='draw besides: dimensions, floor (what walks on it makes it move), '
-                      "labels (the joints' names, which animations are without)")
+                      help='draw these too: dimensions, floor (which moves with the foot on it), '
+                      "labels (the joints' names, by default not in animations)")
     made.add_argument('--hide', metavar='PART,...', type=parts_of_a_picture, default=frozenset(),
                       help=f'leave out some of {", ".join(parts.PARTS)}')
     made.add_argument('--size', metavar='WxH', type=size, default=(720, 720),
@@ -167,14 +167,14 @@ def parser() -> Parser:
                        '(default: where it starts)')
     moving = made.add_argument_group('for .gif and .mp4')
     moving.add_argument('--turns', metavar='N', type=within(float, 0.001, 1000.0),
-                        help="turns of the first mechanism's crank, or swings to and fro "
+                        help="turns of the first mechanism's crank, or periods of its oscillation "
                         '(default: 1)')
     moving.add_argument('--fps', metavar='N', type=within(float, 0.001, FASTEST),
-                        help=f'frames a second (default: {FPS:g})')
+                        help=f'frames per second (default: {FPS:g})')
     moving.add_argument('--frames', metavar='N', type=within(int, 1, MOST_FRAMES),
-                        help="frames in all (default: as many as the crank's speed takes)")
+                        help="frames in all (default: in real time, by the crank's speed)")
     moving.add_argument('--loop', metavar='N', type=within(int, 0, 65536),
-                        help='how often a .gif plays (default: 0, again and again)')
+                        help='number of times that a .gif plays (default: 0, endlessly)')
     moving.add_argument('--colours', metavar='N', type=within(int, 2, MOST_COLOURS),
                         help=f'colours of a .gif: fewer make it smaller (default: {MOST_COLOURS})')
     return made
@@ -211,7 +211,7 @@ def parts_of_a_picture(text):
     """Return the parts between commas."""
     for word in words(text):
         if word not in parts.PARTS:
-            raise argparse.ArgumentTypeError(f'{word} is no part of a picture; allowed: '
+            raise argparse.ArgumentTypeError(f'unknown part {word}; allowed: '
                                              f'{", ".join(parts.PARTS)}{meant(word, parts.PARTS)}')
     return frozenset(words(text))
 

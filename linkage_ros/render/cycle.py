@@ -17,7 +17,7 @@ from ..scene import in_words, InputSettings, SceneError, SceneMechanism
 from ..scene.motion import Motion
 
 SAMPLES = 720  # of a turn
-MOST_TURNS = 24  # after which several inputs need not be where they started
+MOST_TURNS = 24  # limit of the turns in which several inputs return to their starts
 
 
 class Configuration(NamedTuple):
@@ -64,7 +64,7 @@ class Wheel:
             value = low + (value - low) % math.tau if self.input.turns else value
             if not low <= value <= high:
                 unit = self.input.unit
-                raise SceneError(f'the {self.input.quantity} never is {value:.6g} {unit}: '
+                raise SceneError(f'the {self.input.quantity} never reaches {value:.6g} {unit}: '
                                  f'it stays inside {in_words([self._sweep])} {unit}')
             ends = [value, 2.0 * low - value]
         return min(self._sign * (end - self._start) % self._turn for end in ends) / self._turn
@@ -98,7 +98,7 @@ class Cycle:
         self._wheels = [Wheel(drive) for drive in machine.inputs.values()]
         self.first = self._wheels[0]
         self.period = self.first.period
-        self._ratios = [1.0, *(at_once(self.period, wheel.period)
+        self._ratios = [1.0, *(turn_ratio(self.period, wheel.period)
                                for wheel in self._wheels[1:])]
         self.turns = next((n for n in range(1, MOST_TURNS) if all(
             math.isclose(n * ratio, round(n * ratio)) for ratio in self._ratios)), MOST_TURNS)
@@ -133,7 +133,7 @@ class Cycle:
         return self.course[:, 0, machine.linkage.points.index(machine.tracer)]
 
 
-def at_once(period: float, other: float) -> float:
+def turn_ratio(period: float, other: float) -> float:
     """Return the turns of another input in one turn of the first, from their periods [s]."""
     if not math.isfinite(other):
         return 0.0

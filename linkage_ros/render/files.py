@@ -16,7 +16,7 @@ from PIL import Image
 
 PALETTE_FRAMES = 8
 FREQUENT = 0.3  # of a GIF's colours: the most frequent ones
-FINEST = 100  # a GIF counts its time in hundredths of a second
+FINEST = 100  # the unit of time in a GIF is a hundredth of a second
 
 # Fonts as outlines, and names from a fixed salt: an SVG that is the same everywhere.
 SVG = {'svg.hashsalt': 'linkage_ros', 'svg.fonttype': 'path'}
@@ -108,12 +108,12 @@ def unpacked(colours):
 def mp4(picture, times, fps, file: Path, progress):
     """Write a picture at some times as MP4; raise OSError with ffmpeg's message if it fails."""
     height, width, _ = picture.at(times[0]).shape
-    with replacing(file) as new, tempfile.TemporaryFile() as said:
+    with replacing(file) as new, tempfile.TemporaryFile() as messages:
         encoder = subprocess.Popen([
             'ffmpeg', '-v', 'error', '-y', '-f', 'rawvideo', '-pix_fmt', 'rgb24',
             '-video_size', f'{width}x{height}', '-framerate', f'{fps:g}', '-i', '-',
             '-c:v', 'libx264', '-crf', '18', '-pix_fmt', 'yuv420p', '-movflags', '+faststart',
-            *REPRODUCIBLE, '-f', 'mp4', new], stdin=subprocess.PIPE, stderr=said)
+            *REPRODUCIBLE, '-f', 'mp4', new], stdin=subprocess.PIPE, stderr=messages)
         try:
             assert encoder.stdin
             with encoder.stdin as pipe:
@@ -122,8 +122,8 @@ def mp4(picture, times, fps, file: Path, progress):
         except BrokenPipeError:
             pass
         if encoder.wait():
-            said.seek(0)
-            raise OSError(f'ffmpeg failed: {said.read().decode(errors="replace").strip()}')
+            messages.seek(0)
+            raise OSError(f'ffmpeg failed: {messages.read().decode(errors="replace").strip()}')
 
 
 def data(picture, times, file: Path):

@@ -23,9 +23,9 @@ from ..palette import BAR, DARK, DRIVEN, EARTH, FLOOR, GREY, LOCUS, TRACK
 from ..robot_model import shapes
 
 FADED = 0.3  # turns after which a fading trace is gone
-STANCE = 0.06  # of a foot curve's height: a foot lower than that is on the ground
+STANCE = 0.06  # of a foot curve's height: below that the foot is on the ground
 CURVED = 20  # points: a line that has more is a curve
-STRAIGHT = 1e-9  # of a curve's length: how far it may leave a line and still be called one
+STRAIGHT = 1e-9  # of a curve's length: largest deviation of a straight line
 WHITENED = 0.7  # how white the last of many pairs of legs is
 
 HALO = [withStroke(linewidth=3, foreground='white')]
@@ -113,7 +113,7 @@ def sliding(machine):
 
 
 def straight(curve):
-    """Return two ends of a curve if it is a straight line, else None."""
+    """Return the ends of a curve that is a straight line, else None."""
     if not len(curve):
         return None
     first = curve[0]
@@ -126,13 +126,13 @@ def straight(curve):
 
 def around(frame):
     """Return a link's joints in their order around their centre."""
-    seen = {name: complex(*place) for name, place in frame.items()}
-    middle = sum(seen.values()) / len(seen)
-    return sorted(seen, key=lambda name: cmath.phase(seen[name] - middle))
+    places = {name: complex(*place) for name, place in frame.items()}
+    middle = sum(places.values()) / len(places)
+    return sorted(places, key=lambda name: cmath.phase(places[name] - middle))
 
 
 class Legs:
-    """The links and joints; of several pairs of legs each is paler than the one before it."""
+    """The links and joints; each pair of legs is paler than the one before."""
 
     def __init__(self, axes, machine, cycle, parts, unit):
         linkage = machine.linkage
@@ -228,7 +228,7 @@ def fixed(course):
 class Floor:
     """The floor, which moves with the lowest foot."""
 
-    MARKS = 9  # in a turn's way
+    MARKS = 9  # per turn
 
     def __init__(self, axes, machine, cycle, unit):
         tracer = machine.linkage.points.index(machine.tracer)
@@ -236,7 +236,7 @@ class Floor:
         lowest = np.nan_to_num(feet[:-1, :, 1], nan=np.inf).argmin(axis=1)
         steps = np.diff(feet[:, :, 0], axis=0)[np.arange(len(lowest)), lowest]
         self._way = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
-        # After a turn the marks coincide with former marks; a single foot returns them itself.
+        # After a turn, marks are at the places of other marks; a single foot moves them back.
         turn, stride = abs(self._way[-1]), np.ptp(self._way) or 1.0
         self.spacing = turn / self.MARKS if turn > 0.1 * stride else 0.5 * stride
         self._tracer = tracer
@@ -292,7 +292,7 @@ class Headline:
 
 
 def readings(linkage, inputs, short=False):
-    """Return as texts the inputs, the angle of a lever that one drives, and their ratios."""
+    """Return texts of the inputs and, for a slotted lever, of its angle and the ratios."""
     if not hasattr(linkage, 'reduction'):
         return [reading(re.sub(r'^crank(?=\d*$)', 'θ', input_.name), value) if input_.turns
                 else f'{input_.name} = {value:.4g} m'
@@ -312,7 +312,7 @@ def reading(name, angle):
 
 
 def rounded(number, digits):
-    """Return a number as text, with the sign of what is shown."""
+    """Return a rounded number as text, without the sign of a zero."""
     return f'{round(number, digits) + 0.0:.{digits}f}'.replace('-', '−')
 
 

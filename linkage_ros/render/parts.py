@@ -1,10 +1,10 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The names of what a picture can show, as the command line takes them."""
+"""Names of traces and parts of a picture, as the command line has them."""
 
 TRACES = ('whole', 'growing', 'fading', 'stance', 'none')
 PARTS = ('axes', 'title', 'dimensions', 'labels', 'links', 'joints', 'guides', 'floor')
 
-USUAL = frozenset({'axes', 'title', 'labels', 'links', 'joints', 'guides'})
-USUAL_IN_MOTION = USUAL - {'labels'}
+DEFAULT = frozenset({'axes', 'title', 'labels', 'links', 'joints', 'guides'})
+DEFAULT_IN_MOTION = DEFAULT - {'labels'}

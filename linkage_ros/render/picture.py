@@ -13,17 +13,17 @@ import numpy as np
 
 from . import layers
 from .cycle import Cycle
-from .parts import USUAL
+from .parts import DEFAULT
 from ..palette import FRAME, GRID
 
 DOTS_PER_INCH = 100
-CROWDED = 'the size is too small for what is drawn: choose a larger one, or hide a part'
+CROWDED = 'the size is too small for the drawn parts: choose a larger one, or hide a part'
 PADDING = 0.1  # inches, around everything
 READABLE = 24  # poses in which the joints' names keep clear of the links
 
 
 class PictureError(ValueError):
-    """What cannot be drawn, and why."""
+    """A picture that cannot be drawn; the text has the reason."""
 
 
 class Picture:
@@ -33,20 +33,20 @@ class Picture:
     Parameters
     ----------
     machines : sequence of SceneMechanism
-        What to draw.
+        The machines.
     size : (int, int)
         Width and height in pixels.
     trace : str
         One of parts.TRACES.
     parts : collection of str
-        What of parts.PARTS to draw.
+        Some of parts.PARTS.
     motions : sequence, optional
-        How each machine moves, if not as its Cycle does: whatever has a cycle's `period`,
+        The motion of each machine, by default its Cycle: objects with a cycle's `period`,
         `prefixes`, `course`, `pose`, `curve` and `locus`.
 
     """
 
-    def __init__(self, machines, size=(720, 720), trace='whole', parts=USUAL, motions=None):
+    def __init__(self, machines, size=(720, 720), trace='whole', parts=DEFAULT, motions=None):
         width, height = size
         self.figure = Figure((width / DOTS_PER_INCH, height / DOTS_PER_INCH), DOTS_PER_INCH,
                              layout='constrained', facecolor='white')
@@ -78,7 +78,7 @@ class Picture:
         self.show(times[0])
         with warnings.catch_warnings():
             warnings.filterwarnings('error', 'constrained_layout not applied')
-            for _ in range(2):  # the axes fit their labels, which follow from their limits
+            for _ in range(2):  # the axes' size depends on their labels, these on their limits
                 try:
                     self._canvas.draw()
                 except UserWarning:
@@ -91,12 +91,12 @@ class Picture:
             panel.settle([self._turns(panel, turns) for turns in chosen])
 
     def show(self, turns):
-        """Move all to where they are after so many turns of the first mechanism's crank."""
+        """Move all panels to a time [turns of the first mechanism's crank]."""
         for panel in self.panels:
             panel.show(self._turns(panel, turns))
 
     def at(self, turns):
-        """Return the picture after so many turns, shape (height, width, 3), 8 bits a colour."""
+        """Return the picture at a time [turns], shape (height, width, 3), 8 bits per colour."""
         self.show(turns)
         if self._still is None:
             self._canvas.draw()
@@ -107,11 +107,11 @@ class Picture:
         return np.array(self._canvas.buffer_rgba())[..., :3]
 
     def seconds(self, turns):
-        """Return how long so many turns take [s]; what stands still takes none."""
+        """Return the duration of turns [s]; 0 if the first mechanism stands still."""
         return turns * self.period if math.isfinite(self.period) else 0.0
 
     def _turns(self, panel, turns):
-        """Return the turns of one mechanism in the time of so many turns of the first."""
+        """Return the turns of one mechanism in the time of some turns of the first."""
         if panel is self.panels[0] or panel.cycle.period == self.period:
             return turns
         return self.seconds(turns) / panel.cycle.period
@@ -142,7 +142,7 @@ class Panel:
         self._dress('axes' in parts, unit)
 
     def _drawn(self):
-        """Return the lowest and the highest x and y of what is drawn in a turn [m]."""
+        """Return the lowest and the highest x and y drawn in a turn [m]."""
         course, joints = self.cycle.course, len(self.machine.linkage.points)
         places = [course[:, :, self._joints].reshape(-1, 2), course[:, :, joints:].reshape(-1, 2)]
         places += [line.get_xydata() for line in self._axes.lines if len(line.get_xdata()) > 2]
@@ -164,7 +164,7 @@ class Panel:
                                                steps=[1, 2, 2.5, 5, 10]))
 
     def fill(self):
-        """Set the limits so that all is inside, at one scale; PictureError if there is no room."""
+        """Set limits around all that is drawn, at one scale; PictureError if too small."""
         low, high = self._extent
         pixels = np.array(self._axes.get_window_extent().size)
         if pixels.min() < 3.0 * self._margin:
@@ -180,24 +180,24 @@ class Panel:
             self._names.settle(np.stack([self.cycle.pose(turns).places for turns in times]))
 
     def show(self, turns):
-        """Move all to where they are after so many turns of the crank."""
+        """Move all layers to a time [turns of the crank]."""
         self.pose = self.cycle.pose(turns)
         for layer in self.moving:
             layer.show(self.pose)
 
     def draw(self):
-        """Draw what moves onto what stands still."""
+        """Draw the moving artists over the fixed ones."""
         for layer in self.moving:
             for artist in layer.artists:
                 self._axes.draw_artist(artist)
 
     def columns(self):
-        """Return the names of what `values` returns."""
+        """Return the names of the `values`."""
         name = self.machine.name
         joints = [f'{leg}{joint}_{axis}' for leg in self.cycle.prefixes
                   for joint in self.machine.points for axis in 'xy']
         return [f'{name}_{part}' for part in (*self.machine.inputs, *joints)]
 
     def values(self):
-        """Return the inputs [rad or m] and the joints [m] as they are shown."""
+        """Return the shown inputs [rad or m] and joints [m]."""
         return [*self.pose.inputs, *self.pose.places[:, self._joints].ravel().tolist()]

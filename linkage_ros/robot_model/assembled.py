@@ -19,12 +19,12 @@ from .bodies import BALL, Body, BOX, Joint, Piece, Point, Robot, ROD, size
 from ..scene import SceneError, SceneMechanism
 from ..scene.motion import Motion
 
-# Of aluminium [kg/m^3].
+# Density of aluminium [kg/m^3].
 DENSITY = 2700.0
 
 
 class Weight(NamedTuple):
-    """Mass [kg], centre x, y [m], and moments of inertia about it xx, yy, zz, xy [kg m^2]."""
+    """Mass [kg], centre of mass x, y [m], moments of inertia about it xx, yy, zz, xy [kg m^2]."""
 
     mass: float
     centre: Tuple[float, float]
@@ -96,10 +96,10 @@ def assembled(robot: Robot, density: float = DENSITY) -> Assembled:
         tips = {link.name: link.tip for link in machine.linkage.links}
         mass = sum(solid.weight.mass for solid in solids[1:])
         for name, drive in machine.inputs.items():
-            called = machine.joints[name]
+            joint = machine.joints[name]
             arm = math.hypot(*machine.linkage.frames[name][tips[name]])
-            ends = sorted(map(called.of, drive.sweep or ()))
-            made.motors.append(Motor(called.name, drive.input.turns, called.of(starts[name]), ends,
+            ends = sorted(map(joint.of, drive.sweep or ()))
+            made.motors.append(Motor(joint.name, drive.input.turns, joint.of(starts[name]), ends,
                                      mass, machine.scale * arm if arm else size(machine)))
         made.gears.extend(Gear(name, *max(rates[name].items(), key=lambda item: abs(item[1])))
                           for name in rates)
@@ -109,7 +109,7 @@ def assembled(robot: Robot, density: float = DENSITY) -> Assembled:
 def _solved(machine: SceneMechanism, starts: Dict[str, float]
             ) -> Tuple[Dict[str, float], Dict[str, Dict[str, float]]]:
     """Return the initial positions of joints, and the rates of geared ones by each input."""
-    assembly, called, inputs = machine.assembly(), machine.joints, list(machine.inputs)
+    assembly, published, inputs = machine.assembly(), machine.joints, list(machine.inputs)
     solution = assembly.solution((), assembly.joints, assembly.joints)
     values = dict(starts)
     rates: Dict[str, Dict[str, float]] = {}
@@ -120,13 +120,14 @@ def _solved(machine: SceneMechanism, starts: Dict[str, float]
             values.update(zip([prefix + joint for joint in assembly.joints], row))
             for joint, rate in zip(assembly.joints, row[count:]):
                 if joint in machine.linkage.geared:
-                    own, other = called[prefix + joint], called[driving]
+                    own, other = published[prefix + joint], published[driving]
                     rates.setdefault(own.name, {})[other.name] = own.sign * rate * other.sign
     if not np.isfinite(list(values.values())).all():
         keys = ' and '.join(f'{machine.name}.{name}.start' for name in starts)
-        given = ', '.join(f'{value:g}' for value in starts.values())
-        raise SceneError(f'{keys} must be where {machine.name} can be assembled, not at {given}')
-    return {called[name].name: called[name].of(value) for name, value in values.items()}, rates
+        actual = ', '.join(f'{value:g}' for value in starts.values())
+        raise SceneError(f'{keys} must be where {machine.name} can be assembled, not at {actual}')
+    return {published[name].name: published[name].of(value)
+            for name, value in values.items()}, rates
 
 
 def _slots(machine: SceneMechanism, bodies: Sequence[Body], positions: Dict[str, float]

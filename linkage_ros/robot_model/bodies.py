@@ -12,7 +12,7 @@ joint, which coincides with the joint's own point in a closed loop::
       <mechanism>_ground_link             at the mechanism's pose; its plane is x-y
         <mechanism>_<link>_link           moved by <mechanism>_<link>, or by its joint_names
           <mechanism>_<point>             fixed, one for each joint of the linkage
-          <mechanism>_<point>_cut         fixed, on the link that has to meet that joint
+          <mechanism>_<point>_cut         fixed, at the same joint on the link that was cut off
 
 Legs of a walker have their prefix before link and point, and one crank for all of them.
 """
@@ -34,11 +34,11 @@ from ..scene import SceneError, SceneMechanism
 from ..scene.scene_mechanism import IN_SPACE
 from ..words import listed
 
-# As in the markers: bars, what inputs move, guides and joints.
+# The colours of the markers: bars, driven bodies, guides and joints.
 COLOURS = {'bar': palette.BAR, 'driven': palette.DRIVEN, 'slot': palette.SLOT,
            'joint': palette.JOINT}
 
-# As parts of the longest bar: radii of bars, joints and barrels, thickness of guides and blocks.
+# Fractions of the longest bar: radii of bars, joints and barrels, thickness of guides and blocks.
 BAR, JOINT, BARREL, GUIDE, BLOCK = 1 / 80, 1 / 40, 1 / 32, 1 / 80, 1 / 20
 
 # Range of sizes [m] that displays can draw in single precision.
@@ -65,14 +65,14 @@ class Piece(NamedTuple):
 
     @property
     def pose(self) -> Tuple[float, ...]:
-        """Its middle x, y, z [m], roll, pitch, yaw: a cylinder's z is laid down, then turned."""
+        """Its middle x, y, z [m], roll, pitch, yaw [rad]; pitch lays a cylinder's z along x."""
         (x, y), (u, v) = self.start, self.end
         return (0.5 * (x + u), 0.5 * (y + v), 0.0,
                 0.0, 0.5 * math.pi if self.shape == ROD else 0.0, math.atan2(v - y, u - x))
 
     @property
     def sizes(self) -> Dict[str, Tuple[float, ...]]:
-        """Its sizes [m], as URDF and SDF call them."""
+        """Its sizes [m], by their names in URDF and SDF."""
         if self.shape == BOX:
             return {'size': (self.length, self.thickness, self.thickness)}
         length = {'length': (self.length,)} if self.shape == ROD else {}
@@ -80,7 +80,7 @@ class Piece(NamedTuple):
 
 
 class Point(NamedTuple):
-    """A joint of the linkage on a body; where a loop was cut, it has to meet another point."""
+    """A joint of the linkage on a body; `meets` is the coinciding point if a loop was cut here."""
 
     name: str
     place: Place
@@ -93,7 +93,7 @@ class Point(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """The joint of a body: rotation about z or sliding along x, with a sign and limits, if any."""
+    """The joint of a body: rotation about z or slide along x, with a sign and optional limits."""
 
     name: str
     kind: str
@@ -108,7 +108,7 @@ class Joint(NamedTuple):
 
 @dataclass
 class Body:
-    """A body on its parent at x, y, z [m], roll, pitch, yaw [rad] where its joint is at zero."""
+    """A body; pose: x, y, z [m], roll, pitch, yaw [rad] on its parent with its joint at zero."""
 
     name: str
     parent: str
@@ -162,17 +162,18 @@ class Robot:
         """Return the bodies of all mechanisms."""
         return [body for part in self.parts for body in part.bodies]
 
-    def check_names(self, whose: str) -> None:
-        """Raise SceneError where two links or two joints have the same name."""
+    def check_names(self, parameter: str) -> None:
+        """Raise SceneError if two links or two joints have the same name."""
         for tag, several in (('joint', [part.joints for part in self.parts]),
                              ('link', [part.links for part in self.parts])):
             names = set().union(*several)
             if tag == 'link' and self.root in names:
-                raise SceneError(f'frame_id must be no link of the robot model, not {self.root!r}')
+                raise SceneError('frame_id must differ from the links of the robot model, '
+                                 f'not be {self.root!r}')
             if len(names) < sum(map(len, several)):
                 (name, _), = Counter(chain(*several)).most_common(1)
-                raise SceneError(f'{whose} must be other names: the robot model would have two '
-                                 f'{tag}s {name}')
+                raise SceneError(f'{parameter} must have other names: the robot model would have '
+                                 f'two {tag}s {name}')
 
 
 def robot(machines: Iterable[SceneMechanism], frame_id: str,
@@ -192,8 +193,8 @@ def robot(machines: Iterable[SceneMechanism], frame_id: str,
     Raises
     ------
     SceneError
-        If two links or two joints would have the same name, the whole would be no tree, or
-        something is too large or small.
+        If two links or two joints would have the same name, the links would not form a tree, or
+        a size is out of range.
 
     """
     return together([_robot(machine, machine.frame_id or frame_id, width) for machine in machines])
@@ -201,9 +202,9 @@ def robot(machines: Iterable[SceneMechanism], frame_id: str,
 
 def together(robots: Sequence[Robot]) -> Robot:
     """
-    Return robot models as one; raise SceneError if they make no tree.
+    Return robot models as one; raise SceneError if they do not form a tree.
 
-    They have the same root link, or the root of one is a link of another.
+    They must have the same root link, or the root of one must be a link of another.
     """
     if len(robots) == 1:
         return robots[0]
@@ -256,7 +257,7 @@ def _numbers(robot: Robot) -> Iterator[float]:
 
 
 def size(machine: SceneMechanism) -> float:
-    """Return the longest bar [m]; raise SceneError where it cannot be drawn."""
+    """Return the length of the longest bar [m]; raise SceneError if it is out of range."""
     length = machine.scale * float(machine.linkage.longest)
     if not SMALLEST <= length <= LARGEST:
         raise SceneError(

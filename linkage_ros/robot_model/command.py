@@ -21,13 +21,13 @@ def main(args: Optional[List[str]] = None) -> int:
 
 
 def show(args: Optional[List[str]], given: Optional[scene.Scene] = None) -> None:
-    """Print what a command line asks for, of its scene or of one that ROS has."""
+    """Print the model that a command line requests, of its scene or of the one from ROS."""
     asked = parser().parse_args(args)
     if given and asked.scene:
-        raise command.RequestError('the scene comes as SCENE or with --ros-args, not with both')
+        raise command.RequestError('give the scene either as SCENE or with --ros-args, not both')
     found = given or (scene.load(asked.scene) if asked.scene else scene.read({}))
     if asked.format == 'urdf' and asked.density:
-        raise command.RequestError('--density is for sdf and mjcf: a URDF has no masses here')
+        raise command.RequestError('--density is for sdf and mjcf only: the URDF has no masses')
     robot = bodies.robot(command.chosen(found.machines, asked.mechanism), found.frame_id,
                          asked.width)
     if asked.format == 'urdf':
@@ -41,7 +41,7 @@ def parser() -> command.Parser:
     """Return the parser of the command line."""
     made = command.Parser(
         NAME, description='Print the robot model of a scene.',
-        epilog='As `ros2 run linkage_ros urdf` it takes the scene as a node does, too: '
+        epilog='`ros2 run linkage_ros urdf` also accepts the scene as a node does: '
                '--ros-args --params-file SCENE')
     made.add_argument('scene', metavar='SCENE', nargs='?',
                       help="the scene's parameter file (default: the catalogue's linkages)")
@@ -51,9 +51,11 @@ def parser() -> command.Parser:
                       help='a tree for robot_state_publisher, or closed loops for Gazebo or '
                            'MuJoCo (default: urdf)')
     made.add_argument('--width', type=_positive, metavar='M',
-                      help='of a bar, all else in proportion (default: a 40th of the longest)')
+                      help='thickness of a bar, with all other shapes in proportion (default: a '
+                           '40th of the longest)')
     made.add_argument('--density', type=_positive, metavar='KG/M3',
-                      help=f'of all bodies of sdf and mjcf (default: {DENSITY:g}, aluminium)')
+                      help='density of all bodies of sdf and mjcf '
+                           f'(default: {DENSITY:g}, aluminium)')
     return made
 
 

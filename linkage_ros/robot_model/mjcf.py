@@ -25,7 +25,7 @@ from ..scene import SceneError
 
 # Time steps [s] for a linkage of a metre; smaller linkages oscillate faster.
 STEP, LARGE = 1e-3, 1.0
-# A servo yields by a thousandth [rad or of the longest bar] to the weight of it all.
+# A servo yields by a thousandth [rad, or of the longest bar] to the weight of all bodies.
 STIFFNESS = 1000.0
 GRAVITY = 9.81
 # The smallest moment of inertia [kg m^2] that MuJoCo accepts.

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""RViz's configuration of any scene, made from the one that shows all of the catalogue."""
+"""RViz's configuration of a scene, adapted from that of the catalogue."""
 
 import copy
 import json
@@ -68,9 +68,9 @@ def adapted(config: dict, machines: Mapping[str, SceneMechanism], frame_id: str,
 
 
 def _camera(machines: Iterable[SceneMechanism]) -> Dict[str, Any]:
-    """Return from where all that mechanisms reach is seen, square to the plane of the first."""
-    seen, normals = zip(*map(_seen, machines))
-    places, normal = np.concatenate(seen), normals[0]
+    """Return a camera that sees all places of the joints, square to the first one's plane."""
+    clouds, normals = zip(*map(_seen, machines))
+    places, normal = np.concatenate(clouds), normals[0]
     low, high = places.min(axis=0), places.max(axis=0)
     x, y, z = (round(float(one), 2) + 0.0 for one in (low + high) / 2)
     pitch = min(max(math.asin(max(-1.0, min(1.0, normal[2]))), DOWN), STEEPEST)

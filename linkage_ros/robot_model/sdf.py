@@ -84,7 +84,7 @@ def _add_joint(robot: ElementTree.Element, name: str, joint: Optional[Joint], pa
 
 def _add_ends(joint: ElementTree.Element, gear: Optional[Gear], motor: Optional[Motor],
               start: float) -> None:
-    """Say how a joint follows another, or between which ends it is moved."""
+    """Add the gear of a joint, or the limits of its motor."""
     axis, = joint.iter('axis')
     if gear:
         mimic = ElementTree.SubElement(axis, 'mimic', joint=gear.input)

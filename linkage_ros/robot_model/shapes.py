@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What there is to be drawn of a linkage: what slides, which bars are cranks, which make a plate.
+Shapes of a linkage for drawing: sliding parts, cranks, plates and marks of the ground.
 
-What slides is a cylinder's barrel and rod, a block, and the guide it runs on. Each is a straight
-piece of one link, so it moves with that link in markers, pictures and models.
+Sliding parts are a cylinder's barrel and rod, a block, and the guide that it runs on. Each is a
+straight piece of one link, so it moves with that link in markers, pictures and models.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from ..linkage.quantities import LinkPoint
 from ..scene import InputSettings, SceneMechanism
 
 GUIDE, BLOCK, BARREL, ROD = 'guide', 'block', 'barrel', 'rod'
-# Of the longest bar: half the length of a block, and how far a guide goes beyond its block.
+# Half the length of a block, and of a guide beyond its travel, as a fraction of the longest bar.
 HALF_BLOCK = 1 / 20
-# Of a cylinder's shortest length: the least and the most that its barrel takes.
+# Least and greatest length of a barrel, as a fraction of the cylinder's shortest length.
 SHORT_BARREL, LONG_BARREL = 0.5, 0.9
-# Of the longest bar: how high the mark of a joint on the ground is; half its width of its height.
+# Height of a ground joint's mark, as a fraction of the longest bar; half its width per height.
 MARK, HALF_MARK = 1 / 15, 0.6
-# Of the longest bar squared: an area that is none.
+# A smaller area counts as zero, as a fraction of the longest bar squared.
 FLAT = 1e-9
-# Poses by which it is found how far something slides.
+# Number of poses that determine the travel of a slide.
 SAMPLES = 361
 
 
@@ -50,7 +50,7 @@ class Shape(NamedTuple):
 
 
 def shapes(machine: SceneMechanism) -> List[Shape]:
-    """Return what slides in a mechanism, guides first; what no pose is found of is left out."""
+    """Return the sliding parts, guides first; parts that no pose was found for are omitted."""
     linkage = machine.linkage
     slides = [link for link in linkage.links if link.kind == 'prismatic']
     if not slides:
@@ -65,20 +65,20 @@ def shapes(machine: SceneMechanism) -> List[Shape]:
 
 
 def drawn(machine: SceneMechanism, names: Collection[str]) -> List[Shape]:
-    """Return what is drawn of these joints; rods are drawn as other bars are."""
+    """Return the shapes to draw between these joints; rods are drawn as bars."""
     return [shape for shape in shapes(machine)
             if shape.kind != ROD and {shape.slide.joint, shape.slide.tip} <= set(names)]
 
 
 def cranks(linkage: Mechanism, parent: Optional[str] = None) -> List[Tuple[str, str]]:
-    """Return the bars that inputs turn, from centre to pin; all, or those on one link."""
+    """Return the bars that inputs turn, from centre to pin; all, or those with one parent."""
     names = [input_.name for input_ in linkage.inputs if input_.turns]
     return [(link.joint, link.tip) for link in linkage.links
             if link.name in names and parent in (None, link.parent)]
 
 
 def plates(linkage: Mechanism, names: Collection[str]) -> List[Tuple[str, str, str]]:
-    """Return three by three those joints whose bars are a triangle of one link."""
+    """Return triples of joints whose bars form a triangle of one link."""
     bars = set(map(frozenset, linkage.bars))
     return [corners for frame in linkage.frames.values()
             for corners in combinations([name for name in frame if name in names], 3)
@@ -91,7 +91,7 @@ def _area(p: complex, q: complex, r: complex) -> float:
 
 
 def marks(linkage: Mechanism, names: Collection[str]) -> List[Tuple[str, LinkPoint, LinkPoint]]:
-    """Return for each of these joints on the ground the triangle that it stands on."""
+    """Return the triangle below each of these joints that is on the ground."""
     height = MARK * linkage.longest
     width = HALF_MARK * height
     return [(name, LinkPoint(GROUND, x - width, y - height),
@@ -100,7 +100,7 @@ def marks(linkage: Mechanism, names: Collection[str]) -> List[Tuple[str, LinkPoi
 
 
 def _cylinder(link: Link, low: float, high: float) -> Iterable[Tuple[str, LinkPoint, LinkPoint]]:
-    """Yield barrel and rod: a barrel takes in the stroke, as far as there is room for it."""
+    """Yield barrel and rod; the barrel is as long as the stroke, within its limits."""
     barrel = min(max(high - low, SHORT_BARREL * low), LONG_BARREL * low)
     yield BARREL, LinkPoint(link.parent, 0.0, 0.0), LinkPoint(link.parent, barrel, 0.0)
     yield ROD, LinkPoint(link.name, barrel - high, 0.0), LinkPoint(link.name, 0.0, 0.0)
@@ -108,7 +108,7 @@ def _cylinder(link: Link, low: float, high: float) -> Iterable[Tuple[str, LinkPo
 
 def _block(link: Any, low: float, high: float, frames: Dict[str, dict],
            half: float) -> Iterable[Tuple[str, LinkPoint, LinkPoint]]:
-    """Yield the guide, on the link that a slide slides on, and the block."""
+    """Yield the guide, on the parent link of a slide, and the block."""
     x, y = frames[link.name][link.tip]
     start, along = complex(*frames[link.parent][link.joint]), cmath.rect(1.0, link.zero)
     first, last = (start + along * complex(x + end, y) for end in (low - half, high + half))

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Robot models as URDF: the tree, for what moves it by the positions of its joints.
+Robot models as URDF: the tree, for programs that move it by the positions of its joints.
 
-Points are links of their own, fixed to their bodies. There are no inertias, which nothing needs
-that is moved by positions. Limits have effort and velocity 0: not known.
+Points are links of their own, fixed to their bodies. There are no inertias: a model moved by
+positions needs none. Effort and velocity of limits are 0, which means unknown.
 
 Format: the URDF XML specification of ROS (wiki.ros.org/urdf/XML).
 """
@@ -21,7 +21,7 @@ from .bodies import Body, COLOURS, numbers, Part, Piece, Robot
 from .. import palette
 from ..scene import SceneMechanism
 
-# Of a scene most mechanisms are as they were when it is written again.
+# When a scene is written again, most of its mechanisms are unchanged.
 _written: WeakKeyDictionary[Part, str] = WeakKeyDictionary()
 
 

@@ -33,7 +33,7 @@ SOURCE = Field('string', 'Source joint, whose position in messages gives the {0}
 MEASURES = Field('string', 'Output that the source joint measures; empty: the {0} itself.',
                  readers=ALL, read_only=True)
 RATIO = Field('double', 'Motion of the {0} per unit of its source joint [1].', readers=ALL,
-              rule='not zero')
+              rule='other than zero')
 OFFSET = Field('double', 'Value of the {0} when its source joint is at zero [{1}].', readers=ALL)
 SWEEP = Field('double_array', "Ends of the {0}'s oscillation [{1}]; empty: its reach, or full "
               'rotation.', readers=ALL,

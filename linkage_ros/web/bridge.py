@@ -72,7 +72,7 @@ class Bridge:
     async def call(self, client: Any, request: Any) -> Any:
         """Return a service's response; raise NoAnswer if there is none in time."""
         try:
-            return await asyncio.wait_for(self._called(client, request), SECONDS_TO_ANSWER)
+            return await asyncio.wait_for(self._response(client, request), SECONDS_TO_ANSWER)
         except asyncio.TimeoutError:
             raise NoAnswer(f'{client.srv_name} does not answer') from None
 
@@ -87,16 +87,16 @@ class Bridge:
         except RuntimeError:
             pass
 
-    async def _called(self, client: Any, request: Any) -> Any:
+    async def _response(self, client: Any, request: Any) -> Any:
         while not await self.ask(client.service_is_ready):
             await asyncio.sleep(SECONDS_BETWEEN_TRIES)
         future = self.loop.create_future()
-        asked = await self.ask(client.call_async, request)
-        asked.add_done_callback(lambda done: self.hand_over(_settle, future, done.result()))
+        pending = await self.ask(client.call_async, request)
+        pending.add_done_callback(lambda done: self.hand_over(_settle, future, done.result()))
         try:
             return await future
         finally:
-            self.ask(client.remove_pending_request, asked)
+            self.ask(client.remove_pending_request, pending)
 
 
 def _settle(future: asyncio.Future[Any], result: Any, error: Optional[Exception] = None) -> None:

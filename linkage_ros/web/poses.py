@@ -81,17 +81,17 @@ def arrows(machine: SceneMechanism, present: Sequence[float], kind: str,
     """
     Return one of ARROWS at each joint of the first leg: `unit`, and x, y in its plane by joint.
 
-    Speeds [rad/s or m/s] are by input; what is not given stands still. Forces are the loads, and
-    `efforts` by input what holds them [N m or N].
+    Speeds [rad/s or m/s] are by input, 0 if missing. Forces are the loads; `efforts` by input
+    [N m or N] balance them.
     """
     if kind not in ARROWS:
         raise ValueError(f'arrows must be one of {", ".join(ARROWS)}, not {quoted(kind)}')
-    given = {name: speeds.get(name, 0.0) for name in machine.inputs}
-    if not all(map(is_number, given.values())):
+    by_input = {name: speeds.get(name, 0.0) for name in machine.inputs}
+    if not all(map(is_number, by_input.values())):
         raise ValueError(f'speeds must be finite numbers, not {quoted(speeds)}')
     linkage, own = machine.linkage, [machine.scale_of(name) for name in machine.inputs]
     theta = theta_of([value / size for value, size in zip(present, own)])
-    rates = [speed / size for speed, size in zip(given.values(), own)]
+    rates = [speed / size for speed, size in zip(by_input.values(), own)]
     if kind == FORCE:
         efforts = machine.efforts(present) if machine.loads else ()
         return {'unit': 'N', 'at': {
@@ -110,10 +110,10 @@ def arrows(machine: SceneMechanism, present: Sequence[float], kind: str,
 
 
 def number(text: str) -> dict[str, Any]:
-    """Return the `value` of arithmetic such as pi/2, and whether it `turns`: is in rad."""
+    """Return the `value` of arithmetic such as pi/2, and whether it is in rad (`turns`)."""
     formula = Formula(text)
     if formula.names:
-        raise Refused(f'{quoted(text)} is no number: there is no {listed(formula.names)}')
+        raise Refused(f'{quoted(text)} is not a number: {listed(formula.names)} is unknown')
     return {'value': float(formula.value({})), 'turns': bool({'pi', 'deg'} & formula.words.keys())}
 
 
@@ -158,8 +158,8 @@ def _input_at(machine: SceneMechanism, present: Sequence[float], name: str,
     near = min((min(max(float(drive.input.beside(value, (low + high) / 2.0)), low), high)
                 for low, high in ends), key=lambda end: drive.input.apart(end, value))
     whole = drive.input.is_whole(ends)
-    taken = math.remainder(value, math.tau) if whole else near
-    inputs = [taken if key == name else old for key, old in zip(machine.inputs, present)]
+    new = math.remainder(value, math.tau) if whole else near
+    inputs = [new if key == name else old for key, old in zip(machine.inputs, present)]
     own = [value / machine.scale_of(key) for key, value in zip(machine.inputs, inputs)]
     places = machine.linkage.solve(theta_of(own))
     if not all(math.isfinite(part) for place in places.values() for part in place):
@@ -196,12 +196,12 @@ def _joint_at(machine: SceneMechanism, present: Sequence[float], joint: str, pla
                          f'not {quoted(joint)}')
     one, own = legs[leg], [machine.scale_of(name) for name in machine.inputs]
     # Conversion to a leg's own input and back: trivial for a single leg.
-    ways = [[sorted(one.start + one.side * (end - one.lag) for end in arc) for arc in arcs(drive)]
-            for drive in machine.inputs.values()]
+    ranges = [[sorted(one.start + one.side * (end - one.lag) for end in arc)
+               for arc in arcs(drive)] for drive in machine.inputs.values()]
     found = nearest_inputs(
         machine.linkage, joint, [one.side * place[0] / machine.scale, place[1] / machine.scale],
         [one.start + one.side * (value - one.lag) / size for value, size in zip(present, own)],
-        [[(low / size, high / size) for low, high in way] for way, size in zip(ways, own)])
+        [[(low / size, high / size) for low, high in each] for each, size in zip(ranges, own)])
     return [float(one.lag + one.side * (value - one.start)) * size
             for value, size in zip(found, own)]
 

@@ -49,7 +49,7 @@ INPUTS_TYPE = 'sensor_msgs/msg/JointState'
 SECONDS_BETWEEN_LOOKS = 1.0
 SECONDS_TO_LINGER = 1.0
 SECONDS_TO_ARRIVE, ARRIVED = 1.0, 1e-6
-# What a scene has beside its mechanisms.
+# Parameters that define a scene, which a saved file always has.
 DEFINES = re.compile(r'mechanisms|[^.]+\.(type|scale|dimensions\..+)')
 GENERAL = 'mechanisms', 'frame_id', 'frame_prefix', 'rate'
 SCENE = 'scene'
@@ -102,7 +102,7 @@ class ShownMechanism:
     def scene(self) -> scene.Scene:
         """Return the scene of it alone; raise Refused if its parameters are incomplete."""
         if 'type' not in self.settings:
-            raise Refused(f'the nodes of {self.name} have not told its parameters yet')
+            raise Refused(f'the parameters of {self.name} are not known yet')
         return _read({'mechanisms': [self.name], **self.values()})
 
     def described(self) -> dict[str, Any]:
@@ -125,7 +125,7 @@ class SceneView:
     Attributes
     ----------
     clients : list
-        Open pages, which receive news by `tell(key, message)` and markers by `offer(feed)`.
+        Open pages, which receive messages by `tell(key, message)`, markers by `offer(feed)`.
 
     """
 
@@ -240,7 +240,7 @@ class SceneView:
         for (name, drive), value in zip(machine.inputs.items(), inputs):
             start = mechanism.settings.get(f'{name}.start')
             if start is None:
-                raise Refused(f'nothing that is known here moves the {name}: no crank_driver runs')
+                raise Refused(f'the {name} cannot be moved: no crank_driver is running')
             if value == start.value:
                 # An input moves only to a start that differs from the last one.
                 value = math.nextafter(value, sum(poses.arcs(drive)[0]) / 2.0)
@@ -270,13 +270,13 @@ class SceneView:
     async def save(self, key: str, values: Any = ()) -> Answer:
         """Return a parameter file of a mechanism's scene: its definition and changed values."""
         mechanism, space = self._find(key), _space(key)
-        given = dict(self._general.get(space, {}))
+        whole = dict(self._general.get(space, {}))
         for other in self._mechanisms.values():
             if _space(other.key) == space:
-                given.update(other.values())
-        given.update((f'{mechanism.name}.{name}', value) for name, value in dict(values).items())
+                whole.update(other.values())
+        whole.update((f'{mechanism.name}.{name}', value) for name, value in dict(values).items())
         return {'text': await self._aside(
-            lambda: writing.in_yaml(writing.without_defaults(_read(given), DEFINES)))}
+            lambda: writing.in_yaml(writing.without_defaults(_read(whole), DEFINES)))}
 
     async def _aside(self, work: Callable[[], Result]) -> Result:
         """Run slow work in another thread; return its result."""
@@ -373,30 +373,30 @@ class SceneView:
         return []
 
     async def _change(self, marked: Marked, nodes: Sequence[str],
-                      heard: Mapping[str, Sequence[str]]) -> None:
+                      input_topics: Mapping[str, Sequence[str]]) -> None:
         owners = {key: [name for name, _ in publishers] for key, publishers in marked}
         spaces = {_space(node) for names in owners.values() for node in names}
         nodes = [node for node in nodes if _space(node) in spaces]
-        sources = {topic for topics in heard.values() for topic in topics}
+        sources = {topic for topics in input_topics.values() for topic in topics}
         await self._bridge.ask(self._open, list(owners), nodes, sources)
         names = sorted({*GENERAL, *(key.rsplit('/', 1)[1] for key in owners)})
         # Parameters that drawing nodes describe are read from them only. A parameter without a
         # description is an override of a node that does not use it.
         found: dict[str, Optional[Described]] = {}
-        for part in ([node for node in nodes if node in heard],
-                     [node for node in nodes if node not in heard]):
+        for part in ([node for node in nodes if node in input_topics],
+                     [node for node in nodes if node not in input_topics]):
             known = {space: {name for node, own in found.items() if _space(node) == space
                              for name, (about, _) in (own or {}).items() if about.description}
                      for space in spaces}
             found.update(zip(part, await asyncio.gather(
                 *(self._parameters(node, names, known[_space(node)]) for node in part))))
         self._found = found
-        self._mechanisms = {key: self._mechanism(key, own_nodes, found, heard)
+        self._mechanisms = {key: self._mechanism(key, own_nodes, found, input_topics)
                             for key, own_nodes in owners.items()}
         self._general = {}
-        told = [(node, name, *own[name]) for node, given in found.items()
-                for own in [given or {}] for name in GENERAL if name in own]
-        for node, name, about, value in sorted(told, key=lambda one: not one[2].description):
+        general = [(node, name, *own[name]) for node, described in found.items()
+                   for own in [described or {}] for name in GENERAL if name in own]
+        for node, name, about, value in sorted(general, key=lambda one: not one[2].description):
             with suppress(ValueError):
                 self._general.setdefault(_space(node), {}).setdefault(
                     name, Setting(name, node, about, value).value)
@@ -414,10 +414,10 @@ class SceneView:
 
     def _mechanism(self, key: str, own_nodes: Sequence[str],
                    found: Mapping[str, Optional[Described]],
-                   heard: Mapping[str, Sequence[str]]) -> ShownMechanism:
+                   input_topics: Mapping[str, Sequence[str]]) -> ShownMechanism:
         """Return a mechanism with the parameters of its namespace's nodes, its own node first."""
         mechanism = ShownMechanism(key, {}, tuple(
-            topic for node in own_nodes for topic in heard.get(node, ())))
+            topic for node in own_nodes for topic in input_topics.get(node, ())))
         spaces = {_space(node) for node in own_nodes}
         prefix = f'{mechanism.name}.'
         silent = any(found.get(node, {}) is None for node in own_nodes)
@@ -450,7 +450,7 @@ class SceneView:
         for topic in set(sources) - set(self._sources):
             self._told[topic] = {}
             self._sources[topic] = self._bridge.node.create_subscription(
-                JointState, topic, partial(_hear, self._told[topic]), NEWEST)
+                JointState, topic, partial(_store, self._told[topic]), NEWEST)
         for name in set(topics) - set(self._feeds):
             self._feeds[name] = self._feed(name, *topics[name])
 
@@ -529,9 +529,10 @@ def _read(given: Mapping[str, Any]) -> scene.Scene:
         raise Refused(str(error)) from None
 
 
-def _hear(told: dict[str, float], message: JointState) -> None:
-    told.update((name, position) for name, position in zip(message.name, message.position)
-                if math.isfinite(position))
+def _store(positions: dict[str, float], message: JointState) -> None:
+    """Store the finite positions of a message by name."""
+    positions.update((name, position) for name, position in zip(message.name, message.position)
+                     if math.isfinite(position))
 
 
 def _joined(space: str, name: str) -> str:

@@ -27,13 +27,13 @@ from .scene_view import SCENE, SceneView
 from .. import palette
 from ..words import quoted
 
-Said = dict[str, Any]
+Message = dict[str, Any]
 
 PAGE = files(__package__) / 'page'
 FOLDERS = {'': PAGE, 'vendor/': PAGE / 'vendor'}
 KINDS = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript',
          '.svg': 'image/svg+xml'}
-# Where the colours of the palette are filled in, by their names in small letters.
+# Files with placeholders for the palette's colours, which are their names in lower case.
 COLOURED = ('.css', '.svg')
 COLOURS = {name.lower(): colour for name, colour in vars(palette).items() if name.isupper()}
 HEADERS = {
@@ -47,12 +47,12 @@ HEADERS = {
 MOST_BYTES, MOST_WAITING = 1 << 16, 64
 SECONDS_TO_CLOSE = 1.0
 SECONDS_TO_READ = 10.0
-# More figures than a number of ours has; what they say to a double is enough.
+# An integer with more digits is read as a float.
 MOST_FIGURES = 18
 CLOSED_FOR = {
     WSCloseCode.MESSAGE_TOO_BIG: f'a message may have {MOST_BYTES} bytes'.encode(),
     WSCloseCode.INVALID_TEXT: b'a text must be UTF-8',
-    WSCloseCode.PROTOCOL_ERROR: b'this is no WebSocket frame',
+    WSCloseCode.PROTOCOL_ERROR: b'this is not a WebSocket frame',
 }
 
 
@@ -63,13 +63,13 @@ class Server:
     Parameters
     ----------
     view : SceneView
-        What is shown.
+        The scene.
     bridge : Bridge
-        Is given the event loop.
+        Receives the event loop.
     host : str
         Address or name to listen at.
     port : int
-        Port to listen at; 0: any that is free.
+        Port to listen at; 0: any free port.
 
     Raises
     ------
@@ -91,7 +91,7 @@ class Server:
 
     @property
     def url(self) -> str:
-        """Where a browser on this machine finds the page."""
+        """The page's address for a browser on this machine."""
         host = {'0.0.0.0': '127.0.0.1', '::': '::1', '': '127.0.0.1'}.get(self._host, self._host)
         return f'http://{f"[{host}]" if ":" in host else host}:{self.port}/'
 
@@ -126,10 +126,10 @@ class Server:
     @web.middleware
     async def _guard(self, request: web.Request, handler: Callable[..., Any]) -> Any:
         """
-        Let nobody in but this page itself.
+        Refuse all requests except those of this page.
 
-        A foreign page can reach an address of this machine in two ways: by its address, with an
-        Origin of its own, or by a name of its own that it lets lead here, with that as the Host.
+        A foreign page can reach this server in two ways: by its address, with the page's Origin,
+        or by a host name that the page's owner directs to this machine, with that as the Host.
         """
         host = request.headers.get('Host', '')
         origin = request.headers.get('Origin')
@@ -150,7 +150,7 @@ class Server:
             address = ipaddress.ip_address(name)
         except ValueError:
             return False
-        # An address in figures cannot be made to lead elsewhere.
+        # A numeric address cannot be directed to another machine.
         return address.is_loopback or self._host in ('', '0.0.0.0', '::')
 
     async def _connect(self, request: web.Request) -> Any:
@@ -162,36 +162,36 @@ class Server:
         try:
             await client.serve()
         except (ConnectionError, asyncio.TimeoutError):
-            # It has left, or does not read.
+            # The browser has left, or does not read.
             pass
         finally:
             self._clients.discard(client)
             transport = request.transport
             if transport and transport.get_write_buffer_size():
-                # A connection that is closed would wait for ever until this is read.
+                # Closing the connection would wait forever for the browser to read this.
                 transport.abort()
         return socket_
 
 
 class OneLineHandler(logging.Handler):
-    """Says in one sentence what is logged, for what others send is no traceback of ours."""
+    """Logs a record in one sentence: an invalid request of a client deserves no traceback."""
 
-    def __init__(self, say: Callable[[str], None]) -> None:
+    def __init__(self, log: Callable[[str], None]) -> None:
         super().__init__()
-        self._say = say
+        self._log = log
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Say it."""
+        """Log a record."""
         error = record.exc_info[1] if record.exc_info else ''
-        self._say(f'{record.getMessage()}: {error!r}')
+        self._log(f'{record.getMessage()}: {error!r}')
 
 
 class Socket(web.WebSocketResponse):
-    """A WebSocket that says why it is closed."""
+    """A WebSocket that sends the reason when it is closed."""
 
     async def close(self, *, code: int = WSCloseCode.OK, message: bytes = b'',
                     **kwargs: Any) -> bool:
-        """Close it; raise TimeoutError if nothing is read at the other end."""
+        """Close it; raise TimeoutError if the other end does not read."""
         closing = super().close(
             code=code, message=message or CLOSED_FOR.get(code, b''), **kwargs)
         return await asyncio.wait_for(closing, 2 * SECONDS_TO_CLOSE)
@@ -201,28 +201,28 @@ class Client:
     """
     The page in one browser.
 
-    It is sent what is new, the newest only, and as often as it has drawn what it was sent; each
-    request is answered. Nothing is gathered for one that does not read: it is disconnected.
+    It receives the newest state only, and markers no faster than it draws them. Each request is
+    answered. A browser that does not read is disconnected, so that no messages accumulate.
     """
 
     def __init__(self, view: SceneView, socket_: Socket, warn: Callable[[str], None]) -> None:
         self._view = view
         self._socket = socket_
         self._warn = warn
-        self._texts: dict[Any, Said] = {}
+        self._texts: dict[Any, Message] = {}
         self._offered: set[str] = set()
-        self._looks: dict[int, Said] = {}
+        self._looks: dict[int, Message] = {}
         self._ready = True
         self._news = asyncio.Event()
-        self._requests: asyncio.Queue[Said] = asyncio.Queue(MOST_WAITING)
+        self._requests: asyncio.Queue[Message] = asyncio.Queue(MOST_WAITING)
 
-    def tell(self, key: Any, message: Said) -> None:
-        """Send a message; of those with one key the last is enough."""
+    def tell(self, key: Any, message: Message) -> None:
+        """Send a message; it replaces a waiting one with the same key."""
         self._texts[key] = message
         self._news.set()
 
     def offer(self, feed: Feed) -> None:
-        """Send what a feed has, when the browser is ready to draw it."""
+        """Send a feed's newest message when the browser is ready to draw it."""
         self._offered.add(feed.topic)
         self._news.set()
 
@@ -233,12 +233,12 @@ class Client:
         Raises
         ------
         ConnectionError, TimeoutError
-            If it leaves without a word, or does not read.
+            If it leaves without closing the connection, or does not read.
 
         """
         self._view.add(self)
         tasks = [asyncio.ensure_future(doing)
-                 for doing in (self._hear(), self._answer(), self._send())]
+                 for doing in (self._receive(), self._answer(), self._send())]
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in done:
@@ -255,40 +255,43 @@ class Client:
             await self._socket.close(
                 code=WSCloseCode.GOING_AWAY, message=b'the viewer ended')
 
-    async def _hear(self) -> None:
+    async def _receive(self) -> None:
         async for message in self._socket:
-            # Others have their turn, however much comes.
+            # Other tasks get their turn, however many messages arrive.
             await asyncio.sleep(0)
-            said: Said = {}
+            request: Message = {}
             try:
-                said = _parsed(message.data)
-                if said['op'] == 'drawn':
+                request = _parsed(message.data)
+                if request['op'] == 'drawn':
                     self._ready = True
                     self._news.set()
                 else:
-                    self._requests.put_nowait(said)
+                    self._requests.put_nowait(request)
             except ValueError as error:
-                await self._say(_answer(said, f'the request is not understood: {error}'))
+                await self._send_message(
+                    _answer(request, f'the request is not understood: {error}'))
             except asyncio.QueueFull:
-                await self._say(_answer(said, f'{MOST_WAITING} requests wait already'))
+                await self._send_message(
+                    _answer(request, f'{MOST_WAITING} requests wait already'))
 
     async def _answer(self) -> None:
         while True:
-            said = await self._requests.get()
-            await self._say(_answer(said, **await self._done(said)))
+            request = await self._requests.get()
+            await self._send_message(_answer(request, **await self._result(request)))
 
-    async def _done(self, said: Said) -> Said:
-        op = said['op']
+    async def _result(self, request: Message) -> Message:
+        op = request['op']
         try:
             if op == 'set':
-                await self._view.set(said['mechanism'], dict(said['values']))
+                await self._view.set(request['mechanism'], dict(request['values']))
                 return {}
             if op == 'read':
-                return number(str(said['text']))
+                return number(str(request['text']))
             if op in ('pose', 'tune', 'curve', 'save', 'export'):
-                about = {name: value for name, value in said.items()
-                         if name not in ('op', 'id', 'mechanism')}
-                answer: Said = await getattr(self._view, op)(said['mechanism'], **about)
+                arguments = {name: value for name, value in request.items()
+                             if name not in ('op', 'id', 'mechanism')}
+                answer: Message = await getattr(self._view, op)(
+                    request['mechanism'], **arguments)
                 return answer
             return {'reason': f'unknown request {quoted(op)}'}
         except Refused as reason:
@@ -298,7 +301,7 @@ class Client:
         except (TypeError, ValueError) as error:
             return {'reason': f'{op} is not understood: {error}'}
         except Exception as error:
-            # The browser would wait for ever for what raised.
+            # Without an answer the browser would wait forever.
             self._warn(f'{op}: {error!r}')
             return {'reason': f'internal error: {error!r}'}
 
@@ -314,9 +317,9 @@ class Client:
         while self._texts:
             key = next(iter(self._texts))
             if key == SCENE:
-                # The page forgets mechanisms that are not in it.
+                # The page drops the looks of mechanisms that are not in the scene.
                 self._looks = {}
-            await self._say(self._texts.pop(key))
+            await self._send_message(self._texts.pop(key))
 
     async def _send_picture(self) -> None:
         offered, self._offered = self._offered, set()
@@ -325,42 +328,42 @@ class Client:
             for id_, look in looks.items():
                 if self._looks.get(id_) != look:
                     self._looks[id_] = look
-                    await self._say({'op': 'look', 'number': id_, **look})
+                    await self._send_message({'op': 'look', 'number': id_, **look})
         self._ready = False
         await self._within(self._socket.send_bytes(b''.join(records for _, records in drawn)))
 
-    async def _say(self, message: Said) -> None:
+    async def _send_message(self, message: Message) -> None:
         await self._within(self._socket.send_json(message))
 
     async def _within(self, sending: Any) -> None:
         await asyncio.wait_for(sending, SECONDS_TO_READ)
 
 
-def _parsed(text: Any) -> Said:
-    """Return a request; raise ValueError if it is none."""
+def _parsed(text: Any) -> Message:
+    """Return the request in a text; raise ValueError if it is invalid."""
     if not isinstance(text, str):
         raise ValueError('it must be a text')
     try:
-        said = json.loads(text, parse_int=_number)
+        request = json.loads(text, parse_int=_number)
     except RecursionError:
         raise ValueError('it is nested too deeply') from None
-    if not isinstance(said, dict) or not isinstance(said.get('op'), str):
+    if not isinstance(request, dict) or not isinstance(request.get('op'), str):
         raise ValueError('it must be a JSON object with an "op"')
-    return said
+    return request
 
 
 def _number(text: str) -> float:
     return int(text) if len(text) <= MOST_FIGURES else float(text)
 
 
-def _answer(said: Said, reason: str = '', **more: Any) -> Said:
-    id_ = said.get('id')
+def _answer(request: Message, reason: str = '', **more: Any) -> Message:
+    id_ = request.get('id')
     return {'op': 'answer', 'id': id_ if isinstance(id_, (int, str)) else None,
             'reason': reason, **more}
 
 
 def _parts(url: str) -> SplitResult:
-    """Return the parts of an address, nothing of one that is none."""
+    """Return the parts of an address; empty parts if it is invalid."""
     try:
         return urlsplit(url)
     except ValueError:
@@ -378,6 +381,6 @@ async def _file(request: web.Request) -> web.Response:
         text = Template(text).substitute(COLOURS)
     response = web.Response(text=text, charset='utf-8',
                             content_type=KINDS.get(ending, 'text/plain'))
-    # What follows before the answer was read would be gathered without bound.
+    # On an open connection, pipelined requests would accumulate without limit.
     response.force_close()
     return response

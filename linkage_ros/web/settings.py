@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of the scene's nodes, as the page's sliders show and set them."""
+"""The parameters of the scene's nodes for the page's sliders."""
 
 import asyncio
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ Described = dict[str, tuple[Any, Any]]
 
 SERVICES = {'list_parameters': ListParameters, 'describe_parameters': DescribeParameters,
             'get_parameters': GetParameters, 'set_parameters_atomically': SetParametersAtomically}
-# The range of a dimension takes a node some 20 ms.
+# Number of names in one request: a node needs some 20 ms for the range of each dimension.
 NAMES_AT_ONCE = 20
 
 
@@ -45,12 +45,12 @@ class RemoteNode:
 
     async def parameters(self, prefixes: list[str], known: Collection[str] = ()) -> Described:
         """
-        Return descriptor and value message by name, but for names that are known.
+        Return descriptor and value message by name, except for known names.
 
         Raises
         ------
         NoAnswer
-            If the node is silent.
+            If the node does not answer.
 
         """
         found: Described = {}
@@ -65,7 +65,7 @@ class RemoteNode:
         return found
 
     async def set(self, parameters: list[Any]) -> str:
-        """Set all parameters or none; return the reason of a refusal, or nothing."""
+        """Set all parameters or none; return the reason of a refusal, or an empty text."""
         response = await self._call('set_parameters_atomically', parameters=parameters)
         result = response.result
         return '' if result.successful else result.reason or f'{self.name} gives no reason'
@@ -78,12 +78,12 @@ class RemoteNode:
 @dataclass
 class Setting:
     """
-    A parameter as the page shows it, on the node that it is set on.
+    A parameter on the page, with the node on which it is set.
 
     Raises
     ------
     ValueError
-        If its type is none that there is.
+        If its type is unknown.
 
     """
 
@@ -97,12 +97,12 @@ class Setting:
 
     @property
     def value(self) -> Any:
-        """Its value, as JSON has it."""
+        """Its value for JSON."""
         value = parameter_value_to_python(self.message)
         return list(map(shown, value)) if isinstance(value, list) else shown(value)
 
     def described(self) -> dict[str, Any]:
-        """Return what the page needs to draw it."""
+        """Return its description for the page."""
         about = self.descriptor
         ranges = [*about.floating_point_range, *about.integer_range]
         low, high, step = (ranges[0].from_value, ranges[0].to_value,
@@ -113,8 +113,8 @@ class Setting:
                 'step': shown(step)}
 
     def asked(self, full_name: str, value: Any) -> Any:
-        """Return a parameter message with a value from JSON; ValueError if it cannot hold it."""
-        if not HOLDS.get(self._type, lambda _: False)(value):
+        """Return a parameter message with a value from JSON; ValueError if it is not allowed."""
+        if not ALLOWS.get(self._type, lambda _: False)(value):
             allowed = self.descriptor.additional_constraints or f'a {self._type.name.lower()}'
             raise ValueError(f'{full_name} must be {allowed}, not {quoted(value)}')
         if self._type == Parameter.Type.DOUBLE:
@@ -123,11 +123,11 @@ class Setting:
 
 
 def is_number(value: Any) -> bool:
-    """Return whether a value from JSON is a finite number that a double can hold."""
+    """Return whether a value from JSON is a finite number in the range of a double."""
     return type(value) in (int, float) and abs(value) <= sys.float_info.max
 
 
-HOLDS = {
+ALLOWS = {
     Parameter.Type.DOUBLE: is_number,
     Parameter.Type.INTEGER: lambda value: type(value) is int and -1 << 63 <= value < 1 << 63,
     Parameter.Type.BOOL: lambda value: type(value) is bool,
@@ -135,7 +135,7 @@ HOLDS = {
 
 
 def shown(value: Any) -> Any:
-    """Return a value as JSON can say it: None for a number that is not finite."""
+    """Return a value for JSON: None for a number that is not finite."""
     if isinstance(value, bytes):
         return value[0]
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Node that shows the running scene on a page in the browser, with sliders to change it."""
+"""Node that serves a page with the running scene and sliders to change it."""
 
 from errno import EADDRINUSE
 import sys
@@ -28,12 +28,12 @@ PORT = 8020
 
 class Viewer(Node):
     """
-    Serves a page that draws the mechanisms in the graph; listens only while somebody looks.
+    Serves a page with the mechanisms of the graph; it subscribes only while a page is open.
 
     Raises
     ------
     SceneError
-        If it cannot listen where it is told to.
+        If it cannot listen at its host and port.
 
     """
 
@@ -43,10 +43,10 @@ class Viewer(Node):
             self._server = self._served()
         except (OSError, ParameterException) as error:
             super().destroy_node()
-            taken = getattr(error, 'errno', None) == EADDRINUSE
-            raise scene.SceneError(f'the viewer cannot be started: {error}' + taken * (
-                '; another is chosen by -p port:=8021, with ros2 launch by port:=8021, with make '
-                'view by PORT=8021, and any that is free by 0')) from None
+            in_use = getattr(error, 'errno', None) == EADDRINUSE
+            raise scene.SceneError(f'the viewer cannot be started: {error}' + in_use * (
+                '; for another port use -p port:=8021, with ros2 launch port:=8021, with make '
+                'view PORT=8021; port 0 is any free one')) from None
         self.url = self._server.url
         self.get_logger().info(f'Look at {self.url}')
 

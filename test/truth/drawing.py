@@ -379,10 +379,9 @@ class Linkage:
         found = {}
         for i, line in enumerate(self.lines):
             if line.word in _INPUTS:
-                before = sum(self.lines[k].word == line.word and not self.lines[k].input_name
+                before = sum(self.lines[k].word == line.word and not self.lines[k].called
                              for k in found)
-                found[i] = line.input_name or (
-                    f'{line.word}{before + 1}' if before else line.word)
+                found[i] = line.called or (f'{line.word}{before + 1}' if before else line.word)
         return found
 
     def driven(self, rows, values):

@@ -1,7 +1,7 @@
 // Copyright 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// The WebSocket to the viewer; open only while the page can be seen.
+// The WebSocket to the viewer; open only while the page is visible.
 
 const RETRY = 1000;
 const GONE = { reason: 'the viewer is gone' };
@@ -51,7 +51,7 @@ export class Connection {
     if (this.opened) this.socket.send(JSON.stringify(message));
   }
 
-  /** Ask for something; the answer's reason is empty where it was granted. */
+  /** Send a request and return its answer, whose reason is empty if the request was granted. */
   ask(message) {
     if (!this.opened) return Promise.resolve(GONE);
     const id = this.next++;

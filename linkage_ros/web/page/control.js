@@ -1,7 +1,7 @@
 // Copyright 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// A slider with a number beside it, and a switch; what is refused springs back, with the reason.
+// A slider with a number, a choice and a switch; a refused value springs back, with the reason.
 
 import { figures, units } from './units.js';
 
@@ -26,10 +26,10 @@ export const FINE_ABOUT_ZERO = {
 
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
-/** Reads what is more than a number, such as pi/2 or 90deg; the page sets it. */
+/** Evaluates arithmetic such as pi/2 or 90deg by `ask`, which the page sets. */
 export const arithmetic = { ask: null };
 
-/** The number in rad or m that a text says, counted in so many parts of a unit; NaN if it says none. */
+/** The number in rad or m of a text in a unit that is `factor` times smaller; NaN if it is invalid. */
 export async function typed(text, unit, factor) {
   if (NUMBER.test(text)) return Number(text.replace(',', '.')) / factor;
   const { value = NaN, turns } = await arithmetic.ask(text);
@@ -45,7 +45,7 @@ export function element(tag, properties = {}, ...children) {
   return made;
 }
 
-/** Change only what is other than before: what is drawn anew takes time. */
+/** Set only the properties that differ, because each change is drawn anew. */
 export function put(node, properties) {
   for (const [name, value] of Object.entries(properties)) if (node[name] !== value) node[name] = value;
 }
@@ -53,7 +53,7 @@ export function put(node, properties) {
 let made = 0;
 const nextId = () => `s${made += 1}`;
 
-/** Passes on values one after the other; of those that wait only the newest. */
+/** Passes on values one after another; of the waiting ones only the newest. */
 export class Newest {
   constructor(pass) {
     this.pass = pass;
@@ -73,7 +73,7 @@ export class Newest {
   }
 }
 
-/** The line below a control that says why not all was done that was asked for. */
+/** The line below a control with the reason why a request was not fully granted. */
 export class Reason {
   constructor(id = nextId()) {
     this.line = element('p', { className: 'reason', id, hidden: true });
@@ -86,13 +86,13 @@ export class Reason {
     this.since = performance.now();
   }
 
-  /** Forget it, for what somebody else does; what one did oneself may be heard of late. */
+  /** Clear it after a change by another client; a late notice of one's own change is ignored. */
   fade() {
     if (performance.now() - this.since > SETTLED) this.say('');
   }
 }
 
-/** A number with a slider. Each time it is taken hold of is a gesture. */
+/** A number with a slider. A gesture lasts from its first change to its release. */
 export class Slider {
   constructor({ label, title, unit, low, high, kind, value, scale, step, digits = 6, times = () => 1 }, request) {
     Object.assign(this, { unit, low, high, kind, scale, digits, times, accepted: value, held: false, gesture: {} });
@@ -107,8 +107,8 @@ export class Slider {
     this.unitShown = element('span', { className: 'unit' });
     this.row = element('div', { className: 'row', title },
       element('label', { htmlFor: id, textContent: label }), this.range, this.number, this.unitShown, this.reason.line);
-    this.asked = new Newest(async ([wanted, gesture]) => this.settle(
-      wanted, await request(wanted, gesture, this.accepted)));
+    this.asked = new Newest(async ([requested, gesture]) => this.settle(
+      requested, await request(requested, gesture, this.accepted)));
     this.range.oninput = () => this.slid();
     this.range.onchange = () => this.release();
     this.range.onkeydown = event => this.key(event);
@@ -128,7 +128,7 @@ export class Slider {
     this.offer(this.chosen());
   }
 
-  /** An arrow key goes one stop; with Shift a tenth of it. */
+  /** An arrow key moves by one stop, with Shift by a tenth of it. */
   key(event) {
     const way = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
     if (!way || this.kind === 'integer') return;
@@ -144,12 +144,12 @@ export class Slider {
     this.asked.offer([value, this.gesture]);
   }
 
-  /** The value that it has, or will have when what was asked for is granted. */
+  /** The present value, or the requested one while a request is pending. */
   get expected() {
     return this.asked.busy ? this.offered : this.accepted;
   }
 
-  /** By what its value is multiplied to be shown. */
+  /** The factor from the value to the displayed number. */
   get factor() {
     return units.of(this.unit).factor * this.times();
   }
@@ -167,10 +167,10 @@ export class Slider {
     return clamp(Number(value.toPrecision(5)), this.low, this.high);
   }
 
-  /** Show what came of it: all that was wanted, another value, or a refusal. */
-  settle(wanted, answer) {
+  /** Show the result of a request: the requested value, another value, or a refusal. */
+  settle(requested, answer) {
     const refused = answer.reason && answer.value === undefined;
-    if (!refused) this.accepted = answer.value ?? wanted;
+    if (!refused) this.accepted = answer.value ?? requested;
     if (!this.mistyped) this.explain(refused ? `Refused: ${answer.reason}` : answer.reason, refused);
     if (!this.held && !this.asked.waiting) this.render();
   }
@@ -186,13 +186,13 @@ export class Slider {
     if (!this.asked.busy) this.render();
   }
 
-  /** Move between other ends. */
+  /** Set the ends of the range. */
   bound(low, high) {
     [this.low, this.high] = [low, high];
     if (!this.held) this.render();
   }
 
-  /** Show a value that somebody else has set. */
+  /** Show a value that another client has set. */
   update(value) {
     if (value !== this.accepted) this.reason.fade();
     this.follow(value);
@@ -221,7 +221,7 @@ export class Slider {
   }
 }
 
-/** A button for each of two values, of which the pressed one holds. */
+/** A button for each of two values; the pressed one has the present value. */
 export class Choice {
   constructor({ label, title, value }, words, request) {
     this.reason = new Reason();
@@ -244,7 +244,7 @@ export class Choice {
     for (const [sign, button] of this.buttons) button.setAttribute('aria-pressed', sign === value);
   }
 
-  /** Call the values so. */
+  /** Set the labels of the values. */
   name(words) {
     for (const [sign, textContent] of Object.entries(words)) put(this.buttons.get(Number(sign)), { textContent });
   }

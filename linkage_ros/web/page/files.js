@@ -1,19 +1,19 @@
 // Copyright 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// What can be taken away of a mechanism: its numbers, its picture, its robot model, its code.
+// Downloads of a mechanism: its outputs, its picture, its robot model, its C code.
 
 import { element, Reason } from './control.js';
 import { paint } from './picture.js';
 
 const FORMS = {
   CSV: ['csv', 'All outputs over a turn or a stroke, in radians and metres, the input at 1 rad/s or 1 m/s'],
-  PNG: ['png', 'The picture as it is seen'],
+  PNG: ['png', 'The present view'],
   URDF: ['urdf', 'The robot model'],
   C: ['h', 'A C99 header for a microcontroller'],
 };
 
-/** Let the browser save what is in a blob or a text. */
+/** Let the browser save blobs or texts as a file. */
 export function download(name, ...parts) {
   const href = URL.createObjectURL(new Blob(parts));
   element('a', { download: name, href }).click();

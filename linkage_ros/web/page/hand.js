@@ -1,7 +1,7 @@
 // Copyright 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// The hand over the picture: drags joints, and finds the bar that is pointed at.
+// The pointer over the picture: drags joints, and finds the bar below it.
 
 const GRAB = { mouse: 16, touch: 28 };
 const BAR = 9;
@@ -41,7 +41,7 @@ export class Hand {
     return best;
   }
 
-  /** The bar that is nearest to a pointer, with the dimension that it follows. */
+  /** The bar that is nearest to a pointer, with the dimension that determines it. */
   bar(pointer) {
     let best = null;
     for (const { mechanism, seen } of this.picture.legsSeen()) {
@@ -99,7 +99,7 @@ export class Hand {
       ({ mechanism, leg }) => mechanism.key === this.grabbed.key && leg === this.grabbed.leg);
   }
 
-  /** The ends of the line from the joint to where it is wanted. */
+  /** The ends of the line from the dragged joint to the pointer. */
   get pull() {
     const from = this.held()?.seen.get(this.grabbed.joint);
     return from ? [from, this.grabbed.pointer] : null;

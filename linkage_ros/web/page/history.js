@@ -1,7 +1,7 @@
 // Copyright 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// What was changed of a mechanism, to be undone.
+// Changes of a mechanism's parameters, for undo and reset.
 
 const MOVES = /\.(speed|start)$/;
 
@@ -13,7 +13,7 @@ export class History {
     this.begin();
   }
 
-  /** Remember the values that a mechanism has when it is first seen; how it moves is none. */
+  /** Store the first value of each parameter, except speeds and starts. */
   begin() {
     for (const { name, kind, value, fixed } of this.mechanism.settings.values()) {
       const tuned = !fixed && !MOVES.test(name) && ['double', 'integer', 'bool'].includes(kind);
@@ -21,14 +21,14 @@ export class History {
     }
   }
 
-  /** Remember a value before it is changed; all changes of one gesture are one step. */
+  /** Store a value before a change; all changes of one gesture are one step. */
   remember(name, value, gesture) {
     const last = this.steps.at(-1);
     if (!this.first.has(name) || last?.name === name && last.gesture === gesture) return;
     this.steps.push({ name, gesture, values: { [name]: value } });
   }
 
-  /** What brings the first values back, and what undoes that. */
+  /** The values that restore the first ones, and those that undo this. */
   changes() {
     const changed = [...this.first].filter(([name, value]) => this.mechanism.value(name) !== value);
     return [changed, changed.map(([name]) => [name, this.mechanism.value(name)])].map(pairs => Object.fromEntries(pairs));

@@ -1,7 +1,7 @@
 // Copyright 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// The page: what the viewer sends goes into the picture and the panel, what is dragged goes back.
+// The page: passes the viewer's messages to picture and panel, and requests to the viewer.
 
 import { Connection } from './connection.js';
 import { arithmetic, element, put } from './control.js';
@@ -53,7 +53,7 @@ function light(mechanism, dimension) {
   draw();
 }
 
-/** Say over the picture what keeps it from being shown or moved; nothing: all is well. */
+/** Show over the picture why it is not available or cannot be moved; an empty text hides it. */
 function say(words) {
   clearTimeout(fading);
   put(notice, { textContent: words, hidden: !words });
@@ -83,7 +83,7 @@ const connection = new Connection({
     for (const one of described) {
       const mechanism = known.get(one.key) ?? new Mechanism(one);
       mechanism.describe(one);
-      // Those of one name in two namespaces are told apart.
+      // Mechanisms of one name in two namespaces have distinct titles.
       mechanism.title = described.some(({ key, name }) => name === one.name && key !== one.key) ? one.key.slice(1) : one.name;
       mechanisms.set(one.key, mechanism);
     }
@@ -119,7 +119,7 @@ const connection = new Connection({
         const marker = mechanism.markers.get(number);
         if (!marker) continue;
         marker.points = new Float32Array(buffer, from + 8, 3 * count);
-        if (marker.look.kind !== 'strip') mechanism.heard = now;
+        if (marker.look.kind !== 'strip') mechanism.lastMarkers = now;
       }
       from += 8 + 12 * count;
     }
@@ -132,7 +132,7 @@ arithmetic.ask = text => connection.ask({ op: 'read', text });
 
 const panel = new Panel(at('panel'), connection, light, refuse);
 
-/** Draw once before the next refresh of the screen, then do what is to be done after it. */
+/** Draw once before the next refresh of the screen, then call `after`. */
 function draw(after) {
   if (scheduled && !after) return;
   scheduled = true;
@@ -167,7 +167,7 @@ function show(key) {
   draw();
 }
 
-/** Let what is chosen above the picture take effect, and a reload keep it. */
+/** Apply the options above the picture, and save them for a reload. */
 function choose() {
   keep({ names: names.checked, workshop: workshop.checked, arrows: arrows.value });
   picture.named = kept.names;

@@ -1,17 +1,17 @@
 // Copyright 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// A mechanism as the page knows it: its markers by number, its settings by name, what was changed.
+// A mechanism on the page: its markers by number, its settings by name, and its changes.
 
 import { History } from './history.js';
 
 export class Mechanism {
   constructor(described) {
     this.markers = new Map();
-    this.heard = performance.now();
-    /** What may be tuned: travel, bars and fixed joints; empty until the viewer has said. */
+    this.lastMarkers = performance.now();
+    /** Ranges and bars of dimensions, and fixed joints; empty until the viewer has answered. */
     this.tunable = { travel: {}, bars: {}, fixed: [] };
-    /** What arrows are asked for, and what is known of them. */
+    /** The requested kind of arrows, and the received arrows by joint. */
     this.arrows = { kind: '', at: {} };
     this.describe(described);
     this.history = new History(this);
@@ -23,7 +23,7 @@ export class Mechanism {
     this.history?.begin();
   }
 
-  /** Take arrows that were asked for, by joint. */
+  /** Store the arrows that were requested, by joint. */
   show(arrows) {
     Object.assign(this.arrows, arrows);
   }
@@ -32,7 +32,7 @@ export class Mechanism {
     return this.settings.get(name)?.value;
   }
 
-  /** Its markers, and the curve of the mirrored legs' feet beside that of the others. */
+  /** Its markers; with mirrored legs, the curve of their feet, too. */
   *drawn() {
     for (const { look, points } of this.markers.values()) {
       yield { look, points };

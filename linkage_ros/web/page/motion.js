@@ -1,7 +1,7 @@
 // Copyright 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// How a mechanism moves: a slider for each input, play and step, and what its outputs are now.
+// The motion of a mechanism: a slider for each input, play and step, and its present outputs.
 
 import { element, LINEAR, Newest, noNumber, put, Reason, Slider, typed } from './control.js';
 import { figures, units } from './units.js';
@@ -55,8 +55,8 @@ class InputRow {
 
   step(way) {
     const { low, high, expected } = this.slider;
-    const wanted = expected + way * (this.turns ? STEP : (high - low) / STEPS_A_STROKE);
-    this.slider.offer(this.turns ? this.beside(wanted) : wanted);
+    const requested = expected + way * (this.turns ? STEP : (high - low) / STEPS_A_STROKE);
+    this.slider.offer(this.turns ? this.beside(requested) : requested);
   }
 
   show(input) {
@@ -66,7 +66,7 @@ class InputRow {
   }
 }
 
-/** An output: its value, which can be written where there is one input, and d output / d input. */
+/** An output: its value, which is editable with a single input, and d output / d input. */
 class OutputRow {
   constructor(name, editable, count, want, say) {
     this.editable = editable;
@@ -109,7 +109,7 @@ class OutputRow {
   }
 }
 
-/** The part of the panel in which one mechanism is moved; calls `onshow` when it was heard where it is. */
+/** The part of the panel that moves one mechanism; calls `onshow` when its pose has been received. */
 export class Motion {
   constructor(mechanism, connection, open, refuse) {
     this.mechanism = mechanism;
@@ -141,24 +141,24 @@ export class Motion {
     this.connection.ask({ op: 'set', mechanism: this.mechanism.key, values }).then(answer => this.say(answer));
   }
 
-  /** A speed for an input that was never seen to move. */
+  /** The default speed of an input that has not moved yet. */
   usual(name) {
     const row = this.inputs.get(name.split('.')[0]);
     return !row || row.turns ? 1 : (row.slider.high - row.slider.low) / SECONDS_A_STROKE;
   }
 
-  /** The speeds with which it would play. */
+  /** The speeds of the inputs when it plays. */
   get playing() {
     return Object.fromEntries([...this.speeds].filter(([, speed]) => speed));
   }
 
-  /** The speed with which the first input plays, or would. */
+  /** The speed of the first input when it plays. */
   get speed() {
     const name = `${this.inputs.keys().next().value}.speed`;
     return this.playing[name] ?? this.usual(name);
   }
 
-  /** Where the inputs are, and whether the first is an angle. */
+  /** The present inputs, and whether the first is an angle. */
   get present() {
     return [...this.inputs.values()].map(({ slider }) => slider.accepted);
   }
@@ -178,7 +178,7 @@ export class Motion {
     this.reason.say(reason ?? '');
   }
 
-  /** Bring it where something is wanted. */
+  /** Request a value of an output, or a place of a joint. */
   async want(want) {
     const answer = await this.connection.ask({ op: 'pose', mechanism: this.mechanism.key, want });
     if (answer.inputs) this.show(answer);
@@ -190,14 +190,14 @@ export class Motion {
     this.dragged.offer(want);
   }
 
-  /** What arrows are asked for: at the speeds with which it plays, or would. */
+  /** The request for arrows, at the inputs' speeds when it plays. */
   get arrows() {
     if (!this.mechanism.arrows.kind) return {};
     const speeds = Object.fromEntries([...this.inputs.keys()].map(name => [name, this.playing[`${name}.speed`] ?? this.usual(`${name}.speed`)]));
     return { arrows: this.mechanism.arrows.kind, speeds };
   }
 
-  /** See where it is. */
+  /** Request the present pose. */
   async look() {
     if (this.looking || !this.connection.opened) return;
     this.looking = true;

@@ -1,7 +1,7 @@
 // Copyright 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// The panel: for each mechanism that is shown how it moves, and what it is.
+// The panel: motion, plot and parameters of each displayed mechanism.
 
 import { element } from './control.js';
 import { Files } from './files.js';
@@ -13,7 +13,7 @@ import { units } from './units.js';
 const STILL = 2000;
 const LOOKS = 120;
 
-/** The part of one mechanism. A part is an element with render(), to be added to `parts`. */
+/** The section of one mechanism. Its `parts` have a method render(). */
 class Section {
   constructor(mechanism, { connection, light, refuse }, folded) {
     const { key, name, title } = mechanism;
@@ -36,7 +36,7 @@ class Section {
     this.element.dataset.key = key;
   }
 
-  /** Unfold what was unfolded of the section before, which was built of other settings. */
+  /** Open the foldings that are open in the section that this one replaces. */
   after(old, built) {
     this.built = built;
     const title = folding => folding.firstElementChild.textContent;
@@ -58,7 +58,7 @@ class Section {
   }
 }
 
-/** All sections that are shown. */
+/** All displayed sections. */
 export class Panel {
   /** Calls `light`, and `refuse` with the reason why a joint is not dragged. */
   constructor(place, connection, light, refuse) {
@@ -70,7 +70,7 @@ export class Panel {
     document.addEventListener('keydown', event => this.key(event));
   }
 
-  /** Show mechanisms; a section whose settings stay as they are stays. */
+  /** Show mechanisms; a section with unchanged settings is reused. */
   show(mechanisms, folded) {
     const before = this.sections;
     this.sections = new Map(mechanisms.map(one => {
@@ -104,7 +104,7 @@ export class Panel {
     for (const { motion, mechanism } of this.sections.values()) if (mechanism.arrows.kind) motion.look();
   }
 
-  /** Undo by the usual key, where no text is written. */
+  /** Undo by Ctrl-Z, except in a text field. */
   key(event) {
     const section = event.target.closest?.('section') ?? this.place.querySelector('section');
     if (event.key !== 'z' || !(event.ctrlKey || event.metaKey) || event.target.type === 'text' || !section) return;
@@ -128,10 +128,10 @@ export class Panel {
     for (const { parts } of this.sections.values()) for (const part of parts) part.render();
   }
 
-  /** Say which mechanisms send nothing. */
+  /** Show which mechanisms send no markers. */
   check(now) {
     for (const { mechanism, still } of this.sections.values()) {
-      const silent = now - mechanism.heard;
+      const silent = now - mechanism.lastMarkers;
       still.hidden = silent < STILL;
       still.textContent = `No markers for ${Math.round(silent / 1000)} s`;
     }

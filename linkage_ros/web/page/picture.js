@@ -1,7 +1,7 @@
 // Copyright 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// The picture: markers seen at a right angle to the plane of the linkage, to scale.
+// The picture: markers to scale, seen at a right angle to the plane of the linkage.
 
 import { figures, units } from './units.js';
 
@@ -20,7 +20,7 @@ const HEAD = 9;
 /** Where a name is tried: beside its joint from the side away from the middle on, then farther out. */
 const TURNS = [1, 1.9].flatMap(ring => [0, 1, -1, 2, -2, 3, -3, 4].map(eighth => [ring, eighth * Math.PI / 4]));
 const MOST_LINES = 100;
-/** How many numbers make a line, a triangle, a joint. */
+/** The number of coordinates of a line, a triangle, a joint. */
 const PIECE = { lines: 4, triangles: 6, joints: 2 };
 /** A linkage in space is seen from the front, from the right and above. */
 const OBLIQUE = { right: [0.8, 0.6, 0], up: [-0.168, 0.224, 0.96], out: [0.576, -0.768, 0.28] };
@@ -48,14 +48,14 @@ function round(value) {
   return [1, 2, 5, 10].find(one => one * power >= value * 0.999) * power;
 }
 
-/** The multiples of a step between two ends; few, even so far out that adding one changes nothing. */
+/** The multiples of a step between two ends; few even where adding a step is lost to rounding. */
 export function multiples(step, low, high) {
   const first = Math.ceil(low / step);
   const count = Math.max(0, Math.floor(high / step) - first + 1) || 0;
   return Array.from({ length: Math.min(count, MOST_LINES) }, (_, i) => (first + i) * step);
 }
 
-/** A height for a line of text, no higher than `y`, that is clear of the lines at other heights. */
+/** A height for a line of text at or below `y` that is clear of the lines at other heights. */
 function below(y, others) {
   return others.sort((a, b) => a - b).reduce((free, other) => Math.abs(other - free) < LINE ? other + LINE : free, y);
 }
@@ -72,7 +72,7 @@ function mixed([r, g, b, a], part, towards) {
   return `rgba(${[r, g, b].map(one => Math.round(255 * (one + (other - one) * part))).join(',')},${a})`;
 }
 
-/** A colour as it is, stronger for the legs in front; each is seen well against the paper. */
+/** A colour, stronger for the legs in front; all are visible against the paper. */
 const colour = (rgba, front = 0) => mixed(rgba, 0.55 * front, 'ink');
 
 /** A box along the axes, of two dimensions or three. */
@@ -97,7 +97,7 @@ class Box {
     return this.low.every((low, i) => low <= other.low[i] && other.high[i] <= this.high[i]);
   }
 
-  /** Return the box around both, with room for more. */
+  /** Return the box around both, with a margin. */
   grown(other) {
     const box = new Box(this.low.length);
     box.add(...this.low.map((low, i) => Math.min(low, other.low[i])));
@@ -115,11 +115,11 @@ export class Picture {
     this.canvas = canvas;
     this.context = canvas.getContext('2d');
     this.named = true;
-    /** From where it is seen; see view.js. */
+    /** The view; see view.js. */
     this.view = null;
     this.mechanisms = [];
     this.boxes = new Map();
-    /** How far each frame is drawn aside: what is in two frames need not be in one place. */
+    /** The shift of each frame: mechanisms in different frames are drawn side by side. */
     this.asides = new Map();
     /** The mechanism and the dimension whose bars are lit, and the line of a joint that is pulled. */
     this.lit = { mechanism: null, dimension: '' };
@@ -132,7 +132,7 @@ export class Picture {
     this.asides.clear();
   }
 
-  /** Find the size of a mechanism anew. */
+  /** Forget the size of a mechanism. */
   refit(key) {
     this.boxes.delete(key);
   }
@@ -149,11 +149,11 @@ export class Picture {
     context.clearRect(0, 0, width, height);
     const shapes = this.shapes();
     if (!shapes.length) return;
-    // Under a joint that is dragged the paper stays where it is.
+    // The picture is not refitted while a joint is dragged.
     if (!this.scale || !this.pull()) this.fit(shapes, width, height);
     if (!this.view.turned && !this.mechanisms[0].inSpace) this.grid(width, height);
     this.planes();
-    // A slot hides what is behind it, and no bar is.
+    // Slots are drawn first, so that they do not hide bars.
     shapes.sort((a, b) => this.isSlot(b) - this.isSlot(a) || a.depth - b.depth);
     const joints = shapes.filter(({ look }) => look.kind === 'joints');
     for (const shape of shapes) if (!joints.includes(shape)) this[shape.look.kind](shape);
@@ -189,7 +189,7 @@ export class Picture {
     return shapes;
   }
 
-  /** Choose scale and place so that everything is seen, and stays where it is while it moves. */
+  /** Choose scale and place so that everything is visible, and steady during the motion. */
   fit(shapes, width, height) {
     const now = new Map();
     this.maps = new Map();
@@ -240,7 +240,7 @@ export class Picture {
         ([x, y]) => this.maps.get(key).map(([a, b, c, d]) => a * x + b * y + c * z + d)));
   }
 
-  /** Draw the planes of the mechanisms that are not seen at a right angle. */
+  /** Draw the planes of mechanisms that are oblique to the view. */
   planes() {
     const { context } = this;
     context.lineWidth = 1;
@@ -322,7 +322,7 @@ export class Picture {
     context.stroke();
   }
 
-  /** Call back with each leg's part of what is drawn, the last pair first, and how far in front. */
+  /** Call back with each leg's part of a shape, the last pair first, and its closeness to the front. */
   legs({ mechanism, look, places }, draw) {
     const { pairs, legs } = mechanism;
     const size = places.length / legs;
@@ -360,7 +360,7 @@ export class Picture {
     });
   }
 
-  /** Draw plates as pale as paper between their bars; what has no bars of its colour is filled. */
+  /** Draw plates pale between their bars; triangles without bars of their colour are filled. */
   triangles(shape) {
     const { context } = this;
     const same = [...shape.mechanism.markers.values()].map(({ look }) => look)
@@ -372,7 +372,7 @@ export class Picture {
       context.beginPath();
       for (let i = 0; i < places.length; i += 6) {
         const [first, ...others] = [0, 2, 4].map(k => this.at(places[i + k], places[i + k + 1]));
-        // The mark of a joint on the ground can be seen below it however small.
+        // The mark of a ground joint stays visible below it at any scale.
         const size = Math.max(...others.map(([x, y]) => Math.hypot(x - first[0], y - first[1])));
         const larger = same.length ? 1 : Math.max(1, MARK / size);
         context.moveTo(...first);
@@ -485,7 +485,7 @@ export class Picture {
     }
   }
 
-  /** Return of each leg the joints as they are seen, by name, in pixels. */
+  /** Return the joints of each leg by name, in pixels of the view. */
   legsSeen() {
     return this.shapes().filter(({ look }) => look.kind === 'joints').flatMap(({ mechanism, places, map }) => {
       const names = mechanism.value('points') ?? [];
@@ -499,13 +499,13 @@ export class Picture {
     });
   }
 
-  /** Return the point of a linkage's plane that is seen at a place. */
+  /** Return the point of a linkage's plane at a place in the view. */
   inPlane([[a, b, , right], [c, d, , up]], x, y) {
     const area = a * d - b * c;
     return [(d * (x - right) - b * (y - up)) / area, (a * (y - up) - c * (x - right)) / area];
   }
 
-  /** Draw the bars that follow the dimension that is pointed at. */
+  /** Light up the bars of the selected dimension. */
   light() {
     const { mechanism, dimension } = this.lit;
     const pairs = mechanism?.tunable.bars[dimension] ?? [];
@@ -522,7 +522,7 @@ export class Picture {
     }
   }
 
-  /** Draw what was asked for at the joints of the first legs; the longest of a mechanism is as long as any. */
+  /** Draw the requested arrows at the joints of the first legs; the longest one has a fixed length. */
   arrows() {
     const { context, canvas } = this;
     const length = Math.min(ARROW, canvas.clientHeight / 6);
@@ -553,7 +553,7 @@ export class Picture {
     context.fill();
   }
 
-  /** Say how long the longest arrow is, and what holds the loads. */
+  /** Write the value of the longest arrow, and the efforts that balance the loads. */
   legend({ kind, unit, efforts = {} }, joint, most) {
     const { name, factor } = units.of(unit);
     const figure = value => value === null ? 'without bound' : figures(value, 3);
@@ -579,7 +579,7 @@ export class Picture {
     return lines;
   }
 
-  /** Draw from the joint that is dragged to where it is wanted. */
+  /** Draw a line from the dragged joint to the pointer. */
   ghost() {
     const pull = this.pull();
     if (!pull) return;

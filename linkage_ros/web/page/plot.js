@@ -1,20 +1,20 @@
 // Copyright 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// What an output does over a turn or a stroke of the first input, the others held where they are.
+// A plot of an output over a turn or a stroke of the first input; the other inputs are fixed.
 
 import { element, Newest, put, Reason } from './control.js';
 import { multiples, paint } from './picture.js';
 import { figures, units } from './units.js';
 
 const KINDS = ['position', 'velocity', 'acceleration', 'transmission angle', 'force ratio'];
-// What grows with the input's speed, and by which power of it.
+// Quantities that grow with the input's speed: the power of the speed.
 const POWERS = { velocity: 1, acceleration: 2 };
 const FONT = "12px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
 const DIGIT = 7.5;
 const DEGREES = [1, 2, 5, 10, 15, 30, 45, 90, 180, 360];
 const FIGURES = 4;
-// What goes further than so many times the way between its outer tenths grows without bound.
+// Values beyond the middle eight tenths by more than this many times their range grow without bound.
 const MOST = 8;
 const NOTHING = 1e-9;
 
@@ -30,7 +30,7 @@ function library() {
 
 const shown = value => value === null || value === undefined ? '—' : figures(value, FIGURES);
 
-/** Between which values curves are drawn: all, but of what grows without bound. */
+/** The range of the drawn values: all, except those that grow without bound. */
 function bounds(values) {
   const sorted = values.filter(value => value !== null).sort((a, b) => a - b);
   if (!sorted.length) return [-1, 1];
@@ -97,7 +97,7 @@ export class Plot {
     return { width: this.place.clientWidth, height: this.place.clientHeight };
   }
 
-  /** Fill the window with the plot, or leave that. */
+  /** Enlarge the plot to the window, or shrink it again. */
   enlarge(large = !this.element.classList.contains('large')) {
     this.element.classList.toggle('large', large);
     this.enlarging.textContent = large ? 'Back' : 'Enlarge';
@@ -109,7 +109,7 @@ export class Plot {
     return select;
   }
 
-  /** What it is about: what was chosen of the one is kept beside what was chosen of the other. */
+  /** Whether a joint or an output is plotted; each of them keeps its own selection. */
   get about() {
     return this.kind.value === 'transmission angle' ? 'joint' : 'output';
   }
@@ -119,12 +119,12 @@ export class Plot {
     this.refresh();
   }
 
-  /** Ask for the curve anew. */
+  /** Request the curve again. */
   refresh() {
     if (this.element.open) this.asked.offer();
   }
 
-  /** Follow a parameter that was changed. */
+  /** Update the plot after a change of a parameter. */
   update(name) {
     if (name.endsWith('.speed')) this.render();
     else if (!name.endsWith('.start')) this.refresh();
@@ -148,7 +148,7 @@ export class Plot {
     this.draw();
   }
 
-  /** Draw the curve in the units that are shown. */
+  /** Draw the curve in the displayed units. */
   draw() {
     const { kind, input, output, units: [across, up], x, y, reach, dead } = this.curve;
     this.units = [units.of(across), units.of(up)];
@@ -176,7 +176,7 @@ export class Plot {
     this.look();
   }
 
-  /** Say in words what is drawn. */
+  /** Describe the plot in words. */
   describe(title, unit, across) {
     const known = this.data[1].filter(value => value !== null);
     const [from, to] = [this.data[0][0], this.data[0].at(-1)].map(shown);
@@ -193,7 +193,7 @@ export class Plot {
     const axis = label => ({
       label, font: FONT, labelFont: FONT, stroke: () => paint('--ink'), labelSize: 20, labelGap: 0,
       grid: { stroke: () => paint('--grid'), width: 1 }, ticks: { show: false },
-      // The library's own way to these adds until an end is reached.
+      // The library's own function adds steps up to the end, which may never be reached.
       splits: (_, side, low, high, step) => multiples(step, low, high),
       values: (_, splits) => splits.map(value => figures(value, 6)),
     });
@@ -230,7 +230,7 @@ export class Plot {
     ctx.restore();
   }
 
-  /** A value of the input plus the whole turns that take it into the plot. */
+  /** A value of the input plus the whole turns that bring it into the plot. */
   inside(value) {
     if (!this.motion.turns) return value;
     const [low, high] = [this.data[0][0], this.data[0].at(-1)];
@@ -238,7 +238,7 @@ export class Plot {
     return value - turn * Math.round((value - (low + high) / 2) / turn);
   }
 
-  /** Move the input to where the pointer is pressed or drawn. */
+  /** Move the input to the place where the pointer is pressed or dragged. */
   hold(over) {
     const move = ({ offsetX }) => this.motion.drag({
       output: this.curve.input, value: this.plot.posToVal(offsetX, 'x') / this.units[0].factor,
@@ -250,7 +250,7 @@ export class Plot {
     over.onpointermove = event => { if (event.buttons) move(event); };
   }
 
-  /** Show where the input is, and the value there or at the pointer. */
+  /** Mark the present input, and print the value there or at the pointer. */
   look() {
     if (!this.element.open || !this.curve) return;
     const [present, ...others] = this.motion.present;
@@ -260,7 +260,7 @@ export class Plot {
     this.sight = sight;
     const here = this.inside(present * this.units[0].factor);
     const left = this.plot.valToPos(here, 'x');
-    // It does not fly back where a turn begins anew.
+    // At the start of a new turn the mark jumps without an animation.
     this.now.classList.toggle('jumps', Math.abs(left - this.left) > this.plot.over.clientWidth / 2);
     this.left = left;
     this.now.style.transform = `translateX(${left}px)`;
@@ -268,7 +268,7 @@ export class Plot {
     const [x, y] = idx === null || idx === undefined
       ? [here, between(...this.data, here)] : this.data.map(values => values[idx]);
     const { kind, input, output, units: [, unit] } = this.curve;
-    // An angle is drawn without jumps, and said as it is elsewhere.
+    // An angle is drawn without jumps, but printed within half a turn.
     const turn = 2 * Math.PI * this.units[1].factor;
     const value = kind === 'position' && unit === 'rad' && y ? y - turn * Math.round(y / turn) : y;
     put(this.read, { textContent: `${input} ${shown(x)} ${this.units[0].name}: ${output} ${shown(value)} ${this.units[1].name}` });
@@ -278,7 +278,7 @@ export class Plot {
     if (this.element.open && this.curve) this.draw();
   }
 
-  /** Leave nothing behind that listens. */
+  /** Remove the plot with its listeners. */
   end() {
     this.plot?.destroy();
   }

@@ -1,7 +1,7 @@
 // Copyright 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// What a mechanism is: a control for each parameter, undo and reset, and its scene as a file.
+// The parameters of a mechanism: a control for each, undo and reset, and its scene as a file.
 
 import { BY_FACTOR, Choice, element, FINE_ABOUT_ZERO, LINEAR, Reason, Slider, Switch } from './control.js';
 import { download } from './files.js';
@@ -12,7 +12,7 @@ const SIGNS = { 1: '+1', '-1': '−1' };
 const MOVES = /\.(speed|start)$/;
 const RESTED = 300;
 
-/** A parameter's name without what its place in the panel says. */
+/** A parameter's name without the part that its group in the panel implies. */
 function labelled(name, inputs) {
   const [input, what] = name.split('.');
   if (MOVES.test(name)) return inputs > 1 ? `${what} of ${input}` : what;
@@ -30,7 +30,7 @@ function folding(title, children, open) {
 }
 
 export class Tuning {
-  /** Calls `light` with the name of the dimension whose bars are to light up, or nothing. */
+  /** Calls `light` with the dimension whose bars light up, or an empty text. */
   constructor(mechanism, connection, open, light) {
     Object.assign(this, { mechanism, connection, light });
     this.controls = new Map();
@@ -64,9 +64,9 @@ export class Tuning {
     const { name, kind, meaning, allowed, fixed, low, high } = setting;
     if (fixed) return null;
     const described = {
-      ...setting, label: labelled(name, this.inputs), title: `${meaning}\nMay be: ${allowed}.`,
+      ...setting, label: labelled(name, this.inputs), title: `${meaning}\nAllowed: ${allowed}.`,
       unit: /\[([^\]]+)\]/.exec(meaning)?.[1] ?? '', scale: law(setting),
-      // A dimension is shown as long as it is in the picture.
+      // A dimension is displayed with its length in the picture.
       times: () => name.startsWith(DIMENSION) ? this.mechanism.value('scale') ?? 1 : 1,
     };
     const request = (...about) => this.set(name, ...about);
@@ -106,7 +106,7 @@ export class Tuning {
     this.renderTools();
   }
 
-  /** Set several values at once; return whether that was granted. */
+  /** Set several values at once; return whether they were accepted. */
   async put(values) {
     const { reason } = await this.connection.ask({ op: 'set', mechanism: this.mechanism.key, values });
     this.reason.say(reason && `Refused: ${reason}`);
@@ -121,7 +121,7 @@ export class Tuning {
     if (text) download(`${name}.yaml`, text);
   }
 
-  /** Learn anew between what the dimensions may be moved, when nobody moves one. */
+  /** Update the ranges of dimensions, once no slider is held. */
   refresh() {
     clearTimeout(this.resting);
     this.resting = setTimeout(async () => {

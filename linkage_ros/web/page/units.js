@@ -1,7 +1,7 @@
 // Copyright 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// Units: all is counted in radians and metres, and shown so, or in degrees and millimetres.
+// Units: values are in radians and metres; they are displayed so, or in degrees and millimetres.
 
 const WORKSHOP = { rad: ['°', 180 / Math.PI], m: ['mm', 1000] };
 /** How many characters a field shows. */
@@ -11,7 +11,7 @@ const listeners = [];
 export const units = {
   workshop: false,
 
-  /** The unit that is shown for one such as 'rad', 'm/s', 'rad/m', and its factor. */
+  /** The displayed unit for one such as 'rad', 'm/s', 'rad/m', and its factor. */
   of(unit) {
     if (!this.workshop || !unit) return { name: unit, factor: 1 };
     const parts = unit.split('/').map(part => WORKSHOP[part] ?? [part, 1]);

@@ -1,7 +1,7 @@
 // Copyright 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// From where the picture is seen: zoomed, shifted and turned by mouse, fingers and keys.
+// The view of the picture: zoom, shift and rotation by mouse, fingers and keys.
 
 const PIXELS_A_RADIAN = 200;
 const STEP = 40;
@@ -57,7 +57,7 @@ export class View {
     return { right: mix(right, c, out, -s), up: mix(up, e, towards, -f), out: mix(towards, e, up, f) };
   }
 
-  /** Zoom by a factor, with what is at a place in the canvas left there. */
+  /** Zoom by a factor about a place in the canvas. */
   magnify(factor, at) {
     const zoom = Math.min(Math.max(this.zoom * factor, LEAST), MOST);
     const real = zoom / this.zoom;
