@@ -19,7 +19,7 @@ try:
     from domains import Domain
     from linkage_ros import command, scene
     from linkage_ros.render import files
-    from linkage_ros.render.parts import USUAL, USUAL_IN_MOTION
+    from linkage_ros.render.parts import DEFAULT, DEFAULT_IN_MOTION
     from linkage_ros.render.picture import Picture
     from listener import Listener
     from motion import lever_error, Motion
@@ -123,7 +123,7 @@ def draw(motions):
     OUT.mkdir(exist_ok=True)
     print(f'\nDrawing what they sent to {OUT} ...', flush=True)
     for motion in motions:
-        picture = Picture([motion.machine], PORTRAIT_SIZE, 'whole', USUAL, [motion])
+        picture = Picture([motion.machine], PORTRAIT_SIZE, 'whole', DEFAULT, [motion])
         shown_at = motion.turns_to(PORTRAIT_ANGLE)
         picture.arrange([shown_at])
         files.still(picture, shown_at, OUT / f'{motion.machine.name}.png')
@@ -131,7 +131,7 @@ def draw(motions):
     for motion in motions:
         motion.start = max(other.times[0] for other in motions)
     picture = Picture([motion.machine for motion in motions], ANIMATION_SIZE, 'whole',
-                      USUAL_IN_MOTION - {'axes'}, motions)
+                      DEFAULT_IN_MOTION - {'axes'}, motions)
     times = np.arange(0.0, ANIMATED_SECONDS, 1.0 / FRAMES_PER_SECOND) / picture.period
     picture.arrange(times)
     files.gif(picture, times, FRAMES_PER_SECOND, 0, COLOURS, OUT / 'all.gif', iter)

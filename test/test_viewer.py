@@ -1867,7 +1867,7 @@ def test_what_is_refused_is_said_where_one_looks_and_leaves_the_picture_free(sho
         await browser.until(moved)
         (x, y), _ = await upright_lever(seen)
         await page.drag((x, y), (x + 30.0, y))
-        why = 'nothing that is known here moves the crank: no crank_driver runs'
+        why = 'the crank cannot be moved: no crank_driver is running'
         await browser.until(lambda: page.value(f'{notice}.textContent === "{why}"'))
         assert await reason() == why
         await browser.until(lambda: page.value(f'{notice}.hidden'))
