@@ -11,6 +11,7 @@ gcc-arm-none-eabi libnewlib-arm-none-eabi). With --document the tables go into d
 """
 
 import argparse
+from itertools import chain
 from pathlib import Path
 import re
 import shutil
@@ -35,7 +36,8 @@ SCENES = ('config/slotted_lever', 'config/jansen', 'config/excavator', 'examples
 POSES, CALLS = 16, 20_000
 USES = {
     'pose': '{name}_pose p; {name}_solve(given[k], &p); out = p.angle_{output};',
-    'inverse': 'float x = given[k] + 0.05f; {name}_crank_for_angle_{output}(found[k], x, &x); '
+    # Next to the other end of the reach, so that each assembly mode is chosen somewhere.
+    'inverse': '{number} x = given[{last} - k]; {name}_crank_for_angle_{output}(found[k], x, &x); '
                'out = x;',
     'actuators to joints': 'side.position[0] = given[k]; out = side.velocity[0] = 1.0f; '
                            '{name}_actuators_to_joints(&memory, &side, &other); '
@@ -90,12 +92,32 @@ int main(void)
     cli(); sleep_enable(); sleep_cpu();
 }}
 """
-# Nanoseconds of each call, the least of some tries, in a controller's double precision.
-TIMES = """
+NOW = """
 #include <stdio.h>
 #include <time.h>
 static double now(void) {{ struct timespec t; clock_gettime(CLOCK_MONOTONIC, &t);
     return 1e9 * (double)t.tv_sec + (double)t.tv_nsec; }}
+"""
+# Nanoseconds of a call at each pose, by repeating it, the least of some tries.
+PACE = NOW + """
+static volatile {number} given[] = {{ {given} }}, found[] = {{ {found} }}, out;
+int main(void)
+{{
+    for (int k = 0; k < {count}; k++) {{
+        double best = 1e30;
+        for (int tries = 0; tries < 50; tries++) {{
+            double start = now();
+            for (int i = 0; i < 1000; i++) {{ {body} }}
+            double taken = (now() - start) / 1000;
+            best = taken < best ? taken : best;
+        }}
+        printf("%.2f\\n", best);
+    }}
+    return 0;
+}}
+"""
+# Nanoseconds of each call, the least of some tries, in a controller's double precision.
+TIMES = NOW + """
 int main(void)
 {{
     static {name}_memory m;
@@ -105,7 +127,7 @@ int main(void)
         {name}_point p;
         {name}_side a = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, j = a, b = a;
         {name}_sample(k, q);
-        if (!{name}_at(q, &p)) continue;
+        if (!{name}_at(q, 1, &p)) continue;
         for (int i = 0; i < {n}; i++) {{
             a.position[i] = p.position[0][i];
             a.velocity[i] = a.effort[i] = 1;
@@ -136,6 +158,11 @@ def main():
     text += '\n\n' + table(
         ['linkage', 'actuators to joints [us], median', 'at most', 'joints to actuators [us], '
          'median', 'at most'], [[name, *times] for name, times in timed()])
+    text += '\n\n' + table(
+        ['linkage', 'number', 'pose [ns], median', 'at most', 'inverse [ns], median', 'at most'],
+        [[name, number, *chain.from_iterable(paced(name, output, number, use)
+                                             for use in ('pose', 'inverse'))]
+         for name, output in CASES.items() for number in ('float', 'double')])
     print(text)
     if parser.parse_args().document:
         document.write('c-code.md', text)
@@ -143,22 +170,48 @@ def main():
 
 def measured(compiler, flags, name, output, use):
     """Return code, that of the C library, the stack of the linkage's own code, and cycles."""
-    machine = scene.read({'mechanisms': [name], f'{name}.type': name}).machines[name]
-    given = np.linspace(*machine.first.reach[0], POSES + 2)[1:-1]
-    found = machine.linkage.joint_angles(given, [output])[output]
-    values = {'name': name, 'count': POSES, **{
-        key: ', '.join(f'{value:.7g}f' for value in each)
-        for key, each in (('given', given + 1e-7), ('found', found))}}
-    body = USES[use].format(name=name, output=output)
+    machine, values = prepared(name, output, 'float', use)
+    body = values['body']
     begin = f'{name}_begin(&memory);' if 'memory' in body else ''
     text = header.written(machine, (output,), True, [f'{name}_{output}'])
     with tempfile.TemporaryDirectory() as folder:
         sizes = [built(Path(folder), compiler, [*flags, *extra], text + MAIN.format(
-            **values, begin=each and begin, body=each)) for extra in ((), ('-c',))
+            **{**values, 'body': each}, begin=each and begin)) for extra in ((), ('-c',))
             for each in ('', body)]
         (idle, _), (linked, _), (empty, _), (own, stack) = sizes
         return [linked - idle, linked - idle - (own - empty), stack,
-                *cycles(Path(folder), compiler, flags, text + CYCLES.format(**values, body=body))]
+                *cycles(Path(folder), compiler, flags, text + CYCLES.format(**values))]
+
+
+def prepared(name, output, number, use):
+    """Return a mechanism, and what the programs that call its C are filled with."""
+    machine = scene.read({'mechanisms': [name], f'{name}.type': name}).machines[name]
+    given = np.linspace(*machine.first.reach[0], POSES + 2)[1:-1]
+    found = machine.linkage.joint_angles(given, [output])[output]
+    return machine, {
+        'name': name, 'count': POSES, 'number': number,
+        'body': USES[use].format(name=name, output=output, number=number, last=POSES - 1),
+        **{key: ', '.join(f'{value:.7g}f' if number == 'float' else repr(float(value))
+                          for value in each)
+           for key, each in (('given', given + 1e-7), ('found', found))}}
+
+
+def paced(name, output, number, use):
+    """Return the time of a call on this machine: median and most [ns]."""
+    machine, values = prepared(name, output, number, use)
+    with tempfile.TemporaryDirectory() as folder:
+        taken = run(folder, header.written(machine, (output,), number == 'float')
+                    + PACE.format(**values))
+    return [f'{value:.0f}' for value in (np.median(taken), max(taken))]
+
+
+def run(folder, text):
+    """Compile a program for this machine, and return the numbers that it prints."""
+    source, program = Path(folder) / 'main.c', Path(folder) / 'main'
+    source.write_text(text)
+    subprocess.run(['cc', '-O2', source, '-o', program, '-lm'], check=True)
+    return np.array(subprocess.run([program], capture_output=True, text=True, check=True)
+                    .stdout.split(), float)
 
 
 def cycles(folder, compiler, flags, text):
@@ -179,12 +232,8 @@ def timed():
     for path in SCENES:
         for name, machine in scene.load(str(root / f'{path}.yaml')).machines.items():
             with tempfile.TemporaryDirectory() as folder:
-                source, program = Path(folder) / 'main.c', Path(folder) / 'main'
-                source.write_text(header.written(machine) + TIMES.format(
-                    name=name, n=len(machine.inputs), count=CALLS))
-                subprocess.run(['cc', '-O2', source, '-o', program, '-lm'], check=True)
-                rows = np.array(subprocess.run([program], capture_output=True, text=True)
-                                .stdout.split(), float).reshape(-1, 2) / 1000.0
+                rows = run(folder, header.written(machine) + TIMES.format(
+                    name=name, n=len(machine.inputs), count=CALLS)).reshape(-1, 2) / 1000.0
             yield name, [f'{value:.2f}' for row in rows.T
                          for value in (np.median(row), row.max())]
 

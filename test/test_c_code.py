@@ -29,7 +29,8 @@ SCENE = {
     'bent.type': 'custom', 'bent.joints': [
         'O ground 0 0', 'A crank O 0.4', 'B crank A 0.3 zero O', 'C rigid A B 0.2 0.4 left']}
 OUTPUTS = {'slotted_lever': ('lever', 'A.x'), 'four_bar': ('QB', 'distance(O,B)'),
-           'jansen': ('G.x', 'angle(A,G)'), 'whitworth': ('lever',), 'slider_crank': ('block',),
+           'jansen': ('G.x', 'angle(A,G)'), 'whitworth': ('lever', 'block'),
+           'peaucellier': ('PB', 'BC'), 'slider_crank': ('block',),
            'boom': ('B.x', 'angle(O,B)')}
 CALLER = """
 void {name}_over(long count, const {number} *given, {number} *out)
@@ -156,6 +157,37 @@ def test_the_inverse_finds_the_nearest_input(library, machines, name, output):
             continue
         given, found = (ctypes.c_double * 2)(value, 0.0), ctypes.c_double(7.0)
         assert invert(given, ctypes.byref(found)) == 0 and found.value == 7.0
+
+
+@pytest.mark.parametrize('name, output', [
+    ('four_bar', 'QB'), ('slotted_lever', 'lever'), ('jansen', 'BC'), ('whitworth', 'lever'),
+    ('peaucellier', 'BC'), ('klann', 'CF')])
+def test_an_inverse_takes_no_more_poses_than_its_header_says(machines, tmp_path, name, output):
+    machine, rng = machines[name], np.random.default_rng(6)
+    text = header.written(machine, (output,))
+    said = re.findall(r'(\d+) poses at most', text)[-1]
+    counted = re.sub(rf'(int {name}_at_angle_{output}\([^;]*?\)\n{{\n)', r'\1    taken++;\n', text)
+    assert counted.count('taken++') == 1
+    library = loaded(tmp_path, f"""
+static int taken;
+{counted}
+int poses(double value, double near)
+{{
+    double found;
+    taken = 0;
+    (void){name}_crank_for_angle_{output}(value, near, &found);
+    return taken;
+}}
+""")
+    (low, high), = machine.first.reach
+    edge = 0.01 * (high - low)
+    values = machine.linkage.joint_angles(np.concatenate([
+        rng.uniform(low + edge, high - edge, 200), [low, high]]), [output])[output]
+    taken = [library.poses(*map(ctypes.c_double, (value, near))) for value, near in zip(
+        [*values, *rng.uniform(-7.0, 7.0, 200)], rng.uniform(-9.0, 9.0, 402))]
+    assert max(taken) <= int(said)
+    # Inside the reach a closed form is checked, not searched.
+    assert machine.linkage.inverse(output).closed is None or max(taken[:200]) == 1
 
 
 def test_several_inputs_are_found_for_as_many_outputs(machines, tmp_path):

@@ -4,18 +4,19 @@
 """Scenes from robot descriptions: what they publish closes the loops of the file, everywhere."""
 
 import cmath
-from collections import Counter
+from collections import Counter, defaultdict
 from contextlib import redirect_stderr, redirect_stdout
 from functools import lru_cache
 import io
+import json
 import math
 from pathlib import Path
 import random
 import re
 
 from linkage_ros import mechanisms, scene
-from linkage_ros.robot_files import closing, command, model, readers
-from linkage_ros.robot_files.spatial import trees
+from linkage_ros.robot_files import check, closing, command, model, readers
+from linkage_ros.robot_files.spatial import posed, trees
 import numpy as np
 import pytest
 from robots import LIBRARIES
@@ -169,6 +170,26 @@ def test_a_scene_is_held_against_its_robot_over_the_range_of_its_motor(tmp_path,
     (count, worst), = checked(text)
     assert count >= 200 and worst < 1e-12 and 'motor from -1.2 to 1.2' in text
     assert ('# wrist has its ends 0.01 m apart along its axis' in text) == ('0.01' in place)
+
+
+@pytest.mark.parametrize('old, new', [
+    (' parallelogram', ' antiparallelogram'), ('ground 0.3 0', 'ground 0.3 1e-8'),
+    ('=-shoulder', '=shoulder'), ('=elbow-1.57079632', '=elbow-1.57079633')])
+def test_a_mechanism_that_differs_from_its_robot_is_refused(old, new):
+    robot = closing.closed(readers.read(str(ROBOTS / 'four_bar.urdf'))).robot
+    given, _ = command.described(robot)
+
+    def compared():
+        machine = scene.read(given).machines['motor']
+        return check.compared(robot, machine, ['motor'], {'motor': (-1.2, 1.2)}, 0.0)
+
+    assert compared().startswith('Checked: motor: in 240 poses')
+    key = 'motor.joint_names' if '=' in old else 'motor.joints'
+    changed = [line.replace(old, new) for line in given[key]]
+    assert changed != given[key]
+    given[key] = changed
+    with pytest.raises(check.Difference, match='with motor at .* is off by'):
+        compared()
 
 
 def test_a_parallelogram_that_hangs_in_its_file_stays_one(imported):
@@ -355,6 +376,23 @@ def test_what_is_missing_is_said_in_one_sentence(capsys, tmp_path):
     loops.write_text('loops: []')
     assert 'must have one of closures: closed_loop: pin_loops: ball_loops:' in refused(
         capsys, ROBOTS / 'five_bar.urdf', '--loops', loops)
+
+
+PIN = '{pin_loops: [{parent: coupler, child: rocker, %s: [0.3, 0, 0]}], actuated_joints: [motor]}'
+
+
+@pytest.mark.parametrize('text, why', [
+    (PIN % 'parent_xzy', "pin_loops[0] has no key 'parent_xzy'; allowed: name, parent, child, "
+     'parent_xyz, child_xyz, axis; did you mean parent_xyz?'),
+    (PIN.replace('actuated', 'actated') % 'parent_xyz', "the file has no key 'actated_joints'; "
+     'allowed: closures, .*; did you mean actuated_joints?'),
+    ('{closures: [{link_a: coupler, link_b: rocker, 7: 8}]}', 'closures[0] has no key 7; '
+     'allowed: link_a, link_b, point, axis\n')])
+def test_an_unknown_key_of_a_file_of_loops_is_refused(capsys, tmp_path, text, why):
+    loops = tmp_path / 'loops.yaml'
+    loops.write_text(text)
+    said = refused(capsys, ROBOTS / 'four_bar.urdf', '--loops', loops)
+    assert re.search(re.escape(why).replace(r'\.\*', '.*'), said)
 
 
 def test_rods_that_hold_each_other_are_named(capsys, tmp_path):
@@ -666,6 +704,18 @@ def test_all_joints_of_a_whole_robot_are_published(imported, file):
     assert {*LIBRARIES[1](text).joints} <= published
 
 
+def test_a_universal_joint_with_one_axis_is_refused(capsys, tmp_path):
+    file = written(tmp_path, 'four_bar.urdf', ('name="wrist" type="revolute"',
+                                               'name="wrist" type="universal"'), (
+        '<child_axis xyz="0 1 0"/>', ''))
+    assert 'joint wrist is universal and must have two axes' in refused(capsys, file)
+
+
+def test_a_comment_of_another_format_makes_no_urdf(tmp_path):
+    file = written(tmp_path, 'four_bar.sdf', ('</sdf>', '</sdf><!-- from <robot> -->'))
+    assert model.description(str(file)).startswith('<robot')
+
+
 def test_a_motor_between_two_moving_links_is_measured(imported, tmp_path):
     # As in a parallelogram: the elbow turns back as far as the shoulder turns.
     machine, = imported('four_bar.urdf', '--driven', 'elbow').values()
@@ -757,7 +807,7 @@ def test_links_are_where_other_readers_of_a_urdf_have_them(tmp_path, seed, libra
     robot = readers.read(str(file))
     positions = {name: float(rng.uniform(-3.0, 3.0)) for name in robot.positions}
     there = library(text).places(dict.fromkeys(positions, 0.0) | positions, names)
-    here = closing.posed(robot, positions).frames
+    here = posed(robot, positions).frames
     for name in names:
         assert here[name][:3, 3] == pytest.approx(there[name], abs=1e-12)
 
@@ -816,8 +866,13 @@ def robot_of(linkage, values):
     return robot
 
 
-def check_comes_back(linkage, values, robot, steps):
-    """Check that the scene of a linkage's robot moves as the linkage does, by steps of inputs."""
+def check_comes_back(linkage, values, robot, steps, zeros=None):
+    """
+    Check that the scene of a linkage's robot moves as the linkage does, by steps of inputs.
+
+    `zeros` are positions of the robot's joints before a step, if they are not 0.
+    """
+    zeros = Counter(zeros or {})
     given, said = command.described(robot)
     for count, worst in checked('\n'.join(said)):
         assert count >= 200 and worst < 1e-6
@@ -825,13 +880,15 @@ def check_comes_back(linkage, values, robot, steps):
     was, moved = linkage.joint_angles(values), 0
     for step in steps:
         now = linkage.joint_angles(np.add(values, step))
-        motors = dict(zip((each.name for each in linkage.inputs), np.ravel(step)))
+        motors = {each.name: zeros[each.name] + change
+                  for each, change in zip(linkage.inputs, np.ravel(step))}
         found = {}
         for machine in machines:
             found.update(published(machine, **{drive.source: motors[drive.source]
                                                for drive in machine.inputs.values()}))
         for link in linkage.links:
-            apart = found.get(link.name, math.nan) - (now[link.name] - was[link.name])
+            apart = found.get(link.name, math.nan) - zeros[link.name] - (
+                now[link.name] - was[link.name])
             if not math.isnan(apart) and link.name not in motors:
                 size = linkage.longest if link.kind == 'prismatic' else 1.0
                 apart = apart if link.kind == 'prismatic' else math.remainder(apart, math.tau)
@@ -921,13 +978,30 @@ CLOSINGS = [
         fixed(one, f'closing_{name}_1', at) + fixed(other, f'closing_{name}_2', to))]
 
 
-def as_urdf(robot, rng):
+def in_file(loops, way, name, one, other, at, to):
+    """Add what closes a hinge about z to a file of loops; return the links that this needs."""
+    if way == 0:
+        loops['closures'].append({'link_a': one, 'link_b': other, 'point': words(at),
+                                  'axis': [0, 0, 1]})
+    elif way == 1:
+        loops['closed_loop'].append([f'{name} a', f'{name} b_fixed'])
+        loops['type'].append('3d')
+        return fixed(one, f'{name} a', at) + fixed(other, f'{name} b', to)
+    else:
+        loops[['pin_loops', 'ball_loops'][way - 2]].append({
+            'parent': one, 'child': other, 'parent_xyz': at.tolist(), 'child_xyz': to.tolist()})
+    return ''
+
+
+def as_urdf(robot, rng, loops=None):
     """Return a robot of cuts as URDF, each loop closed in a dialect of its own."""
     for joint in robot.joints:
         joint.is_cut = joint.name.startswith('cut_')
-    text = model.urdf(robot)
-    closings = ''.join(CLOSINGS[rng.integers(len(CLOSINGS))](
-        f'c{i}', *cut.bodies, *cut.places) for i, cut in enumerate(trees(robot)[1]))
+    text, closings = model.urdf(robot), ''
+    for i, cut in enumerate(trees(robot)[1]):
+        given = f'c{i}', *cut.bodies, *cut.places
+        closings += CLOSINGS[rng.integers(len(CLOSINGS))](*given) if loops is None else in_file(
+            loops, rng.integers(4), *given)
     return text.replace('</robot>', f'{closings}</robot>')
 
 
@@ -937,9 +1011,12 @@ def check_dialects(folder, seeds):
         if not (made := random_robot(seed)):
             continue
         linkage, values, robot, steps = made
-        file = folder / f'{seed}.urdf'
-        file.write_text(as_urdf(robot, np.random.default_rng(seed)))
-        again = readers.read(str(file))
+        # Every other robot has its loops in a file of their own.
+        loops, rng = defaultdict(list) if seed % 2 else None, np.random.default_rng(seed)
+        file, more = folder / f'{seed}.urdf', folder / f'{seed}.yaml'
+        file.write_text(as_urdf(robot, rng, loops))
+        more.write_text(json.dumps(loops))
+        again = readers.read(str(file), str(more) if loops else None)
         again.driven, again.follows = robot.driven, robot.follows
         try:
             moved += check_comes_back(linkage, values, again, steps if len(steps[0]) > 1
@@ -951,11 +1028,13 @@ def check_dialects(folder, seeds):
 
 @pytest.mark.slow
 def test_random_linkages_come_back_in_any_dialect(tmp_path):
+    pytest.importorskip('yaml')
     check_dialects(tmp_path, range(6))
 
 
 @pytest.mark.long
 def test_more_random_linkages_come_back_in_any_dialect(tmp_path):
+    pytest.importorskip('yaml')
     check_dialects(tmp_path, range(6, 40))
 
 

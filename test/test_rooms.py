@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / 'linkage_ros'
 # From the ground up: a module imports from its own room and from those below.
 ROOMS = ('words', 'palette', 'cache', 'formula', 'linkage', 'mechanisms', 'scene', 'command',
-         'c_code', 'robot_files', 'robot_model', 'render', 'nodes', 'web',
+         'c_code', 'robot_model', 'robot_files', 'render', 'nodes', 'web',
          'executables')
 WITH_ROS = ('nodes', 'web')
 ROS = ('rclpy', 'builtin_interfaces', 'geometry_msgs', 'rcl_interfaces', 'sensor_msgs', 'std_msgs',

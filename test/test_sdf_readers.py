@@ -12,7 +12,7 @@ from itertools import count
 import math
 from xml.sax.saxutils import quoteattr
 
-from linkage_ros.robot_files import closing, readers
+from linkage_ros.robot_files import readers, spatial
 import numpy as np
 import pytest
 
@@ -210,7 +210,7 @@ def test_many_robots_are_read_as_they_were(tmp_path):
 
 def turn(robot, name, body, base):
     """Return how a body is turned as seen from another, from where the file has both."""
-    here = closing.posed(robot, name).frames
+    here = spatial.posed(robot, name).frames
     was = np.linalg.inv(robot.frames[base]) @ robot.frames[body]
     return (np.linalg.inv(here[base]) @ here[body])[:3, :3] @ was[:3, :3].T
 

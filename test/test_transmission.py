@@ -390,7 +390,7 @@ const char *{name}_placed(const double *dimension, const double *q, double *posi
     {name}_point p;
     const char *wrong = {name}_set(&c, dimension);
     if (!wrong)
-        position[0] = {name}_at(&c, q, &p) ? p.position[1][0] : NAN;
+        position[0] = {name}_at(&c, q, 1, &p) ? p.position[1][0] : NAN;
     return wrong;
 }}
 """ for name, machine in machines.items()))

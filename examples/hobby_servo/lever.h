@@ -4,7 +4,7 @@
  * Input: crank [rad]. Angles [rad] count counterclockwise.
  * float: joints are off by up to 1e-07 of the longest bar at 2001 poses over the reach, without its outermost hundredth.
  * C99 and C++17 without heap, lock or recursion; compile without -ffast-math, which drops the checks.
- * A call of the transmission takes at most 8 poses.
+ * A call of the transmission takes at most 12 poses.
  */
 #ifndef LEVER_LINKAGE_H
 #define LEVER_LINKAGE_H
@@ -122,8 +122,8 @@ static inline int lever_reaches(float crank)
     return isfinite(crank);
 }
 
-/* What a call returns: 0, or a sum of these. OUT_OF_REACH: the linkage cannot get there, or may
-   not. SINGULAR: it would take an infinite velocity or effort. NOT_KNOWN: a number is missing. */
+/* Status of a call: 0, or a sum of these. OUT_OF_REACH: outside the reach or the sweep. SINGULAR: a
+   velocity or an effort would be infinite. NOT_KNOWN: a value is NaN or infinite. */
 enum { LEVER_OK = 0, LEVER_OUT_OF_REACH = 1, LEVER_SINGULAR = 2, LEVER_NOT_KNOWN = 4 };
 enum { LEVER_ACTUATOR_LEVER_CRANK = 0 };
 enum { LEVER_JOINT_LEVER_LEVER = 0 };
@@ -132,12 +132,12 @@ typedef struct { float position[1], velocity[1], effort[1]; } lever_side;
 typedef lever_side lever_actuators;
 typedef lever_side lever_joints;
 
-/* A pose: positions of the actuators [0] and joints [1], their rates by each input, and what the
-   inputs give against the loads. */
+/* A pose: positions of the actuators [0] and joints [1], their rates by each input, and the inputs'
+   efforts against the loads. */
 typedef struct { float position[2][1], rate[2][1][1], load[1]; } lever_point;
 
-/* What is remembered between calls: where the actuators were, where the joints were to be, and the
-   last valid values of both. lever_begin fills it. */
+/* The state between calls, which lever_begin initializes: the last poses and inputs by measured
+   actuators [0] and by commanded joints [1], and the last valid values of both. */
 typedef struct {
     lever_point point[2];
     float input[2][1];
@@ -153,83 +153,73 @@ static inline const char *lever_name(int side, int i)
 }
 
 /* Place it at inputs, each in rad or in its size; 0 if it cannot be assembled. */
-static inline int lever_at(const float *q, lever_point *p)
+static inline int lever_at(const float *q, int is_rated, lever_point *p)
 {
     const float k2 = 0.02f;
-    const float k5 = 0.025f;
-    const float k16 = 0.000625f;
-    const float k19 = 0.0036f;
-    const float k31 = 0.0f;
-    const float k34 = 0.04f;
-    const float k54 = (-0.025f);
-    const float k55 = 0.09f;
-    const float k59 = 0.000625f;
+    const float k3 = 0.04f;
+    const float k13 = 0.025f;
+    const float k22 = (-0.025f);
+    const float k23 = 0.09f;
+    const float k27 = 0.000625f;
+    const float k30 = 0.0036f;
     const float x0 = q[0];
-    const float v21 = (0.5f * x0);
-    const float v22 = cosf(v21);
-    const float v23 = (v22 * v22);
-    const float v24 = (k19 * v23);
-    const float v25 = (k16 + v24);
-    const float v38 = (-((k34 * sinf(v21)) * v22));
-    const float v41 = (k5 + (k34 * v23));
-    const float v44 = sqrtf(((v38 * v38) + (v41 * v41)));
-    if (!isfinite(lever_gated(x0, v25, k31) + lever_gated(atan2f((-(v38 / v44)), (v41 / v44)), v25, k31)))
+    const float v5 = (0.5f * x0);
+    const float v8 = cosf(v5);
+    const float v14 = (v8 * v8);
+    p->position[0][0] = x0;
+    p->position[1][0] = atan2f((-(-((k3 * sinf(v5)) * v8))), (k13 + (k3 * v14)));
+    if (!isfinite(p->position[0][0] + p->position[1][0]))
         return 0;
-    p->position[0][0] = lever_gated(x0, v25, k31);
+    if (!is_rated)
+        return 1;
     p->rate[0][0][0] = lever_gated(1.0f, fabsf(x0), 0.0f);
-    p->position[1][0] = lever_gated(atan2f((-(v38 / v44)), (v41 / v44)), v25, k31);
-    p->rate[1][0][0] = (((k2 * (k54 + (k55 * v23))) / (k59 + v24)) + 0.0f);
+    p->rate[1][0][0] = (((k2 * (k22 + (k23 * v14))) / (k27 + (k30 * v14))) + 0.0f);
     p->load[0] = 0.0f;
     return 1;
 }
 
 /* Place it at inputs, each in rad or in its size; 0 if it cannot be assembled. */
-static inline int lever_at_angle_lever(const float *q, lever_point *p)
+static inline int lever_at_angle_lever(const float *q, int is_rated, lever_point *p)
 {
     const float k1 = 0.02f;
     const float k2 = 0.04f;
     const float k13 = 0.025f;
-    const float k36 = 0.000625f;
-    const float k39 = 0.0036f;
-    const float k47 = 0.0f;
-    const float k49 = (-0.025f);
-    const float k50 = 0.09f;
-    const float k54 = 0.000625f;
+    const float k18 = (-0.025f);
+    const float k19 = 0.09f;
+    const float k23 = 0.000625f;
+    const float k26 = 0.0036f;
     const float x0 = q[0];
     const float v5 = (0.5f * x0);
     const float v8 = cosf(v5);
-    const float v10 = (-((k2 * sinf(v5)) * v8));
     const float v14 = (v8 * v8);
-    const float v16 = (k13 + (k2 * v14));
-    const float v19 = sqrtf(((v10 * v10) + (v16 * v16)));
-    const float v40 = (k39 * v14);
-    if (!isfinite(lever_gated(atan2f((-(v10 / v19)), (v16 / v19)), (k36 + v40), k47)))
+    p->position[1][0] = atan2f((-(-((k2 * sinf(v5)) * v8))), (k13 + (k2 * v14)));
+    if (!isfinite(p->position[1][0]))
         return 0;
-    p->position[0][0] = lever_gated(atan2f((-(v10 / v19)), (v16 / v19)), (k36 + v40), k47);
-    p->rate[0][0][0] = (((k1 * (k49 + (k50 * v14))) / (k54 + v40)) + 0.0f);
-    p->position[1][0] = lever_gated(atan2f((-(v10 / v19)), (v16 / v19)), (k36 + v40), k47);
-    p->rate[1][0][0] = (((k1 * (k49 + (k50 * v14))) / (k54 + v40)) + 0.0f);
+    if (!is_rated)
+        return 1;
+    p->rate[1][0][0] = (((k1 * (k18 + (k19 * v14))) / (k23 + (k26 * v14))) + 0.0f);
     p->load[0] = 0.0f;
     return 1;
 }
 
-/* How large a position is, and after how much it is the same again, or 0. */
+/* One over the size of a position; or half the turn after which it is the same again, or 0. */
 static inline float lever_scale(int side, int i, int is_turn)
 {
-    static const float scale[3][1][2] = { { { 1.0f, 0.0f } }, { { 1.0f, 6.2831855f } }, { { 1.0f, 6.2831855f } } };
+    static const float scale[3][1][2] = { { { 1.0f, 0.0f } }, { { 1.0f, 3.1415927f } }, { { 1.0f, 3.1415927f } } };
     return scale[side][i][is_turn];
 }
 
-/* From a pose to positions, the shorter way; returns the largest, in sizes. */
+/* Gaps from a pose to positions, the shorter way round; returns the largest, in sizes. */
 static inline float lever_gap(const float to[1], const lever_point *p, int side, float gap[1])
 {
-    float most = 0.0f;
+    float most = 0;
     int i;
     for (i = 0; i < 1; i++) {
-        const float turn = lever_scale(side, i, 1);
+        const float half = lever_scale(side, i, 1);
         gap[i] = to[i] - p->position[side > 0][i];
-        gap[i] -= turn > 0.0f ? turn * floorf(gap[i] / turn + 0.5f) : 0.0f;
-        most = fmaxf(most, fabsf(gap[i]) / lever_scale(side, i, 0));
+        if (half > 0 && fabsf(gap[i]) > half)
+            gap[i] -= 2 * half * floorf(0.5f * gap[i] / half + 0.5f);
+        most = fmaxf(most, fabsf(gap[i]) * lever_scale(side, i, 0));
     }
     return most;
 }
@@ -238,17 +228,17 @@ static inline float lever_gap(const float to[1], const lever_point *p, int side,
 static inline int lever_solved(const lever_point *p, int side, int transposed, float least,
     const float b[1], float x[1])
 {
-    float a[1][1 + 1], most = 1.0f, t;
+    float a[1][1 + 1], most = 1, t;
     int i, j, k, best, sign = 1;
     for (i = 0; i < 1; i++) {
         for (j = 0; j < 1; j++) {
-            a[i][j] = transposed ? p->rate[side > 0][j][i] / lever_scale(side, j, 0)
-                : p->rate[side > 0][i][j] / lever_scale(side, i, 0);
+            a[i][j] = transposed ? p->rate[side > 0][j][i] * lever_scale(side, j, 0)
+                : p->rate[side > 0][i][j] * lever_scale(side, i, 0);
             if (!isfinite(a[i][j]))
                 return 0;
             most = fmaxf(most, fabsf(a[i][j]));
         }
-        a[i][1] = transposed ? b[i] : b[i] / lever_scale(side, i, 0);
+        a[i][1] = transposed ? b[i] : b[i] * lever_scale(side, i, 0);
     }
     for (k = 0; k < 1; k++) {
         for (best = k, i = k + 1; i < 1; i++)
@@ -260,7 +250,7 @@ static inline int lever_solved(const lever_point *p, int side, int transposed, f
             a[k][j] = a[best][j];
             a[best][j] = t;
         }
-        sign = (best == k) == (a[k][k] > 0.0f) ? sign : -sign;
+        sign = (best == k) == (a[k][k] > 0) ? sign : -sign;
         for (i = k + 1; i < 1; i++)
             for (t = a[i][k] / a[k][k], j = k; j <= 1; j++)
                 a[i][j] -= t * a[k][j];
@@ -271,56 +261,73 @@ static inline int lever_solved(const lever_point *p, int side, int transposed, f
         x[i] /= a[i][i];
     }
     for (i = 0; i < 1; i++) {
-        x[i] /= transposed ? lever_scale(side, i, 0) : 1.0f;
+        x[i] *= transposed ? lever_scale(side, i, 0) : 1;
         if (!isfinite(x[i]))
             return 0;
     }
     return sign;
 }
 
-/* Newton steps from inputs q to positions; each comes nearer, and stays on
-   its side of singular poses. Returns 0, with q anywhere, where they do not get there. */
-static inline int lever_reached(int side, int (*at)(const float *, lever_point *),
-    int steps, const float position[1], float q[1], lever_point *p)
+/* Newton's method from inputs q to positions: each step comes nearer, and stays on its side of
+   singular poses. Returns 0, with any q, if it does not converge; -1 if it is strict and q misses
+   by so much that it belongs to another assembly. */
+static inline int lever_reached(int side, int (*at)(const float *, int, lever_point *),
+    int steps, int is_strict, const float position[1], float q[1], lever_point *p)
 {
     lever_point next;
-    float gap[1], x[1] = { 0.0f }, y[1] = { 0.0f }, to[1], share = 1.0f, longest, left, now;
-    float steepest = 1.0f;
+    float gap[1], x[1] = { 0 }, y[1] = { 0 }, to[1], share = 1, longest, left, now;
+    float steepest = 1;
     int i, j, sign, other = 0;
-    if (!at(q, p))
+    if (!at(q, side < 2, p))
         return 0;
     left = lever_gap(position, p, side, gap);
+    if (left <= 2e-06f)
+        return 1;
+    if (is_strict && left > 0.01f)
+        return -1;
+    if (side > 1 && !at(q, 1, p))
+        return 0;
     sign = lever_solved(p, side, 0, 1e-05f, gap, x);
     while (--steps > 0 && sign && left > 2e-06f && share > 0.00024414062f) {
-        for (longest = 1.0f, i = 0; i < 1; i++)
+        for (longest = 1, i = 0; i < 1; i++)
             longest = fmaxf(longest, fabsf(x[i]) / 0.5f);
         for (i = 0; i < 1; i++)
             to[i] = q[i] + share / longest * x[i];
-        now = at(to, &next) ? lever_gap(position, &next, side, gap) : left;
+        now = at(to, 1, &next) ? lever_gap(position, &next, side, gap) : left;
         if (now < left)
             other = lever_solved(&next, side, 0, 1e-05f, gap, y);
         if (now < left && (other == sign || now <= 4e-06f)) {
             *p = next;
             left = now;
             sign = other;
-            share = 1.0f;
+            share = 1;
             for (i = 0; i < 1; i++) {
                 q[i] = to[i];
                 x[i] = y[i];
             }
         } else
-            share = left <= 4e-06f ? 0.0f : 0.5f * share;
+            share = left <= 4e-06f ? 0 : 0.5f * share;
     }
     for (i = 0; i < 1; i++)
         for (j = 0; j < 1; j++)
-            steepest = fmaxf(steepest, fabsf(p->rate[side > 0][i][j]) / lever_scale(side, i, 0));
-    return left <= 4e-06f * steepest;
+            steepest = fmaxf(steepest, fabsf(p->rate[side > 0][i][j]) * lever_scale(side, i, 0));
+    return left <= 0.01f && left <= 4e-06f * steepest;
+}
+
+/* How far inputs are from others. */
+static inline float lever_away(const float q[1], const float near[1])
+{
+    float sum = fabsf(q[0] - near[0]);
+    int i;
+    for (i = 1; i < 1; i++)
+        sum += fabsf(q[i] - near[i]);
+    return sum;
 }
 
 /* Whether inputs are within the sweeps that are set. */
 static inline int lever_inside(const float q[1])
 {
-    static const float end[1][2] = {  { (-INFINITY), (INFINITY) }  };
+    static const float end[1][2] = { { (-INFINITY), (INFINITY) } };
     int i;
     for (i = 0; i < 1; i++)
         if (!(q[i] >= end[i][0] - 1e-05f && q[i] <= end[i][1] + 1e-05f))
@@ -331,26 +338,28 @@ static inline int lever_inside(const float q[1])
 /* From positions to the inputs nearest to q. By its gear, 4 poses at most. */
 static inline int lever_from_actuators(const float position[1], float q[1], lever_point *p)
 {
+    /* The inputs' turns, and one over them; 0 where there is none. */
+    static const float turn[1][2] = { { 0.0f, 0.0f } };
     float start[1][1], away[1], far, best = (INFINITY), near[1];
     lever_point found;
-    int i, k, tried, next;
+    int i, k, next, ended;
     for (i = 0; i < 1; i++)
-        near[i] = q[i];
-    start[0][0] = near[0];
-    for (k = 0; k < 1; k++)
+        start[0][i] = near[i] = q[i];
+    for (k = 0; k < 1; k++) {
         start[k][0] = position[0];
-    for (k = 0; k < 1; k++)
-        for (away[k] = 0.0f, i = 0; i < 1; i++)
-            away[k] += fabsf(start[k][i] - near[i]);
-    for (tried = 0; tried < 1; tried++) {
+        for (i = 0; i < 1; i++)
+            start[k][i] += turn[i][0] * floorf((near[i] - start[k][i]) * turn[i][1] + 0.5f);
+        away[k] = lever_away(start[k], near);
+    }
+    for (;;) {
         for (next = 0, k = 1; k < 1; k++)
             next = away[k] < away[next] || !isfinite(away[next]) ? k : next;
         if (!isfinite(away[next]))
             break;
-        away[next] = (INFINITY);
-        if (lever_reached(0, lever_at, 4, position, start[next], &found)) {
-            for (far = 0.0f, i = 0; i < 1; i++)
-                far += fabsf(start[next][i] - near[i]);
+        far = away[next];
+        ended = lever_reached(0, lever_at, 4, 0, position, start[next], &found);
+        away[next] = ended < 0 ? far + 1e+06f : (INFINITY);
+        if (ended > 0) {
             if (far < best) {
                 *p = found;
                 for (best = far, i = 0; i < 1; i++)
@@ -362,58 +371,57 @@ static inline int lever_from_actuators(const float position[1], float q[1], leve
     return best < (INFINITY);
 }
 
-/* The inputs in each assembly mode, next to others; NAN where there is none. */
+/* The inputs in each assembly mode, NAN where there is none. */
 static inline void lever_modes_joints(const float position[1],
-    const float near[1], float start[2][1])
+    float start[2][1])
 {
-    const float k28 = 0.70710677f;
-    const float k35 = 0.70710677f;
+    const float k26 = 0.70710677f;
+    const float k33 = 0.70710677f;
     const float x0 = position[0];
     const float v3 = (0.5f * x0);
     const float v4 = sinf(v3);
-    const float v9 = (((2.0f * v4) * cosf(v3)) * 0.081f);
+    const float v6 = cosf(v3);
+    const float v9 = (((2.0f * v4) * v6) * 0.081f);
     const float v15 = ((1.0f - (2.0f * (v4 * v4))) * 0.081f);
     const float v18 = sqrtf(((v9 * v9) + (v15 * v15)));
     const float v19 = (v9 / v18);
-    const float v22 = (-v3);
-    const float v23 = sinf(v22);
-    const float v30 = cosf(v22);
-    const float v37 = ((v23 * k28) + (v30 * k35));
-    const float v45 = ((v30 * k28) - (v23 * k35));
-    const float v50 = (lever_root(((-0.025f) + (0.09f * (v37 * v37))), 5.7731595e-17f) * lever_root(((-0.025f) + (0.09f * (v45 * v45))), 5.7731595e-17f));
-    const float v51 = (v19 * v50);
-    const float v53 = (v15 / v18);
-    const float v55 = (v19 * 0.045f);
-    const float v56 = (v53 * v55);
-    const float v60 = (-(v19 * v55));
-    const float v61 = (v53 * v50);
-    (void)near;
-    start[0][0] = atan2f((-((-v51) - v56)), (v60 + v61));
-    start[0][0] = start[0][0] + 6.2831855f * floorf((near[0] - start[0][0]) / 6.2831855f + 0.5f);
-    start[1][0] = atan2f((-(v51 - v56)), (v60 - v61));
-    start[1][0] = start[1][0] + 6.2831855f * floorf((near[0] - start[1][0]) / 6.2831855f + 0.5f);
+    const float v35 = ((-(v4 * k26)) + (v6 * k33));
+    const float v43 = ((v6 * k26) + (v4 * k33));
+    const float v48 = (lever_root(((-0.025f) + (0.09f * (v35 * v35))), 5.7731595e-17f) * lever_root(((-0.025f) + (0.09f * (v43 * v43))), 5.7731595e-17f));
+    const float v49 = (v19 * v48);
+    const float v51 = (v15 / v18);
+    const float v53 = (v19 * 0.045f);
+    const float v54 = (v51 * v53);
+    const float v58 = (-(v19 * v53));
+    const float v59 = (v51 * v48);
+    start[0][0] = atan2f((-((-v49) - v54)), (v58 + v59));
+    start[1][0] = atan2f((-(v49 - v54)), (v58 - v59));
 }
-/* From positions to the inputs nearest to q. In closed form, 8 poses at most. */
+/* From positions to the inputs nearest to q. In closed form, 12 poses at most. */
 static inline int lever_from_joints(const float position[1], float q[1], lever_point *p)
 {
+    /* The inputs' turns, and one over them; 0 where there is none. */
+    static const float turn[1][2] = { { 6.2831855f, 0.15915494f } };
     float start[2][1], away[2], far, best = (INFINITY), near[1];
     lever_point found;
-    int i, k, tried, next;
+    int i, k, next, ended;
     for (i = 0; i < 1; i++)
-        near[i] = q[i];
-    lever_modes_joints(position, near, start);
-    for (k = 0; k < 2; k++)
-        for (away[k] = 0.0f, i = 0; i < 1; i++)
-            away[k] += fabsf(start[k][i] - near[i]);
-    for (tried = 0; tried < 2; tried++) {
+        start[0][i] = near[i] = q[i];
+    lever_modes_joints(position, start);
+    for (k = 0; k < 2; k++) {
+        for (i = 0; i < 1; i++)
+            start[k][i] += turn[i][0] * floorf((near[i] - start[k][i]) * turn[i][1] + 0.5f);
+        away[k] = lever_away(start[k], near);
+    }
+    for (;;) {
         for (next = 0, k = 1; k < 2; k++)
             next = away[k] < away[next] || !isfinite(away[next]) ? k : next;
         if (!isfinite(away[next]))
             break;
-        away[next] = (INFINITY);
-        if (lever_reached(1, lever_at, 4, position, start[next], &found)) {
-            for (far = 0.0f, i = 0; i < 1; i++)
-                far += fabsf(start[next][i] - near[i]);
+        far = away[next];
+        ended = lever_reached(1, lever_at, 4, far < 1e+06f, position, start[next], &found);
+        away[next] = ended < 0 ? far + 1e+06f : (INFINITY);
+        if (ended > 0) {
             if (far < best) {
                 *p = found;
                 for (best = far, i = 0; i < 1; i++)
@@ -425,58 +433,57 @@ static inline int lever_from_joints(const float position[1], float q[1], lever_p
     return best < (INFINITY);
 }
 
-/* The inputs in each assembly mode, next to others; NAN where there is none. */
+/* The inputs in each assembly mode, NAN where there is none. */
 static inline void lever_modes_angle_lever(const float position[1],
-    const float near[1], float start[2][1])
+    float start[2][1])
 {
-    const float k28 = 0.70710677f;
-    const float k35 = 0.70710677f;
+    const float k26 = 0.70710677f;
+    const float k33 = 0.70710677f;
     const float x0 = position[0];
     const float v3 = (0.5f * x0);
     const float v4 = sinf(v3);
-    const float v9 = (((2.0f * v4) * cosf(v3)) * 0.081f);
+    const float v6 = cosf(v3);
+    const float v9 = (((2.0f * v4) * v6) * 0.081f);
     const float v15 = ((1.0f - (2.0f * (v4 * v4))) * 0.081f);
     const float v18 = sqrtf(((v9 * v9) + (v15 * v15)));
     const float v19 = (v9 / v18);
-    const float v22 = (-v3);
-    const float v23 = sinf(v22);
-    const float v30 = cosf(v22);
-    const float v37 = ((v23 * k28) + (v30 * k35));
-    const float v45 = ((v30 * k28) - (v23 * k35));
-    const float v50 = (lever_root(((-0.025f) + (0.09f * (v37 * v37))), 5.7731595e-17f) * lever_root(((-0.025f) + (0.09f * (v45 * v45))), 5.7731595e-17f));
-    const float v51 = (v19 * v50);
-    const float v53 = (v15 / v18);
-    const float v55 = (v19 * 0.045f);
-    const float v56 = (v53 * v55);
-    const float v60 = (-(v19 * v55));
-    const float v61 = (v53 * v50);
-    (void)near;
-    start[0][0] = atan2f((-((-v51) - v56)), (v60 + v61));
-    start[0][0] = start[0][0] + 6.2831855f * floorf((near[0] - start[0][0]) / 6.2831855f + 0.5f);
-    start[1][0] = atan2f((-(v51 - v56)), (v60 - v61));
-    start[1][0] = start[1][0] + 6.2831855f * floorf((near[0] - start[1][0]) / 6.2831855f + 0.5f);
+    const float v35 = ((-(v4 * k26)) + (v6 * k33));
+    const float v43 = ((v6 * k26) + (v4 * k33));
+    const float v48 = (lever_root(((-0.025f) + (0.09f * (v35 * v35))), 5.7731595e-17f) * lever_root(((-0.025f) + (0.09f * (v43 * v43))), 5.7731595e-17f));
+    const float v49 = (v19 * v48);
+    const float v51 = (v15 / v18);
+    const float v53 = (v19 * 0.045f);
+    const float v54 = (v51 * v53);
+    const float v58 = (-(v19 * v53));
+    const float v59 = (v51 * v48);
+    start[0][0] = atan2f((-((-v49) - v54)), (v58 + v59));
+    start[1][0] = atan2f((-(v49 - v54)), (v58 - v59));
 }
-/* From positions to the inputs nearest to q. In closed form, 8 poses at most. */
+/* From positions to the inputs nearest to q. In closed form, 12 poses at most. */
 static inline int lever_from_angle_lever(const float position[1], float q[1], lever_point *p)
 {
+    /* The inputs' turns, and one over them; 0 where there is none. */
+    static const float turn[1][2] = { { 6.2831855f, 0.15915494f } };
     float start[2][1], away[2], far, best = (INFINITY), near[1];
     lever_point found;
-    int i, k, tried, next;
+    int i, k, next, ended;
     for (i = 0; i < 1; i++)
-        near[i] = q[i];
-    lever_modes_angle_lever(position, near, start);
-    for (k = 0; k < 2; k++)
-        for (away[k] = 0.0f, i = 0; i < 1; i++)
-            away[k] += fabsf(start[k][i] - near[i]);
-    for (tried = 0; tried < 2; tried++) {
+        start[0][i] = near[i] = q[i];
+    lever_modes_angle_lever(position, start);
+    for (k = 0; k < 2; k++) {
+        for (i = 0; i < 1; i++)
+            start[k][i] += turn[i][0] * floorf((near[i] - start[k][i]) * turn[i][1] + 0.5f);
+        away[k] = lever_away(start[k], near);
+    }
+    for (;;) {
         for (next = 0, k = 1; k < 2; k++)
             next = away[k] < away[next] || !isfinite(away[next]) ? k : next;
         if (!isfinite(away[next]))
             break;
-        away[next] = (INFINITY);
-        if (lever_reached(2, lever_at_angle_lever, 4, position, start[next], &found)) {
-            for (far = 0.0f, i = 0; i < 1; i++)
-                far += fabsf(start[next][i] - near[i]);
+        far = away[next];
+        ended = lever_reached(2, lever_at_angle_lever, 4, far < 1e+06f, position, start[next], &found);
+        away[next] = ended < 0 ? far + 1e+06f : (INFINITY);
+        if (ended > 0) {
             if (far < best) {
                 *p = found;
                 for (best = far, i = 0; i < 1; i++)
@@ -488,27 +495,27 @@ static inline int lever_from_angle_lever(const float position[1], float q[1], le
     return best < (INFINITY);
 }
 
-/* Inputs all over their ways for i = 1, 2, ...; for 0 where they start. */
+/* Sample i of the inputs, all over their ranges; 0 is where they start. */
 static inline void lever_sample(long i, float q[1])
 {
-    static const float way[1][4] = {  { 0.0f, (-3.1415927f), 6.2831855f, 0.41421357f }  };
+    static const float range[1][4] = { { 0.0f, (-3.1415927f), 6.2831855f, 0.41421357f } };
     int k;
     for (k = 0; k < 1; k++) {
-        const float x = way[k][3] * (float)i;
-        q[k] = i ? way[k][1] + way[k][2] * (x - floorf(x)) : way[k][0];
+        const float x = range[k][3] * (float)i;
+        q[k] = i ? range[k][1] + range[k][2] * (x - floorf(x)) : range[k][0];
     }
 }
 
-/* Forget all that was, and find a pose to start from; returns 0 if there is none. */
+/* Initialize the memory and find a first pose; returns 0 if there is none. */
 static inline int lever_begin(lever_memory *m)
 {
-    static const lever_side none = { { 0.0f }, { 0.0f }, { 0.0f } };
+    static const lever_side none = { { 0 }, { 0 }, { 0 } };
     int i;
     m->is_known[0] = m->is_known[1] = m->is_held[0] = m->is_held[1] = 0;
     m->held[0] = m->held[1] = none;
     for (i = 0; i < 4096; i++) {
         lever_sample(i, m->input[1]);
-        if (lever_at(m->input[1], &m->point[1]))
+        if (lever_at(m->input[1], 1, &m->point[1]))
             return 1;
     }
     return 0;
@@ -520,7 +527,7 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
     lever_side *held = &m->held[other];
     lever_point found;
     const lever_point *at;
-    float q[1], x[1], y[1] = { 0.0f };
+    float q[1], x[1], y[1] = { 0 };
     int i, j, status = LEVER_OK, all;
     for (i = 0; i < 1; i++) {
         q[i] = m->input[!m->is_known[0]][i];
@@ -529,11 +536,9 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
     if (status == LEVER_OK && !(side ? lever_from_joints(from->position, q, &found)
             : lever_from_actuators(from->position, q, &found)))
         status = LEVER_OUT_OF_REACH;
-    /* A command stays within the sweep that is set; a measurement is what it is. */
+    /* Only a command has to be in the sweep: a measurement may be outside. */
     if (status == LEVER_OK && side && !lever_inside(q))
         status = LEVER_OUT_OF_REACH;
-    for (i = 0; status == LEVER_OK && i < 1; i++)
-        status = isfinite(found.position[other][i]) ? LEVER_OK : LEVER_OUT_OF_REACH;
     if (status == LEVER_OK) {
         m->point[side] = found;
         for (i = 0; i < 1; i++) {
@@ -546,7 +551,7 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
         m->is_known[1] = 0;
     all = status;
 
-    /* Velocities at the pose that is asked for, or else where it is; what is held stands still. */
+    /* Velocities at the requested pose, else at the last one; a held position has velocity 0. */
     at = &m->point[m->is_known[side] ? side : other];
     if (status == LEVER_NOT_KNOWN && (m->is_known[0] || m->is_known[1]))
         status = LEVER_OK;
@@ -560,10 +565,10 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
     for (i = 0; i < 1; i++)
         status |= isfinite(y[i]) ? LEVER_OK : LEVER_SINGULAR;
     for (i = 0; i < 1; i++)
-        held->velocity[i] = status == LEVER_OK ? y[i] : 0.0f;
+        held->velocity[i] = status == LEVER_OK ? y[i] : 0;
     all |= status;
 
-    /* Efforts where the actuators are: power in is power out, but for what the loads take. */
+    /* Efforts at the actuators' pose: their power is that of the joints, less that of the loads. */
     at = &m->point[m->is_known[0] ? 0 : 1];
     status = m->is_known[0] || m->is_known[1] ? LEVER_OK : LEVER_NOT_KNOWN;
     for (i = 0; status == LEVER_OK && i < 1; i++) {
@@ -583,14 +588,14 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
     return all | status;
 }
 
-/* From the actuators' positions, velocities and efforts to the joints'. Returns a status; what it
-   is not OK about is held: positions and efforts as they were last, velocities at zero. */
+/* From the actuators' positions, velocities and efforts to the joints'. Returns a status: where it
+   is not OK, positions and efforts are the last valid ones, and velocities 0. */
 static inline int lever_actuators_to_joints(lever_memory *m, const lever_actuators *from, lever_joints *to)
 {
     return lever_transmit(m, 0, from, to);
 }
 
-/* The same from the joints to the actuators, which go to the answer nearest to where they are. */
+/* The same from the joints to the actuators, to the inputs nearest to the last ones. */
 static inline int lever_joints_to_actuators(lever_memory *m, const lever_joints *from, lever_actuators *to)
 {
     return lever_transmit(m, 1, from, to);
@@ -603,7 +608,7 @@ static inline int lever_crank_for_angle_lever(float value, float near, float *cr
     float q[1];
     lever_point p;
     q[0] = near;
-    if (!(isfinite(value) && isfinite(near)) || !lever_from_angle_lever(&value, q, &p))
+    if (!(isfinite(value)) || !lever_from_angle_lever(&value, q, &p))
         return 0;
     *crank = q[0];
     return 1;

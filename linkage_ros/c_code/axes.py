@@ -132,7 +132,7 @@ def _chain(machine: SceneMechanism) -> List[str]:
 
 
 def _tell(machine: SceneMechanism, outputs: Sequence[str]) -> bool:
-    """Return whether outputs change independently of each other at the start."""
+    """Return whether outputs change independently of each other at the start of the inputs."""
     pose = machine.linkage.posed((), (), tuple(outputs))
     rates = np.reshape(pose.over(*start(machine)), (-1, len(outputs)))
     if not np.isfinite(rates).all():

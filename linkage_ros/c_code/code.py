@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Callable, Dict, Iterable, List, Sequence
+from typing import Callable, Dict, Iterable, Iterator, List, Sequence, Tuple
 
 import numpy as np
 
-from .names import literal as texts
-from ..formula.expression import Real, unknown
+from .names import literal as text_literal
+from ..formula.expression import Real, real, unknown
 from ..formula.operations import OPERATIONS
 from ..formula.program import Dialect, Pose
 from ..linkage.mechanism import Mechanism
@@ -46,9 +46,9 @@ class Code:
         self.literal = self.dialect.number
         self._constants: Dict[Real, int] = {}
 
-    def row(self, values: Iterable[float]) -> str:
-        """Return numbers as an initializer."""
-        return ', '.join(map(self.literal, values))
+    def rows(self, rows: Iterable[Iterable[float]]) -> str:
+        """Return rows of numbers as initializers."""
+        return ', '.join('{ %s }' % ', '.join(map(self.literal, row)) for row in rows)
 
     def times(self, code: str, factor: float) -> str:
         """Return code times a number."""
@@ -94,52 +94,56 @@ class Code:
 
     def struct(self) -> str:
         """Return the struct of constants; it is complete once all functions are written."""
-        return '\n'.join(['/* What follows from the dimensions. */', 'typedef struct {',
+        return '\n'.join(['/* Constants that depend on the dimensions. */', 'typedef struct {',
                           f'    double k[{max(len(self._constants), 1)}];', '    int is_own;',
                           f'}} {self.name}_linkage;', ''])
 
-    def setter(self, checks: Sequence[tuple]) -> str:
-        """
-        Return the function that fills the struct of constants from dimensions.
-
-        `checks` are pairs of an expression that has to be above zero and of what is said else.
-        """
-        names = {name: i for i, name in enumerate(self.linkage.dimensions)}
+    def setter(self) -> str:
+        """Return the function that fills the struct of constants from dimensions."""
+        places = {name: i for i, name in enumerate(self.linkage.dimensions)}
+        demands = list(self._demands())
         number: Dict[Real, int] = {}
-        for root in (*self._constants, *(node for node, _ in checks)):
+        for root in (*self._constants, *(node for node, _ in demands)):
             for node in unknown(root, lambda node: node.operands, number):
                 number[node] = len(number)
-        nodes = list(number)
 
         def value(node: Real) -> str:
             if node.op == 'constant':
                 return self.literal(node.args[0])
             if node.op == 'dimension':
-                return f'dimension[{names[node.args[0]]}]' if node.args[0] in names else '1.0'
+                return f'dimension[{places[node.args[0]]}]' if node.args[0] in places else '1.0'
             args = [f'd{number[x]}' for x in node.operands]
             return self.dialect.templates[node.op].format(*args)
 
-        body = []
-        for node in nodes:
-            body.append(f'    const {_kind(node, "double")} d{number[node]} = {value(node)};')
-        tests = [(f'd{number[node]}', '%s > 0.0 && ', text) for node, text in checks]
-        for node in nodes:
-            if node.op == 'dimension' and node.args[0] in names:
-                sign, text = ('%s > 0.0 && ', 'positive ') if node.positive else ('', '')
-                tests.insert(0, (f'd{number[node]}', sign,
-                                 f'{node.args[0]} must be a {text}number [m]'))
-        refusals = [f'    if (!({sign.replace("%s", value)}isfinite({value})))\n'
-                    f'        return {texts(text)};' for value, sign, text in tests]
+        given = [node for node in number if node.op == 'dimension' and node.args[0] in places]
+        tests = [(node, node.positive, f'{node.args[0]} must be a {"positive " * node.positive}'
+                                       'number [m]') for node in reversed(given)]
+        tests += [(node, True, text) for node, text in demands]
         own = ' && '.join(f'dimension[{i}] == {self.literal(float(np.ravel(value)[0]))}'
                           for i, value in enumerate(self.linkage.dimensions.values())) or '1'
-        fills = [f'    c->k[{i}] = d{number[node]};' for node, i in self._constants.items()]
         return '\n'.join([
-            '/* Take dimensions; returns 0, or what is wrong with them. */',
+            '/* Set dimensions; returns 0, or what is wrong with them. */',
             f'static inline const char *{self.name}_set({self.name}_linkage *c, '
             'const double *dimension)', '{',
-            *body, *refusals, *fills, f'    c->is_own = {own};',
-            *([] if names else ['    (void)dimension;']),
+            *(f'    const {_kind(node, "double")} d{i} = {value(node)};'
+              for node, i in number.items()),
+            *(f'    if (!({f"d{number[node]} > 0.0 && " * positive}isfinite(d{number[node]})))\n'
+              f'        return {text_literal(text)};' for node, positive, text in tests),
+            *(f'    c->k[{i}] = d{number[node]};' for node, i in self._constants.items()),
+            f'    c->is_own = {own};', *([] if places else ['    (void)dimension;']),
             '    return 0;', '}', ''])
+
+    def _demands(self) -> Iterator[Tuple[Real, str]]:
+        """Yield expressions of dimensions that must be positive, with their error messages."""
+        built = self.linkage.structure.built
+        for bar in built.bars:
+            yield bar.length, f'the bar {bar.first}-{bar.second} must be longer than zero'
+        for name, height in built.triangles.items():
+            yield (abs(height) + real(1.0),
+                   f'no triangle has the sides at {name}: each must be shorter than the others')
+        for input_ in built.inputs:
+            if not input_.turns:
+                yield real(input_.high) - input_.low, f'the {input_.name} must have a way to go'
 
 
 def open_linkage(linkage: Mechanism) -> Mechanism:

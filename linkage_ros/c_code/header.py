@@ -10,15 +10,14 @@ library's sine, cosine and arctangent.
 
 from __future__ import annotations
 
-import math
-from typing import Callable, List, Sequence, Tuple
+from itertools import islice
+from typing import Callable, Iterable, List, Sequence, Tuple
 
 import numpy as np
 
 from .names import field
 from .sides import Sides
 from ..formula.program import Pose
-from ..linkage.inputs import Input
 from ..scene import SceneMechanism
 from ..words import listed, plain_text
 
@@ -57,7 +56,7 @@ def opened(machine: SceneMechanism, joints: Sequence[str] = ()) -> str:
     text = sides.text()
     names = ', '.join(sides.linkage.dimensions) or 'none'
     return guarded(sides, [f'Dimensions [m] that may be given: {names}.'], [
-        sides.code.helpers(), sides.code.struct(), sides.code.setter(list(sides.checks())), text])
+        sides.code.helpers(), sides.code.struct(), sides.code.setter(), text])
 
 
 def guarded(sides: Sides, about: Sequence[str], parts: Sequence[str]) -> str:
@@ -79,23 +78,24 @@ def guarded(sides: Sides, about: Sequence[str], parts: Sequence[str]) -> str:
 class _Header:
     def __init__(self, machine: SceneMechanism, single: bool, joints: Sequence[str],
                  outputs: Sequence[str]):
-        self.machine, self.name = machine, machine.name
-        self.linkage = machine.linkage
-        # Points in space are of no use on a board.
-        self.points = () if machine.in_space else machine.linkage.points
+        self.machine, self.name, self.linkage = machine, machine.name, machine.linkage
         self.inputs = [input_.name for input_ in self.linkage.inputs]
         for output in outputs:
             self.linkage.check_output(output)
         if outputs and len(self.inputs) > 1 and len(outputs) != len(self.inputs):
             raise ValueError(f'{self.name} has {len(self.inputs)} inputs: as many outputs are '
                              f'needed, got {listed(outputs)}')
-        single_input = len(self.inputs) == 1
-        self.outputs = [(output,) for output in outputs] if single_input else [
+        self.outputs = [(output,) for output in outputs] if len(self.inputs) == 1 else [
             tuple(outputs)] * bool(outputs)
         self.sides = Sides(machine, joints, single, outputs=self.outputs)
         self.code = self.sides.code
-        self.number, self.literal, self._times = (
-            self.code.number, self.code.literal, self.code.times)
+        self.number, self._times = self.code.number, self.code.times
+        # Points in space are of no use on a board.
+        self.points = () if machine.in_space else self.linkage.points
+        # The fields of a pose: their names in C, and as outputs.
+        self.fields = {**{f'{point}_{axis}': f'{point}.{axis}'
+                          for point in self.points for axis in 'xy'},
+                       **{field(self.linkage, link): link for link in self.linkage.joints}}
 
     def text(self) -> str:
         """Return the whole header."""
@@ -114,112 +114,89 @@ class _Header:
                  f'Input: {inputs}. Angles [rad] count counterclockwise.']
         return lines + [self._error()] if self.number == 'float' else lines
 
-    @property
-    def _fields(self) -> List[str]:
-        linkage = self.linkage
-        return [*(f'{joint}_{axis}' for joint in self.points for axis in 'xy'),
-                *(field(linkage, link) for link in linkage.joints)]
-
-    @property
-    def _outputs(self) -> List[str]:
-        return [*(f'{joint}.{axis}' for joint in self.points for axis in 'xy'),
-                *self.linkage.joints]
-
     def _struct(self) -> str:
-        links = {link.name: link for link in self.linkage.links}
-        lines = []
-        for joint in self.points:
-            lines.append(f'    {self.number} {joint}_x, {joint}_y;'.ljust(34) + '/* [m] */')
-        for name in self.linkage.joints:
-            turns = self.linkage.is_angle(name)
-            what = f'/* to {links[name].parent} [rad] */' if turns else '/* [m] */'
-            lines.append(f'    {self.number} {field(self.linkage, name)};'.ljust(34) + what)
+        parents = {link.name: link.parent for link in self.linkage.links}
+        lines = [f'    {self.number} {point}_x, {point}_y;'.ljust(34) + '/* [m] */'
+                 for point in self.points]
+        lines += [f'    {self.number} {field(self.linkage, name)};'.ljust(34) + (
+            f'/* to {parents[name]} [rad] */' if self.linkage.is_angle(name) else '/* [m] */')
+            for name in self.linkage.joints]
         return '\n'.join(['/* Where the joints are, and each link to its parent. */',
                           'typedef struct {', *lines, f'}} {self.name}_pose;', ''])
 
-    def _function(self, head: str, pose: Pose, ending: Callable[[List[str]], List[str]],
-                  scaled: bool = True) -> str:
+    def _function(self, head: str, pose: Pose, ending: Callable[[List[str]], List[str]]) -> str:
         """Return a C function of the inputs with the operations of a Pose."""
         return self.code.function(head, pose, [
-            self._times(name, 1.0 / self.machine.scale_of(name) if scaled else 1.0)
-            for name in self.inputs], ending)
+            self._times(name, 1.0 / self.machine.scale_of(name)) for name in self.inputs], ending)
 
-    def _arguments(self) -> str:
-        return ', '.join(f'{self.number} {name}' for name in self.inputs)
+    def _filled(self, pose: str, codes: Iterable[str], unit: float = 1.0) -> List[str]:
+        """Return the assignments of a pose, whose fields are divided by a unit."""
+        return [f'    {pose}->{name} = {self._times(code, self.machine.scale_of(output) / unit)};'
+                for (name, output), code in zip(self.fields.items(), codes)]
 
     def _solve(self) -> str:
-        linkage, n = self.linkage, self.name
-        pose = linkage.posed(self.points, linkage.joints)
-
-        def ending(outputs: List[str]) -> List[str]:
-            filled = [f'    p->{field} = {self._times(code, self.machine.scale_of(output))};'
-                      for field, output, code in zip(self._fields, self._outputs, outputs)]
-            return [*filled, '    return ' + '\n        && '.join(
-                f'isfinite(p->{field})' for field in self._fields) + ';']
-
+        arguments = ', '.join(f'{self.number} {name}' for name in self.inputs)
+        tests = '\n        && '.join(f'isfinite(p->{name})' for name in self.fields)
         return self._function(
             '/* Place the joints. Return 0 if not all can be assembled: NaN is what cannot. */\n'
-            f'static inline int {n}_solve({self._arguments()}, {n}_pose *p)', pose, ending)
+            f'static inline int {self.name}_solve({arguments}, {self.name}_pose *p)',
+            self.linkage.posed(self.points, self.linkage.joints),
+            lambda codes: [*self._filled('p', codes), f'    return {tests};'])
 
     def _rates(self) -> str:
-        linkage, names = self.linkage, self._outputs
-        places = ', '.join(f'{self.name}_pose *by_{name}' for name in self.inputs)
+        arguments = ', '.join([*(f'{self.number} {name}' for name in self.inputs),
+                               *(f'{self.name}_pose *by_{name}' for name in self.inputs)])
 
-        def ending(outputs: List[str]) -> List[str]:
-            return [f'    by_{name}->{field} = {self._times(outputs.pop(0), size / unit)};'
-                    for name in self.inputs for unit in [self.machine.scale_of(name)]
-                    for field, output in zip(self._fields, names)
-                    for size in [self.machine.scale_of(output)]]
+        def ending(codes: List[str]) -> List[str]:
+            rates = iter(codes)
+            return [line for name in self.inputs for line in self._filled(
+                f'by_{name}', islice(rates, len(self.fields)), self.machine.scale_of(name))]
 
         return self._function(
             f'/* Differentiate all of it by {" and by ".join(self.inputs)}. */\n'
-            f'static inline void {self.name}_rates({self._arguments()}, {places})',
-            linkage.posed((), (), names), ending)
+            f'static inline void {self.name}_rates({arguments})',
+            self.linkage.posed((), (), [*self.fields.values()]), ending)
 
     def _reach(self) -> str:
         if len(self.inputs) > 1:
             return ''
-        first: Input = self.linkage.inputs[0]
-        arcs, name = self.machine.first.reach, first.name
+        first, arcs, literal = self.linkage.inputs[0], self.machine.first.reach, self.code.literal
         said = ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in arcs)
-        tests = []
-        for low, high in arcs:
-            if first.is_whole(arcs):
-                tests = ['isfinite(' + name + ')']
-            elif first.turns:
-                tau, f = self.literal(math.tau * first.period), self.code.suffix
-                ahead = f'({name} - {self.literal(low)})'
-                tests.append(f'{ahead} - {tau} * floor{f}({ahead} / {tau}) <= '
-                             f'{self.literal(high - low)}')
-            else:
-                tests.append(f'({name} >= {self.literal(low)} && {name} <= {self.literal(high)})')
+        turn, f, name = literal(first.turn), self.code.suffix, first.name
+        tests = [f'isfinite({name})'] if first.is_whole(arcs) else [
+            f'({name} - {low}) - {turn} * floor{f}(({name} - {low}) / {turn}) <= {width}'
+            if first.turns else f'({name} >= {low} && {name} <= {high})'
+            for low, high, width in ((literal(low), literal(high), literal(high - low))
+                                     for low, high in arcs)]
         return '\n'.join([f'/* Whether it can be assembled: {said} {first.unit}. */',
                           f'static inline int {self.name}_reaches({self.number} {name})', '{',
                           f'    return {" || ".join(tests)};', '}', ''])
 
     def _inverse(self, outputs: Tuple[str, ...]) -> str:
         """Return the users' inverse: from outputs and near inputs, in scene units, to inputs."""
-        linkage, number = self.linkage, self.number
-        n, tag = len(outputs), '_'.join(field(linkage, output) for output in outputs)
+        linkage, number, n = self.linkage, self.number, len(outputs)
+        tag = '_'.join(field(linkage, output) for output in outputs)
         said = ', '.join(f'{output} [{"rad" if linkage.is_angle(output) else "m"}]'
                          for output in outputs)
         units = [size * self.machine.scale_of(name)
                  for name, size in zip(self.inputs, self.sides.sizes)]
-        what = self.inputs[0] if n == 1 else 'inputs'
-        value, near, put = ((f'{number} value', f'{number} near', f'{number} *{what}') if n == 1
-                            else (f'const {number} value[{n}]', f'const {number} near[{n}]',
-                                  f'{number} inputs[{n}]'))
-        given, beside, made = ('&value', ['near'], [f'*{what}']) if n == 1 else (
-            'value', [f'near[{i}]' for i in range(n)], [f'inputs[{i}]' for i in range(n)])
-        known = ' && '.join(f'isfinite({code})' for code in (
-            ['value'] if n == 1 else [f'value[{i}]' for i in range(n)]) + beside)
+        if n == 1:
+            what, near, values = self.inputs[0], ['near'], ['value']
+            head, given, made = (f'{number} value, {number} near, {number} *{what}', '&value',
+                                 [f'*{what}'])
+        else:
+            what, given = 'inputs', 'value'
+            near, values, made = ([f'{name}[{i}]' for i in range(n)]
+                                  for name in ('near', 'value', 'inputs'))
+            head = f'const {number} value[{n}], const {number} near[{n}], {number} inputs[{n}]'
+        known = ' && '.join(f'isfinite({value})' for value in values)
         return '\n'.join([
             f'/* The {what} for {said}, nearest to `near`, whole turns included. Returns 0, and',
             f'   leaves {what} alone, where there is none. */',
-            f'static inline int {self.name}_{what}_for_{tag}({value}, {near}, {put})', '{',
+            f'static inline int {self.name}_{what}_for_{tag}({head})', '{',
             f'    {number} q[{n}];', f'    {self.name}_point p;',
             *(f'    q[{i}] = {self._times(code, 1.0 / units[i])};'
-              for i, code in enumerate(beside)),
+              for i, code in enumerate(near)),
             f'    if (!({known}) || !{self.name}_from_{tag}({given}, q, &p))', '        return 0;',
             *(f'    {code} = {self._times(f"q[{i}]", units[i])};'
               for i, code in enumerate(made)), '    return 1;', '}', ''])

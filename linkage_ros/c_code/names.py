@@ -3,12 +3,18 @@
 
 """Names of a scene, with any characters, as C identifiers, comments and texts."""
 
+from importlib.resources import files
 import re
 from typing import Iterable, List, Mapping
 
 from ..linkage.mechanism import Mechanism
 
 _PLACE = re.compile(r'@(\w+)@')
+
+
+def template(name: str) -> str:
+    """Return a template of this room."""
+    return files(__package__).joinpath('templates', name).read_text()
 
 
 def filled(template: str, values: Mapping[str, object]) -> str:

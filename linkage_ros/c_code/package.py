@@ -10,8 +10,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 from . import header
 from .axes import actuators, Axis, joints
-from .names import comment, constants, filled, literal
-from .sides import template
+from .names import comment, constants, filled, literal, template
 from ..scene import SceneMechanism
 
 # Names of packages.

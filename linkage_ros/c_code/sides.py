@@ -8,33 +8,31 @@ Both are outputs of the linkage. Positions are converted through the inputs, vel
 exact Jacobians, efforts by their transposes, so that power is conserved.
 """
 
-from importlib.resources import files
-from itertools import product
 import math
 from typing import Dict, Iterator, List, Sequence, Tuple
 
 from .axes import actuators, Axis, axis, joints, start
 from .code import Code, open_linkage
-from .names import comment, constants, field, filled, literal
-from ..formula.expression import Real, real
+from .inverses import Inverses
+from .names import comment, constants, field, filled, literal, template
+from ..formula.expression import arctangent, Real, real
 from ..formula.program import Program
 from ..linkage.builder import in_metres
-from ..linkage.inverse_linkage import InverseLinkage
 from ..scene import SceneMechanism
 
-# In double and in single precision: below which part of its size a Jacobian is singular, and in a
-# search; what a search may miss, an input may be beside its sweep, and what is near enough.
-LIMITS = {'double': (1e-6, 1e-12, 1e-13, 1e-9, 1e-14),
-          'float': (1e-3, 1e-5, 4e-6, 1e-5, 2e-6)}
-# Poses from a closed form and of a search, its longest step [rad, sizes] and the smallest part.
-CLOSED, SEARCHED, LONGEST, FINEST = 4, 64, 0.5, 2.0 ** -12
+# Limits by precision. A Jacobian is `singular` below this part of its size, and below `least` for
+# Newton's method, which ends where `enough` is left of a position [rad, sizes], and may leave
+# `close`; an input may be beyond an end by `slack`.
+LIMITS = {'double': {'singular': 1e-6, 'least': 1e-12, 'enough': 1e-14, 'close': 1e-13,
+                     'slack': 1e-9},
+          'float': {'singular': 1e-3, 'least': 1e-5, 'enough': 2e-6, 'close': 4e-6,
+                    'slack': 1e-5}}
+# The longest step of Newton's method [rad, sizes], and its finest part. The start of a closed form
+# that misses by more than `other` is of another assembly, and tried last: as if `last` further.
+COMMON = {'longest': 0.5, 'finest': 2.0 ** -12, 'other': 1e-2, 'last': 1e6, 'infinity': math.inf,
+          'half': 0.5}
 # Samples for the first pose of a search.
 SAMPLES = 4096
-
-
-def template(name: str) -> str:
-    """Return a template of this room."""
-    return files(__package__).joinpath('templates', name).read_text()
 
 
 class Sides:
@@ -54,56 +52,51 @@ class Sides:
         self.pairs = {'': (actuators(machine), joints(machine, names))}
         for group in outputs:
             own = [axis(machine, output) for output in group]
-            self.pairs['_' + '_'.join(field(self.linkage, each) for each in group)] = own, own
-        number, one = self.code.literal, {'half': 0.5, 'zero': 0.0, 'one': 1.0}
-        limits = dict(zip(('singular', 'least', 'close', 'slack', 'enough'),
-                          LIMITS[self.code.number]), longest=LONGEST, finest=FINEST,
-                      infinity=math.inf)
+            self.pairs['_' + '_'.join(field(self.linkage, each) for each in group)] = [], own
         self.values: Dict[str, object] = {
             'name': machine.name, 'N': machine.name.upper(), 'n': len(self.sizes),
             'number': self.code.number, 'f': self.code.suffix, 'sides': len(self.pairs) + 1,
             'given': f'const {machine.name}_linkage *c, ' if is_open else '',
             'types': f'const {machine.name}_linkage *, ' if is_open else '',
             'pass': 'c, ' if is_open else '', 'samples': SAMPLES,
-            **{key: number(value) for key, value in {**one, **limits}.items()}}
-        self.poses = 0
+            **{key: self.code.literal(value)
+               for key, value in {**COMMON, **LIMITS[self.code.number]}.items()}}
+        self._inverses = Inverses(machine.linkage, self.code, self.values)
 
     def text(self) -> str:
         """Return all types and functions."""
         machine, (first, second) = self.machine, self.pairs['']
-        scales = [first, *(own for _, own in self.pairs.values())]
-        inverses = [self._inverse(0, 'actuators', first), *(
-            self._inverse(i, tag[1:] or 'joints', own)
-            for i, (tag, (_, own)) in enumerate(self.pairs.items(), 1))]
+        tables = [first, *(own for _, own in self.pairs.values())]
+        tags = ['actuators', 'joints', *(tag[1:] for tag in self.pairs if tag)]
         return filled(template('transmission.h'), {
-            **self.values, 'at': '\n'.join(map(self._at, self.pairs)),
-            'inverses': '\n'.join(inverses), 'about': self._about(),
+            **self.values, **self._inverses.within(), 'at': '\n'.join(map(self._at, self.pairs)),
+            'inverses': '\n'.join(map(self._inverses.function, range(len(tags)), tags, tables)),
+            'about': self._about(),
             'enums': self._enum('actuator', first) + '\n' + self._enum('joint', second),
             'actuator_names': ', '.join(literal(each.name) for each in first),
             'joint_names': ', '.join(literal(each.name) for each in second),
-            'scales': ', '.join(self._rows((each.size, each.turn) for each in own)
-                                for own in scales),
-            'ways': self._rows((at, *way) for at, way in zip(self._start(), self._ways()))[1:-1],
-            'ends': self._rows(self._counted(i, drive.ends or (-math.inf, math.inf))
-                               for i, drive in enumerate(machine.inputs.values()))[1:-1]})
+            'scales': ', '.join('{ %s }' % self.code.rows(
+                (1.0 / each.size, 0.5 * each.turn) for each in own) for own in tables),
+            'ranges': self.code.rows(self._ranges()),
+            'ends': self.code.rows(self._counted(i, drive.ends or (-math.inf, math.inf))
+                                   for i, drive in enumerate(machine.inputs.values()))})
 
-    def _rows(self, rows: Iterator[Sequence[float]]) -> str:
-        return '{ ' + ', '.join(f'{{ {self.code.row(row)} }}' for row in rows) + ' }'
+    @property
+    def poses(self) -> int:
+        """Return the largest number of poses of a call, once the text is written."""
+        return self._inverses.poses
 
     def _counted(self, i: int, ends: Sequence[float]) -> Tuple[float, ...]:
         """Return values of an input in units of its size."""
         unit = self.sizes[i] * self.machine.scale_of(self.linkage.inputs[i].name)
         return tuple(end / unit for end in ends)
 
-    def _start(self) -> List[float]:
-        return [value / size for value, size in zip(start(self.machine), self.sizes)]
-
-    def _ways(self) -> Iterator[Tuple[float, ...]]:
-        """Yield the start, range and step of each input's samples."""
-        for i, drive in enumerate(self.machine.inputs.values()):
+    def _ranges(self) -> Iterator[Tuple[float, ...]]:
+        """Yield the start of each input, the range of its samples, and their step."""
+        for i, (drive, first) in enumerate(zip(self.machine.inputs.values(), start(self.machine))):
             low, high = self._counted(i, drive.ends or max(
                 drive.reach, key=lambda arc: arc[1] - arc[0]))
-            yield low, high - low, math.sqrt((i + 1) ** 2 + 1.0) % 1.0
+            yield first / self.sizes[i], low, high - low, math.sqrt((i + 1) ** 2 + 1.0) % 1.0
 
     def _enum(self, side: str, axes: Sequence[Axis]) -> str:
         upper = f'{self.name}_{side}'.upper()
@@ -121,19 +114,23 @@ class Sides:
         names = list(dict.fromkeys(each.output for axes in pairs for each in axes))
         loads = [] if tag else list(self._loads())
         outputs = names + [output for output, _ in loads]
-        pose = self.linkage.bound('checked', tuple(outputs))
+        pose = self.linkage.bind(Program(self._checked(tuple(outputs)), len(self.sizes)))
 
         def ending(codes: List[str]) -> List[str]:
             count = len(outputs)
             by = [codes[count + i * count:][:count] for i in range(len(self.sizes))]
-            body = [f'    if (!isfinite({" + ".join(codes[:len(names)])}))\n        return 0;']
+            body: List[str] = []
+            rates, places = [], []
             for side, axes in enumerate(pairs):
                 for i, each in enumerate(axes):
                     k = names.index(each.output)
-                    body += self._position(f'p->position[{side}][{i}]', each, codes[k])
-                    body += [f'    p->rate[{side}][{i}][{j}] = '
-                             f'{code.times(by[j][k], each.factor * size)};'
-                             for j, size in enumerate(self.sizes)]
+                    places.append(f'p->position[{side}][{i}]')
+                    body += self._position(places[-1], each, codes[k])
+                    rates += [f'    p->rate[{side}][{i}][{j}] = '
+                              f'{code.times(by[j][k], each.factor * size)};'
+                              for j, size in enumerate(self.sizes)]
+            body += [f'    if (!isfinite({" + ".join(places)}))\n        return 0;',
+                     '    if (!is_rated)\n        return 1;', *rates]
             powers = [[code.times(by[j][len(names) + k], -load * size)
                        for k, (_, load) in enumerate(loads)] for j, size in enumerate(self.sizes)]
             return [*self._strokes(), *body, *(
@@ -143,8 +140,18 @@ class Sides:
         return code.function(
             '/* Place it at inputs, each in rad or in its size; 0 if it cannot be assembled. */\n'
             f'static inline int {self.name}_at{tag}({self.values["given"]}'
-            f'const {code.number} *q, {self.name}_point *p)', pose,
+            f'const {code.number} *q, int is_rated, {self.name}_point *p)', pose,
             [code.times(f'q[{i}]', size) for i, size in enumerate(self.sizes)], ending)
+
+    def _checked(self, outputs: Tuple[str, ...]) -> List[Real]:
+        """Return outputs and their rates by each input, NaN unless all joints are assembled."""
+        linkage, structure = self.machine.linkage, self.linkage.structure
+        row = structure.checked(outputs)
+        if self.code.is_open or len(linkage.inputs) > 1 or not linkage.inputs[0].is_whole(
+                linkage.reach()):
+            return row
+        # It can be assembled at any input: no limit needs to be checked.
+        return [*map(_undivided, map(structure.output, outputs)), *row[len(outputs):]]
 
     def _position(self, place: str, each: Axis, value: str) -> Iterator[str]:
         code = self.code
@@ -176,91 +183,22 @@ class Sides:
                     yield name, load
                 name = links[name].parent
 
-    def _inverse(self, side: int, tag: str, axes: Sequence[Axis]) -> str:
-        """Return the function from positions to the inputs."""
-        linkage, code = self.machine.linkage, self.code
-        inputs = {input_.name: i for i, input_ in enumerate(linkage.inputs)}
-        values = [code.times(
-            f'position[{i}]' + (f' - {code.literal(each.offset)}' if each.offset else ''),
-            1.0 / each.factor) for i, each in enumerate(axes)]
-        outputs = tuple(each.output for each in axes)
-        closed = None if inputs.keys() >= {*outputs} else linkage.inverse(outputs).closed
-        start = ' '.join(f'start[0][{i}] = near[{i}];' for i in inputs.values())
-        made, count, steps, how, stop = '', 1, f'{CLOSED}', 'By its gear', 'break;'
-        if closed:
-            made, count = self._modes(tag, closed, values)
-            start, how = f'{self.name}_modes_{tag}(position, near, start);', 'In closed form'
-            if code.is_open and linkage.dimensions:
-                start = (f'if (c->is_own)\n        {start}\n    else\n        for (k = 0; k < '
-                         f'{count}; k++)\n            for (i = 0; i < {len(inputs)}; i++)\n'
-                         f'                start[k][i] = k ? {code.literal(math.nan)} : near[i];')
-                steps, how = f'c->is_own ? {CLOSED} : {SEARCHED}', (
-                    'In closed form; with other dimensions by a search')
-        elif not inputs.keys() >= {*outputs}:
-            steps, how = f'{SEARCHED}', 'By a search'
-            if len(inputs) == 1 and not code.is_open:
-                middles = [0.5 * (low + high) / self.sizes[0] for low, high, *_ in
-                           linkage.monotone(outputs[0], math.inf)[0]]
-                count, stop = 1 + len(middles), ''
-                start += ''.join(f'\n    start[{k}][0] = {self._beside(0, code.literal(value))};'
-                                 for k, value in enumerate(middles, 1))
-        for value, output in zip(values, outputs):
-            if output in inputs:
-                i = inputs[output]
-                start += (f'\n    for (k = 0; k < {count}; k++)\n        start[k][{i}] = '
-                          f'{code.times(value, 1.0 / self.sizes[i])};')
-        most = count * int(steps.split()[-1])
-        self.poses = max(self.poses, most)
-        measured = side == 0 and how != 'By its gear'
-        return made + filled(template('inverse.h'), {
-            **self.values, 'tag': tag, 'side': side, 'count': count, 'steps': steps, 'stop': stop,
-            'starts': f'    {start}', 'how': f'{how}, {most} poses at most',
-            'at': f'{self.name}_at' + (f'_{tag}' if side > 1 else ''),
-            'inside': f'\n                && {self.name}_inside(start[next])' * measured})
 
-    def _beside(self, i: int, value: str) -> str:
-        """Return code for a value of an input plus the turns that bring it closest to near."""
-        input_, code = self.machine.linkage.inputs[i], self.code
-        turn = code.literal(math.tau * input_.period)
-        return value if not input_.turns else (
-            f'{value} + {turn} * floor{code.suffix}((near[{i}] - {value}) / {turn} + '
-            f'{code.literal(0.5)})')
+def _undivided(value: Real) -> Real:
+    """Return an angle without the length by which both of its coordinates are divided."""
+    if value.op != 'atan2':
+        return value
+    (y, length), (x, other) = map(_fraction, value.args)
+    return arctangent(y, x) if length is other and length.op == 'sqrt' else value
 
-    def _modes(self, tag: str, closed: InverseLinkage,
-               values: Sequence[str]) -> Tuple[str, int]:
-        """Return the function for the inputs of all assembly modes, and their number."""
-        inputs, number = self.machine.linkage.inputs, self.code.number
-        n, code = len(inputs), Code(self.name, self.machine.linkage, number == 'float')
-        # If an input has a period of several turns, each turn has its own pose.
-        turns = list(product(*closed.turns))
-        count = len(closed.modes) * len(turns)
-        program = Program([value for mode in closed.modes for value in mode.inputs], len(values),
-                          closed.given)
 
-        def ending(codes: List[str]) -> List[str]:
-            body = ['    (void)near;']
-            for k, (mode, turned) in enumerate(product(range(len(closed.modes)), turns)):
-                for i in range(n):
-                    place, value = f'start[{k}][{i}]', codes[mode * n + i]
-                    value += f' + {code.literal(turned[i])}' if turned[i] else ''
-                    body += [f'    {place} = {code.times(value, 1.0 / self.sizes[i])};',
-                             f'    {place} = {self._beside(i, place)};'][:1 + inputs[i].turns]
-            return body
-
-        return code.function(
-            '/* The inputs in each assembly mode, next to others; NAN where there is none. */\n'
-            f'static inline void {self.name}_modes_{tag}(const {number} position[{n}],\n'
-            f'    const {number} near[{n}], {number} start[{count}][{n}])',
-            self.machine.linkage.bind(program), values, ending), count
-
-    def checks(self) -> Iterator[Tuple[Real, str]]:
-        """Yield expressions of dimensions that must be positive, with their error messages."""
-        built = self.linkage.structure.built
-        for bar in built.bars:
-            yield bar.length, f'the bar {bar.first}-{bar.second} must be longer than zero'
-        for name, height in built.triangles.items():
-            yield (abs(height) + real(1.0),
-                   f'no triangle has the sides at {name}: each must be shorter than the others')
-        for input_ in built.inputs:
-            if not input_.turns:
-                yield real(input_.high) - input_.low, f'the {input_.name} must have a way to go'
+def _fraction(x: Real) -> Tuple[Real, Real]:
+    """Return the numerator and the divisor of an expression."""
+    if x.op == 'divide':
+        return x.args
+    if x.op == 'rated':
+        return _fraction(x.args[0])
+    if x.op == 'negative':
+        numerator, divisor = _fraction(x.args[0])
+        return -numerator, divisor
+    return x, x

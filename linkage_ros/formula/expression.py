@@ -170,13 +170,13 @@ def argument(index: int) -> Real:
 
 
 def sine(x: Real) -> Real:
-    """Return the sine of x."""
-    return operation('sin', x)
+    """Return sin x."""
+    return -sine(x.args[0]) if x.op == 'negative' else operation('sin', x)
 
 
 def cosine(x: Real) -> Real:
     """Return cos x."""
-    return operation('cos', x)
+    return operation('cos', x.args[0] if x.op == 'negative' else x)
 
 
 def square(x: Real) -> Real:

@@ -185,7 +185,7 @@ class Inverse:
             # inputs and the rates.
             self._rows = self._judged_modes(self.closed)
             self._row = 1 + self._n * (self._n + 1)
-            self._solve = linkage.bind(Program(self._rows, self._n, self.closed.given))
+            self._solve = linkage.bind(Program(self._rows, self._n, self.closed.arguments))
         else:
             self._search = search_for(linkage, outputs, self.inputs, self._periods)
 
@@ -421,7 +421,7 @@ class Inverse:
             rates = next((row[n:] for row in rows if np.isfinite(row).all()), rates)
         mode //= math.prod(map(len, closed.turns))
         pose = self._programs.get_or_make(('rates', mode), lambda: self.linkage.bind(Program(
-            [*chain(*closed.modes[mode].rates)], n, closed.given)))
+            [*chain(*closed.modes[mode].rates)], n, closed.arguments)))
         turning = np.reshape(pose.at(*values), (n, n))
         with np.errstate(invalid='ignore'):
             # The identity up to rounding; a dyad on its other side turns a sign.
@@ -763,7 +763,7 @@ class Inverse:
                 other, best)], choices)
         return self.linkage.bind(Program([best[many] + unknown, *(
             gated(part, LARGE - best[0], 0.0) for part in best[many + 1:])], total,
-            self.closed.given if self.closed and not count else {}))
+            self.closed.arguments if self.closed and not count else {}))
 
     def _place(self, by: int, row: Sequence[Real], near: Sequence[Real],
                ends: Sequence[Real]) -> Tuple[Real, List[Real]]:

@@ -90,7 +90,7 @@ class InverseLinkage(NamedTuple):
     turns : tuple of tuple of float
         For each input, the angles [rad] that may be added to its value in a mode: 0, and whole
         turns of the link that it is read from, up to the input's period.
-    given : dict
+    arguments : dict
         The inputs of the modes, as expressions of the outputs, which are arguments of a program.
     is_own : bool
         Whether the original linkage has no branches; all modes are then its own.
@@ -102,7 +102,7 @@ class InverseLinkage(NamedTuple):
     branches: Tuple[str, ...]
     modes: Tuple[Mode, ...]
     turns: Tuple[Tuple[float, ...], ...]
-    given: Dict[Real, Real]
+    arguments: Dict[Real, Real]
     is_own: bool = False
 
     def __str__(self) -> str:

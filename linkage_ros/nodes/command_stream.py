@@ -47,7 +47,7 @@ class Target(NamedTuple):
 
     @property
     def actuators(self) -> list[str]:
-        """The actuator of each input: its source joint or, if that is a sensor, the input."""
+        """Names of the joints to command, per input: its source or, if that measures, itself."""
         return [f'{self.machine.name}_{drive.input.name}' if drive.measures else drive.source
                 for drive in self.machine.inputs.values()]
 
@@ -137,10 +137,10 @@ class CommandStream:
 
     def _targets(self, names: Sequence[str]) -> tuple[list[Target], list[str], list[str]]:
         """
-        Return the targets for the output names in a message.
+        Return three lists for the output names in a message.
 
-        The second list has the names that are no outputs. The third has the reasons why mechanisms
-        with named outputs have no target.
+        They are the targets, the names that are no outputs, and the reasons why a mechanism with
+        outputs in the message has no target.
         """
         found: dict[str, list[tuple]] = {}
         targets, unknown, reasons = [], [], []

@@ -29,9 +29,9 @@ PUBLISHERS = 128
 
 class Validity(NamedTuple):
     """
-    Which numbers of a solution are valid, and so belong into its messages.
+    Which numbers of a solution are valid, so that they are published.
 
-    A solution is regular if all legs are assembled and all numbers are finite.
+    A solution of which all are valid is regular: all legs are assembled, all numbers finite.
     """
 
     solution: Solution
@@ -125,9 +125,10 @@ class MechanismModel:
 
     def conversion(self, layout: Layout) -> Optional[Tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """
-        Return factors (values,), offsets (values,) and indices of angles to wrap.
+        Return how solved values become published ones, or None if they are equal.
 
-        They convert solved to published values. None means that these are equal.
+        A published value is factor * value + offset, with factors (values,) and offsets (values,).
+        The angles at the indices in the third array are then wrapped to (-pi, pi].
         """
         return None if self._is_plain else self._conversions[layout]
 

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Node that solves values of a lever, or of any outputs, for the inputs."""
+"""Node with services for inverse kinematics: inputs at which outputs have given values."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Comparison of a scene's mechanism with its robot, whose loops are closed in space."""
+"""Comparison of a mechanism with its robot, whose loops are closed in space."""
 
 from __future__ import annotations
 
@@ -12,60 +12,27 @@ from typing import Dict, List, Mapping, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from .robot import Robot, SLIDE
-from .spatial import Component, components, Poses
+from .spatial import CLOSED, Component, components, DEAD, Poses
 from .. import scene
 
-# Motors are moved on so many paths, in all to so many poses; fewer than some are no check.
+# Number of paths of several motors, of poses on all paths, and of poses that a check needs.
 PATHS, POSES, FEWEST = 12, 240, 200
-# By what numbers may differ [rad, or of the size], where the file's axes are exact.
+# Allowed difference [rad, or of the size] for exact axes in the file.
 EXACT = 1e-9
-# Loops open by less, of their size, are closed.
-CLOSED = 1e-10
-# Of the usual stiffness of its loops, what a pose next to a change point has.
+# Stiffness next to a change point, as a part of the largest.
 CHANGE = 0.25
-# Loops that are no stiffer than this, of their size, cannot be closed to all digits.
-FLAT = 1e-6
-# A first step, as a part of one.
+# The first step, as a part of the others.
 LITTLE = 1e-3
-# A step that turns joints by more [rad] is made in smaller ones, so many times halved.
+# A step that turns joints by more [rad] is halved, at most so many times.
 LEAP, HALVINGS = 0.35, 6
 
 
-class Found(NamedTuple):
-    """
-    What a check has found: in how many poses, between which positions, the worst difference.
-
-    Attributes
-    ----------
-    ranges : list of (str, float, float)
-        Each motor, and between which positions it was moved.
-    worst, joint : float, str
-        The worst difference [rad, or of the size], and of which joint.
-    wrong : str
-        Why the scene is not the robot's, if it is not.
-    beyond : str
-        What was not reached.
-
-    """
-
-    poses: int
-    ranges: List[Tuple[str, float, float]]
-    worst: float
-    joint: str
-    wrong: str
-    beyond: str
-
-    def said(self, name: str) -> str:
-        """Return the report on a mechanism without differences."""
-        moved = ', '.join(f'{source} from {low:.4g} to {high:.4g}'
-                          for source, low, high in self.ranges)
-        beyond = f'; not beyond {self.beyond}' if self.beyond else ''
-        return (f'Checked: {name}: in {self.poses} poses of the robot, its loops closed in space, '
-                f'{moved}, the worst difference is {self.worst:.0e}, of {self.joint}{beyond}.')
+class Difference(ValueError):
+    """How a mechanism differs from its robot, or why it could not be compared."""
 
 
 class Track(NamedTuple):
-    """Poses along paths: where motors and joints are, which are closed, how stiff they are."""
+    """Poses along paths: positions of motors and joints, which are closed, and their stiffness."""
 
     motors: np.ndarray
     joints: Dict[str, np.ndarray]
@@ -75,9 +42,9 @@ class Track(NamedTuple):
 
 
 def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
-             ends: Mapping[str, Tuple[float, float]], slack: float) -> Found:
+             ends: Mapping[str, Tuple[float, float]], slack: float) -> str:
     """
-    Compare what a mechanism publishes with the joints of its robot.
+    Compare what a mechanism publishes with the joints of its robot, and report on it.
 
     Parameters
     ----------
@@ -92,6 +59,11 @@ def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
     slack : float
         What the file leaves open for good, of the size.
 
+    Raises
+    ------
+    Difference
+        If they differ, or if fewer than FEWEST poses could be compared.
+
     """
     component = next(each for each in components(replace(robot, driven=[*driven]))
                      if {*driven} & {joint.name for joint in each.joints})
@@ -100,50 +72,53 @@ def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
     if len(ends) > 1:
         low, high = targets
         targets = np.random.default_rng(1).uniform(low, high, (PATHS, len(ends)))
-    tracker = _Tracker(robot, component, driven, [*ends], slack)
-    count, worst, joint, beyond = 0, 0.0, '', ''
+    tracker, sources = _Tracker(robot, component, driven, [*ends], slack), [*ends]
+    good, beyond = np.zeros((0, 1), bool), ''
     for _ in range(3):
         targets = targets[np.max(np.abs(targets - start), axis=1) > 1e-9]
         if not len(targets):
             break
         track = tracker.track(start, targets)
-        apart, names = _differences(machine, component, [*ends], track)
+        apart, names = _differences(machine, component, sources, track)
         allowed = (EXACT + 30.0 * slack) / np.maximum(track.margin, 1e-4)
         good = np.logical_and.accumulate(track.alive & (apart <= allowed), axis=1)
-        first = np.minimum(good.sum(axis=1), good.shape[1] - 1)
-        paths = np.arange(len(good))
-        # Past a change point a robot may go on in two ways.
-        near = np.minimum.accumulate(track.volume, axis=1)[paths, first] < CHANGE * np.max(
-            track.volume[track.alive], initial=0.0)
-        for i in paths[track.alive[paths, first] & ~good[paths, first] & ~near]:
-            if np.max(track.margin[track.alive]) < FLAT:
-                return Found(0, [], 0.0, '', 'it could not be checked: its loops are at a dead '
-                             'point wherever its motors are', '')
-            where = ', '.join(f'{source} at {value:.4g}' for source, value in zip(
-                ends, track.motors[i, first[i]]))
-            off = apart[i, first[i]]
-            return Found(count, [], float(off), '', f'with {where} ' + (
-                'it has no pose, where the loops of the robot are closed' if math.isnan(off)
-                else f'{names[i][first[i]]} is off by {off:.2g}'), '')
-        count = int(good.sum())
-        if count:
-            worst, i, j = max((float(apart[i, j]), i, j) for i, j in np.argwhere(good))
-            joint, reached = names[i][j], track.motors[good]
-        if not good[paths, first].all():
-            beyond = 'a change point' if (track.alive & ~good).any() else 'where its loops end'
-        if count >= FEWEST:
-            ranges = [(source, float(low), float(high)) for source, low, high in zip(
-                ends, reached.min(axis=0), reached.max(axis=0))]
-            return Found(count, ranges, worst, joint, '', beyond)
-        share = good.sum(axis=1) / good.shape[1]
-        targets = start + (targets - start) * share[:, None]
-    return Found(count, [], worst, joint, f'it could not be checked in more than {count} poses',
-                 beyond)
+        _check_ends(track, sources, apart, names, good)
+        if not good.all():
+            beyond = '; not beyond ' + (
+                'a change point' if (track.alive & ~good).any() else 'where its loops end')
+        if good.sum() >= FEWEST:
+            worst = np.unravel_index(np.argmax(np.where(good, apart, -1.0)), good.shape)
+            moved = ', '.join(f'{source} from {values.min():.4g} to {values.max():.4g}'
+                              for source, values in zip(sources, track.motors[good].T))
+            return (f'Checked: {machine.name}: in {good.sum()} poses of the robot, its loops '
+                    f'closed in space, {moved}, the worst difference is {apart[worst]:.0e}, of '
+                    f'{names[worst]}{beyond}.')
+        targets = start + (targets - start) * good.mean(axis=1)[:, None]
+    raise Difference(f'it could not be checked in more than {good.sum()} poses')
+
+
+def _check_ends(track: Track, sources: List[str], apart: np.ndarray, names: np.ndarray,
+                good: np.ndarray) -> None:
+    """Raise Difference for a path with good poses up to a wrong one, unless it branches there."""
+    largest = np.max(track.volume, where=track.alive, initial=0.0)
+    for i in np.flatnonzero(~good.all(axis=1)):
+        at = i, good[i].sum()
+        # Past a change point a robot can continue in two ways.
+        if not track.alive[at] or np.min(track.volume[i, :at[1] + 1]) < CHANGE * largest:
+            continue
+        if np.max(track.margin, where=track.alive, initial=0.0) < DEAD:
+            raise Difference('it could not be checked: its loops are at a dead point wherever '
+                             'its motors are')
+        where = ', '.join(f'{source} at {value:.4g}'
+                          for source, value in zip(sources, track.motors[at]))
+        raise Difference(f'with {where} ' + (
+            'it has no pose, where the loops of the robot are closed' if math.isnan(apart[at])
+            else f'{names[at]} is off by {apart[at]:.2g}'))
 
 
 def _differences(machine: scene.SceneMechanism, component: Component, sources: List[str],
-                 track: Track) -> Tuple[np.ndarray, List[List[str]]]:
-    """Return the worst difference in each pose, and of which joint."""
+                 track: Track) -> Tuple[np.ndarray, np.ndarray]:
+    """Return the largest difference in each pose [rad, or of the size], and its joint."""
     values = [drive.ratio * track.motors[..., sources.index(drive.source)] + drive.offset
               for drive in machine.inputs.values()]
     if output := machine.first.measures:
@@ -160,65 +135,64 @@ def _differences(machine: scene.SceneMechanism, component: Component, sources: L
             off = called.of(angles[link]) - track.joints[called.name]
             apart[called.name] = np.abs(off) / component.size if called.name in slides else np.abs(
                 off - math.tau * np.round(off / math.tau))
-    if not apart:
-        return np.full(track.alive.shape, math.nan), [[''] * track.alive.shape[1]] * len(
-            track.alive)
-    every, order = np.array([*apart.values()]), [*apart]
+    apart = apart or {'': np.full(track.alive.shape, math.nan)}
+    every = np.array([*apart.values()])
     worst = np.argmax(np.where(np.isnan(every), math.inf, every), axis=0)
-    return (np.take_along_axis(every, worst[None], axis=0)[0],
-            [[order[i] for i in row] for row in worst])
+    return np.take_along_axis(every, worst[None], axis=0)[0], np.array([*apart])[worst]
 
 
 class _Tracker:
-    """Closes the loops of a component at other motor positions, step by step."""
+    """Moves the motors of a component along paths, and closes its loops."""
 
     def __init__(self, robot: Robot, component: Component, driven: Sequence[str],
                  sources: List[str], slack: float):
         self._component, self._slack = component, slack
-        self._still = component.held(driven)
-        self._movers = []
-        for name in driven:
-            source, ratio, offset = robot.source(name)
-            self._movers.append((sources.index(source), ratio, offset, *component.column(name)))
+        self._fixed = component.columns_of(driven)
+        # For each driven joint its source, ratio and offset.
+        self._movers = {name: (sources.index(source), ratio, offset) for name in driven
+                        for source, ratio, offset in [robot.source(name)]}
 
     def track(self, start: np.ndarray, targets: np.ndarray) -> Track:
         """Return poses on straight paths of the motors, each closed from the one before."""
-        component, still, count = self._component, self._still, len(targets)
+        component, fixed, count = self._component, self._fixed, len(targets)
         steps = -(-POSES // count)
-        poses = component.closed(component.at_start(count), still)
+        poses = component.closed(component.at_start(count), fixed)
         self._base = component.errors(poses)[0][0]
-        nullity = component.nullity(still)
+        nullity = component.nullity(fixed)
         motors = start + (targets - start)[:, None] * (np.arange(steps + 1) / steps)[:, None]
         alive = np.zeros((count, steps), bool)
         margin, volume = np.ones((2, count, steps))
         joints: Dict[str, np.ndarray] = {}
-        drift, going = np.zeros((count, len(still))), np.arange(count)
-        # A little way tells which way joints go, so that the first step keeps to its branch.
+        drift, going = np.zeros((count, len(fixed))), np.arange(count)
+        # A small step gives the directions of joints, which keep the first step on its branch.
         little = motors[:, 0] + LITTLE * (motors[:, 1] - motors[:, 0])
         ahead, fine = self._advanced(poses, motors[:, 0], little, drift, 0)
         drift[fine] = component.step_between(poses, ahead)[fine] / LITTLE
+        last = drift
         for k in range(steps):
             before = poses
             poses, fine = self._advanced(
                 poses, motors[going, k], motors[going, k + 1], drift, HALVINGS)
-            drift = component.step_between(before, poses).take(np.flatnonzero(fine), axis=0)
-            poses, going = poses.some(np.flatnonzero(fine)), going[fine]
+            moved = component.step_between(before, poses)[fine]
+            # The path is extrapolated by a parabola.
+            drift, last = 2.0 * moved - last[fine], moved
+            poses, going = poses.some(fine), going[fine]
             if not len(going):
                 break
             alive[going, k] = True
-            margin[going, k], volume[going, k] = component.stiffness(poses, still, nullity)
+            margin[going, k], volume[going, k] = component.stiffness(poses, fixed, nullity)
             for name, values in component.read(poses).items():
                 joints.setdefault(name, np.full(alive.shape, math.nan))[going, k] = values
         return Track(motors[:, 1:], joints, alive, margin, volume)
 
     def _advanced(self, poses: Poses, before: np.ndarray, after: np.ndarray, drift: np.ndarray,
                   halvings: int) -> Tuple[Poses, np.ndarray]:
-        """Return poses with the motors moved on, and which of them are closed."""
-        component, step = self._component, drift.copy()
-        for i, ratio, offset, element, column, sign, zero in self._movers:
-            step[:, column] = sign * (ratio * after[:, i] + offset - zero) \
-                - poses.positions[:, element]
-        new = component.closed(component.stepped(poses, step), self._still, 8)
+        """Return poses with the motors moved, and which of them are closed."""
+        component = self._component
+        step = component.aimed(poses, drift, {
+            name: ratio * after[:, i] + offset
+            for name, (i, ratio, offset) in self._movers.items()})
+        new = component.closed(component.stepped(poses, step), self._fixed, 8)
         fine = (np.max(np.abs(component.errors(new)[0] - self._base), axis=1)
                 < (CLOSED + 10.0 * self._slack) * component.size) & (
             np.max(np.abs(component.step_between(poses, new)) / component.unit, axis=1) < LEAP)

@@ -1,25 +1,26 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What robot descriptions in XML share: elements, numbers and poses in them."""
+"""Elements, numbers and poses in robot descriptions in XML."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, Dict, Iterable, Optional, Tuple
+from typing import Any, Dict, Iterable, Optional, Sequence, Tuple, Union
 import xml.etree.ElementTree as ElementTree
 from xml.parsers import expat
 
 import numpy as np
 
-from .robot import FARTHEST
+from .robot import FARTHEST, FIXED, Robot
 from ..command import RequestError
+from ..robot_model.bodies import pose
 
 Element = ElementTree.Element
 
 
 def parse(path: str) -> Element:
-    """Return the root element of a file, all names without their namespace's prefix."""
+    """Return the root element of a file; names lose the prefix of their namespace."""
     builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
     has_xacro = False
 
@@ -42,7 +43,7 @@ def parse(path: str) -> Element:
 
 
 def once(parts: Iterable[Tuple[str, Element]]) -> Dict[str, Element]:
-    """Return parts by name; raise RequestError if two have one name, or one child."""
+    """Return parts by name; raise RequestError if two have the same name."""
     found: Dict[str, Element] = {}
     for name, part in parts:
         if found.setdefault(name, part) is not part:
@@ -61,12 +62,20 @@ def text(part: Element, tag: str, otherwise: str = '') -> str:
     return (part.findtext(tag) or otherwise).strip()
 
 
-def numbers(said: str, count: int = 3) -> np.ndarray:
-    """Return so many numbers; raise ValueError if they are others."""
-    found = np.array(said.split(), float)
-    if len(found) != count or not np.all(np.abs(found) < FARTHEST):
-        raise ValueError(f'{said!r} must be {count} numbers within {FARTHEST:g}')
+def numbers(given: Union[str, Sequence[Any]], count: int = 3) -> np.ndarray:
+    """Return the numbers of a text or a list; raise ValueError if they are not `count`."""
+    found = np.array(given.split() if isinstance(given, str) else given, float)
+    if found.shape != (count,) or not np.all(np.abs(found) < FARTHEST):
+        raise ValueError(f'{given!r} must be {count} numbers within {FARTHEST:g}')
     return found
+
+
+def weld(robot: Robot, plugins: Iterable[Element]) -> None:
+    """Fix the links of Gazebo's DetachableJoint to each other, if plugins are one."""
+    for plugin in plugins:
+        if 'detachable' in f'{plugin.get("name")} {plugin.get("filename")}'.lower():
+            one, other = (text(plugin, tag) for tag in ('parent_link', 'child_link'))
+            robot.join(f'{one}={other}', FIXED, (one, other), robot.frames[one])
 
 
 def origin(part: Optional[Element]) -> np.ndarray:
@@ -74,15 +83,6 @@ def origin(part: Optional[Element]) -> np.ndarray:
     if part is None:
         return np.eye(4)
     return pose(*numbers(f'{part.get("xyz", "0 0 0")} {part.get("rpy", "0 0 0")}', 6))
-
-
-def pose(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """Return a pose by its place [m] and its angles about fixed axes [rad]."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos((roll, pitch, yaw)), np.sin((roll, pitch, yaw))
-    about_z, about_y, about_x = np.array([
-        [[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]], [[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]],
-        [[1, 0, 0], [0, cr, -sr], [0, sr, cr]]])
-    return at((x, y, z), about_z @ about_y @ about_x)
 
 
 def at(place: Any, turned: Any = ((1, 0, 0), (0, 1, 0), (0, 0, 1))) -> np.ndarray:

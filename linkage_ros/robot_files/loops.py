@@ -1,7 +1,7 @@
 # Copyright 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The closed loops of a robot, each linkage in its plane, and closed."""
+"""The planar loops of a robot, each in its plane."""
 
 from __future__ import annotations
 
@@ -11,27 +11,25 @@ from typing import Collection, Dict, List, Mapping, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from .robot import BALL, FIXED, HINGE, Joint, Robot, SLIDE
-from .spatial import blocks, top, trees
+from .spatial import blocks, TOGETHER, top, trees
+from ..linkage.dyads import ROUNDING
 
-# What joints of a planar loop may be.
+# Kinds of joints in planar loops.
 FLAT = (HINGE, SLIDE, BALL)
-# Axes that differ by more [rad] are not parallel: files have angles such as 1.5708.
+# Axes that differ by less [rad] are parallel: files have angles such as 1.5708.
 ASKEW = 1e-4
-# Hinges nearer to each other [m] cross in a point; the ends of a loop [m] are in one plane.
-TOGETHER = 1e-6
-# Loops that stay open by more, of their size, are not closed.
+# Loops with a larger gap, of their size, cannot be closed.
 OPEN = 1e-5
-# Of the size of a linkage, what is rounding.
-ROUNDING = 1e-12
 
 
 class Loop(NamedTuple):
     """
-    Joints of a linkage on a ground; its plane is `frame`, seen from the link `frame_id`.
+    A linkage in its plane, whose pose on the link `frame_id` is `frame`.
 
-    In the plane places are complex, and so are the axes of slides; that of a hinge is 1 or -1.
-    What cannot be closed is a gap [m]; what is nearer than `near` [m] is at one place. Axes lean
-    against the plane's [rad]. Some joints have ends that are apart [m] across the plane.
+    Places of joints are complex [m], and so are the axes of slides; the axis of a hinge is 1 or
+    -1. `size` is the largest distance of two joints [m], `gap` the distance that cannot be closed
+    [m], `lean` the inclination of axes [rad], and `across` has the distances of joints' ends
+    normal to the plane [m].
     """
 
     ground: str
@@ -45,11 +43,12 @@ class Loop(NamedTuple):
 
     @property
     def near(self) -> float:
+        """Points nearer to each other [m] coincide."""
         return self.size * min(max(ROUNDING, 10.0 * self.gap / self.size), 1e-6)
 
 
 class Group(NamedTuple):
-    """Joints of loops that share bars, their ground, its name in the file; why not planar."""
+    """Loops that share bars: ground and its frame, joints, why not planar, and planar parts."""
 
     ground: str
     frame_id: str
@@ -58,32 +57,32 @@ class Group(NamedTuple):
     parts: List['Group']
 
 
-def groups(robot: Robot, stiff: Collection[str] = ()) -> List[Group]:
+def groups(robot: Robot, immobile: Collection[str] = ()) -> List[Group]:
     """
-    Return the loops of a robot; where they are not planar, those parts of them that are.
+    Return the loops of a robot, with the planar parts of those that are not planar.
 
-    Joints that are `stiff` never move: where they are all that is not planar, they are rigid.
+    Joints that are `immobile` count as rigid where only they are not planar.
     """
     home = _merged(robot, {body: body for body in robot.frames}, [
         joint for joint in robot.joints if joint.kind == FIXED])
     found = _blocks(robot, home, _with_balls(robot, _on(home, robot.joints)))
-    return [group if not group.why else group._replace(parts=_parts(robot, home, group, stiff))
+    return [group if not group.why else group._replace(parts=_parts(robot, home, group, immobile))
             for group in found]
 
 
-def _parts(robot: Robot, home: Dict[str, str], group: Group, stiff: Collection[str]
+def _parts(robot: Robot, home: Dict[str, str], group: Group, immobile: Collection[str]
            ) -> List[Group]:
     """Return the planar parts of loops that are not planar as a whole."""
     names = {joint.name for joint in group.joints if joint.position is not None}
-    if names & {*robot.driven} <= {*stiff}:
-        stiff = ()
+    if names & {*robot.driven} <= {*immobile}:
+        immobile = ()
     parts: List[Group] = []
     for joint in sorted(group.joints, key=lambda joint: joint.name not in robot.driven):
         if joint.kind != HINGE or any(joint.name == one.name for part in parts
                                       for one in part.joints):
             continue
         left = [one for one in group.joints if not any(one in part.joints for part in parts)]
-        rigid = [one for one in left if one.name in stiff and _lean(one, joint.axis) > ASKEW]
+        rigid = [one for one in left if one.name in immobile and _lean(one, joint.axis) > ASKEW]
         here = _merged(robot, home, rigid)
         parts += [part for part in _blocks(robot, here, _on(here, [
             one for one in left if one.kind in FLAT and _lean(one, joint.axis) < ASKEW]))
@@ -92,7 +91,7 @@ def _parts(robot: Robot, home: Dict[str, str], group: Group, stiff: Collection[s
 
 
 def _blocks(robot: Robot, home: Mapping[str, str], joints: Sequence[Joint]) -> List[Group]:
-    """Return loops that share bars between bodies that have become one."""
+    """Return the loops of merged bodies, those that share bars together."""
     found, cuts = trees(replace(robot, root=home[robot.root], joints=[*joints], frames={
         body: robot.frames[body] for body in home.values()}))
     ranks = {body: i for i, body in enumerate((home[robot.root], *found))}
@@ -142,15 +141,14 @@ def _with_balls(robot: Robot, joints: List[Joint]) -> List[Joint]:
         if body == robot.root or len(own) != 2 or any(
                 joint.name in robot.driven or joint.kind not in (HINGE, BALL) for joint in own):
             continue
-        (one, two), axes = ((joint, joint.bodies[0] == body) for joint in own), np.array(
-            [joint.axis for joint in own])
-        bodies = one[0].bodies[one[1]], two[0].bodies[two[1]]
-        places = one[0].places[one[1]], two[0].places[two[1]]
+        one, two = own
+        bodies = one.other(body), two.other(body)
+        places = one.place(bodies[0]), two.place(bodies[1])
         if bodies[0] != bodies[1] and np.linalg.norm(places[0] - places[1]) < TOGETHER \
-                and (BALL in (own[0].kind, own[1].kind)
-                     or np.linalg.norm(np.cross(*axes)) > ASKEW):
-            ball = Joint(f'{own[0].name}+{own[1].name}', BALL, bodies, places, axes[0],
-                         parts=tuple(own))
+                and (BALL in (one.kind, two.kind)
+                     or np.linalg.norm(np.cross(one.axis, two.axis)) > ASKEW):
+            ball = Joint(f'{one.name}+{two.name}', BALL, bodies, places, one.axes,
+                         parts=(one, two))
             joints, on[body] = [*(joint for joint in joints if joint not in own), ball], []
             for end in bodies:
                 on[end] = [ball if joint in own else joint for joint in on[end]]
@@ -179,7 +177,7 @@ def check_planar(ground: str, joints: Sequence[Joint], drives: Sequence[str] = (
 
 
 def _lean(joint: Joint, normal: np.ndarray) -> float:
-    """Return by how much a joint's axes are not as they are in a plane [rad]."""
+    """Return the inclination of a joint's axes against those of a plane [rad]."""
     if joint.kind == SLIDE:
         return float(abs(joint.axis @ normal))
     return float(max(np.linalg.norm(np.cross(axis, normal)) for axis in joint.axes)) \
@@ -205,25 +203,21 @@ def flat(robot: Robot, group: Group, drives: Sequence[str]) -> Loop:
         if abs(first[2] - second[2]) > TOGETHER * 1e-3:
             across[joint.name] = abs(first[2] - second[2])
         axis = seen[:3, :3] @ joint.axis
+        way = complex(*axis[:2])
         found.append(replace(
             joint, places=(complex(*first[:2]), complex(*second[:2])),
-            axis=complex(*axis[:2]) / abs(complex(*axis[:2])) if joint.kind == SLIDE
-            else float(np.sign(axis[2]))))
+            axes=[way / abs(way) if joint.kind == SLIDE else float(np.sign(axis[2]))] * 2))
     places = [place for joint in found for place in joint.places]
     size = max(abs(place - other) for place in places for other in places)
     if size < TOGETHER:
         raise ValueError('all its joints are at one place')
-    gap = max(_gap(joint) for joint in found)
+    gaps = ((joint.places[1] - joint.places[0], joint) for joint in found)
+    gap = max(abs((apart / joint.axis).imag if joint.kind == SLIDE else apart)
+              for apart, joint in gaps)
     if gap > OPEN * size:
         raise ValueError(f'its loops cannot be closed: they stay open by {gap:.3g} m')
     return Loop(ground, frame_id, frame, found, size, gap, lean if lean > 1e-12 else 0.0,
                 across)
-
-
-def _gap(joint: Joint) -> float:
-    """Return by how much [m] a joint is open."""
-    apart = joint.places[1] - joint.places[0]
-    return abs((apart / joint.axis).imag if joint.kind == SLIDE else apart)
 
 
 def _check_rods(ground: str, joints: Sequence[Joint]) -> None:

@@ -31,7 +31,7 @@ def read(path: str) -> Robot:
         if not joints.size:
             robot.join(body, FIXED, (above, body), robot.frames[body])
         for j in joints:
-            # Between several joints of one body there are bodies without a name.
+            # Several joints of one body have bodies without a name between them.
             below = body if j == joints[-1] else f'{body}/{names[j]}'
             robot.frames.setdefault(below, robot.frames[body])
             kind = mj.mjtJoint(model.jnt_type[j]).name[6:].lower()
@@ -57,7 +57,7 @@ def _compiled(path: str) -> Any:
     """Return a model without meshes, whose files may be missing."""
     import mujoco as mj
 
-    # What it warns of, and writes to a file, is dynamics.
+    # Warnings, which MuJoCo writes to a file, concern dynamics.
     mj.set_mju_user_warning(lambda text: None)
     spec = mj.MjSpec.from_file(path)
     for geom in spec.geoms:
@@ -84,11 +84,11 @@ def _tie(robot: Robot, model: Any, i: int, bodies: Any, names: Any) -> None:
         robot.follow(names[ends[0]], names[ends[1]], given[1], given[0] + one - given[1] * other)
     if kind in ('connect', 'weld'):
         welds = kind == 'weld'
-        own, other = (given[3:6], given[:3]) if welds else (given[:3], given[3:6])
-        frames = [at(own, turned_by(given[6:10] if welds else (1.0, 0.0, 0.0, 0.0))), at(other)]
         if mj.mjtObj(model.eq_objtype[i]) == mj.mjtObj.mjOBJ_SITE:
             frames = [at(model.site_pos[end], turned_by(model.site_quat[end])) for end in ends]
             ends = model.site_bodyid[ends]
-        first, second = (robot.frames[bodies[end]] @ frame for end, frame in zip(ends, frames))
-        robot.join(model.equality(i).name or f'equality{i}', FIXED if welds else BALL,
-                   (bodies[ends[0]], bodies[ends[1]]), first, other=second)
+        else:
+            own, other = (given[3:6], given[:3]) if welds else (given[:3], given[3:6])
+            frames = [at(own, turned_by(given[6:10]) if welds else np.eye(3)), at(other)]
+        robot.close(model.equality(i).name or f'equality{i}', FIXED if welds else BALL,
+                    (bodies[ends[0]], bodies[ends[1]]), frames)

@@ -5,18 +5,18 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
-from typing import Any, Dict, Optional, Tuple
-import xml.etree.ElementTree as ElementTree
+from typing import Any, Dict, Optional
 
 import numpy as np
 
 from . import readers
-from .closing import posed
-from .robot import HINGE, Robot, SLIDE
-from .spatial import trees
+from .elements import at, parse
+from .robot import FARTHEST, HINGE, Robot, SLIDE
+from .spatial import posed, trees
 from .. import scene
+from ..robot_model.bodies import coordinates
+from ..robot_model.urdf import link, tree_joint
 from ..scene.joint_names import quoted_name
 
 OTHERS = 'others'
@@ -24,67 +24,31 @@ OTHERS = 'others'
 
 def description(path: str, loops: Optional[str] = None) -> str:
     """Return a robot as robot_state_publisher takes it: a URDF as it is, else its tree."""
-    robot, text = readers.read(path, loops), Path(path).read_text()
-    return text if '<robot' in text else urdf(robot)
+    robot = readers.read(path, loops)
+    return Path(path).read_text() if parse(path).tag == 'robot' else urdf(robot)
 
 
 def urdf(robot: Robot) -> str:
     """Return the tree of a robot, all joints at zero where its URDF has them at zero."""
-    found, _ = trees(robot)
-    tree = {joint.name for _, joint in found.values()}
-    robot = posed(robot, {name: 0.0 for name in robot.positions if name in tree})
-    root = ElementTree.Element('robot', name='robot')
-    ElementTree.SubElement(root, 'link', name=robot.root)
-    homes = {robot.root: robot.frames[robot.root]}
+    names = {joint.name for _, joint in trees(robot)[0].values()}
+    robot = posed(robot, {name: 0.0 for name in robot.positions if name in names})
+    text = link(robot.root)
     for body, (base, joint) in trees(robot)[0].items():
-        moves = joint.kind in (HINGE, SLIDE) and joint.position is not None
-        home = robot.frames[body].copy()
-        forward = joint.bodies[1] == body
-        if moves:
-            # A URDF has a joint where its child's frame is.
-            home[:3, 3] = joint.places[not forward]
-        names = (f'{body}/joint', body) if moves and not np.array_equal(
-            home, robot.frames[body]) else (body,)
-        made = _joint(root, joint.name if moves else f'{body}_fixed', 'fixed' if not moves else (
-            'prismatic' if joint.kind == SLIDE else 'revolute' if joint.limits else 'continuous'),
-            base, names[0], np.linalg.inv(homes[base]) @ home)
-        if moves:
-            way = home[:3, :3].T @ joint.axis * (1.0 if forward else -1.0)
-            ElementTree.SubElement(made, 'axis', xyz=_text(way))
-            low, high = joint.limits or (-math.inf, math.inf)
-            if made.get('type') != 'continuous':
-                low, high = max(low, -1e3), min(high, 1e3)
-                ElementTree.SubElement(made, 'limit', lower=repr(low), upper=repr(high),
-                                       effort='0', velocity='0')
-        if len(names) > 1:
-            _joint(root, f'{body}_fixed', 'fixed', names[0], body,
-                   np.linalg.inv(home) @ robot.frames[body])
-        homes[body] = robot.frames[body]
-    return ElementTree.tostring(root, encoding='unicode')
-
-
-def _joint(root: ElementTree.Element, name: str, kind: str, base: str, body: str,
-           pose: np.ndarray) -> ElementTree.Element:
-    ElementTree.SubElement(root, 'link', name=body)
-    joint = ElementTree.SubElement(root, 'joint', name=name, type=kind)
-    ElementTree.SubElement(joint, 'parent', link=base)
-    ElementTree.SubElement(joint, 'child', link=body)
-    ElementTree.SubElement(joint, 'origin', xyz=_text(pose[:3, 3]), rpy=_text(rpy(pose[:3, :3])))
-    return joint
-
-
-def _text(numbers: Any) -> str:
-    return ' '.join(repr(float(number)) for number in numbers)
-
-
-def rpy(turned: np.ndarray) -> Tuple[float, float, float]:
-    """Return roll, pitch and yaw [rad] of a rotation matrix."""
-    a, b = turned[:2, 0]
-    yaw = math.atan2(b, a) if math.hypot(a, b) > 1e-9 else 0.0
-    sin, cos = math.sin(yaw), math.cos(yaw)
-    ahead, aside = turned[:2, 2], turned[:2, 1]
-    return (math.atan2(sin * ahead[0] - cos * ahead[1], cos * aside[1] - sin * aside[0]),
-            math.atan2(-turned[2, 0], cos * a + sin * b), yaw)
+        frame, seen = robot.frames[body], np.linalg.inv(robot.frames[base])
+        if joint.kind in (HINGE, SLIDE) and joint.position is not None:
+            # In URDF the frame of a joint is that of its child.
+            home = at(joint.place(base), frame[:3, :3])
+            child = body if np.array_equal(home, frame) else f'{body}/joint'
+            kind = 'prismatic' if joint.kind == SLIDE else 'revolute'
+            ends = joint.limits or ((-FARTHEST, FARTHEST) if joint.kind == SLIDE else ())
+            axis = home[:3, :3].T @ joint.motion(body)
+            text += tree_joint(joint.name, kind, base, child, coordinates(seen @ home),
+                               axis.tolist(), np.clip(ends, -1e3, 1e3).tolist()) + link(child)
+            base, seen = child, np.linalg.inv(home)
+        if base != body:
+            text += tree_joint(f'{body}_fixed', 'fixed', base, body,
+                               coordinates(seen @ frame)) + link(body)
+    return f'<robot name="robot">\n{text}</robot>'
 
 
 def others(robot: Robot, machines: Dict[str, scene.SceneMechanism], held: Dict[str, float]

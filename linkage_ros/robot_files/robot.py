@@ -5,18 +5,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 import re
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple
 
 import numpy as np
 
 from ..command import RequestError
+from ..words import listed, meant
 
 HINGE, SLIDE, BALL, FIXED, UNIVERSAL, FREE = (
     'hinge', 'slide', 'ball', 'fixed', 'universal', 'free')
-KINDS = {'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE, 'spherical': BALL,
-         'floating': FREE}
+# What files call them, in small letters.
+KINDS = {'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE, 'spherical': BALL, '3d': BALL,
+         '6d': FIXED, 'revolute2': UNIVERSAL, 'floating': FREE}
 # No robot has parts farther off [m], or limits [m or rad].
 FARTHEST = 1e9
 
@@ -24,18 +26,16 @@ FARTHEST = 1e9
 @dataclass(eq=False)
 class Joint:
     """
-    What joins two bodies: its place on each, its axis; with a name, position and limits.
+    A joint between two bodies; its position and limits, if it has one degree of freedom.
 
     Attributes
     ----------
     places : pair of array
-        Where each body has it [m].
-    axis : array
-        Its unit axis, as the first body has it.
+        Its place on each body [m].
+    axes : pair of array
+        Its unit axis on each body.
     turns : pair of array
         Rotation matrices of its frame on each body.
-    second : array
-        The axis on its second body, where that is another.
     is_cut : bool
         Whether it closes a loop of a tree, so that its two frames may be apart.
     parts : tuple of Joint
@@ -47,28 +47,43 @@ class Joint:
     kind: str
     bodies: Tuple[str, str]
     places: Any
-    axis: Any
+    axes: Any
     position: Optional[float] = None
     limits: Optional[Tuple[float, float]] = None
     turns: Any = (np.eye(3), np.eye(3))
-    second: Any = None
     is_cut: bool = False
     parts: Tuple['Joint', ...] = ()
 
-    @property
-    def hinges(self) -> List['Joint']:
-        """Return the hinges that it is made of, or itself."""
-        return [one for part in self.parts for one in part.hinges] or [self]
+    def other(self, body: str) -> str:
+        """Return the body that it joins to one."""
+        return self.bodies[self.bodies[0] == body]
+
+    def place(self, body: str) -> Any:
+        """Return its place on a body [m]."""
+        return self.places[self.bodies[1] == body]
+
+    def motion(self, body: str) -> Any:
+        """Return the axis on the other body about or along which positions move a body."""
+        return self.axes[0] if self.bodies[1] == body else -self.axes[1]
 
     @property
-    def axes(self) -> Tuple[np.ndarray, np.ndarray]:
-        """Its axis as each body has it."""
-        other = self.turns[1] @ self.turns[0].T @ self.axis if self.second is None else self.second
-        return self.axis, other
+    def axis(self) -> Any:
+        """Return the axis on the first body."""
+        return self.axes[0]
+
+    @property
+    def start(self) -> float:
+        """Return the position in the file [rad or m], 0 for a joint without one."""
+        return self.position or 0.0
+
+    @property
+    def hinges(self) -> List['Joint']:
+        """Return the hinges of a ball that is made of some, else the joint itself."""
+        return [one for part in self.parts for one in part.hinges] or [self]
 
 
 def plain(name: str, most: int) -> str:
-    """Return a name of letters, digits and single underscores, of no more than so many."""
+    """Return a name of at most so many letters, digits and single underscores."""
     found = re.sub('[^A-Za-z0-9]+', '_', name).strip('_')[:most]
     return found if found[:1].isalpha() else f'joint_{found}'.rstrip('_')
 
@@ -76,9 +91,23 @@ def plain(name: str, most: int) -> str:
 @dataclass
 class Robot:
     """
-    Frames of bodies, joints, which of them motors move, and which are a multiple of others.
+    Bodies and joints of a robot, in the pose of its file.
 
-    Some are held where they are.
+    Attributes
+    ----------
+    root : str
+        The body that does not move.
+    frames : dict
+        The pose of each body.
+    joints : list of Joint
+        All joints.
+    driven : list of str
+        Joints that motors move.
+    follows : dict
+        For each dependent joint another joint, the ratio and the offset.
+    held : dict
+        Positions of joints that are fixed.
+
     """
 
     root: str
@@ -92,35 +121,49 @@ class Robot:
              axis: Any = (0.0, 0.0, 1.0), other: Optional[np.ndarray] = None,
              position: Optional[float] = None, limits: Sequence[Any] = ('', ''),
              second: Any = None) -> None:
-        """Add a joint by its frame on the parent, and on the child where it closes a loop."""
+        """
+        Add a joint by its frame on the first body, and on the second where it closes a loop.
+
+        The axes are in these frames; `second` is that of the second body, if it is another.
+        """
         for body in bodies:
             if body not in self.frames:
                 raise RequestError(f'joint {name} is on {body!r}, which is no link')
-        kind, size = KINDS.get(kind, kind), np.linalg.norm(axis)
-        frames = frame, frame if other is None else other
-        places = frames[0][:3, 3], frames[1][:3, 3]
-        if not np.all(np.abs((*places, axis)) < FARTHEST):
+        kind = KINDS.get(kind.lower(), kind.lower())
+        frames, ways = (frame, frame if other is None else other), [
+            axis, axis if second is None else second]
+        places = tuple(each[:3, 3] for each in frames)
+        sizes = np.linalg.norm(ways, axis=1)
+        if not np.all(np.abs((*places, *ways)) < FARTHEST):
             raise RequestError(f'joint {name} must be within {FARTHEST:g} m')
-        if kind in (HINGE, SLIDE, UNIVERSAL) and not size > 0.0:
+        if kind in (HINGE, SLIDE, UNIVERSAL) and not np.all(sizes > 0.0):
             raise RequestError(f'the axis of joint {name} has no length')
-        low, high = (float(str(limit) or 'nan') for limit in limits)
+        if kind == UNIVERSAL and second is None:
+            raise RequestError(f'joint {name} is universal and must have two axes')
         if kind == UNIVERSAL:
             # Two hinges with a cross between them.
             cross = f'{name}/cross'
             self.frames[cross] = frame
             self.join(name, HINGE, (bodies[0], cross), frame, axis)
-            self.join(f'{name}/second', HINGE, (cross, bodies[1]), frame,
-                      frame[:3, :3].T @ second, other)
+            self.join(f'{name}/second', HINGE, (cross, bodies[1]), frame, ways[1], other)
             return
-        if kind not in (HINGE, SLIDE):
-            position = None
+        low, high = (float(str(limit) or 'nan') for limit in limits)
+        turns = tuple(each[:3, :3] for each in frames)
         self.joints.append(Joint(
-            name, kind, bodies, places, frame[:3, :3] @ axis / (size or 1.0), position,
-            (low, high) if -FARTHEST < low < high < FARTHEST else None,
-            (frames[0][:3, :3], frames[1][:3, :3]), second, other is not None))
+            name, kind, bodies, places,
+            tuple(turn @ way / (size or 1.0) for turn, way, size in zip(turns, ways, sizes)),
+            position if kind in (HINGE, SLIDE) else None,
+            (low, high) if -FARTHEST < low < high < FARTHEST else None, turns,
+            other is not None))
+
+    def close(self, name: str, kind: str, bodies: Tuple[str, str], own: Sequence[np.ndarray],
+              axis: Any = (0.0, 0.0, 1.0), second: Any = None) -> None:
+        """Close a loop by a joint, by its frame on each body as this has it; see `join`."""
+        first, other = (self.frames[body] @ frame for body, frame in zip(bodies, own))
+        self.join(name, kind, bodies, first, axis, other, second=second)
 
     def follow(self, name: str, other: str, ratio: float, offset: float) -> None:
-        """Have a joint be a multiple of another, plus an offset."""
+        """Make a joint dependent: ratio * position + offset of another."""
         if ratio:
             self.follows[name] = other, float(ratio), float(offset)
 
@@ -129,8 +172,16 @@ class Robot:
         """Return the positions of all joints that have a name."""
         return {joint.name: joint.position for joint in self.joints if joint.position is not None}
 
+    def check_names(self, names: Iterable[str]) -> None:
+        """Raise RequestError for a name that no joint of one degree of freedom has."""
+        for name in names:
+            if name not in self.positions:
+                raise RequestError(f'there is no joint {name!r}; allowed: '
+                                   f'{listed(self.positions, 200)}'
+                                   f'{meant(name, self.positions)}')
+
     def source(self, name: str) -> Tuple[str, float, float]:
-        """Return the joint that another follows, if not itself, its ratio and its offset."""
+        """Return the joint that another depends on, or itself, with ratio and offset."""
         ratio, offset, passed = 1.0, 0.0, [*self.driven]
         while name in self.follows and name not in passed:
             passed.append(name)
@@ -139,20 +190,3 @@ class Robot:
         if name not in self.positions:
             raise ValueError(f'{passed[-1]} follows {name!r}, which is no joint')
         return name, ratio, offset
-
-    def displaced(self, moved: Mapping[str, np.ndarray], positions: Mapping[str, float]
-                  ) -> 'Robot':
-        """Return it with each body displaced, and joints where they are then."""
-        joints = []
-        for joint in self.joints:
-            one, other = (moved[body] for body in joint.bodies)
-            joints.append(replace(
-                joint, axis=one[:3, :3] @ joint.axis,
-                places=tuple(each[:3, :3] @ place + each[:3, 3]
-                             for each, place in zip((one, other), joint.places)),
-                turns=(one[:3, :3] @ joint.turns[0], other[:3, :3] @ joint.turns[1]),
-                second=None if joint.second is None else other[:3, :3] @ joint.second,
-                position=positions.get(joint.name, joint.position)
-                if joint.position is not None else None))
-        return replace(self, joints=joints,
-                       frames={body: moved[body] @ frame for body, frame in self.frames.items()})

@@ -13,33 +13,23 @@ from __future__ import annotations
 
 from itertools import product
 import math
-from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Set, Tuple
 
 import numpy as np
 
 from . import check
-from .dyads import short
 from .loops import Group
 from .robot import BALL, HINGE, Joint, plain, Robot, SLIDE
 from .. import mechanisms, scene
+from ..linkage.dyads import short
 from ..linkage.rod_lines import FORMS, WindowError
 from ..scene.joint_names import quoted_name
 from ..words import listed
 
-# Limits of a hinge that say nothing [rad].
+# A hinge with wider limits [rad] has none.
 _ANY = 0.999 * math.pi
-# Poses on each side of the motors' ranges that a check moves them in.
+# Number of poses along each side of the motors' ranges.
 _SIDE = 7
-
-
-class Link(NamedTuple):
-    """A link on a joint, its parent, and its axis, which may be the other way round."""
-
-    name: str
-    parent: str
-    joint: Joint
-    axis: np.ndarray
-    place: np.ndarray
 
 
 class Rods:
@@ -57,10 +47,13 @@ class Rods:
         ground, self.frame_id = group.ground, group.frame_id
         self._seen = np.linalg.inv(robot.frames[self.frame_id])
         self._driven = {*robot.driven}
-        self.links: Dict[str, Link] = {}
+        # The joint of each link, and its end of a line: its parent, its place and its axis.
+        self.links: Dict[str, Joint] = {}
+        self._ends: Dict[str, str] = {}
         self.rods: List[str] = []
-        # The joint that drives an input, by the input's name.
+        # The joint that drives each input, and the input's value in the pose of the robot.
         self.inputs: Dict[str, Joint] = {}
+        self.zeros: Dict[str, float] = {}
         self._names: Set[str] = {*FORMS, 'ground', 'at', 'axis', 'within', 'length'}
         rods = {body: tuple(held) for body, held in _on_bodies(group.joints).items()
                 if body != ground and [joint.kind for joint in held] == [BALL, BALL]}
@@ -98,58 +91,56 @@ class Rods:
         return ' '.join(short(float(x)) for x in seen)
 
     def _add(self, joint: Joint) -> None:
-        """Add a link on a joint with one that is there."""
-        backwards = joint.bodies[0] not in self._bodies
-        base, body = joint.bodies[::-1] if backwards else joint.bodies
+        """Add a link, and its joint with a link that is there."""
+        base, body = sorted(joint.bodies, key=self._bodies.__contains__, reverse=True)
         if joint.kind not in (HINGE, SLIDE):
             raise ValueError(f'{joint.name} is a joint of type {joint.kind} and no end of a rod')
         name = self._bodies[body] = self._named(joint)
-        self.links[name] = Link(name, self._bodies[base], joint,
-                                -joint.axis if backwards else joint.axis, joint.places[backwards])
+        self.links[name] = joint
+        self._ends[name] = (f'{self._bodies[base]} at {self._text(joint.place(base))} axis '
+                            f'{self._text(joint.motion(body), False)}')
         if joint.name in self._driven:
             if joint.kind != HINGE:
                 raise ValueError(f'{joint.name} drives, and is no hinge and no cylinder')
-            self.inputs[name] = joint
+            self.inputs[name], self.zeros[name] = joint, 0.0
 
     def _end(self, joint: Joint, body: str) -> str:
         """Return the other end of a ball of a rod: its link and place."""
-        other = joint.bodies[joint.bodies[0] == body]
+        other = joint.other(body)
         if other not in self._bodies:
             raise ValueError(f'{joint.name} holds {body} to {other}, which hangs on rods alone')
-        return f'{self._bodies[other]} {self._text(joint.places[joint.bodies[1] == other])}'
+        return f'{self._bodies[other]} {self._text(joint.place(other))}'
 
     def _rod(self, body: str, held: Tuple[Joint, ...]) -> None:
-        ends = [joint.places[joint.bodies[1] == body] for joint in held]
+        ends = [joint.place(body) for joint in held]
         length = short(float(np.linalg.norm(ends[0] - ends[1])))
         name = self._named(held[0])
         self.rods.append(f'{name} rod {self._end(held[0], body)} {self._end(held[1], body)} '
                          f'length {length}')
 
     def _cylinder(self, half: Joint, balls: Sequence[Joint]) -> None:
-        ends = [ball.places[ball.bodies[1] == body] for ball, body in zip(balls, half.bodies)]
+        ends = [ball.place(body) for ball, body in zip(balls, half.bodies)]
         way = ends[1] - ends[0]
         if np.linalg.norm(np.cross(half.axis, way)) > 1e-6 * np.linalg.norm(way):
             raise ValueError(f'{half.name} does not slide along the line of its balls')
         name = self._named(half)
         self.rods.append(f'{name} cylinder ' + ' '.join(
             self._end(ball, body) for ball, body in zip(balls, half.bodies)))
-        self.inputs[name] = half
+        self.inputs[name], self.zeros[name] = half, float(np.linalg.norm(way))
 
     def lines(self, limits: Mapping[str, Tuple[float, float]] = {}) -> List[str]:
         """Return the lines, with limits for some other than the file's."""
         found = []
-        for name, link in self.links.items():
-            word = 'motor' if name in self.inputs else link.joint.kind
-            ends = None if word == 'motor' else limits.get(name, self._limits(link))
-            found.append(f'{name} {word} {link.parent} at {self._text(link.place)} axis '
-                         f'{self._text(link.axis, False)}' + (
-                             f' within {short(ends[0])} {short(ends[1])}' if ends else ''))
+        for name, joint in self.links.items():
+            word = 'motor' if name in self.inputs else joint.kind
+            ends = None if word == 'motor' else limits.get(name, self._limits(joint))
+            found.append(f'{name} {word} {self._ends[name]}' + (
+                f' within {short(ends[0])} {short(ends[1])}' if ends else ''))
         return found + self.rods
 
     @staticmethod
-    def _limits(link: Link) -> Optional[Tuple[float, float]]:
+    def _limits(joint: Joint) -> Optional[Tuple[float, float]]:
         """Return a joint's limits relative to its position; None without limits."""
-        joint = link.joint
         if joint.limits is None or joint.position is None:
             return None
         low, high = (end - joint.position for end in joint.limits)
@@ -162,22 +153,14 @@ class Rods:
         yield 'frame_id', self.frame_id
         for name, joint in self.inputs.items():
             yield f'{name}.source', joint.name
-            yield f'{name}.offset', self._zero(name) - (joint.position or 0.0)
-            yield f'{name}.start', self._zero(name)
+            yield f'{name}.offset', self.zeros[name] - joint.start
+            yield f'{name}.start', self.zeros[name]
         yield 'joint_names', [
-            f'{link.name}={quoted_name(link.joint.name)}' + (
-                f'{position:+}' if (position := float(short(link.joint.position or 0.0))) else '')
-            for link in self.links.values() if link.name not in self.inputs
-            and link.joint.position is not None]
+            f'{name}={quoted_name(joint.name)}' + (
+                f'{position:+}' if (position := float(short(joint.start))) else '')
+            for name, joint in self.links.items() if name not in self.inputs
+            and joint.position is not None]
         yield 'only_named', True
-
-    def _zero(self, name: str) -> float:
-        """Return an input's value in the robot's pose: 0 for an angle, the length for a length."""
-        line = next((line for line in self.rods if line.startswith(f'{name} cylinder ')), None)
-        if line is None:
-            return 0.0
-        words = line.split()
-        return math.dist(map(float, words[3:6]), map(float, words[7:10]))
 
 
 def _on_bodies(joints: Sequence[Joint]) -> Dict[str, List[Joint]]:
@@ -188,7 +171,7 @@ def _on_bodies(joints: Sequence[Joint]) -> Dict[str, List[Joint]]:
 def described(robot: Robot, group: Group, others: Sequence[str]
               ) -> Tuple[str, Dict[str, Any], List[str]]:
     """
-    Return a mechanism's name, its parameters, and what is to be said of it.
+    Return a mechanism's name, its parameters, and its report.
 
     Raises ValueError for loops that rods cannot be, or whose poses are others than the robot's.
     """
@@ -201,16 +184,13 @@ def described(robot: Robot, group: Group, others: Sequence[str]
     given = {f'{name}.{key}': value for key, value in found.parameters(lines)}
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     ends = _ranges(machine, found)
-    compared = check.compared(robot, machine, [joint.name for joint in found.inputs.values()],
-                              ends, 0.0)
-    if compared.wrong:
-        raise ValueError(compared.wrong)
-    said.append(compared.said(name))
-    return name, given, said + [*_corners(machine, found)]
+    report = check.compared(robot, machine, [joint.name for joint in found.inputs.values()],
+                            ends, 0.0)
+    return name, given, [*said, report, *_corners(machine, found)]
 
 
 def _lines(found: Rods) -> Tuple[List[str], List[str]]:
-    """Return lines whose limits can be, and what is said where they are not the file's."""
+    """Return lines with limits that allow one pose, and a report if they are not the file's."""
     lines = found.lines()
     try:
         mechanisms.create('rods', joints=lines)
@@ -220,14 +200,14 @@ def _lines(found: Rods) -> Tuple[List[str], List[str]]:
             raise
         said = ', '.join(f'{name} from {low + zero:.4g} to {high + zero:.4g}'
                          for name, (low, high) in error.limits.items()
-                         for zero in [found.links[name].joint.position or 0.0])
+                         for zero in [found.links[name].start])
         return found.lines(limits=error.limits), [
             f'Limits: inside those of the file, or without any, there may be a second pose; these '
             f'are the largest shown to have one at most: {said}.']
 
 
 def _ranges(machine: scene.SceneMechanism, found: Rods) -> Dict[str, Tuple[float, float]]:
-    """Return ranges of the motors, as the robot counts them, in which all is a pose."""
+    """Return ranges of the motors' positions in which every pose exists."""
     names = [*machine.inputs]
     start = np.array([machine.inputs[name].start for name in names])
     sizes = np.array([2.5 if machine.linkage.is_angle(name) else 0.5 * x
@@ -251,10 +231,10 @@ def _corners(machine: scene.SceneMechanism, found: Rods) -> Iterator[str]:
     for held in machine.linkage.windows():
         names = [line.names[0] for line in held.lines]
         inverse = machine.linkage.driven_by(*names)
-        zeros = [found.links[name].joint.position or 0.0 for name in names]
+        zeros = [found.links[name].start for name in names]
         for corner in product(*held.limits):
             motors = inverse.joint_angles(corner, [*found.inputs])
-            where = ', '.join(f'{found.links[name].joint.name} at {value + zero:.4g}'
+            where = ', '.join(f'{found.links[name].name} at {value + zero:.4g}'
                               for name, value, zero in zip(names, corner, zeros))
             there = ', '.join(
                 f'{joint.name} at {motors[name] - machine.inputs[name].offset:.4g}'

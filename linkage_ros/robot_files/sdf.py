@@ -13,14 +13,14 @@ from xml.etree.ElementTree import SubElement
 
 import numpy as np
 
-from .elements import at, attribute, Element, numbers, once, parse, pose, text, turned_by
-from .robot import FIXED, HINGE, Robot, UNIVERSAL
+from .elements import at, attribute, Element, numbers, once, parse, pose, text, turned_by, weld
+from .robot import HINGE, KINDS, Robot, UNIVERSAL
 from ..command import RequestError
 
 
 def read(path: str, root: Element) -> Robot:
-    """Return the robot that the first model with joints is."""
-    _say_frames(root)
+    """Return the robot of the first model with joints."""
+    _make_axes_explicit(root)
     for model in (*root.findall('model'), *root.findall('world/model')):
         parts = [*_parts(model, '', path)]
         if any(part.tag == 'joint' for _, part in parts):
@@ -28,8 +28,8 @@ def read(path: str, root: Element) -> Robot:
     raise RequestError('the SDF has no model with joints')
 
 
-def _say_frames(root: Element) -> None:
-    """Write what is without saying up to version 1.4 of a file: axes are in the model's frame."""
+def _make_axes_explicit(root: Element) -> None:
+    """Make explicit that up to version 1.4 axes are in the model's frame."""
     if tuple(map(int, root.get('version', '1.12').split('.'))) <= (1, 4):
         for axis in (*root.iter('axis'), *root.iter('axis2')):
             if not text(axis, 'use_parent_model_frame'):
@@ -37,7 +37,7 @@ def _say_frames(root: Element) -> None:
 
 
 def _parts(model: Element, name: str, path: str) -> Iterator[Tuple[str, Element]]:
-    """Yield the parts of a model by name, those of models in it too."""
+    """Yield the parts of a model and of the models in it, with their full names."""
     yield name, model
     for part in model:
         inner = f'{name}::{part.get("name", "")}'.lstrip(':')
@@ -56,7 +56,7 @@ def _included(part: Element, name: str, path: str) -> Iterator[Tuple[str, Elemen
     if not file.is_file() or part.get('merge') in ('1', 'true'):
         raise RequestError(f'the model includes {uri!r}, which is not read: write it in its place')
     root = parse(str(file))
-    _say_frames(root)
+    _make_axes_explicit(root)
     model = root.find('model')
     if model is None:
         raise RequestError(f'{file} has no model')
@@ -70,14 +70,14 @@ def _included(part: Element, name: str, path: str) -> Iterator[Tuple[str, Elemen
 
 
 class _Model:
-    """Frames of a model's parts; names in it count from the model that they are said in."""
+    """Frames of a model's parts; a name is relative to the model in which it stands."""
 
     def __init__(self, parts: Dict[str, Element]):
         self._parts = parts
         self.frame = lru_cache(None)(self._frame)
 
     def robot(self) -> Robot:
-        """Return the robot that it is."""
+        """Return the robot of the model."""
         links = [name for name, part in self._parts.items() if part.tag == 'link']
         joints = {name: part for name, part in self._parts.items() if part.tag == 'joint'}
         ends = {name: (self.body(self.named(name, text(part, 'parent'))),
@@ -87,21 +87,18 @@ class _Model:
         bodies = ['world'] * any('world' in pair for pair in ends.values()) + sorted(
             links, key=children.__contains__)
         robot = Robot(bodies[0], {name: self.frame(name) for name in bodies})
-        for name, part in joints.items():
-            if part.get('type') != 'gearbox':
-                self._join(robot, name, part, ends[name])
-        for name, part in joints.items():
-            if part.get('type') == 'gearbox':
-                self._gear(robot, name, part, ends[name])
+        # A gearbox refers to other joints.
+        gears = [name for name, part in joints.items() if part.get('type') == 'gearbox']
+        for name in sorted(joints, key=gears.__contains__):
+            add = self._gear if name in gears else self._join
+            add(robot, name, joints[name], ends[name])
         for model in (part for part in self._parts.values() if part.tag == 'model'):
             for plugin in model.findall('plugin'):
                 kind = f'{plugin.get("name")} {plugin.get("filename")}'.lower()
                 if 'state' not in kind:
                     robot.driven += [(one.text or '').strip()
                                      for one in plugin.findall('joint_name')]
-                if 'detachable' in kind:
-                    one, other = (text(plugin, tag) for tag in ('parent_link', 'child_link'))
-                    robot.join(f'{one}={other}', FIXED, (one, other), self.frame(one))
+            weld(robot, model.findall('plugin'))
         return robot
 
     def named(self, where: str, name: str, is_model: bool = False) -> str:
@@ -142,11 +139,9 @@ class _Model:
                            'which is not read: give it a pose of its own')
 
     def _join(self, robot: Robot, name: str, part: Element, ends: Tuple[str, str]) -> None:
-        kind = {'universal': UNIVERSAL, 'revolute2': UNIVERSAL, 'ball': 'ball'}.get(
-            part.get('type', ''), part.get('type', ''))
-        second = None
-        if kind == UNIVERSAL:
-            second = self.frame(name)[:3, :3] @ self._axis(name, part.find('axis2'))
+        kind, second = part.get('type', ''), None
+        if KINDS.get(kind, kind) == UNIVERSAL:
+            second = self._axis(name, part.find('axis2'))
         robot.join(name, kind, ends, self.frame(name), self._axis(name, part.find('axis')), None,
                    0.0, [text(part, f'axis/limit/{end}') for end in ('lower', 'upper')], second)
         mimic = part.find('axis/mimic')
@@ -168,7 +163,7 @@ class _Model:
         return way
 
     def _gear(self, robot: Robot, name: str, part: Element, ends: Tuple[str, str]) -> None:
-        """Have the second of two joints that turn on one body follow the first."""
+        """Make the second of two hinges on one body depend on the first."""
         body = self.body(self.named(name, text(part, 'gearbox_reference_body')))
         turns: List[Tuple[str, float]] = []
         for end, tag in zip(ends, ('axis', 'axis2')):
@@ -177,8 +172,7 @@ class _Model:
             if joint is None:
                 raise RequestError(f'gearbox {name} turns {end} against {body}, on no joint')
             axis = self.frame(name)[:3, :3] @ self._axis(name, part.find(tag))
-            turns.append((joint.name, math.copysign(1.0, axis @ joint.axis) * (
-                1.0 if joint.bodies[1] == end else -1.0)))
+            turns.append((joint.name, math.copysign(1.0, axis @ joint.motion(end))))
         (first, sign), (second, other) = turns
         ratio = float(text(part, 'gearbox_ratio', '1'))
         robot.follow(second, first, -ratio * sign * other, 0.0)

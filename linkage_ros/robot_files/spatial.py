@@ -11,45 +11,44 @@ has it: a product of screws along a tree of joints; joints that are not in the t
 
 from __future__ import annotations
 
+from dataclasses import replace
 import math
-from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
+from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Sequence, Set, Tuple
 
 import numpy as np
 
 from .robot import BALL, FIXED, FREE, HINGE, Joint, Robot, SLIDE
 from ..command import RequestError
 
-# A pose moves by no more than this in a step [rad, or parts of the size].
+# The largest step of an iteration [rad, or of the size].
 STRIDE = 0.5
-# After a step this small [rad, or of the size] the next is rounding: steps square.
-STILL = 1e-10
-# Bodies in loops that are closed together.
+# The last step [rad, or of the size]: steps square, so that the next would be rounding.
+STILL = 1e-8
+# The most bodies of one component.
 MOST = 100
 # Hinges nearer to each other [m] cross in a point.
 TOGETHER = 1e-6
-# In which order joints are taken into the tree, so that hinges and balls are left to close it.
+# Loops open by less, of their size, are closed.
+CLOSED = 1e-10
+# Loops that are less stiff, of their size, are at a dead point.
+DEAD = 1e-6
+# The order of joints in the tree, which leaves hinges and balls to close the loops.
 _TREE = {FIXED: 0, SLIDE: 1, FREE: 2, BALL: 3, HINGE: 4}
 
 
 class Element(NamedTuple):
-    """A joint: rotation about or motion along an axis, or a ball with three rotations."""
+    """A joint: rotation about an axis, motion along it, or the three rotations of a ball."""
 
     joint: Joint
     kind: str
-    sign: float
     place: np.ndarray
     axis: np.ndarray
     parent: int
     body: str
 
-    @property
-    def columns(self) -> int:
-        """How many numbers move it."""
-        return 3 if self.kind == BALL else 1
-
 
 class Poses(NamedTuple):
-    """Positions of the elements [rad or m], a row a pose, and how each displaces what is on it."""
+    """Positions of the elements [rad or m], a row a pose, and the displacement by each."""
 
     positions: np.ndarray
     moved: np.ndarray
@@ -60,14 +59,14 @@ class Poses(NamedTuple):
 
 
 def top(home: Dict[str, str], body: str) -> str:
-    """Return the body that stands for all that are joined with one."""
+    """Return the body that represents a set of joined bodies."""
     while home[body] != body:
         home[body] = body = home[home[body]]
     return body
 
 
 def trees(robot: Robot) -> Tuple[Dict[str, Tuple[str, Joint]], List[Joint]]:
-    """Return on which body, by which joint, each body hangs, and the joints that close loops."""
+    """Return the parent and the joint of each body, and the joints that close loops."""
     home = {body: body for body in robot.frames}
     near: Dict[str, List[Tuple[str, Joint]]] = {body: [] for body in robot.frames}
     cuts = []
@@ -83,9 +82,9 @@ def trees(robot: Robot) -> Tuple[Dict[str, Tuple[str, Joint]], List[Joint]]:
     found: Dict[str, Tuple[str, Joint]] = {}
     for start in (robot.root, *robot.frames):
         if start != robot.root and start not in found:
-            # A body that is only held by what closes loops.
-            place = robot.frames[start][:3, 3]
-            found[start] = robot.root, Joint('', FREE, (robot.root, start), (place, place), place)
+            # A body that only cuts connect.
+            places = [robot.frames[start][:3, 3]] * 2
+            found[start] = robot.root, Joint('', FREE, (robot.root, start), places, places)
         row = [start]
         for body in row:
             for other, joint in near[body]:
@@ -95,17 +94,44 @@ def trees(robot: Robot) -> Tuple[Dict[str, Tuple[str, Joint]], List[Joint]]:
     return found, cuts
 
 
-def displaced(robot: Robot, moves: Mapping[str, np.ndarray]) -> Dict[str, np.ndarray]:
-    """Return how each body is displaced where the joints that bodies hang on displace some."""
-    made = {robot.root: np.eye(4)}
+def displaced(robot: Robot, moves: Mapping[str, np.ndarray], positions: Mapping[str, float]
+              ) -> Robot:
+    """Return a robot with some bodies displaced on their parents, and new positions of joints."""
+    moved = {robot.root: np.eye(4)}
     for body, (base, _) in trees(robot)[0].items():
-        made[body] = made[base] @ moves[body] if body in moves else made[base]
-    return made
+        moved[body] = moved[base] @ moves[body] if body in moves else moved[base]
+    joints = []
+    for joint in robot.joints:
+        ends = [moved[body] for body in joint.bodies]
+        joints.append(replace(
+            joint, places=tuple(end[:3, :3] @ place + end[:3, 3]
+                                for end, place in zip(ends, joint.places)),
+            axes=tuple(end[:3, :3] @ axis for end, axis in zip(ends, joint.axes)),
+            turns=tuple(end[:3, :3] @ turn for end, turn in zip(ends, joint.turns)),
+            position=positions.get(joint.name, joint.position)
+            if joint.position is not None else None))
+    return replace(robot, joints=joints, frames={
+        body: moved[body] @ frame for body, frame in robot.frames.items()})
+
+
+def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
+    """Return a robot with some joints moved; raise RequestError for an unknown joint."""
+    robot.check_names(values)
+    tree, moves = trees(robot)[0], {}
+    names = {joint.name for _, joint in tree.values()}
+    if cuts := [name for name in values if name not in names]:
+        raise RequestError(f'{cuts[0]} closes a loop, so that other joints say where it is')
+    for body, (base, joint) in tree.items():
+        if joint.name in values and joint.position is not None:
+            slides, change = joint.kind == SLIDE, np.array(values[joint.name] - joint.position)
+            screw = screws(joint.motion(body), joint.place(base), slides)
+            moves[body] = displacements(screw, change, slides)
+    return displaced(robot, moves, values)
 
 
 def blocks(found: Mapping[str, Tuple[str, Joint]], cuts: Sequence[Joint]
            ) -> List[Tuple[Set[str], List[Joint]]]:
-    """Return the loops of a tree and cuts, those that share joints together: bodies and cuts."""
+    """Return bodies and cuts of the loops of a tree; loops that share joints are together."""
     lots: List[Tuple[Set[str], List[Joint]]] = []
     for cut in cuts:
         ways: List[Set[str]] = []
@@ -123,7 +149,7 @@ def blocks(found: Mapping[str, Tuple[str, Joint]], cuts: Sequence[Joint]
 
 
 def components(robot: Robot) -> Iterator['Component']:
-    """Yield the loops that share joints, each lot on its own."""
+    """Yield the loops of a robot; those that share joints are one component."""
     found, cuts = trees(robot)
     for bodies, own in blocks(found, cuts):
         if len(bodies) > MOST:
@@ -145,14 +171,15 @@ class Component:
 
     """
 
-    def __init__(self, robot: Robot, found: Dict[str, Tuple[str, Joint]], bodies: set,
+    def __init__(self, robot: Robot, found: Dict[str, Tuple[str, Joint]], bodies: Set[str],
                  cuts: Sequence[Joint]):
         self._elements: List[Element] = []
         self._cuts = cuts
+        # The last element that moves each body.
         self._on: Dict[str, int] = {}
         for body in found:
             if body in bodies:
-                self._add(found, body, bodies)
+                self._add(found, body)
         own = {found[body][1] for body in bodies} | {*cuts}
         self.joints = [joint for joint in robot.joints if joint in own]
         places = np.array([place for joint in self.joints for place in joint.places])
@@ -161,55 +188,50 @@ class Component:
         for i, each in enumerate(self._elements):
             self._above[i] = self._above[each.parent]
             self._above[i, i] = True
-        counts = [each.columns for each in self._elements]
-        self._column = np.repeat(np.arange(len(counts)), counts)
-        self._first = np.cumsum([0, *counts])[:-1]
+        joints = [each.joint for each in self._elements]
+        self._names = [joint.name for joint in joints]
+        self._named = np.array([joint.position is not None for joint in joints], bool)
+        self._starts = np.array([joint.start for joint in joints])
         self._is_ball, self._slides = (np.array(
             [each.kind == kind for each in self._elements], bool) for kind in (BALL, SLIDE))
+        counts = np.where(self._is_ball, 3, 1)
+        self._column = np.repeat(np.arange(len(counts)), counts)
+        self._first = np.cumsum([0, *counts])[:-1]
+        self._balls = self._first[self._is_ball, None] + np.arange(3)
         self._are_balls = np.array([each.kind == BALL or any(
             np.linalg.norm(each.place - other.place) < TOGETHER
             and np.linalg.norm(np.cross(each.axis, other.axis)) > 0.1
             for other in self._elements if HINGE == each.kind == other.kind)
             for each in self._elements], bool)
-        self._place, self._axis = (np.array([getattr(each, key) for each in self._elements]
-                                            ).reshape(-1, 3) for key in ('place', 'axis'))
-        self._parents = np.array([each.parent for each in self._elements], int)
-        self._ways = np.where(self._is_ball[self._column, None], np.eye(3)[
-            (np.arange(len(self._column)) - self._first[self._column]) % 3],
-            self._axis[self._column])
-        self.unit = np.where(self._slides[self._column], self.size, 1.0)
-        self._cut_ends = [[self._end(found, body) for body in cut.bodies] for cut in self._cuts]
+        self._places = np.array([each.place for each in self._elements]).reshape(-1, 3)
+        axes = np.array([self._elements[i].axis for i in self._column]).reshape(-1, 3)
+        axes[self._balls] = np.eye(3)
+        slides = self._slides[self._column]
+        self._screws = screws(axes, self._places[self._column], slides)
+        self._parents = np.array([self._elements[i].parent for i in self._column], int)
+        self.unit = np.where(slides, self.size, 1.0)
+        self._cut_ends = [[self._last(found, body) for body in cut.bodies] for cut in self._cuts]
         self._equations()
 
-    def _end(self, found: Dict[str, Tuple[str, Joint]], body: str) -> int:
+    def _last(self, found: Dict[str, Tuple[str, Joint]], body: str) -> int:
         """Return the last element that moves a body."""
         while body in found and body not in self._on:
             body = found[body][0]
         return self._on.get(body, -1)
 
-    def _add(self, found: Dict[str, Tuple[str, Joint]], body: str, bodies: set) -> None:
+    def _add(self, found: Dict[str, Tuple[str, Joint]], body: str) -> None:
+        """Add the elements that move a body; those of its base are there."""
         base, joint = found[body]
-        while base in found and base not in self._on:
-            if base in bodies:
-                self._add(found, base, bodies)
-                break
-            base = found[base][0]
-        parent = self._on.get(base, -1)
-        if body in self._on:
-            return
-        forward = joint.bodies[1] == body
-        sign = 1.0 if forward else -1.0
-        place, axis = joint.places[not forward], joint.axes[not forward]
-        parts = {HINGE: [(HINGE, axis)], SLIDE: [(SLIDE, axis)], BALL: [(BALL, axis)],
-                 FREE: [*((SLIDE, each) for each in np.eye(3)), (BALL, axis)]}
-        for kind, way in parts.get(joint.kind, []):
-            self._elements.append(Element(joint, kind, sign, place, np.asarray(way), parent,
-                                          body))
+        parent, place, axis = self._last(found, base), joint.place(base), joint.motion(body)
+        parts = {kind: [(kind, axis)] for kind in (HINGE, SLIDE, BALL)}
+        parts[FREE] = [*((SLIDE, each) for each in np.eye(3)), (BALL, axis)]
+        for kind, way in parts.get(joint.kind, ()):
+            self._elements.append(Element(joint, kind, place, way, parent, body))
             parent = len(self._elements) - 1
         self._on[body] = parent
 
     def _equations(self) -> None:
-        """Note points on both ends of each cut that have to be the same."""
+        """Set the points that coincide on both ends of each cut."""
         ends, points = [], []
         for end, cut in zip(self._cut_ends, self._cuts):
             ways = [np.zeros((2, 3))]
@@ -220,7 +242,8 @@ class Component:
                 ways += [np.array([turn[:, k] for turn in cut.turns]) for k in range(3)]
             points += [np.array(cut.places) + self.size * way for way in ways]
             ends += [end] * len(ways)
-        self._ends, self._points = np.array(ends, int).reshape(-1, 2), np.array(points)
+        self._ends = np.array(ends, int).reshape(-1, 2)
+        self._points = np.concatenate([points, np.ones((len(ends), 2, 1))], axis=2)
         above = self._above[self._ends][..., self._column]
         self._signed = above * np.array([[1.0], [-1.0]])
 
@@ -231,55 +254,55 @@ class Component:
                 if joint.position is not None}
 
     def at_start(self, count: int = 1) -> Poses:
-        """Return so many times the pose of the file."""
+        """Return the pose of the file, `count` times."""
         return Poses(np.zeros((count, len(self._elements))),
                      np.tile(np.eye(4), (count, len(self._elements), 1, 1)))
 
-    def held(self, names: Sequence[str]) -> np.ndarray:
+    def columns_of(self, names: Sequence[str]) -> np.ndarray:
         """Return which columns are of the joints that are named."""
-        return np.array([self._elements[i].joint.name in names for i in self._column], bool)
+        return np.array([self._names[i] in names for i in self._column], bool)
 
     def most_moved(self, ways: np.ndarray) -> List[str]:
-        """Return the joint with a name that some ways move the most."""
-        sizes = np.linalg.norm(ways, axis=0) * [
-            self._elements[i].joint.position is not None for i in self._column]
-        return [self._elements[self._column[int(np.argmax(sizes))]].joint.name]
+        """Return the joint with a name that moves the most in some directions."""
+        sizes = np.linalg.norm(ways, axis=0) * self._named[self._column]
+        return [self._names[self._column[int(np.argmax(sizes))]]]
 
     def towards_limits(self, names: Sequence[str], part: float) -> np.ndarray:
         """Return a step of joints by some part [rad, or of the size], within their limits."""
         step = np.zeros(len(self._column))
-        for name in names:
-            i, column, sign, start = self.column(name)
+        for i in map(self._names.index, names):
             low, high = self._elements[i].joint.limits or (-math.inf, math.inf)
+            column, start = self._first[i], self._starts[i]
             change = part * self.unit[column]
             if not low <= start + change <= high:
                 change = abs(change) if start < low else -abs(change) if start > high else -change
-            step[column] = sign * change
+            step[column] = change
         return step
 
-    def column(self, name: str) -> Tuple[int, int, float, float]:
-        """Return the element and the column of a joint, its sign in these, and its position."""
-        i = next(i for i, each in enumerate(self._elements) if each.joint.name == name)
-        each = self._elements[i]
-        return i, int(np.searchsorted(self._column, i)), each.sign, each.joint.position or 0.0
+    def aimed(self, poses: Poses, step: np.ndarray, positions: Mapping[str, np.ndarray]
+              ) -> np.ndarray:
+        """Return a step of poses that leads some joints to positions."""
+        step = step.copy()
+        for name, values in positions.items():
+            i = self._names.index(name)
+            step[:, self._first[i]] = values - self._starts[i] - poses.positions[:, i]
+        return step
 
     def step_between(self, one: Poses, other: Poses) -> np.ndarray:
-        """Return by how much each column is farther in other poses; what turns in three is not."""
+        """Return the difference of two poses in each column; balls have none."""
         return (other.positions - one.positions)[:, self._column]
 
-    def stiffness(self, poses: Poses, still: np.ndarray, nullity: int
+    def stiffness(self, poses: Poses, fixed: np.ndarray, nullity: int
                   ) -> Tuple[np.ndarray, np.ndarray]:
         """Return the least and the product of singular values of each pose: 0 at a dead point."""
-        slope = self.errors(poses, True)[1][:, :, ~still] / self.size
-        values = np.linalg.eigvalsh(slope.swapaxes(1, 2) @ slope)[:, nullity:]
-        values = np.sqrt(np.maximum(values, 0.0))
+        slope = self.errors(poses, True)[1][:, :, ~fixed] / self.size
+        values = np.linalg.svd(slope, compute_uv=False)[:, :np.sum(~fixed) - nullity]
         return np.min(values, axis=1, initial=1.0), np.prod(values, axis=1)
 
-    def nullity(self, still: np.ndarray) -> int:
-        """Return how many joints move freely, in an open pose."""
-        step = np.random.default_rng(2).uniform(-0.3, 0.3, (1, len(still)))
-        slope = self.errors(self.stepped(self.at_start(), step * self.unit), True)[1][:, :, ~still]
-        return int(np.sum(np.linalg.eigvalsh(slope[0].T @ slope[0]) < (3e-4 * self.size) ** 2))
+    def nullity(self, fixed: np.ndarray) -> int:
+        """Return the degrees of freedom that the loops leave, in a random open pose."""
+        step = np.random.default_rng(2).uniform(-0.3, 0.3, (1, len(fixed)))
+        return len(self.free_ways(self.stepped(self.at_start(), step * self.unit), fixed))
 
     def _frames(self, poses: Poses) -> np.ndarray:
         """Return the displacement after each element; the last is that of the root."""
@@ -289,69 +312,53 @@ class Component:
             np.matmul(frames[:, each.parent], poses.moved[:, i], out=frames[:, i])
         return frames
 
-    def wrapped(self, poses: Poses) -> Poses:
-        """Return poses without whole turns of hinges."""
-        turns = math.tau * np.round(poses.positions / math.tau)
-        return poses._replace(positions=poses.positions - np.where(self._slides, 0.0, turns))
-
     def stepped(self, poses: Poses, step: np.ndarray) -> Poses:
         """Return poses with a step of the columns [rad or m] more."""
-        positions, balls = poses.positions.copy(), self._is_ball
-        positions[:, ~balls] += step[:, self._first[~balls]]
-        angle = np.where(self._slides, 0.0, positions)
-        moved = turned(angle[..., None] * self._axis, self._place)
-        moved[..., :3, 3] += (positions - angle)[..., None] * self._axis
-        own = step[:, self._first[balls, None] + np.arange(3)]
-        moved[:, balls] = turned(own, self._place[balls]) @ poses.moved[:, balls]
+        positions = poses.positions + np.where(self._is_ball, 0.0, step[:, self._first])
+        moved = displacements(self._screws[self._first], positions, self._slides)
+        if len(self._balls):
+            turn = step[:, self._balls]
+            angle = np.linalg.norm(turn, axis=-1)
+            axes = turn / np.where(angle, angle, 1.0)[..., None]
+            moved[:, self._is_ball] = displacements(
+                screws(axes, self._places[self._is_ball]), angle) @ poses.moved[:, self._is_ball]
         return Poses(positions, moved)
 
-    def _twists(self, frames: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Return how each column turns, and moves the origin: (poses, columns, 3) each."""
-        base = frames[:, self._parents[self._column]]
-        axes = np.einsum('pcij,cj->pci', base[..., :3, :3], self._ways)
-        place = np.einsum('pcij,cj->pci', base[..., :3, :3], self._place[self._column]) \
-            + base[..., :3, 3]
-        slides = self._slides[self._column][:, None]
-        return np.where(slides, 0.0, axes), np.where(slides, axes, _cross(place, axes))
-
     def errors(self, poses: Poses, slopes: bool = False) -> Tuple[np.ndarray, np.ndarray]:
-        """Return what is open in each pose [m], and its derivatives by the columns."""
+        """Return the residuals of the loops in each pose [m], and their derivatives by columns."""
         frames = self._frames(poses)
-        own, count = frames[:, self._ends], len(frames)
-        seen = np.einsum('prsij,rsj->prsi', own[..., :3, :3], self._points) + own[..., :3, 3]
-        error = (seen[:, :, 0] - seen[:, :, 1]).reshape(count, -1)
+        seen = (frames[:, self._ends] @ self._points[..., None])[..., 0]
+        error = (seen[:, :, 0] - seen[:, :, 1])[..., :3].reshape(len(frames), -1)
         if not slopes:
             return error, np.zeros(0)
-        turns, moves = self._twists(frames)
-        rates = _cross(turns[:, None, None], seen[:, :, :, None]) + moves[:, None, None]
+        inverse = np.linalg.inv(frames)
+        twists = frames[:, self._parents] @ self._screws @ inverse[:, self._parents]
+        rates = np.einsum('pcij,prsj->prsci', twists[..., :3, :], seen)
         slope = np.einsum('prsci,rsc->pric', rates, self._signed)
-        return error, slope.reshape(count, -1, len(self._column)) * self.unit
+        return error, slope.reshape(*error.shape, -1) * self.unit
 
-    def closed(self, poses: Poses, still: np.ndarray, count: int = 12,
-               home: Optional[np.ndarray] = None, firm: float = 0.0, soft: float = 1e-14
-               ) -> Poses:
+    def closed(self, poses: Poses, fixed: np.ndarray, count: int = 12, pull: float = 0.0,
+               soft: float = 1e-14) -> Poses:
         """
-        Return poses that Newton's method has closed, as far as it can in so many steps.
+        Return poses after so many steps of Newton's method, or fewer if they are closed.
 
-        The columns that are `still` do not move. `home` [columns] pulls poses back, at first
-        as firmly as loops pull, then less and less. Ways to move that loops hold no more firmly
-        than `soft` are hardly gone.
+        The columns that are `fixed` do not move. `pull` draws poses to that of the file, by half
+        as much in each step. `soft` damps motions that the loops hardly resist. Both are parts of
+        the loops' stiffness.
         """
-        free = ~still
+        free = ~fixed
         for i in range(count):
             error, slope = self.errors(poses, True)
             slope = slope[:, :, free]
             down = slope.swapaxes(1, 2)
-            square, pull = down @ slope, (down @ error[:, :, None])[..., 0]
-            most = np.einsum('pii->p', square)[:, None]
-            weight = soft * most
-            if home is not None:
-                weight = weight + most * max(firm * 0.5 ** i, 1e-13)
-                pull = pull + weight * ((poses.positions[:, self._column] - home) / self.unit)[
-                    :, free]
-            square = square + weight[:, :, None] * np.eye(free.sum()) + 1e-300 * np.eye(free.sum())
-            step = np.zeros((len(error), len(still)))
-            step[:, free] = -np.linalg.solve(square, pull[..., None])[..., 0]
+            square, force = down @ slope, (down @ error[:, :, None])[..., 0]
+            weight = soft * np.einsum('pii->p', square)[:, None]
+            if pull:
+                weight *= 1.0 + max(pull * 0.5 ** i, 1e-13) / soft
+                force += weight * (poses.positions[:, self._column] / self.unit)[:, free]
+            square += (weight[:, :, None] + 1e-300) * np.eye(free.sum())
+            step = np.zeros((len(error), len(fixed)))
+            step[:, free] = -np.linalg.solve(square, force[..., None])[..., 0]
             far = np.max(np.abs(step), axis=1, initial=0.0)[:, None]
             step *= np.minimum(1.0, STRIDE / np.maximum(far, STRIDE)) * self.unit
             poses = self.stepped(poses, step)
@@ -360,11 +367,11 @@ class Component:
         return poses
 
     def gap(self, poses: Poses) -> np.ndarray:
-        """Return by how much the loops are open at most, of the size, in each pose."""
+        """Return the largest residual in each pose, as a part of the size."""
         return np.max(np.abs(self.errors(poses)[0]), axis=1, initial=0.0) / self.size
 
     def moves(self, poses: Poses) -> Dict[str, np.ndarray]:
-        """Return how the joint that each body hangs on displaces it in the first pose."""
+        """Return the displacement of each body on its parent in the first pose."""
         moved: Dict[str, np.ndarray] = {}
         for i, each in enumerate(self._elements):
             moved[each.body] = moved.get(each.body, np.eye(4)) @ poses.moved[0, i]
@@ -379,87 +386,79 @@ class Component:
         turned = positions - math.tau * np.round(positions / math.tau)
         return np.where(self._slides, positions / self.size, turned) * ~self._are_balls
 
-    def free_ways(self, poses: Poses, still: np.ndarray, least: float = 3e-4) -> np.ndarray:
+    def free_ways(self, poses: Poses, fixed: np.ndarray, least: float = 3e-4) -> np.ndarray:
         """
         Return in which ways joints of the first pose can move, a row each, at least at first.
 
         Loops that are less stiff than `least`, of their size, do not count.
         """
-        slope = self.errors(poses.some(np.arange(1)), True)[1][0][:, ~still]
+        slope = self.errors(poses.some(np.arange(1)), True)[1][0][:, ~fixed]
         _, values, ways = np.linalg.svd(slope)
-        found = np.zeros((len(ways) - np.sum(values > least * self.size), len(still)))
-        found[:, ~still] = ways[len(ways) - len(found):]
+        found = np.zeros((len(ways) - np.sum(values > least * self.size), len(fixed)))
+        found[:, ~fixed] = ways[len(ways) - len(found):]
         return found
 
     def free(self, ways: np.ndarray) -> np.ndarray:
-        """Return which elements move in some ways."""
-        moved = np.zeros(len(self._elements))
-        np.maximum.at(moved, self._column, np.linalg.norm(ways, axis=0))
-        return moved > 1e-6
+        """Return which elements move in some directions."""
+        return np.maximum.reduceat(np.linalg.norm(ways, axis=0), self._first) > 1e-6
 
     def loose(self, poses: Poses, motors: Sequence[str]) -> Tuple[List[str], int]:
-        """Return joints that move though motors do not, and how many of them say where all is."""
-        ways = self.free_ways(poses, self.held(motors))
-        # What a rod on balls spins on does not count.
+        """Return the joints that move while motors do not, and their degrees of freedom."""
+        ways = self.free_ways(poses, self.columns_of(motors))
+        # The spin of a rod on balls does not count.
         ways = ways * ~self._are_balls[self._column]
-        names = [each.joint.name for each, moves in zip(self._elements, self.free(ways))
-                 if moves and each.joint.position is not None]
+        names = [self._names[i] for i in np.flatnonzero(self.free(ways) & self._named)]
         return names, int(np.linalg.matrix_rank(ways, 1e-6)) if names else 0
 
     def farthest_apart(self, two: Poses, determined: Any) -> Tuple[str, float, float]:
         """Return the joint with the largest difference between two poses, and both positions."""
-        apart = np.abs(self.away(two.positions[:1] - two.positions[1:]))[0] * determined
-        apart *= [each.joint.position is not None for each in self._elements]
+        apart = np.abs(self.away(two.positions[:1] - two.positions[1:]))[0]
+        apart = apart * determined * self._named
         if not apart.any():
             return '', 0.0, 0.0
-        name = self._elements[int(np.argmax(apart))].joint.name
+        name = self._names[int(np.argmax(apart))]
         first, second = self.read(two)[name]
         return name, float(first), float(second)
 
     def immobile(self, poses: Poses) -> List[str]:
         """Return the joints with a name that cannot move near the first pose, closed."""
-        still = self.held([])
+        fixed = self.columns_of([])
         rng = np.random.default_rng(3)
         moved = np.zeros(len(self._elements), bool)
         for _ in range(3):
-            ways = self.free_ways(poses, still)
+            ways = self.free_ways(poses, fixed)
             moved |= self.free(ways)
             step = ways.T @ rng.normal(size=len(ways))
             step *= 0.1 / max(np.max(np.abs(step), initial=0.0), 0.1)
-            poses = self.closed(self.stepped(poses, step[None] * self.unit), still)
-        return [each.joint.name for each, moves in zip(self._elements, moved)
-                if each.joint.position is not None and not moves]
+            poses = self.closed(self.stepped(poses, step[None] * self.unit), fixed)
+        return [self._names[i] for i in np.flatnonzero(self._named & ~moved)]
 
     def read(self, poses: Poses) -> Dict[str, np.ndarray]:
-        """Return the positions of named joints [rad or m]; those of cuts are wrapped."""
-        found = {each.joint.name: each.sign * poses.positions[:, i] + each.joint.position
-                 for i, each in enumerate(self._elements) if each.joint.position is not None}
+        """Return the positions of named joints [rad or m], within half a turn of the file's."""
+        turns = math.tau * np.round(poses.positions / math.tau)
+        positions = self._starts + poses.positions - np.where(self._slides, 0.0, turns)
+        found = {self._names[i]: positions[:, i] for i in np.flatnonzero(self._named)}
         frames = self._frames(poses)
         for cut, (first, second) in zip(self._cuts, self._cut_ends):
             if cut.position is not None and cut.kind == HINGE:
                 turned = frames[:, first, :3, :3].swapaxes(1, 2) @ frames[:, second, :3, :3]
-                skew = np.stack([turned[:, 2, 1] - turned[:, 1, 2], turned[:, 0, 2] - turned[
-                    :, 2, 0], turned[:, 1, 0] - turned[:, 0, 1]], axis=1)
+                across = np.cross(cut.axis, np.eye(3)[np.argmin(np.abs(cut.axis))])
+                ahead = turned @ across
                 found[cut.name] = cut.position + np.arctan2(
-                    0.5 * skew @ cut.axes[0], 0.5 * (np.einsum('pii->p', turned) - 1.0))
+                    np.cross(across, ahead) @ cut.axis, ahead @ across)
         return found
 
 
-def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    x, y, z = one[..., 0], one[..., 1], one[..., 2]
-    a, b, c = other[..., 0], other[..., 1], other[..., 2]
-    return np.stack([y * c - z * b, z * a - x * c, x * b - y * a], axis=-1)
-
-
-def turned(turn: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Return displacements that turn by vectors (..., 3) about places."""
-    angle = np.linalg.norm(turn, axis=-1)
-    x, y, z = np.moveaxis(turn / np.where(angle, angle, 1.0)[..., None], -1, 0)
-    zero, (sin, cos) = np.zeros_like(x), (
-        function(angle)[..., None, None] for function in (np.sin, np.cos))
-    skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
-    made = np.zeros((*x.shape, 4, 4))
-    made[..., :3, :3] = np.eye(3) + sin * skew + (1.0 - cos) * skew @ skew
-    made[..., :3, 3] = place - np.einsum('...ij,...j->...i', made[..., :3, :3], place)
-    made[..., 3, 3] = 1.0
+def screws(axes: np.ndarray, places: np.ndarray, slides: Any = False) -> np.ndarray:
+    """Return the velocities (..., 4, 4) of unit motions about axes at places, or along them."""
+    made = np.zeros((*axes.shape[:-1], 4, 4))
+    slides = np.asarray(slides)[..., None]
+    made[..., :3, :3] = np.where(slides[..., None], 0.0, np.cross(np.eye(3), axes[..., None, :]))
+    made[..., :3, 3] = np.where(slides, axes, np.cross(places, axes))
     return made
+
+
+def displacements(screw: np.ndarray, by: np.ndarray, slides: Any = False) -> np.ndarray:
+    """Return displacements by positions [rad or m] of screws: their exponentials."""
+    sine, less = np.where(slides, by, np.sin(by)), 1.0 - np.cos(by)
+    return np.eye(4) + sine[..., None, None] * screw + less[..., None, None] * (screw @ screw)

@@ -13,19 +13,24 @@ kinematic loops (`gazebo`); onshape-to-robot's documentation (`closing_`); examp
 from __future__ import annotations
 
 import re
-from typing import Any, Dict, List, Mapping, Tuple
+from typing import Any, Dict, Iterable, List, Mapping, Sequence, Tuple
 
 import numpy as np
 
-from .elements import at, attribute, Element, numbers, once, origin, pose, text
-from .robot import BALL, FIXED, HINGE, Robot, UNIVERSAL
+from .elements import at, attribute, Element, numbers, once, origin, pose, text, weld
+from .robot import BALL, FIXED, HINGE, KINDS, Robot, UNIVERSAL
 from ..command import RequestError
-from ..words import meant
+from ..words import listed, meant, quoted
 
-# What a file of loops has one of.
-LOOPS = ('closures', 'closed_loop', 'pin_loops', 'ball_loops')
-_CLOSING = re.compile(r'(?P<name>.*closing_.+)_(?P<end>[12])')
-_TYPES = {'6d': FIXED, '3d': BALL}
+_ENDS = ('name', 'parent', 'child', 'parent_xyz', 'child_xyz', 'axis')
+# The kinds of loops in a loops file, and the keys of each loop.
+LOOPS = {'closures': ('link_a', 'link_b', 'point', 'axis'), 'closed_loop': (),
+         'pin_loops': _ENDS, 'ball_loops': _ENDS}
+# All its keys; the last two have no effect.
+_KEYS = (*LOOPS, 'type', 'joint_name', 'joint_type', 'ball_upgrades', 'independent', 'name_mot',
+         'actuated_joints', 'dependent', 'ball_limit_deg')
+_CLOSING = re.compile(r'(?P<name>.*closing_.+)_1')
+_NOWHERE = np.eye(4)
 
 
 class Reader:
@@ -44,33 +49,32 @@ class Reader:
         links = once((link.get('name', ''), link) for link in root.findall('link'))
         joints = once((attribute(joint, 'child', 'link'), joint)
                       for joint in root.findall('joint'))
-        names = [*links]
-        if 'world' not in names and any(
-                attribute(joint, 'parent', 'link') == 'world' for joint in joints.values()):
-            names.append('world')
+        bases = {child: attribute(joint, 'parent', 'link') for child, joint in joints.items()}
+        names = {**links, **{base: None for base in bases.values() if base == 'world'}}
+        below: Dict[str, List[str]] = {name: [] for name in names}
         for child, joint in joints.items():
-            for end in (attribute(joint, 'parent', 'link'), child):
+            for end in (bases[child], child):
                 if end not in names:
                     raise RequestError(f'joint {joint.get("name")} is on {end!r}, which is no '
                                        'link')
-        tops = [link for link in names if link not in joints]
-        if len(tops) != 1:
-            raise RequestError(f'a URDF has one root link, not {len(tops)}')
-        robot = self.robot = Robot(tops[0], {tops[0]: np.eye(4)})
-        below: Dict[str, List[str]] = {}
-        for child, joint in joints.items():
-            below.setdefault(attribute(joint, 'parent', 'link'), []).append(child)
-        row = [tops[0]]
+            below[bases[child]].append(child)
+        row = [link for link in names if link not in joints]
+        if len(row) != 1:
+            raise RequestError(f'a URDF has one root link, not {len(row)}')
+        robot = self.robot = Robot(row[0], {row[0]: np.eye(4)})
         for link in row:
-            for child in below.get(link, ()):
+            for child in below[link]:
                 robot.frames[child] = robot.frames[link] @ origin(joints[child].find('origin'))
-                row.append(child)
+            row += below[link]
         if lost := [link for link in names if link not in robot.frames]:
             raise RequestError(f'{lost[0]} hangs on itself')
-        self._joint_frames = {joint.get('name', ''): child for child, joint in joints.items()}
-        self._frames = {frame.get('name', ''): frame for frame in root.findall('frame')}
+        # The link of each frame, and its pose on the link.
+        self._frames = {link: (link, _NOWHERE) for link in robot.frames}
+        self._frames.update((frame.get('name', ''), (frame.get('link', ''), origin(frame)))
+                            for frame in root.findall('frame'))
+        self._children = {joint.get('name', ''): child for child, joint in joints.items()}
         for child, joint in joints.items():
-            self._tree_joint(joint, child)
+            self._tree_joint(joint, (bases[child], child))
         self._of_elements()
         self._of_frames()
         self._of_gazebo()
@@ -78,147 +82,127 @@ class Reader:
             *root.findall('transmission/joint'),
             *root.findall('ros2_control/joint[command_interface]'))]
 
-    def _tree_joint(self, joint: Element, child: str) -> None:
-        robot, name, mimic = self.robot, joint.get('name', ''), joint.find('mimic')
-        robot.join(name, joint.get('type', ''), (attribute(joint, 'parent', 'link'), child),
-                   robot.frames[child], numbers(attribute(joint, 'axis', 'xyz', '1 0 0')), None,
-                   0.0, [attribute(joint, 'limit', end) for end in ('lower', 'upper')])
+    def _tree_joint(self, joint: Element, ends: Tuple[str, str]) -> None:
+        name, mimic = joint.get('name', ''), joint.find('mimic')
+        self.robot.join(
+            name, joint.get('type', ''), ends, self.robot.frames[ends[1]],
+            numbers(attribute(joint, 'axis', 'xyz', '1 0 0')), position=0.0,
+            limits=[attribute(joint, 'limit', end) for end in ('lower', 'upper')])
         if mimic is not None:
             ratio, start = numbers(f'{mimic.get("multiplier", 1)} {mimic.get("offset", 0)}', 2)
-            robot.follow(name, mimic.get('joint', ''), ratio, start)
+            self.robot.follow(name, mimic.get('joint', ''), ratio, start)
 
-    def frame(self, name: str) -> Tuple[str, np.ndarray]:
-        """Return the link that a frame is on, which is called as a link, a joint or by itself."""
-        if name in self._frames:
-            link = self._frames[name].get('link', '')
-            return link, self._on(link, origin(self._frames[name]))
-        link = name if name in self.robot.frames else self._joint_frames.get(name, name)
-        return link, self._on(link, np.eye(4))
-
-    def _on(self, link: str, own: np.ndarray) -> np.ndarray:
-        if link not in self.robot.frames:
-            raise RequestError(f'a loop is closed on {link!r}, which is no link')
-        return self.robot.frames[link] @ own
-
-    def _close(self, name: str, kind: str, ends: Tuple[str, str], own: Any, axis: Any,
-               other_axis: Any = None) -> None:
-        """Add what closes a loop, by its frames on two links, and its axis in them."""
-        first, second = (self._on(link, frame) for link, frame in zip(ends, own))
-        self.robot.join(name, kind, ends, first, axis, second,
-                        second=None if other_axis is None else self._on(
-                            ends[1], np.eye(4))[:3, :3] @ _unit(other_axis))
+    def _pair(self, name: str, kind: str, frames: Tuple[str, str], *axes: Any) -> None:
+        """Close a loop by two frames, each by its name or that of a link or a joint."""
+        (one, start), (other, end) = (
+            self._frames.get(frame) or self._frames[self._children[frame]] for frame in frames)
+        self.robot.close(name, kind, (one, other), (start, end), *axes)
 
     def _of_elements(self) -> None:
         """Add the loops that elements of the URDF close."""
         for cut in (*self._root.findall('constraint'), *self._root.findall('loop_joint'),
                     *self._root.findall('loop')):
-            name, kind = cut.get('name', ''), cut.get('type', '')
             tags = next((tags for tags in (('link1', 'link2'), ('predecessor', 'successor'))
                          if cut.find(tags[0]) is not None), ('parent', 'child'))
-            ends = attribute(cut, tags[0], 'link'), attribute(cut, tags[1], 'link')
-            own = []
-            for tag in tags:
-                part = cut.find(f'{tag}_origin')
-                part = cut.find(f'{tag}/origin') if part is None else part
-                own.append(origin(cut.find(tag) if part is None and tag == 'link1'
-                                  or tag == 'link2' else part))
-            axis = attribute(cut, 'parent_axis', 'xyz', attribute(cut, 'axis', 'xyz', '0 0 1'))
-            other = attribute(cut, 'child_axis', 'xyz')
-            if 'parent_axis' in {part.tag for part in cut}:
-                turned = self._on(ends[0], own[0])[:3, :3].T @ self._on(ends[0], np.eye(4))[:3, :3]
-                axis = ' '.join(map(repr, map(float, turned @ numbers(axis))))
-            self._close(name, kind, ends, own, numbers(axis), numbers(other) if other else None)
+            own = [origin(next((part for part in map(cut.find, (
+                f'{tag}_origin', f'{tag}/origin', tag)) if part is not None), None))
+                for tag in tags]
+            axes = [numbers(attribute(cut, 'axis', 'xyz', '0 0 1'))]
+            if attribute(cut, f'{tags[0]}_axis', 'xyz'):
+                # These are in the frames of links, not in that of the joint.
+                axes = [frame[:3, :3].T @ numbers(way) for tag, frame in zip(tags, own)
+                        if (way := attribute(cut, f'{tag}_axis', 'xyz'))]
+            self.robot.close(
+                cut.get('name', ''), cut.get('type', ''),
+                (attribute(cut, tags[0], 'link'), attribute(cut, tags[1], 'link')), own, *axes)
         for cut in self._root.findall('ball_constraint'):
             one, other = (attribute(cut, f'ball_constraint_body_{end}', 'name') for end in 'AB')
-            own = [at(numbers(attribute(cut, f'ball_constraint_p_{end}', 'value', '0 0 0')))
-                   for end in ('AP', 'BQ')]
-            self._close(f'{one}={other}', BALL, (one, other), own, (0.0, 0.0, 1.0))
+            self.robot.close(f'{one}={other}', BALL, (one, other), [
+                at(numbers(attribute(cut, f'ball_constraint_p_{end}', 'value', '0 0 0')))
+                for end in ('AP', 'BQ')])
         for cut in self._root.findall('linear_bushing_rpy'):
-            names = [attribute(cut, f'bushing_frame{end}', 'name') for end in 'AC']
+            one, other = (attribute(cut, f'bushing_frame{end}', 'name') for end in 'AC')
             stiff = numbers(attribute(cut, 'bushing_torque_stiffness', 'value', '0 0 0'))
-            self._pair(names[0], names[1], FIXED if stiff.all() else BALL)
-
-    def _pair(self, first: str, second: str, kind: str) -> None:
-        (one, start), (other, end) = self.frame(first), self.frame(second)
-        self.robot.join(f'{first}={second}', kind, (one, other), start, other=end)
+            self._pair(f'{one}={other}', FIXED if stiff.all() else BALL, (one, other))
 
     def _of_frames(self) -> None:
         """Add the loops that frames called closing_NAME_1 and closing_NAME_2 close."""
-        names = [*self.robot.frames, *self._frames]
-        for name in names:
+        for name in self._frames:
             match = _CLOSING.fullmatch(name)
-            if not match or match['end'] == '2' or (other := f'{match["name"]}_2') not in names:
+            if not match or (other := f'{match["name"]}_2') not in self._frames:
                 continue
-            (one, start), (two, end) = self.frame(name), self.frame(other)
-            if {f'{name}_z', f'{other}_z'} <= {*names}:
-                axis = self.frame(f'{name}_z')[1][:3, 3] - start[:3, 3]
-                second = self.frame(f'{other}_z')[1][:3, 3] - end[:3, 3]
-                self.robot.join(match['name'], HINGE, (one, two), start, start[:3, :3].T @ axis,
-                                end, second=_unit(second))
-            else:
-                self.robot.join(match['name'], BALL, (one, two), start, other=end)
+            ends, axes = (name, other), []
+            if {f'{end}_z' for end in ends} <= self._frames.keys():
+                axes = [np.linalg.solve(*map(self._place, (end, f'{end}_z')))[:3, 3]
+                        for end in ends]
+            self._pair(match['name'], HINGE if axes else BALL, ends, *axes)
+
+    def _place(self, frame: str) -> np.ndarray:
+        link, own = self._frames[frame]
+        return self.robot.frames[link] @ own
 
     def _of_gazebo(self) -> None:
-        """Add the joints that are added to the model once Gazebo has made SDF of it."""
+        """Add the joints that Gazebo adds to the model."""
         for cut in self._root.findall('gazebo/joint'):
             one, other = (attribute(cut, tag, 'link') or text(cut, tag)
                           for tag in ('parent', 'child'))
-            frame = self._on(other, pose(*numbers(text(cut, 'pose', '0 0 0 0 0 0'), 6)))
+            frame = self.robot.frames[other] @ pose(
+                *numbers(text(cut, 'pose', '0 0 0 0 0 0'), 6))
             axis = numbers(text(cut, 'axis/xyz') or attribute(cut, 'axis', 'xyz', '0 0 1'))
             if text(cut, 'axis/use_parent_model_frame') in ('1', 'true'):
                 axis = frame[:3, :3].T @ axis
             kind = cut.get('type', '')
-            second = frame[:3, :3] @ numbers(text(cut, 'axis2/xyz', '0 0 1'))
-            self.robot.join(cut.get('name', ''), kind, (one, other), frame, axis,
-                            second=second if kind == UNIVERSAL else None)
-        for plugin in self._root.findall('gazebo/plugin'):
-            if 'detachable' in f'{plugin.get("name")} {plugin.get("filename")}'.lower():
-                one, other = (text(plugin, tag) for tag in ('parent_link', 'child_link'))
-                self.robot.join(f'{one}={other}', FIXED, (one, other), self._on(one, np.eye(4)))
+            second = numbers(text(cut, 'axis2/xyz', '0 0 1')) if KINDS.get(
+                kind, kind) == UNIVERSAL else None
+            self.robot.join(cut.get('name', ''), kind, (one, other), frame, axis, second=second)
+        weld(self.robot, self._root.findall('gazebo/plugin'))
 
     def of_file(self, loops: Mapping[str, Any]) -> None:
-        """Add the loops of another file."""
+        """Add the loops of another file; raise RequestError for a key that is not known."""
+        _check_keys('the file', loops, _KEYS)
+        for key, allowed in LOOPS.items():
+            for i, cut in enumerate(loops.get(key, ()) if allowed else ()):
+                _check_keys(f'{key}[{i}]', cut, allowed)
         for i, cut in enumerate(loops.get('closures', ())):
-            point, axis = (_vector(cut[key]) for key in ('point', 'axis'))
-            self.robot.join(f'closures[{i}]', HINGE, (cut['link_a'], cut['link_b']), at(point),
-                            axis, at(point))
+            point = at(numbers(cut['point']))
+            self.robot.join(f'closures[{i}]', HINGE, (cut['link_a'], cut['link_b']), point,
+                            numbers(cut['axis']), point)
         types = loops.get('type', ())
         for i, (first, second) in enumerate(loops.get('closed_loop', ())):
-            kind = str(types[i] if i < len(types) else '6d').lower()
-            self._pair(first, second, _TYPES.get(kind, kind))
+            self._pair(f'{first}={second}', str(types[i] if i < len(types) else FIXED),
+                       (first, second))
         for key, kind in (('pin_loops', HINGE), ('ball_loops', BALL)):
             for i, cut in enumerate(loops.get(key, ())):
-                own = [at(_vector(cut.get(f'{end}_xyz', (0, 0, 0)))) for end in (
-                    'parent', 'child')]
-                axis = _vector(cut.get('axis', (0, 0, 1)))
-                self._close(str(cut.get('name', f'{key}[{i}]')), kind,
-                            (cut['parent'], cut['child']), own, axis)
+                self.robot.close(
+                    str(cut.get('name', f'{key}[{i}]')), kind, (cut['parent'], cut['child']),
+                    [at(numbers(cut.get(f'{end}_xyz', '0 0 0'))) for end in ('parent', 'child')],
+                    numbers(cut.get('axis', '0 0 1')))
         changes = [*zip(loops.get('joint_name', ()), loops.get('joint_type', ())),
                    *((name, 'SPHERICAL') for name in loops.get('ball_upgrades', ()))]
         for name, kind in changes:
             self._change(name, str(kind).upper())
-        # What it says of motors is of the closed robot, transmissions are of the open tree.
+        # Its motors are those of the closed robot, transmissions those of the open tree.
         self.robot.driven = [name for key in ('independent', 'name_mot', 'actuated_joints')
                              for name in loops.get(key, ())] or self.robot.driven
 
     def _change(self, name: str, kind: str) -> None:
-        """Change the type of a joint of the tree, with axes in its frame."""
+        """Change the type of a joint of the tree; the axes of `UJOINT_XY` are in its frame."""
         joint = next((joint for joint in self.robot.joints if joint.name == name), None)
         if joint is None:
             names = [joint.name for joint in self.robot.joints]
             raise RequestError(f'there is no joint {name!r} to be made {kind}{meant(name, names)}')
-        joint.position, joint.limits = None, None
-        joint.kind = {'SPHERICAL': BALL, 'FIXED': FIXED}.get(kind, kind)
         if kind.startswith('UJOINT'):
             self.robot.joints.remove(joint)
-            first, second = ('XYZ'.index(x) for x in kind[-2:])
+            first, second = (np.eye(3)['XYZ'.index(way)] for way in kind[-2:])
             self.robot.join(name, UNIVERSAL, joint.bodies, at(joint.places[0], joint.turns[0]),
-                            np.eye(3)[first], second=joint.turns[0][:, second])
+                            first, second=second)
+        else:
+            joint.kind = KINDS.get(kind.lower(), kind)
+            joint.position, joint.limits = None, None
 
 
-def _vector(said: Any) -> np.ndarray:
-    return numbers(said if isinstance(said, str) else ' '.join(map(str, said)))
-
-
-def _unit(axis: Any) -> np.ndarray:
-    return np.asarray(axis) / (np.linalg.norm(axis) or 1.0)
+def _check_keys(where: str, given: Iterable[Any], allowed: Sequence[str]) -> None:
+    for key in given:
+        if key not in allowed:
+            raise RequestError(f'{where} has no key {quoted(key)}; allowed: '
+                               f'{listed(allowed, 200)}{meant(key, allowed)}')

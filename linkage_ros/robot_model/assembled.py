@@ -9,13 +9,12 @@ All inputs are at their starts, so that every loop is closed at the beginning of
 
 from __future__ import annotations
 
-import cmath
 import math
 from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .bodies import BALL, Body, BOX, Joint, Piece, Point, Robot, ROD, size
+from .bodies import BALL, Body, BOX, Joint, Piece, Point, pose, Robot, ROD, size
 from ..scene import SceneError, SceneMechanism
 from ..scene.motion import Motion
 
@@ -133,40 +132,33 @@ def _solved(machine: SceneMechanism, starts: Dict[str, float]
 def _slots(machine: SceneMechanism, bodies: Sequence[Body], positions: Dict[str, float]
            ) -> Iterator[Body]:
     """Yield the bodies in slots of yokes, which have no joint in the tree."""
-    at: Dict[str, Tuple[complex, float]] = {}
+    at: Dict[str, np.ndarray] = {}
     for body in bodies:
-        start, turn = at.get(body.parent, (0j, 0.0))
-        if body.joint:
-            x, y, *_, yaw = body.posed(positions[body.joint.name])
-            start, turn = start + cmath.rect(1.0, turn) * complex(x, y), turn + yaw
-        elif at:
-            turn += body.pose[5]
-        at[body.name] = start, turn
-    places = {point.name: (at[body.name][0] + cmath.rect(1.0, at[body.name][1])
-                           * complex(*point.place), point) for body in bodies
-              for point in body.points}
+        own = pose(*body.posed(positions[body.joint.name] if body.joint else 0.0))
+        at[body.name] = at[body.parent] @ own if at else np.eye(4)
+    points = {point.name: (at[body.name] @ (*point.place, 0.0, 1.0), point)
+              for body in bodies for point in body.points}
     for prefix in machine.assembly().legs:
         for link, pin in machine.linkage.yokes.items():
             name = f'{machine.name}_{prefix}{link}'
-            start, turn = at[f'{name}_link']
-            place, point = places[f'{machine.name}_{prefix}{pin}']
-            seen = (place - start) * cmath.rect(1.0, -turn)
+            place, point = points[f'{machine.name}_{prefix}{pin}']
+            x, y = np.linalg.solve(at[f'{name}_link'], place)[:2].tolist()
             joint = Joint(f'{name}_slot', 'prismatic', 1.0, None)
             met = Point(f'{name}_pin', (0.0, 0.0), point.name, point.radius)
-            yield Body(f'{name}_slot_link', f'{name}_link',
-                       (seen.real, seen.imag, 0.0, 0.0, 0.0, 0.5 * math.pi), joint, [], [met])
+            yield Body(f'{name}_slot_link', f'{name}_link', (x, y, 0.0, 0.0, 0.0, 0.5 * math.pi),
+                       joint, [], [met])
 
 
 def weight(pieces: Sequence[Piece], density: float) -> Weight:
     """Return the common weight of pieces of a density [kg/m^3]; zero without pieces."""
-    masses = np.array([density * _volume(piece) for piece in pieces])
+    solids = np.array([_solid(piece) for piece in pieces]).reshape(-1, 3)
+    masses = density * solids[:, 0]
     mass = float(masses.sum())
     if not mass:
         return Weight(0.0, (0.0, 0.0), (0.0,) * 4)
     x, y = masses @ [piece.pose[:2] for piece in pieces] / mass
     moments = np.zeros(4)
-    for own, piece in zip(masses, pieces):
-        along, across = (own * each for each in _gyration(piece))
+    for own, (along, across), piece in zip(masses, masses[:, None] * solids[:, 1:], pieces):
         u, v, *_, angle = piece.pose
         u, v, c, s = u - x, v - y, math.cos(angle), math.sin(angle)
         moments += (along * c * c + across * s * s + own * v * v,
@@ -175,14 +167,10 @@ def weight(pieces: Sequence[Piece], density: float) -> Weight:
     return Weight(mass, (float(x), float(y)), moments.tolist())
 
 
-def _volume(piece: Piece) -> float:
-    thickness, length = piece.thickness, piece.length
-    return {ROD: math.pi * thickness ** 2 * length, BOX: thickness ** 2 * length,
-            BALL: 4.0 / 3.0 * math.pi * thickness ** 3}[piece.shape]
-
-
-def _gyration(piece: Piece) -> Tuple[float, float]:
-    """Return the squares of the radii of gyration [m^2] about a piece's length and across it."""
+def _solid(piece: Piece) -> Tuple[float, float, float]:
+    """Return the volume [m^3], and the squares of radii of gyration about and across it [m^2]."""
     thick, long = piece.thickness ** 2, piece.length ** 2 / 12.0
-    return {ROD: (0.5 * thick, 0.25 * thick + long), BOX: (thick / 6.0, thick / 12.0 + long),
-            BALL: (0.4 * thick, 0.4 * thick)}[piece.shape]
+    return {ROD: (math.pi * thick * piece.length, 0.5 * thick, 0.25 * thick + long),
+            BOX: (thick * piece.length, thick / 6.0, thick / 12.0 + long),
+            BALL: (4.0 / 3.0 * math.pi * piece.thickness ** 3, 0.4 * thick, 0.4 * thick)
+            }[piece.shape]

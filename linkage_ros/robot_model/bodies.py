@@ -24,12 +24,16 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
 import math
-from typing import Dict, Iterable, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
 
 from . import shapes
 from .. import palette
-from ..linkage.builder import GROUND
+from ..linkage.builder import GROUND, Link
 from ..linkage.output_range import common_reach, ground_frame, Travel, travels
+from ..linkage.walker import Assembly
 from ..scene import SceneError, SceneMechanism
 from ..scene.scene_mechanism import IN_SPACE
 from ..words import listed
@@ -211,27 +215,19 @@ def together(robots: Sequence[Robot]) -> Robot:
     roots = {robot.root for robot in robots}
     above = {name: robot.root for robot in robots for part in robot.parts
              for name in roots.intersection(part.links)}
-
-    def depth(frame: str) -> int:
-        return 1 + depth(above[frame]) if frame in above else 0
-
-    root = _root(robots, above)
-    made = Robot('linkages', root, [part for robot in sorted(
-        robots, key=lambda robot: depth(robot.root)) for part in robot.parts])
-    made.check_names('mechanisms')
-    return made
-
-
-def _root(robots: Sequence[Robot], above: Mapping[str, str]) -> str:
-    """Return the common root link of all models; `above` maps a link to its model's root."""
-    frames = list(dict.fromkeys(robot.root for robot in robots))
-    for _ in list(frames):
-        frames = [above.get(frame, frame) for frame in frames]
-    tops = dict.fromkeys(frames)
-    if len(tops) > 1 or frames[0] in above:
+    # From each root link those on which it is, up to the last.
+    lines = {robot.root: [robot.root] for robot in robots}
+    for line in lines.values():
+        while len(line) <= len(roots) and line[-1] in above:
+            line.append(above[line[-1]])
+    root, *more = tops = dict.fromkeys(line[-1] for line in lines.values())
+    if more or root in above:
         raise SceneError('frame_id must be the same for all mechanisms of one robot model, or a '
                          f'link of another one of them, not {listed(tops, 120)}')
-    return frames[0]
+    made = Robot('linkages', root, [part for robot in sorted(
+        robots, key=lambda robot: len(lines[robot.root])) for part in robot.parts])
+    made.check_names('mechanisms')
+    return made
 
 
 def _robot(machine: SceneMechanism, frame_id: str, width: Optional[float]) -> Robot:
@@ -276,7 +272,6 @@ class _Tree:
         self._thickness = length if width is None else 0.5 * width / BAR
         self._machine, self._assembly = machine, machine.assembly()
         self._links = machine.linkage.links
-        self._bars = machine.linkage.bars
         self._shapes = shapes.shapes(machine)
         self._frames = {GROUND: ground_frame(machine.linkage), **machine.linkage.frames}
         self._travels = {**travels(machine.linkage, machine.reach),
@@ -285,38 +280,37 @@ class _Tree:
 
     def bodies(self, root: str) -> Iterator[Body]:
         """Yield ground, crank and legs."""
-        ground = Body(self._name('', GROUND), root, self._machine.pose)
-        for side in dict.fromkeys(leg.side for leg in self._assembly.legs.values()):
-            self._add_shapes(side, GROUND, ground)
+        legs = self._assembly.legs
+        ground = Body(self._name('', GROUND), root, self._machine.pose, pieces=[
+            piece for side in dict.fromkeys(leg.side for leg in legs.values())
+            for piece in self._sliding(side, GROUND)])
         yield ground
         if self._shared:
-            yield self._with_hub(self._hung('', 1.0, self._shared))
-        for prefix, leg in self._assembly.legs.items():
+            yield self._with_hub(self._moving('', 1.0, self._shared))
+        for prefix, leg in legs.items():
             ends: Counter[str] = Counter()
-            self._add_points(prefix, leg.side, GROUND, ground, self._frames[GROUND], ends)
+            ground.points += self._points(prefix, leg.side, GROUND, ends)
             for link in self._links:
-                body = (self._lagging(prefix, leg, link) if link is self._shared
-                        else self._hung(prefix, leg.side, link))
-                self._add_pieces(leg.side, link, body)
-                carried = [point for point in self._frames[link.name] if point != link.joint]
-                self._add_points(prefix, leg.side, link.name, body, carried, ends)
+                # The pins of a leg are fixed to the crank of all legs.
+                body = self._moving(prefix, leg.side, link) if link is not self._shared else Body(
+                    self._name(prefix, link.name), self._name('', link.name),
+                    (0.0, 0.0, 0.0, 0.0, 0.0, -leg.lag))
+                body.pieces += (*self._bars(leg.side, link.name),
+                                *self._sliding(leg.side, link.name))
+                body.points += self._points(prefix, leg.side, link.name, ends, link.joint)
                 yield self._with_hub(body)
 
-    def _lagging(self, prefix, leg, crank) -> Body:
-        """Return a leg's pins, fixed to the crank of all legs."""
-        return Body(self._name(prefix, crank.name), self._name('', crank.name),
-                    (0.0, 0.0, 0.0, 0.0, 0.0, -leg.lag))
-
-    def _hung(self, prefix, side, link) -> Body:
+    def _moving(self, prefix: str, side: float, link: Link) -> Body:
         """Return a body that moves on its parent; in a mirrored leg the other way round."""
         prismatic, mirrored = link.kind == 'prismatic', side < 0.0
-        zero = math.pi - link.zero if mirrored and link.parent == GROUND else link.zero
+        zero = float(np.asarray(link.zero))
+        zero = math.pi - zero if mirrored and link.parent == GROUND else zero
         travel = self._travels.get(link.name)
         if travel and mirrored:
             travel = -travel[1], -travel[0]
         if travel and prismatic:
             travel = self._machine.scale * travel[0], self._machine.scale * travel[1]
-        x, y = self._place(side, link.parent, link.joint)
+        x, y = self._place(side, link.parent, self._frames[link.parent][link.joint])
         called = self._machine.joints[prefix + link.name]
         # The link's position at a published value of zero.
         back = -called.sign * called.offset
@@ -330,64 +324,56 @@ class _Tree:
         return Body(self._name(prefix, link.name), self._name(prefix, link.parent),
                     (x, y, 0.0, 0.0, 0.0, zero), joint)
 
-    def _add_pieces(self, side, link, body):
-        """Add bars as rods, and what slides on a link or is the slide."""
-        frame = self._frames[link.name]
-        for first, second in self._bars:
-            if first in frame and second in frame:
-                body.pieces.append(Piece(ROD, self._colour(link), BAR * self._thickness,
-                                         self._place(side, link.name, first),
-                                         self._place(side, link.name, second)))
-        self._add_shapes(side, link.name, body)
+    def _bars(self, side: float, name: str) -> Iterator[Piece]:
+        """Yield the bars of a link as rods."""
+        for bar in self._machine.linkage.bars:
+            if self._frames[name].keys() >= {*bar}:
+                start, end = (self._place(side, name, self._frames[name][point]) for point in bar)
+                yield Piece(ROD, self._colour(name), BAR * self._thickness, start, end)
 
-    def _colour(self, link):
-        return 'driven' if link.name in self._machine.inputs else 'bar'
+    def _colour(self, name: str) -> str:
+        return 'driven' if name in self._machine.inputs else 'bar'
 
-    def _add_shapes(self, side, link, body):
-        """Add guides, blocks, barrels and the rods in them."""
+    def _sliding(self, side: float, name: str) -> Iterator[Piece]:
+        """Yield the guides, blocks, barrels and rods in them on a link."""
         for shape in self._shapes:
-            if shape.start.link == link:
-                start, end = (self._seen(side, link, spot[1:]) for spot in shape[2:])
-                drawn, thickness = {shapes.GUIDE: (BOX, GUIDE), shapes.BLOCK: (BOX, BLOCK),
-                                    shapes.BARREL: (ROD, BARREL), shapes.ROD: (ROD, BAR)
-                                    }[shape.kind]
-                colour = ('slot' if shape.kind == shapes.GUIDE else 'bar'
-                          if shape.kind == shapes.ROD else self._colour(shape.slide))
+            if shape.start.link == name:
+                start, end = (self._place(side, name, spot[1:]) for spot in shape[2:])
+                drawn, thickness, colour = {
+                    shapes.GUIDE: (BOX, GUIDE, 'slot'), shapes.ROD: (ROD, BAR, 'bar'),
+                    shapes.BLOCK: (BOX, BLOCK, self._colour(shape.slide.name)),
+                    shapes.BARREL: (ROD, BARREL, self._colour(shape.slide.name))}[shape.kind]
                 if start != end:
-                    body.pieces.append(Piece(drawn, colour, thickness * self._thickness, start,
-                                             end))
+                    yield Piece(drawn, colour, thickness * self._thickness, start, end)
 
-    def _add_points(self, prefix, side, link, body, points, ends):
-        """Add joints of a link, including those that it was cut off."""
-        for point in points:
-            name = met = f'{self._machine.name}_{prefix}{point}'
-            ends[point] += 1
-            if ends[point] > 1:
-                name += f'_cut{ends[point] - 1 if ends[point] > 2 else ""}'
-            body.points.append(Point(name, self._place(side, link, point),
-                                     met if name != met else '', JOINT * self._thickness))
+    def _points(self, prefix: str, side: float, name: str, ends: Counter[str], but: str = ''
+                ) -> Iterator[Point]:
+        """Yield joints of a link, including those that it was cut off."""
+        for point, place in self._frames[name].items():
+            if point != but:
+                met = f'{self._machine.name}_{prefix}{point}'
+                ends[point] += 1
+                cut = f'_cut{ends[point] - 1 if ends[point] > 2 else ""}' * (ends[point] > 1)
+                yield Point(met + cut, self._place(side, name, place), met if cut else '',
+                            JOINT * self._thickness)
 
-    def _with_hub(self, body) -> Body:
+    def _with_hub(self, body: Body) -> Body:
         """Return a body; one without joints has a visible hub with a weight."""
         if not body.points:
             origin = (0.0, 0.0)
             body.pieces.append(Piece(BALL, 'joint', JOINT * self._thickness, origin, origin))
         return body
 
-    def _name(self, prefix, name):
+    def _name(self, prefix: str, name: str) -> str:
         return f'{self._machine.name}_{"" if name == GROUND else prefix}{name}_link'
 
-    def _place(self, side, link, point):
-        """Return x, y [m] of a point of a link; the ground is mirrored in y, a link in its bar."""
-        return self._seen(side, link, self._frames[link][point])
-
-    def _seen(self, side, link, place):
-        """Return x, y [m] of a place on a link."""
+    def _place(self, side: float, name: str, place: Sequence[float]) -> Place:
+        """Return a place on a link [m]; a mirrored ground is so in y, a link in its bar."""
         x, y = (self._machine.scale * value for value in place)
-        return (side * x, y) if link == GROUND else (x, side * y)
+        return (side * x, y) if name == GROUND else (x, side * y)
 
 
-def _input_travels(machine, assembly) -> Dict[str, Optional[Travel]]:
+def _input_travels(machine: SceneMechanism, assembly: Assembly) -> Dict[str, Optional[Travel]]:
     """Return the outermost ends of each input's reach, unscaled; None: full rotation."""
     found: Dict[str, Optional[Travel]] = {}
     for input_ in machine.linkage.inputs:
@@ -407,3 +393,33 @@ def _input_travels(machine, assembly) -> Dict[str, Optional[Travel]]:
 def numbers(*values: float) -> str:
     """Return numbers with all their digits; adding zero makes -0.0 plain."""
     return ' '.join(repr(float(value) + 0.0) for value in values)
+
+
+def pose(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> np.ndarray:
+    """Return a pose as a matrix (4, 4), by its place [m] and its angles about fixed axes [rad]."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos((roll, pitch, yaw)), np.sin((roll, pitch, yaw))
+    about_z, about_y, about_x = np.array([
+        [[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]], [[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]],
+        [[1, 0, 0], [0, cr, -sr], [0, sr, cr]]])
+    made = np.eye(4)
+    made[:3, :3], made[:3, 3] = about_z @ about_y @ about_x, (x, y, z)
+    return made
+
+
+def coordinates(matrix: np.ndarray) -> Tuple[float, ...]:
+    """Return x, y, z [m], roll, pitch and yaw [rad] of a pose (4, 4)."""
+    a, b = matrix[:2, 0]
+    yaw = math.atan2(b, a) if math.hypot(a, b) > 1e-9 else 0.0
+    sin, cos = math.sin(yaw), math.cos(yaw)
+    ahead, aside = matrix[:2, 2], matrix[:2, 1]
+    return (*matrix[:3, 3].tolist(),
+            math.atan2(sin * ahead[0] - cos * ahead[1], cos * aside[1] - sin * aside[0]),
+            math.atan2(-matrix[2, 0], cos * a + sin * b), yaw)
+
+
+def add(parent: Element, tag: str, *values: Any, **attributes: str) -> Element:
+    """Add an element to a robot model in XML; its text is a word or numbers."""
+    made = SubElement(parent, tag, attributes)
+    if values:
+        made.text = values[0] if isinstance(values[0], str) else numbers(*values)
+    return made

@@ -4,7 +4,6 @@
 """Command that prints the robot model of a scene's mechanisms; it needs no ROS."""
 
 import argparse
-import sys
 from typing import List, Optional
 
 from . import bodies, mjcf, sdf, urdf
@@ -68,7 +67,3 @@ def _positive(text: str) -> float:
         raise argparse.ArgumentTypeError(
             f'must be from {bodies.SMALLEST:g} to {bodies.LARGEST:g}, not {text}')
     return value
-
-
-if __name__ == '__main__':
-    sys.exit(main())

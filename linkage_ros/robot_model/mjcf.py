@@ -19,7 +19,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from .assembled import Assembled, Motor, Solid
-from .bodies import BALL, BOX, COLOURS, numbers, Piece, ROD
+from .bodies import add, BALL, BOX, COLOURS, numbers, Piece, ROD
 from .. import palette
 from ..scene import SceneError
 
@@ -35,51 +35,47 @@ LEAST = 1e-14
 def write(model: Assembled) -> str:
     """Return a robot model, its loops closed, as MJCF."""
     root = ElementTree.Element('mujoco', model=model.name)
-    _add(root, 'compiler', angle='radian', eulerseq='XYZ')
+    add(root, 'compiler', angle='radian', eulerseq='XYZ')
     small = min([LARGE, *(motor.arm for motor in model.motors)])
     step = STEP * math.sqrt(small / LARGE)
-    _add(root, 'option', timestep=numbers(step), integrator='implicitfast')
-    usual = _add(root, 'default')
-    _add(usual, 'geom', contype='0', conaffinity='0')
-    _add(usual, 'equality', solref=numbers(2.0 * step, 1.0), solimp='0.9999 0.9999 1')
-    bodies: Dict[str, ElementTree.Element] = {'': _add(root, 'worldbody')}
+    add(root, 'option', timestep=numbers(step), integrator='implicitfast')
+    usual = add(root, 'default')
+    add(usual, 'geom', contype='0', conaffinity='0')
+    add(usual, 'equality', solref=numbers(2.0 * step, 1.0), solimp='0.9999 0.9999 1')
+    bodies: Dict[str, ElementTree.Element] = {'': add(root, 'worldbody')}
     moving = set()
     for solid in model.solids:
         body = bodies[solid.name] = _add_solid(bodies[solid.parent], solid)
         if solid.joint or solid.parent in moving:
             moving.add(solid.name)
             _add_weight(body, solid)
-    equality, actuator = _add(root, 'equality'), _add(root, 'actuator')
+    equality, actuator = add(root, 'equality'), add(root, 'actuator')
     for solid in model.solids:
         for point in solid.points:
             if point.meets:
-                _add(equality, 'connect', name=point.name, site1=point.meets, site2=point.name)
+                add(equality, 'connect', name=point.name, site1=point.meets, site2=point.name)
     for gear in model.gears:
-        _add(equality, 'joint', joint1=gear.joint, joint2=gear.input,
+        add(equality, 'joint', joint1=gear.joint, joint2=gear.input,
              polycoef=numbers(0.0, gear.ratio, 0.0, 0.0, 0.0))
     for motor in model.motors:
         _add_motor(actuator, motor)
-    _add(_add(root, 'keyframe'), 'key', name='start',
+    add(add(root, 'keyframe'), 'key', name='start',
          ctrl=numbers(*(motor.start for motor in model.motors)))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding='unicode')
 
 
-def _add(parent: ElementTree.Element, tag: str, **attributes: str) -> ElementTree.Element:
-    return ElementTree.SubElement(parent, tag, attributes)
-
-
 def _add_solid(parent: ElementTree.Element, solid: Solid) -> ElementTree.Element:
-    body = _add(parent, 'body', name=solid.name, pos=numbers(*solid.pose[:3]),
+    body = add(parent, 'body', name=solid.name, pos=numbers(*solid.pose[:3]),
                 euler=numbers(*solid.pose[3:]))
     if joint := solid.joint:
         kind = 'slide' if joint.kind == 'prismatic' else 'hinge'
-        _add(body, 'joint', name=joint.name, type=kind, axis=numbers(*joint.axis),
+        add(body, 'joint', name=joint.name, type=kind, axis=numbers(*joint.axis),
              ref=numbers(solid.position))
     for piece in solid.pieces:
         _add_piece(body, piece)
     for point in solid.points:
-        _add(body, 'site', name=point.name, pos=numbers(*point.place, 0.0), group='4')
+        add(body, 'site', name=point.name, pos=numbers(*point.place, 0.0), group='4')
     return body
 
 
@@ -88,7 +84,7 @@ def _add_weight(body: ElementTree.Element, solid: Solid) -> None:
     if np.linalg.eigvalsh([[xx, xy], [xy, yy]])[0] < LEAST:
         raise SceneError(f'{solid.name} is too light for MuJoCo: give a larger scale, --width or '
                          '--density')
-    _add(body, 'inertial', pos=numbers(*centre, 0.0), mass=numbers(mass),
+    add(body, 'inertial', pos=numbers(*centre, 0.0), mass=numbers(mass),
          fullinertia=numbers(xx, yy, zz, xy, 0.0, 0.0))
 
 
@@ -96,7 +92,7 @@ def _add_piece(body: ElementTree.Element, piece: Piece) -> None:
     half, thickness = 0.5 * piece.length, piece.thickness
     sizes = {ROD: (thickness, half), BOX: (half, 0.5 * thickness, 0.5 * thickness),
              BALL: (thickness,)}[piece.shape]
-    _add(body, 'geom', type=piece.shape, pos=numbers(*piece.pose[:3]),
+    add(body, 'geom', type=piece.shape, pos=numbers(*piece.pose[:3]),
          euler=numbers(*piece.pose[3:]), size=numbers(*sizes),
          rgba=numbers(*palette.rgb(COLOURS[piece.colour]), 1.0))
 
@@ -106,7 +102,7 @@ def _add_motor(actuator: ElementTree.Element, motor: Motor) -> None:
     force = motor.mass * GRAVITY
     most = 10.0 * force * (motor.arm if motor.turns else 1.0)
     stiffness = STIFFNESS * force * (motor.arm if motor.turns else 1.0 / motor.arm)
-    servo = _add(actuator, 'position', name=motor.joint, joint=motor.joint, kp=numbers(stiffness),
+    servo = add(actuator, 'position', name=motor.joint, joint=motor.joint, kp=numbers(stiffness),
                  dampratio='1', forcerange=numbers(-most, most))
     if motor.sweep:
         servo.set('ctrlrange', numbers(*motor.sweep))

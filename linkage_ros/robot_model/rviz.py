@@ -6,21 +6,22 @@
 import copy
 import json
 import math
-from typing import Any, Dict, Iterable, Mapping, Tuple
+from typing import Any, Dict, Iterable, Iterator, Mapping, Tuple
 
 import numpy as np
 
-from ..robot_files.elements import pose
+from .bodies import pose
+from .shapes import input_values
 from ..scene import SceneMechanism
 
 GROUP = 'rviz_common/Group'
 NEEDS_TRANSFORMS = ('rviz_default_plugins/RobotModel', 'rviz_default_plugins/TF')
-
-
 # Distance of a camera with a view of 45 degrees that shows a ball of radius 1 with a margin.
 AWAY = 1.1 / math.sin(math.radians(22.5))
 # Downward angle [rad] of the camera on an upright plane, and on a flat one.
 DOWN, STEEPEST = 0.15, 1.56
+# Values of one input by which it is found where a mechanism reaches; of several, their share.
+SAMPLES = 25
 # A linkage in space is seen from the front, from the right and above, as on the viewer's page.
 OBLIQUE = np.array([0.576, -0.768, 0.28])
 
@@ -28,27 +29,11 @@ OBLIQUE = np.array([0.576, -0.768, 0.28])
 def adapted(config: dict, machines: Mapping[str, SceneMechanism], frame_id: str,
             namespace: str = '', robot_model: bool = False, frame_prefix: str = '') -> dict:
     """
-    Return a configuration that shows other mechanisms.
+    Return a configuration that shows mechanisms, and whose camera sees them all.
 
-    Parameters
-    ----------
-    config : dict
-        A configuration with one group of displays a mechanism, which bears its name.
-    machines : mapping
-        The mechanisms to be shown, by name; the camera sees them all.
-    frame_id : str
-        The frame of their poses.
-    namespace : str
-        Namespace of their topics; empty: none.
-    robot_model : bool
-        Whether to show what needs a robot_state_publisher as well.
-    frame_prefix : str
-        Prefix of the robot_state_publishers' frames.
-
-    Returns
-    -------
-    dict
-
+    `config` has one group of displays a mechanism, of the mechanism's name; the poses are in
+    `frame_id`, the topics in `namespace`. `robot_model` enables displays that need a
+    robot_state_publisher, whose frames begin with `frame_prefix`.
     """
     made = copy.deepcopy(config)
     manager = made['Visualization Manager']
@@ -83,11 +68,8 @@ def _camera(machines: Iterable[SceneMechanism]) -> Dict[str, Any]:
 
 def _seen(machine: SceneMechanism) -> Tuple[np.ndarray, np.ndarray]:
     """Return points that a mechanism's joints come to [m], (n, 3), and the way to the camera."""
-    values = [np.concatenate([np.linspace(low, high, 25) for low, high in (
-        [drive.ends] if drive.ends else drive.reach)]) / machine.scale_of(name)
-        for name, drive in machine.inputs.items()]
-    grid = np.meshgrid(*(own[::len(values)] for own in values))
-    found = machine.linkage.solve(grid if len(grid) > 1 else grid[0], machine.points)
+    values = input_values(machine, -(-SAMPLES // len(machine.inputs)))
+    found = machine.linkage.solve(values, machine.points)
     places = machine.scale * np.concatenate(
         [place.reshape(-1, place.shape[-1]) for place in found.values()])
     places = places[np.isfinite(places).all(axis=1)]
@@ -98,13 +80,13 @@ def _seen(machine: SceneMechanism) -> Tuple[np.ndarray, np.ndarray]:
     return places @ seen[:3, :places.shape[1]].T + seen[:3, 3], normal
 
 
-def _renamed(group, name, namespace):
+def _renamed(group: Mapping[str, Any], name: str, namespace: str) -> Dict[str, Any]:
     start = f'/{namespace.strip("/")}/'.replace('//', '/')
     text = json.dumps(group).replace(f'"/{group["Name"]}/', f'"{start}{name}/')
     return {**json.loads(text), 'Name': name}
 
 
-def _all(displays):
+def _all(displays: Iterable[dict]) -> Iterator[dict]:
     for display in displays:
         yield display
         yield from _all(display.get('Displays', ()))

@@ -17,7 +17,7 @@ from typing import Optional
 from xml.etree import ElementTree
 
 from .assembled import Assembled, Gear, Motor, Solid, weight
-from .bodies import COLOURS, Joint, numbers, Piece
+from .bodies import add, COLOURS, Joint, Piece
 from .. import palette
 
 
@@ -25,7 +25,7 @@ def write(model: Assembled) -> str:
     """Return a robot model, its loops closed, as SDF."""
     # Gazebo Classic reads versions up to 1.7, which have no mimic.
     root = ElementTree.Element('sdf', version='1.11' if model.gears else '1.7')
-    robot = ElementTree.SubElement(root, 'model', name=model.name)
+    robot = add(root, 'model', name=model.name)
     gears = {gear.joint: gear for gear in model.gears}
     motors = {motor.joint: motor for motor in model.motors}
     homes = {point.name: solid.name for solid in model.solids for point in solid.points}
@@ -36,16 +36,15 @@ def write(model: Assembled) -> str:
         if solid.joint:
             _add_ends(joint, gears.get(name), motors.get(name), solid.position)
         for point in solid.points:
-            frame = ElementTree.SubElement(robot, 'frame', name=point.name,
-                                           attached_to=solid.name)
-            _text(frame, 'pose', numbers(*point.place, *[0.0] * 4))
+            frame = add(robot, 'frame', name=point.name, attached_to=solid.name)
+            add(frame, 'pose', *point.place, *[0.0] * 4)
     cuts = [(solid, point) for solid in model.solids for point in solid.points if point.meets]
     for solid, point in cuts:
-        pin = Solid(f'{point.name}_pin', solid.name, (*point.place, *[0.0] * 4),
-                    Joint(f'{point.name}_hinge', 'revolute', 1.0, None), 0.0,
+        hinge = Joint(f'{point.name}_hinge', 'revolute', 1.0, None)
+        pin = Solid(f'{point.name}_pin', solid.name, (*point.place, *[0.0] * 4), hinge, 0.0,
                     [point.ball()], [], weight([point.ball()], model.density))
         _add_link(robot, pin)
-        _add_joint(robot, f'{point.name}_hinge', pin.joint, solid.name, pin.name)
+        _add_joint(robot, hinge.name, hinge, solid.name, pin.name)
     for _, point in cuts:
         ends = homes[point.meets], f'{point.name}_pin'
         _add_joint(robot, f'{point.name}_closed', None, *ends)
@@ -59,26 +58,21 @@ def write(model: Assembled) -> str:
     return ElementTree.tostring(root, encoding='unicode')
 
 
-def _text(parent: ElementTree.Element, tag: str, text: str) -> None:
-    ElementTree.SubElement(parent, tag).text = text
-
-
 def _add_plugin(robot: ElementTree.Element, file: str, name: str, **values: str) -> None:
-    plugin = ElementTree.SubElement(robot, 'plugin', filename=f'gz-sim-{file}-system',
-                                    name=f'gz::sim::systems::{name}')
+    plugin = add(robot, 'plugin', filename=f'gz-sim-{file}-system',
+                  name=f'gz::sim::systems::{name}')
     for tag, text in values.items():
-        _text(plugin, tag, text)
+        add(plugin, tag, text)
 
 
 def _add_joint(robot: ElementTree.Element, name: str, joint: Optional[Joint], parent: str,
                child: str) -> ElementTree.Element:
     """Add a joint, a fixed one where there is none, at the child's frame."""
-    element = ElementTree.SubElement(robot, 'joint', name=name,
-                                     type=joint.kind if joint else 'fixed')
-    _text(element, 'parent', parent)
-    _text(element, 'child', child)
+    element = add(robot, 'joint', name=name, type=joint.kind if joint else 'fixed')
+    add(element, 'parent', parent)
+    add(element, 'child', child)
     if joint:
-        _text(ElementTree.SubElement(element, 'axis'), 'xyz', numbers(*joint.axis))
+        add(add(element, 'axis'), 'xyz', *joint.axis)
     return element
 
 
@@ -87,37 +81,36 @@ def _add_ends(joint: ElementTree.Element, gear: Optional[Gear], motor: Optional[
     """Add the gear of a joint, or the limits of its motor."""
     axis, = joint.iter('axis')
     if gear:
-        mimic = ElementTree.SubElement(axis, 'mimic', joint=gear.input)
+        mimic = add(axis, 'mimic', joint=gear.input)
         for tag, value in ('multiplier', gear.ratio), ('offset', 0.0), ('reference', 0.0):
-            _text(mimic, tag, numbers(value))
+            add(mimic, tag, value)
     if motor and motor.sweep:
-        limit = ElementTree.SubElement(axis, 'limit')
+        limit = add(axis, 'limit')
         for tag, end in zip(('lower', 'upper'), motor.sweep):
-            _text(limit, tag, numbers(end - start))
+            add(limit, tag, end - start)
 
 
 def _add_link(robot: ElementTree.Element, solid: Solid) -> None:
-    link = ElementTree.SubElement(robot, 'link', name=solid.name)
-    pose = ElementTree.SubElement(link, 'pose', relative_to=solid.parent or '__model__')
-    pose.text = numbers(*solid.pose)
+    link = add(robot, 'link', name=solid.name)
+    add(link, 'pose', *solid.pose, relative_to=solid.parent or '__model__')
     mass, centre, moments = solid.weight
     if mass:
-        inertial = ElementTree.SubElement(link, 'inertial')
-        _text(inertial, 'pose', numbers(*centre, *[0.0] * 4))
-        _text(inertial, 'mass', numbers(mass))
-        inertia = ElementTree.SubElement(inertial, 'inertia')
+        inertial = add(link, 'inertial')
+        add(inertial, 'pose', *centre, *[0.0] * 4)
+        add(inertial, 'mass', mass)
+        inertia = add(inertial, 'inertia')
         for tag, moment in zip(('ixx', 'iyy', 'izz', 'ixy'), moments):
-            _text(inertia, tag, numbers(moment))
+            add(inertia, tag, moment)
     for i, piece in enumerate(solid.pieces):
         _add_visual(link, f'{solid.name}_{i}', piece)
 
 
 def _add_visual(link: ElementTree.Element, name: str, piece: Piece) -> None:
-    visual = ElementTree.SubElement(link, 'visual', name=name)
-    _text(visual, 'pose', numbers(*piece.pose))
-    geometry = ElementTree.SubElement(ElementTree.SubElement(visual, 'geometry'), piece.shape)
+    visual = add(link, 'visual', name=name)
+    add(visual, 'pose', *piece.pose)
+    shape = add(add(visual, 'geometry'), piece.shape)
     for tag, values in piece.sizes.items():
-        _text(geometry, tag, numbers(*values))
-    material = ElementTree.SubElement(visual, 'material')
+        add(shape, tag, *values)
+    material = add(visual, 'material')
     for tag in 'ambient', 'diffuse':
-        _text(material, tag, numbers(*palette.rgb(COLOURS[piece.colour]), 1.0))
+        add(material, tag, *palette.rgb(COLOURS[piece.colour]), 1.0)

@@ -20,7 +20,7 @@ from ..linkage.builder import GROUND, Link
 from ..linkage.mechanism import Mechanism
 from ..linkage.output_range import ground_frame
 from ..linkage.quantities import LinkPoint
-from ..scene import InputSettings, SceneMechanism
+from ..scene import SceneMechanism
 
 GUIDE, BLOCK, BARREL, ROD = 'guide', 'block', 'barrel', 'rod'
 # Half the length of a block, and of a guide beyond its travel, as a fraction of the longest bar.
@@ -120,19 +120,18 @@ def _block(link: Any, low: float, high: float, frames: Dict[str, dict],
 def _travels(machine: SceneMechanism,
              slides: Sequence[Link]) -> Iterable[Tuple[Link, Tuple[float, float]]]:
     """Yield how far each goes [m] while the inputs take all values that they may, before scale."""
-    names = [link.name for link in slides]
     count = max(round(SAMPLES ** (1.0 / len(machine.inputs))), 2)
-    grid = np.meshgrid(*(_values(drive, machine.scale, count)
-                         for drive in machine.inputs.values()))
-    found = machine.linkage.joint_angles(grid if len(grid) > 1 else grid[0], names)
+    found = machine.linkage.joint_angles(input_values(machine, count),
+                                         [link.name for link in slides])
     for link in slides:
         values = found[link.name][np.isfinite(found[link.name])]
         if values.size:
             yield link, (float(values.min()), float(values.max()))
 
 
-def _values(drive: InputSettings, scale: float, count: int) -> np.ndarray:
-    """Return so many values of an input, all through its ends or its reach, before scale."""
-    arcs = [drive.ends] if drive.ends else drive.reach
-    values = np.concatenate([np.linspace(low, high, count) for low, high in arcs])
-    return values if drive.input.turns else values / scale
+def input_values(machine: SceneMechanism, count: int) -> Any:
+    """Return values of the inputs through their ends or parts of their reach, before scale."""
+    values = [np.concatenate([np.linspace(low, high, count) for low, high in (
+        [drive.ends] if drive.ends else drive.reach)]) / machine.scale_of(name)
+        for name, drive in machine.inputs.items()]
+    return np.meshgrid(*values) if len(values) > 1 else values[0]

@@ -37,8 +37,7 @@ def write(robot: Robot) -> str:
     <color rgba="{numbers(*palette.rgb(code), 1.0)}" />
   </material>
 """ for colour, code in COLOURS.items()]
-    name, root = (_escaped(text) for text in (robot.name, robot.root))
-    return ''.join([f'<robot name="{name}">\n', *materials, f'  <link name="{root}" />\n',
+    return ''.join([f'<robot name="{_escaped(robot.name)}">\n', *materials, link(robot.root),
                     *map(_part, robot.parts), '</robot>'])
 
 
@@ -49,9 +48,9 @@ def _escaped(text: str) -> str:
 def _part(part: Part) -> str:
     if part not in _written:
         _written[part] = ''.join(
-            _joint(body) + _link(body.name, body.pieces) + ''.join(
+            _joint(body) + link(body.name, body.pieces) + ''.join(
                 _joint(Body(point.name, body.name, (*point.place, 0.0, 0.0, 0.0, 0.0)))
-                + _link(point.name, [point.ball()]) for point in body.points)
+                + link(point.name, [point.ball()]) for point in body.points)
             for body in part.bodies)
     return _written[part]
 
@@ -59,24 +58,31 @@ def _part(part: Part) -> str:
 def _joint(body: Body) -> str:
     """Return the joint that a body hangs on."""
     joint = body.joint
-    name, kind = (joint.name, joint.kind) if joint else (f'{body.name}_fixed', 'fixed')
-    if joint and kind == 'revolute' and not joint.travel:
-        kind = 'continuous'
+    return tree_joint(joint.name, joint.kind, body.parent, body.name, body.pose, joint.axis,
+                      joint.travel or ()) if joint else tree_joint(
+        f'{body.name}_fixed', 'fixed', body.parent, body.name, body.pose)
+
+
+def tree_joint(name: str, kind: str, parent: str, child: str, pose: Sequence[float],
+               axis: Sequence[float] = (), limits: Sequence[float] = ()) -> str:
+    """Return a joint; a revolute one without limits is continuous."""
+    kind = 'continuous' if kind == 'revolute' and not limits else kind
     text = f"""\
   <joint name="{_escaped(name)}" type="{kind}">
-    <parent link="{_escaped(body.parent)}" />
-    <child link="{body.name}" />
-{_origin('    ', body.pose)}"""
-    if joint:
-        text += f'    <axis xyz="{numbers(*joint.axis)}" />\n'
-    if joint and joint.travel:
-        lower, upper = map(numbers, joint.travel)
+    <parent link="{_escaped(parent)}" />
+    <child link="{_escaped(child)}" />
+{_origin('    ', pose)}"""
+    if axis:
+        text += f'    <axis xyz="{numbers(*axis)}" />\n'
+    if limits:
+        lower, upper = map(numbers, limits)
         text += f'    <limit lower="{lower}" upper="{upper}" effort="0" velocity="0" />\n'
     return text + '  </joint>\n'
 
 
-def _link(name: str, pieces: Iterable[Piece]) -> str:
+def link(name: str, pieces: Iterable[Piece] = ()) -> str:
     """Return a link, and what is seen of it."""
+    name = _escaped(name)
     seen = ''.join([f"""\
     <visual>
 {_origin('      ', piece.pose)}\

@@ -246,7 +246,7 @@ class InverseRequest:
         return self._out_of_range(value)
 
     def _beyond(self, end: float, input_: float, name: str) -> Tuple[float, float, str]:
-        """Return an input's distance beyond an end, its value there, and the end's name."""
+        """Return how far an input is beyond an end, its value in that turn, and the end's name."""
         sign, own = 1.0 if name == 'upper' else -1.0, self._inverse.inputs[0]
         gap = sign * (input_ - end)
         gap = gap % own.turn if own.turns else gap if gap > 0.0 else math.inf

@@ -72,11 +72,11 @@ class Motion:
 
     @classmethod
     def of(cls, drive: InputSettings, since: int = 0) -> Motion:
-        """Return the motion of an input from its start at the time `since` [ns]."""
+        """Return the motion of an input, which is at its `start` at the time `since` [ns]."""
         return cls(drive.speed, drive.sweep, drive.start, since, drive.input.turns, drive.period)
 
     def changed(self, speed: float, sweep: Optional[Arc], now: int) -> Motion:
-        """Return a motion with another speed and sweep, which continues this one at `now` [ns]."""
+        """Return a motion with this speed and sweep from this one's value at `now` [ns]."""
         motion = Motion(speed, sweep, since=now, turns=self._turns, period=self._round // TURN)
         phase = self._phase_at(now)
         if sweep == self._sweep:
@@ -107,5 +107,6 @@ class Motion:
             return angle % self._round
         half = self._width // 2
         if self._turns and not 0 <= angle - self._low <= self._width:
-            angle = (angle - self._low - half + TURN // 2) % TURN - TURN // 2 + self._low + half
+            middle, turn = self._low + half, self._round
+            angle = (angle - middle + turn // 2) % turn - turn // 2 + middle
         return min(max(angle - self._low, 0), self._width)

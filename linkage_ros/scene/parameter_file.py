@@ -4,8 +4,8 @@
 """
 Read ROS parameter files without ROS. Needs PyYAML.
 
-Numbers, sections, their order and error messages are those of rcl_yaml_param_parser
-(https://github.com/ros2/rcl).
+Syntax of numbers, matching of node names, precedence of sections and error messages are those of
+rcl_yaml_param_parser (https://github.com/ros2/rcl).
 """
 
 from __future__ import annotations

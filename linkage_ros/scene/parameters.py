@@ -153,7 +153,7 @@ def _with(field: Field, *other: Tuple[str, Any]) -> Field:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter to declare: full name, field and value."""
+    """A parameter to declare: its full name, the Field that describes it, and its value."""
 
     name: str
     field: Field

@@ -82,7 +82,7 @@ Pose pose(const OF(_linkage) & c, const double (&q)[n])
 {
   Pose made{};
   double zero[n] = {}, x[n];
-  made.placed = OF(_at)(&c, q, &made.point) != 0;
+  made.placed = OF(_at)(&c, q, 1, &made.point) != 0;
   made.good = made.placed;
   for (int side = 0; side < 2; ++side) {
     made.good = made.good && OF(_solved)(&made.point, side, 0, 1e-2, zero, x) != 0;

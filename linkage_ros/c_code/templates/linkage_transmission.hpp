@@ -19,7 +19,7 @@
 
 namespace @namespace@
 {
-/// What an actuator or a joint is called in the scene, and its part in the linkage.
+/// The name of an actuator or a joint in the scene, and its role in the linkage.
 struct Axis { const char * name, * role; };
 
 /// A dimension [m] that a parameter of the transmission may replace.
@@ -112,14 +112,14 @@ private:
   std::array<std::array<std::optional<Handle>, size>, 3> handles_;
 };
 
-/// A linkage between actuators and joints; Code is what linkage_ros wrote of it in C.
+/// A linkage between actuators and joints; Code wraps its generated C.
 template <class Code>
 class LinkageTransmission : public transmission_interface::Transmission
 {
 public:
   explicit LinkageTransmission(const hardware_interface::TransmissionInfo & info) : info_(info) {}
 
-  /// Take the parameters, and handles by role or name; throws, in words, for what cannot be.
+  /// Set parameters and find handles by role or name; throws an exception that says what is wrong.
   void configure(
     const std::vector<transmission_interface::JointHandle> & joint_handles,
     const std::vector<transmission_interface::ActuatorHandle> & actuator_handles) override
@@ -147,7 +147,7 @@ public:
 
   std::size_t num_joints() const override { return Code::size; }
 
-  /// What the last call said of its values: 0, or a sum of the bits in the header.
+  /// The status of the last call: 0, or a sum of the bits in the header.
   int status() const { return status_; }
 
 private:

@@ -9,7 +9,7 @@
 
 namespace @namespace@
 {
-/// The C of the mechanism @name@, as LinkageTransmission wants it.
+/// The C of the mechanism @name@, for LinkageTransmission.
 struct @class@Code
 {
   using Linkage = @name@_linkage;

@@ -1,5 +1,5 @@
 // Written by linkage_ros. SPDX-License-Identifier: Apache-2.0
-// Actuators all over their ways are taken to the joints and back.
+// Positions of the actuators over all their range, to the joints and back.
 #include <cmath>
 #include <cstdio>
 #include <vector>
@@ -33,7 +33,7 @@ int main()
     double q[Code::size], singular[Code::size], gap[Code::size];
     @name@_point p;
     @name@_sample(state, q);
-    if (!@name@_at(&c, q, &p) || !@name@_solved(&p, 1, 0, 1e-3, p.load, singular)) {
+    if (!@name@_at(&c, q, 1, &p) || !@name@_solved(&p, 1, 0, 1e-3, p.load, singular)) {
       continue;
     }
     for (std::size_t i = 0; i < Code::size; ++i) {

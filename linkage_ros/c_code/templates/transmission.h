@@ -1,5 +1,5 @@
-/* What a call returns: 0, or a sum of these. OUT_OF_REACH: the linkage cannot get there, or may
-   not. SINGULAR: it would take an infinite velocity or effort. NOT_KNOWN: a number is missing. */
+/* Status of a call: 0, or a sum of these. OUT_OF_REACH: outside the reach or the sweep. SINGULAR: a
+   velocity or an effort would be infinite. NOT_KNOWN: a value is NaN or infinite. */
 enum { @N@_OK = 0, @N@_OUT_OF_REACH = 1, @N@_SINGULAR = 2, @N@_NOT_KNOWN = 4 };
 @enums@
 /* @about@. */
@@ -7,12 +7,12 @@ typedef struct { @number@ position[@n@], velocity[@n@], effort[@n@]; } @name@_si
 typedef @name@_side @name@_actuators;
 typedef @name@_side @name@_joints;
 
-/* A pose: positions of the actuators [0] and joints [1], their rates by each input, and what the
-   inputs give against the loads. */
+/* A pose: positions of the actuators [0] and joints [1], their rates by each input, and the inputs'
+   efforts against the loads. */
 typedef struct { @number@ position[2][@n@], rate[2][@n@][@n@], load[@n@]; } @name@_point;
 
-/* What is remembered between calls: where the actuators were, where the joints were to be, and the
-   last valid values of both. @name@_begin fills it. */
+/* The state between calls, which @name@_begin initializes: the last poses and inputs by measured
+   actuators [0] and by commanded joints [1], and the last valid values of both. */
 typedef struct {
     @name@_point point[2];
     @number@ input[2][@n@];
@@ -28,23 +28,24 @@ static inline const char *@name@_name(int side, int i)
 }
 
 @at@
-/* How large a position is, and after how much it is the same again, or 0. */
+/* One over the size of a position; or half the turn after which it is the same again, or 0. */
 static inline @number@ @name@_scale(int side, int i, int is_turn)
 {
     static const @number@ scale[@sides@][@n@][2] = { @scales@ };
     return scale[side][i][is_turn];
 }
 
-/* From a pose to positions, the shorter way; returns the largest, in sizes. */
+/* Gaps from a pose to positions, the shorter way round; returns the largest, in sizes. */
 static inline @number@ @name@_gap(const @number@ to[@n@], const @name@_point *p, int side, @number@ gap[@n@])
 {
-    @number@ most = @zero@;
+    @number@ most = 0;
     int i;
     for (i = 0; i < @n@; i++) {
-        const @number@ turn = @name@_scale(side, i, 1);
+        const @number@ half = @name@_scale(side, i, 1);
         gap[i] = to[i] - p->position[side > 0][i];
-        gap[i] -= turn > @zero@ ? turn * floor@f@(gap[i] / turn + @half@) : @zero@;
-        most = fmax@f@(most, fabs@f@(gap[i]) / @name@_scale(side, i, 0));
+        if (half > 0 && fabs@f@(gap[i]) > half)
+            gap[i] -= 2 * half * floor@f@(@half@ * gap[i] / half + @half@);
+        most = fmax@f@(most, fabs@f@(gap[i]) * @name@_scale(side, i, 0));
     }
     return most;
 }
@@ -53,17 +54,17 @@ static inline @number@ @name@_gap(const @number@ to[@n@], const @name@_point *p,
 static inline int @name@_solved(const @name@_point *p, int side, int transposed, @number@ least,
     const @number@ b[@n@], @number@ x[@n@])
 {
-    @number@ a[@n@][@n@ + 1], most = @one@, t;
+    @number@ a[@n@][@n@ + 1], most = 1, t;
     int i, j, k, best, sign = 1;
     for (i = 0; i < @n@; i++) {
         for (j = 0; j < @n@; j++) {
-            a[i][j] = transposed ? p->rate[side > 0][j][i] / @name@_scale(side, j, 0)
-                : p->rate[side > 0][i][j] / @name@_scale(side, i, 0);
+            a[i][j] = transposed ? p->rate[side > 0][j][i] * @name@_scale(side, j, 0)
+                : p->rate[side > 0][i][j] * @name@_scale(side, i, 0);
             if (!isfinite(a[i][j]))
                 return 0;
             most = fmax@f@(most, fabs@f@(a[i][j]));
         }
-        a[i][@n@] = transposed ? b[i] : b[i] / @name@_scale(side, i, 0);
+        a[i][@n@] = transposed ? b[i] : b[i] * @name@_scale(side, i, 0);
     }
     for (k = 0; k < @n@; k++) {
         for (best = k, i = k + 1; i < @n@; i++)
@@ -75,7 +76,7 @@ static inline int @name@_solved(const @name@_point *p, int side, int transposed,
             a[k][j] = a[best][j];
             a[best][j] = t;
         }
-        sign = (best == k) == (a[k][k] > @zero@) ? sign : -sign;
+        sign = (best == k) == (a[k][k] > 0) ? sign : -sign;
         for (i = k + 1; i < @n@; i++)
             for (t = a[i][k] / a[k][k], j = k; j <= @n@; j++)
                 a[i][j] -= t * a[k][j];
@@ -86,50 +87,68 @@ static inline int @name@_solved(const @name@_point *p, int side, int transposed,
         x[i] /= a[i][i];
     }
     for (i = 0; i < @n@; i++) {
-        x[i] /= transposed ? @name@_scale(side, i, 0) : @one@;
+        x[i] *= transposed ? @name@_scale(side, i, 0) : 1;
         if (!isfinite(x[i]))
             return 0;
     }
     return sign;
 }
 
-/* Newton steps from inputs q to positions; each comes nearer, and stays on
-   its side of singular poses. Returns 0, with q anywhere, where they do not get there. */
-static inline int @name@_reached(@given@int side, int (*at)(@types@const @number@ *, @name@_point *),
-    int steps, const @number@ position[@n@], @number@ q[@n@], @name@_point *p)
+@within@
+/* Newton's method from inputs q to positions: each step comes nearer, and stays on its side of
+   singular poses. Returns 0, with any q, if it does not converge; -1 if it is strict and q misses
+   by so much that it belongs to another assembly. */
+static inline int @name@_reached(@given@int side, int (*at)(@types@const @number@ *, int, @name@_point *),
+    int steps, int is_strict, const @number@ position[@n@], @number@ q[@n@], @name@_point *p)
 {
     @name@_point next;
-    @number@ gap[@n@], x[@n@] = { @zero@ }, y[@n@] = { @zero@ }, to[@n@], share = @one@, longest, left, now;
-    @number@ steepest = @one@;
+    @number@ gap[@n@], x[@n@] = { 0 }, y[@n@] = { 0 }, to[@n@], share = 1, longest, left, now;
+    @number@ steepest = 1;
     int i, j, sign, other = 0;
-    if (!at(@pass@q, p))
+    if (!at(@pass@q, side < 2, p)@clamped@)
         return 0;
     left = @name@_gap(position, p, side, gap);
+    if (left <= @enough@)
+        return 1;
+    if (is_strict && left > @other@)
+        return -1;
+    if (side > 1 && !at(@pass@q, 1, p))
+        return 0;
     sign = @name@_solved(p, side, 0, @least@, gap, x);
     while (--steps > 0 && sign && left > @enough@ && share > @finest@) {
-        for (longest = @one@, i = 0; i < @n@; i++)
+        for (longest = 1, i = 0; i < @n@; i++)
             longest = fmax@f@(longest, fabs@f@(x[i]) / @longest@);
         for (i = 0; i < @n@; i++)
             to[i] = q[i] + share / longest * x[i];
-        now = at(@pass@to, &next) ? @name@_gap(position, &next, side, gap) : left;
+        now = at(@pass@to, 1, &next) ? @name@_gap(position, &next, side, gap) : left;
         if (now < left)
             other = @name@_solved(&next, side, 0, @least@, gap, y);
         if (now < left && (other == sign || now <= @close@)) {
             *p = next;
             left = now;
             sign = other;
-            share = @one@;
+            share = 1;
             for (i = 0; i < @n@; i++) {
                 q[i] = to[i];
                 x[i] = y[i];
             }
         } else
-            share = left <= @close@ ? @zero@ : @half@ * share;
+            share = left <= @close@ ? 0 : @half@ * share;
     }
     for (i = 0; i < @n@; i++)
         for (j = 0; j < @n@; j++)
-            steepest = fmax@f@(steepest, fabs@f@(p->rate[side > 0][i][j]) / @name@_scale(side, i, 0));
-    return left <= @close@ * steepest;
+            steepest = fmax@f@(steepest, fabs@f@(p->rate[side > 0][i][j]) * @name@_scale(side, i, 0));
+    return left <= @other@ && left <= @close@ * steepest;
+}
+
+/* How far inputs are from others. */
+static inline @number@ @name@_away(const @number@ q[@n@], const @number@ near[@n@])
+{
+    @number@ sum = fabs@f@(q[0] - near[0]);
+    int i;
+    for (i = 1; i < @n@; i++)
+        sum += fabs@f@(q[i] - near[i]);
+    return sum;
 }
 
 /* Whether inputs are within the sweeps that are set. */
@@ -144,27 +163,27 @@ static inline int @name@_inside(const @number@ q[@n@])
 }
 
 @inverses@
-/* Inputs all over their ways for i = 1, 2, ...; for 0 where they start. */
+/* Sample i of the inputs, all over their ranges; 0 is where they start. */
 static inline void @name@_sample(long i, @number@ q[@n@])
 {
-    static const @number@ way[@n@][4] = { @ways@ };
+    static const @number@ range[@n@][4] = { @ranges@ };
     int k;
     for (k = 0; k < @n@; k++) {
-        const @number@ x = way[k][3] * (@number@)i;
-        q[k] = i ? way[k][1] + way[k][2] * (x - floor@f@(x)) : way[k][0];
+        const @number@ x = range[k][3] * (@number@)i;
+        q[k] = i ? range[k][1] + range[k][2] * (x - floor@f@(x)) : range[k][0];
     }
 }
 
-/* Forget all that was, and find a pose to start from; returns 0 if there is none. */
+/* Initialize the memory and find a first pose; returns 0 if there is none. */
 static inline int @name@_begin(@given@@name@_memory *m)
 {
-    static const @name@_side none = { { @zero@ }, { @zero@ }, { @zero@ } };
+    static const @name@_side none = { { 0 }, { 0 }, { 0 } };
     int i;
     m->is_known[0] = m->is_known[1] = m->is_held[0] = m->is_held[1] = 0;
     m->held[0] = m->held[1] = none;
     for (i = 0; i < @samples@; i++) {
         @name@_sample(i, m->input[1]);
-        if (@name@_at(@pass@m->input[1], &m->point[1]))
+        if (@name@_at(@pass@m->input[1], 1, &m->point[1]))
             return 1;
     }
     return 0;
@@ -176,7 +195,7 @@ static inline int @name@_transmit(@given@@name@_memory *m, int side, const @name
     @name@_side *held = &m->held[other];
     @name@_point found;
     const @name@_point *at;
-    @number@ q[@n@], x[@n@], y[@n@] = { @zero@ };
+    @number@ q[@n@], x[@n@], y[@n@] = { 0 };
     int i, j, status = @N@_OK, all;
     for (i = 0; i < @n@; i++) {
         q[i] = m->input[!m->is_known[0]][i];
@@ -185,11 +204,9 @@ static inline int @name@_transmit(@given@@name@_memory *m, int side, const @name
     if (status == @N@_OK && !(side ? @name@_from_joints(@pass@from->position, q, &found)
             : @name@_from_actuators(@pass@from->position, q, &found)))
         status = @N@_OUT_OF_REACH;
-    /* A command stays within the sweep that is set; a measurement is what it is. */
+    /* Only a command has to be in the sweep: a measurement may be outside. */
     if (status == @N@_OK && side && !@name@_inside(q))
         status = @N@_OUT_OF_REACH;
-    for (i = 0; status == @N@_OK && i < @n@; i++)
-        status = isfinite(found.position[other][i]) ? @N@_OK : @N@_OUT_OF_REACH;
     if (status == @N@_OK) {
         m->point[side] = found;
         for (i = 0; i < @n@; i++) {
@@ -202,7 +219,7 @@ static inline int @name@_transmit(@given@@name@_memory *m, int side, const @name
         m->is_known[1] = 0;
     all = status;
 
-    /* Velocities at the pose that is asked for, or else where it is; what is held stands still. */
+    /* Velocities at the requested pose, else at the last one; a held position has velocity 0. */
     at = &m->point[m->is_known[side] ? side : other];
     if (status == @N@_NOT_KNOWN && (m->is_known[0] || m->is_known[1]))
         status = @N@_OK;
@@ -216,10 +233,10 @@ static inline int @name@_transmit(@given@@name@_memory *m, int side, const @name
     for (i = 0; i < @n@; i++)
         status |= isfinite(y[i]) ? @N@_OK : @N@_SINGULAR;
     for (i = 0; i < @n@; i++)
-        held->velocity[i] = status == @N@_OK ? y[i] : @zero@;
+        held->velocity[i] = status == @N@_OK ? y[i] : 0;
     all |= status;
 
-    /* Efforts where the actuators are: power in is power out, but for what the loads take. */
+    /* Efforts at the actuators' pose: their power is that of the joints, less that of the loads. */
     at = &m->point[m->is_known[0] ? 0 : 1];
     status = m->is_known[0] || m->is_known[1] ? @N@_OK : @N@_NOT_KNOWN;
     for (i = 0; status == @N@_OK && i < @n@; i++) {
@@ -239,14 +256,14 @@ static inline int @name@_transmit(@given@@name@_memory *m, int side, const @name
     return all | status;
 }
 
-/* From the actuators' positions, velocities and efforts to the joints'. Returns a status; what it
-   is not OK about is held: positions and efforts as they were last, velocities at zero. */
+/* From the actuators' positions, velocities and efforts to the joints'. Returns a status: where it
+   is not OK, positions and efforts are the last valid ones, and velocities 0. */
 static inline int @name@_actuators_to_joints(@given@@name@_memory *m, const @name@_actuators *from, @name@_joints *to)
 {
     return @name@_transmit(@pass@m, 0, from, to);
 }
 
-/* The same from the joints to the actuators, which go to the answer nearest to where they are. */
+/* The same from the joints to the actuators, to the inputs nearest to the last ones. */
 static inline int @name@_joints_to_actuators(@given@@name@_memory *m, const @name@_joints *from, @name@_actuators *to)
 {
     return @name@_transmit(@pass@m, 1, from, to);

@@ -1,0 +1,353 @@
+# Copyright 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Planar loops of a robot as mechanisms of a scene, compared with the robot.
+
+The lines of a mechanism have its inputs first, then its dyads.
+"""
+
+from __future__ import annotations
+
+from cmath import phase
+from itertools import combinations
+import math
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+
+import numpy as np
+
+from . import check, loops
+from .robot import Joint, plain, Robot, SLIDE
+from .. import mechanisms, scene
+from ..linkage.dyads import bar_name, Dyads, Hinge, Motor, Pin, ROUNDING, short, Slide
+from ..linkage.mechanism import Mechanism
+from ..robot_model.bodies import coordinates
+from ..scene.joint_names import quoted_name
+
+# The most joints of which pairs are tried as motors.
+MANY = 30
+_OTHER = {'left': 'right', 'right': 'left', 'out': 'in', 'in': 'out'}
+
+
+class Source(NamedTuple):
+    """An input: ratio * position + offset of its source; `ends` are the limits of its joint."""
+
+    name: str
+    source: str
+    ratio: float
+    offset: float
+    value: float
+    ends: Optional[Tuple[float, ...]]
+
+
+class Drawing(Dyads):
+    """
+    Joint lines of a planar loop, with the lengths of its bodies.
+
+    Attributes
+    ----------
+    drives : list of Source
+        The inputs.
+    driven : list of Joint
+        The joints of the inputs.
+    measured : Joint, optional
+        The motor between two moving links that measures the input.
+
+    """
+
+    def __init__(self, robot: Robot, loop: loops.Loop, drives: Sequence[str]):
+        self.loop, self._robot = loop, robot
+        self.drives: List[Source] = []
+        self.measured: Optional[Joint] = None
+        self.driven = [joint for joint in loop.joints if joint.name in drives]
+        pins: List[Dict[str, complex]] = []
+        for joint in loop.joints:
+            pin = dict(zip(joint.bodies, joint.places))
+            same = [other for other in pins if any(
+                abs(other[body] - pin[body]) < loop.near for body in other.keys() & pin.keys())]
+            if joint.kind != SLIDE:
+                pins = [other for other in pins if other not in same]
+                pins.append({body: place for each in (*same, pin)
+                             for body, place in each.items()})
+        moved: List[Motor] = [
+            Slide(joint.bodies, (joint.places[1] - joint.axis * joint.start,
+                                 joint.places[1]), (joint.axis, joint.axis), joint)
+            if joint.kind == SLIDE else
+            Hinge(joint.bodies, joint.places, joint.axis, -joint.axis * joint.start,
+                  joint) for joint in loop.joints]
+        super().__init__(
+            loop.ground, [body for joint in loop.joints for body in joint.bodies], pins,
+            [each for each in moved if isinstance(each, Slide) and each.joint not in self.driven],
+            [each for each in moved if each.joint in self.driven], loop.size, loop.near)
+        self.take_apart()
+
+    @property
+    def moved_by(self) -> List[Joint]:
+        """Return the motors: the one between two moving links, if there is one."""
+        return [self.measured] if self.measured else self.driven
+
+    @property
+    def allowed(self) -> float:
+        """Allowed distance of a pose from the file's, of the size."""
+        return max(ROUNDING, 30.0 * self.loop.gap / self.loop.size + self.loop.lean)
+
+    @property
+    def places(self) -> Iterator[Pin]:
+        """The places of the lines' joints in the pose of the file, on each of their bodies."""
+        return (pin for body in self.parts for pin in self.on[body].items())
+
+    @property
+    def linkage(self) -> Mechanism:
+        """The linkage of the lines."""
+        return mechanisms.create('custom', joints=self.lines)
+
+    def apart(self, linkage: Mechanism, *names: str) -> float:
+        """Return the largest distance of joints from the file's pose, of the linkage's size."""
+        values = [drive.value for drive in self.drives]
+        places = linkage.solve(values if len(values) > 1 else values[0])
+        return float(np.max([abs(complex(*places[name]) - place) for name, place in self.places
+                             if name in (names or places)])) / self.loop.size
+
+    @property
+    def ends(self) -> Dict[str, Tuple[float, float]]:
+        """The range of each source in a check [rad or m]."""
+        if joint := self.measured:
+            start = joint.start
+            return {joint.name: joint.limits or (start - 0.5 * math.pi, start + 0.5 * math.pi)}
+        found: Dict[str, Tuple[float, float]] = {}
+        for drive in self.drives:
+            around = math.pi if drive.name[:5] == 'crank' else 0.5 * self.loop.size
+            low, high = drive.value - around, drive.value + around
+            if drive.ends:
+                low, high = max(drive.ends[0], low - around), min(drive.ends[1], high + around)
+                low, high = (low, high) if low < high else drive.ends
+            low, high = sorted((end - drive.offset) / drive.ratio for end in (low, high))
+            found[drive.source] = low, high
+        return found
+
+    @property
+    def holders(self) -> List[Joint]:
+        """The joints of bodies that are left."""
+        return [joint for joint in self.loop.joints if {*joint.bodies} & {*self.left}]
+
+    @property
+    def freedom(self) -> int:
+        """The degrees of freedom of the bodies that are left."""
+        return 3 * len(self.left) - 2 * len(self.holders) - sum(
+            joint in self.driven for joint in self.holders)
+
+    def measured_by(self, joint: Joint) -> Optional[Tuple[str, float, float]]:
+        """Return the link whose angle is a joint's position, with sign and position, if any."""
+        if not self.parts.keys() >= {*joint.bodies}:
+            return None
+        parent, child = joint.bodies
+        if joint.kind == SLIDE:
+            block = child if self.parts[child].slide is joint else parent
+            part = self.parts[block]
+            sign = math.copysign(1.0, (part.along / joint.motion(block)).real)
+            way = (self.on[block][part.joint] - part.start) / part.along
+            return (part.link, sign, way.real) if part.slide is joint else None
+        pin = self.joint_at(child, joint.places[1]) or ''
+        base, body = (parent, child) if self.home[pin] == parent else (child, parent)
+        if self.home[pin] != base:
+            return None
+        link, hangs, along, slide, _ = self.parts[body]
+        if hangs != pin or slide:
+            # The angle of a triangle on this link is the angle between the two links.
+            try:
+                start, (other, end) = self.on[body][pin], self.other(body, pin)
+            except ValueError:
+                # No word places a second joint on this block or barrel.
+                return None
+            along = (end - start) * complex(0.5, 0.75 ** 0.5)
+            side = self.length_text(abs(end - start))
+            tip = self.name(start + along, body, f'dyad {pin} {other} {side} {side} left')
+            link = bar_name(pin, tip)
+        return link, joint.motion(body), phase(along / self.parts[base].along)
+
+    def drive(self, word: str, joint: Joint, ratio: float, offset: float) -> Tuple[str, str]:
+        """Add an input, as `Dyads` requires; inputs of one source are geared to the first."""
+        source, factor, start = self._robot.source(joint.name)
+        ends = joint.limits and tuple(sorted(ratio * limit + offset for limit in joint.limits))
+        ratio, offset, number = ratio * factor, offset + ratio * start, self.number(word)
+        for other in self.drives:
+            if other.source == source and (word == 'crank') == (other.name[:5] == 'crank'):
+                gear = ratio / other.ratio
+                offset -= gear * other.offset
+                angle_or_length = self.length_text(offset) if word != 'crank' else short(
+                    math.remainder(offset, math.tau))
+                return number, f' geared {other.name} {gear!r} {angle_or_length}'
+        self.drives.append(Source(word + number, source, ratio, offset, ratio * (
+            self._robot.positions.get(source) or 0.0) + offset, ends))
+        return number, ''
+
+    def position(self, joint: Joint) -> float:
+        """Return the position of a joint's motor in the file."""
+        return joint.start
+
+    def special_line(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
+        """Return the start of a line for bars that mirror others, and so pass dead points."""
+        (first, start), (second, end) = one, two
+        for corner, at in self.places:
+            links = [{body for body in self.parts
+                      if {corner, name} <= self.on[body].keys()} for name in (first, second)]
+            if corner in (first, second) or not all(links) or links[0] == links[1]:
+                continue
+            opposite, along = start + end - at, end - start
+            kite, crossed = (start + along * ((each - start) / along).conjugate()
+                             for each in (at, opposite))
+            for word, seen in (('parallelogram', opposite), ('mirror', kite),
+                               ('antiparallelogram', crossed)):
+                if max(abs(seen - place), abs(seen - other)) < self.loop.near < abs(at - place):
+                    return f'{word} {corner} {first} {second}'
+        return None
+
+
+class NotPlaced(ValueError):
+    """Why bodies are not placed."""
+
+    def __init__(self, drawing: Drawing):
+        super().__init__(_why(drawing))
+        self.bodies = drawing.left
+
+
+def described(robot: Robot, group: loops.Group, others: Sequence[str]
+              ) -> Tuple[str, Dict[str, Any], List[str]]:
+    """
+    Return a mechanism's name, its parameters, and its report.
+
+    Raises ValueError for loops that are no dyads, or whose poses are others than the robot's.
+    """
+    drawing = _drawn(robot, group)
+    name = plain(drawing.moved_by[0].name, 60)
+    name = f'{name}_{len(others)}' if name in others else name
+    loop, given = drawing.loop, {
+        f'{name}.{key}': value for key, value in _parameters(drawing)}
+    machine = scene.read({'mechanisms': [name], **given}).machines[name]
+    if not any(called.published for called in machine.joints.values()):
+        raise NotPlaced(drawing)
+    for drive in drawing.drives:
+        start = f'{name}.{drive.name}.start'
+        if sweep := None if drawing.measured else _sweep(drive, machine.inputs[drive.name]):
+            given[f'{name}.{drive.name}.sweep'] = [*sweep]
+            given[start] = min(max(given[start], sweep[0]), sweep[1])
+    machine = scene.read({'mechanisms': [name], **given}).machines[name]
+    if drawing.apart(machine.linkage) > drawing.allowed:
+        raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
+    report = check.compared(robot, machine, [joint.name for joint in drawing.moved_by],
+                            drawing.ends, loop.lean + loop.gap / loop.size)
+    said = [f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.'] if drawing.left else []
+    said.append(report)
+    said += [f'{joint} has its ends {gap:.2g} m apart along its axis, on which no angle depends.'
+             for joint, gap in loop.across.items()]
+    published = {called.name for called in machine.joints.values() if called.published}
+    published |= {joint.name for joint in drawing.moved_by}
+    own = {one.name for joint in loop.joints if drawing.parts.keys() >= {*joint.bodies}
+           for one in joint.hinges}
+    if lost := [joint for joint in robot.positions if joint in own - published]:
+        said.append(f'Not published: {", ".join(lost)}, which no angle in the plane tells.')
+    return name, given, said
+
+
+def _drawn(robot: Robot, group: loops.Group) -> Drawing:
+    """Return the lines of loops, with the inputs that place the most bodies."""
+    names = [joint.name for joint in group.joints if joint.position is not None]
+    motors = [name for name in names if name in robot.driven]
+    tries: List[Sequence[str]] = [motors, [name for name in names
+                                           if name in motors or name in robot.follows]]
+    if not robot.driven:
+        tries += (pair for count in (1, 2)[:1 + (len(names) <= MANY)]
+                  for pair in combinations(names, count))
+    drawings: List[Drawing] = []
+    for drives in tries:
+        loop = loops.flat(robot, group, drives)
+        drawings.append(Drawing(robot, loop, drives))
+        if not drawings[-1].left:
+            break
+    best = min(drawings, key=lambda drawing: len(drawing.left))
+    if best.left and len(motors) == 1 and all(
+            group.ground not in joint.bodies for joint in group.joints if joint.name == motors[0]):
+        # A link on the ground drives, and the motor between two moving links measures it.
+        for joint in group.joints:
+            if group.ground in joint.bodies and joint.position is not None:
+                other = Drawing(robot, loops.flat(robot, group, [joint.name]), [joint.name])
+                if (not other.left or other.freedom < 0) and [
+                        each.source for each in other.drives] == [joint.name]:
+                    other.measured = next(each for each in other.loop.joints
+                                          if each.name == motors[0])
+                    return other
+    if not best.drives:
+        raise NotPlaced(best) if best.left else ValueError('no motor moves it')
+    for i, line in enumerate(best.lines):
+        # At a change point the side in this pose may be the wrong one.
+        name, *_, side = line.split()
+        if side in _OTHER and not best.apart(best.linkage, name) < best.allowed:
+            best.lines[i] = line[:-len(side)] + _OTHER[side]
+    return best
+
+
+def _why(drawing: Drawing) -> str:
+    """Return why bodies are left."""
+    free, held = drawing.freedom, drawing.holders
+    names = ', '.join(joint.name for joint in held if joint.position is not None)
+    between = [joint.name for joint in held if joint in drawing.driven
+               and {*joint.bodies} <= {*drawing.left}]
+    if between and free <= 0:
+        return f'not of dyads, as {", ".join(between)} drives between two of them'
+    return f'not driven: {free} more of {names} must be, named by --driven' if free > 0 else (
+        'not of dyads: all of them hold each other, as on a platform on three bars'
+        if free == 0 else f'held more than once by {names}')
+
+
+def _sweep(drive: Source, read: scene.InputSettings) -> Optional[Tuple[float, float]]:
+    """Return the limits of an input: those of its joint, within its reach."""
+    if drive.ends is None:
+        return None
+    low, high = (float(short(end, 1e-15)) for end in drive.ends)
+    for start, end in () if read.input.is_whole(read.reach) else read.reach:
+        turns = math.tau * math.floor((drive.value - start) / math.tau) * read.input.turns
+        if start + turns <= drive.value <= end + turns:
+            # An end that is a dead point is not quite reached.
+            edge = ROUNDING * (end - start)
+            low, high = max(low, start + turns + edge), min(high, end + turns - edge)
+    return (low, high) if low + 1e-6 * read.input.size < high else None
+
+
+def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
+    seen = [(joint, found) for joint in drawing.loop.joints if joint.position is not None
+            and joint not in drawing.moved_by and joint not in drawing.driven
+            and (found := drawing.measured_by(joint))]
+    measured = drawing.measured and drawing.measured_by(drawing.measured)
+    yield 'type', 'custom'
+    yield 'joints', drawing.lines
+    yield 'frame_id', drawing.loop.frame_id
+    yield 'pose', [float(short(value)) for value in coordinates(drawing.loop.frame)]
+    links = {link.name: link for link in drawing.linkage.links}
+    names = []
+
+    def zero_of(joint: Joint, link: str, sign: float, angle: float) -> float:
+        if links[link].kind != 'prismatic':
+            angle = math.remainder(angle - float(np.asarray(links[link].zero)), math.tau)
+        return float(short(joint.start - sign * angle))
+
+    for drive in drawing.drives:
+        source, ratio, offset = drive.source, drive.ratio, float(short(drive.offset))
+        if measured and drawing.measured:
+            names.append(_line(drive.name, ratio, source, -ratio * offset))
+            link, ratio, angle = measured
+            source, offset = drawing.measured.name, -ratio * zero_of(
+                drawing.measured, link, ratio, angle)
+            yield f'{drive.name}.measures', link
+        yield f'{drive.name}.source', source
+        yield f'{drive.name}.ratio', ratio
+        yield f'{drive.name}.offset', offset
+        yield f'{drive.name}.start', float(short(drive.value, 1e-15))
+    names += [_line(found[0], found[1], joint.name, zero_of(joint, *found))
+              for joint, found in seen]
+    yield 'joint_names', names
+    yield 'only_named', True
+
+
+def _line(link: str, sign: float, name: str, zero: float) -> str:
+    """Return how a link is published, for joint_names."""
+    return f'{link}={"-" * (sign < 0.0)}{quoted_name(name)}' + (f'{zero:+}' if zero else '')
