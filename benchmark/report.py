@@ -62,10 +62,10 @@ from the preceding pose, at most two degrees away."""
 CHOICE = """\
 Each picture shows linkage_ros in its forms (single poses by `function()`), the fastest C, and one
 method for each kind of peer: formulas, compilers, tables, root finders, programs for linkages and
-sketches, robot libraries and simulators. The method is the fastest at 1000 poses among those that
-are correct, except for the last three digits, at 99 of 100 angles; if there is none, the one with
-the fewest failures. A curve in the lower panel is one method over its setting: nodes, iterations,
-tolerance. A share of wrong poses is given after the method's name."""
+sketches, robot libraries and simulators. Of each kind, the fastest at 1000 poses is shown whose
+result agrees, but for the last three digits, at 99 % of the angles or more; if none does, the one
+with the fewest failures. A curve in the lower panel is one method over its setting: nodes,
+iterations, tolerance. A share of wrong poses is given after the method's name."""
 
 
 def table(result, kind):
@@ -214,13 +214,13 @@ def targets(result):
     step = jansen.get(('pylinkage', 'step()'))
     for ours in (FLOATS, OURS):
         if ours in jansen and step:
-            lines.append(_aim(f"Jansen leg, one pose, all points: {ours[1]} / pylinkage's step",
+            lines.append(_aim(f"Jansen leg, one pose, all joints: {ours[1]} / pylinkage's step",
                               jansen[ours][1], step[1], 0.2))
     for point in 'GC':
         part = jansen.get((OURS[0], f'{point} alone'))
         for batch, ours in ((1, FLOATS), (BATCHES[-1], OURS)):
             if part:
-                lines.append(_aim(f'Jansen leg, {_poses(batch)}: {point} alone / all points',
+                lines.append(_aim(f'Jansen leg, {_poses(batch)}: joint {point} only / all joints',
                                   part[batch], jansen[ours][batch], 1.0))
     for kind, title in TITLES.items():
         found = methods(result, kind)

@@ -55,6 +55,17 @@ class Driver:
         return self._graph.set(self.node, **values)
 
 
+def test_a_crank_with_one_change_point_a_turn_counts_two_turns(graph):
+    # After one turn the linkage is on its other branch: there 0 would be another pose.
+    driver = Driver(graph, {
+        'mechanisms': ['bar'], 'bar.type': 'four_bar', 'bar.crank.speed': 1.0,
+        'use_sim_time': True, **{f'bar.dimensions.{name}': length for name, length in zip(
+            'abcd', (1.0, 2.0, 3.0, 4.0))}})
+    driver.at(SECOND)
+    assert driver.at(8 * SECOND) == pytest.approx((7.0, 1.0))
+    assert driver.at(14 * SECOND) == pytest.approx((13.0 - 4.0 * math.pi, 1.0))
+
+
 def test_all_cranks_of_the_catalogue_turn_on_system_time(graph):
     graph.start(CrankDriver, {'rate': 500.0})
     heard = graph.listen(JointState, 'crank_states')

@@ -9,7 +9,7 @@ What the nodes cost, next to what any node costs, in the same run.
     python -m benchmark.nodes services changes   these pieces alone, in full or --quick
     python -m benchmark.nodes --tables           the tables of the last results
 
-Everything takes some 70 minutes, first with machine code, then without llvmlite. `--missing`
+Everything takes 100 minutes at most, first with machine code, then without llvmlite. `--missing`
 stops before ten minutes are over and ends with 3 while something is left: call it again. The
 pieces are those of `piece.py`. Results go to benchmark/results/nodes.json, those of a look to
 benchmark/.cache/; the tables are printed, and written into docs/performance.md by --document.

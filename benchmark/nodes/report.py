@@ -121,8 +121,12 @@ def _measured_on(result):
     commits, dates = (', '.join(sorted({piece['machine'][key] for piece in pieces}))
                       for key in ('commit', 'date'))
     return (f'{dates}, {machine["cpu"]}, {pieces[-1]["cores"]} cores, load {min(loads):.1f} to '
-            f'{max(loads):.1f}; Python {machine["python"]}, {packages}; commit {commits}. The '
-            f'runs took {sum(piece["seconds"] for piece in pieces) / 60:.0f} minutes.')
+            f'{max(loads):.1f}; Python {machine["python"]}, {packages}; commit {commits}.\n\n'
+            'Times are medians over the rounds. A ratio is the median over the rounds of the '
+            'ratio within a round, so it may differ from the quotient of the two times beside it. '
+            'Rows without llvmlite are of runs of their own, and their ratios are to the floor of '
+            'these. The pieces ran at different times, so the time of one thing differs from '
+            'table to table.')
 
 
 def table(head, rows):
@@ -222,7 +226,7 @@ def change_targets(rows):
     # Not of the requests that come in a heap: each of them is a change.
     longest = max((row for row in rows if row['kind'] not in ('none', '100 requests')),
                   key=lambda row: row['gap'])
-    lines = [[f'longest gap around a change, median ({longest["kind"]})', f'<= {GAP:.0f} ms',
+    lines = [[f'longest gap around one request, median ({longest["kind"]})', f'<= {GAP:.0f} ms',
               f'{longest["gap"]:.1f} ms', met(longest['gap'], GAP)]]
     return lines + [['a hundred sets in one request', f'<= {HUNDRED:.0f} ms',
                      f'{row["answered"]:.1f} ms', met(row['answered'], HUNDRED)]
@@ -444,7 +448,8 @@ def stream(result):
 def changes(result):
     """Return how long poses are held up by a change."""
     return ('12 legs at 500 Hz: the longest time between two poses around a change, its median '
-            'and the longest, and when the change was answered [ms].\n\n' + table(
+            'and the longest, and when the change was answered [ms]. A hundred requests are a '
+            'hundred changes, for which there is no target.\n\n' + table(
                 ['change', 'node', 'gap', 'longest', 'answered after'],
                 [[row['kind'], column, *(f'{row[name]:.1f}'
                                          for name in ('gap', 'longest', 'answered'))]

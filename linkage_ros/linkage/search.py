@@ -128,6 +128,7 @@ class StepSearch:
     """Outputs as functions of several inputs, all of them counted in their sizes inside."""
 
     def __init__(self, linkage: Mechanism, outputs: Names, turns: Sequence[float]):
+        self._linkage = linkage
         self.outputs, self.inputs = outputs, [input_.counted() for input_ in linkage.inputs]
         self.sizes = np.array([input_.size for input_ in linkage.inputs])
         # The period of each output; outputs that are inputs, by their numbers in both.
@@ -155,8 +156,11 @@ class StepSearch:
         found = np.array([start] if np.isfinite(values).all() else []).reshape(-1, len(start))
         for rows, columns in self.blocks:
             if not self._given.keys() >= {*rows}:
+                # With all others fixed, the first input is searched as if it were the only one.
+                solutions = self._on_branches if columns == [0] and len(self._given) + 1 == len(
+                    values) else self.solutions
                 found = np.concatenate([found[:0], *(
-                    self.solutions(q, values, rows, columns) for q in found)])
+                    solutions(q, values, rows, columns) for q in found)])
         inputs = found * self.sizes
         return np.asarray(inputs[self._are_assembled(inputs)])
 
@@ -182,6 +186,15 @@ class StepSearch:
         missed[:, whole] -= self._turns[whole] * np.round(missed[:, whole] / self._turns[whole])
         jacobian = rows[n:].reshape(n, n, rows.shape[1]).transpose(2, 1, 0)
         return missed / self.scale, jacobian * self.sizes / self.scale[:, None]
+
+    def _on_branches(self, q: np.ndarray, target: np.ndarray, rows: List[int], _: List[int]
+                     ) -> np.ndarray:
+        """Return what `solutions` does if the first input alone is unknown."""
+        branches = Analysis(self._linkage, (q * self.sizes)[1:].tolist()).branches(
+            self.outputs[rows[0]])
+        first = self.inputs[0].wrapped(branches.answers(target[rows]).ravel())
+        first = first[np.isfinite(first)]
+        return np.column_stack([first, np.tile(q[1:], (len(first), 1))])
 
     def solutions(self, q: np.ndarray, target: np.ndarray, rows: List[int],
                   columns: List[int]) -> np.ndarray:
