@@ -5,7 +5,7 @@
 Run a scene's nodes, listen to them from outside, check what they sent, and draw it.
 
 Ends with an error if anything is missing, if a bar's length is off, or if a node does not end
-well when it is interrupted.
+well when it is terminated.
 """
 
 import math
@@ -17,9 +17,9 @@ HERE = Path(__file__).parent
 
 try:
     from domains import Domain
-    from linkage_ros import scene
+    from linkage_ros import command, scene
     from linkage_ros.render import files
-    from linkage_ros.render.parts import USUAL, USUAL_IN_MOTION
+    from linkage_ros.render.parts import DEFAULT, DEFAULT_IN_MOTION
     from linkage_ros.render.picture import Picture
     from listener import Listener
     from motion import lever_error, Motion
@@ -51,19 +51,20 @@ def main() -> int:
     """Run the demo; return the exit code of the process."""
     # However it ends, no node is left behind.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    return command.run('demo', lambda _: show(), None, '`make demo` installs it')
+
+
+def show():
+    """Observe the nodes, report and draw; raise DemoError if something is wrong."""
+    machines = list(scene.load(SCENE).machines.values())
     try:
-        machines = list(scene.load(SCENE).machines.values())
         motions, answer = observe(machines)
-        report_motions(motions)
-        report_answer(next(m for m in machines if m.linkage.type == 'slotted_lever'), answer)
-        draw(motions)
-        print(NEXT)
-    except (DemoError, RuntimeError) as error:
-        print(f'demo: {error}', file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        return 130
-    return 0
+    except RuntimeError as error:
+        raise DemoError(error) from None
+    report_motions(motions)
+    report_answer(next(m for m in machines if m.linkage.type == 'slotted_lever'), answer)
+    draw(motions)
+    print(NEXT)
 
 
 def observe(machines):
@@ -78,7 +79,7 @@ def observe(machines):
         answer = listener.servo_angles([math.radians(angle) for angle in LEVER_ANGLES])
         for name, code in nodes.stop().items():
             if code != 0:
-                raise DemoError(f'{name} ended with exit code {code} when it was interrupted')
+                raise DemoError(f'{name} ended with exit code {code} when it was terminated')
     return [Motion(machine, listener.joint_states[machine.name], listener.markers[machine.name],
                    listener.locus[machine.name][-1]) for machine in machines], answer
 
@@ -122,7 +123,7 @@ def draw(motions):
     OUT.mkdir(exist_ok=True)
     print(f'\nDrawing what they sent to {OUT} ...', flush=True)
     for motion in motions:
-        picture = Picture([motion.machine], PORTRAIT_SIZE, 'whole', USUAL, [motion])
+        picture = Picture([motion.machine], PORTRAIT_SIZE, 'whole', DEFAULT, [motion])
         shown_at = motion.turns_to(PORTRAIT_ANGLE)
         picture.arrange([shown_at])
         files.still(picture, shown_at, OUT / f'{motion.machine.name}.png')
@@ -130,7 +131,7 @@ def draw(motions):
     for motion in motions:
         motion.start = max(other.times[0] for other in motions)
     picture = Picture([motion.machine for motion in motions], ANIMATION_SIZE, 'whole',
-                      USUAL_IN_MOTION - {'axes'}, motions)
+                      DEFAULT_IN_MOTION - {'axes'}, motions)
     times = np.arange(0.0, ANIMATED_SECONDS, 1.0 / FRAMES_PER_SECOND) / picture.period
     picture.arrange(times)
     files.gif(picture, times, FRAMES_PER_SECOND, 0, COLOURS, OUT / 'all.gif', iter)

@@ -9,12 +9,13 @@ import signal
 import subprocess
 
 from ament_index_python.packages import get_package_prefix, PackageNotFoundError
+from linkage_ros.command import RequestError
 
 EXECUTABLES = ('crank_driver', 'kinematics', 'servo_inverse')
 SECONDS_TO_END = 10.0
 
 
-class DemoError(Exception):
+class DemoError(RequestError):
     """What is missing or went wrong, in one sentence."""
 
 
@@ -56,9 +57,10 @@ class Nodes:
                 raise DemoError(f'{name} died with exit code {process.returncode}')
 
     def stop(self) -> dict:
-        """Interrupt the nodes that still run; return the exit code of each."""
+        """End the nodes that still run; return the exit code of each."""
         for process in self._processes.values():
-            process.send_signal(signal.SIGINT)
+            # A Python that just starts would answer SIGINT with a traceback.
+            process.send_signal(signal.SIGTERM)
         for process in self._processes.values():
             try:
                 process.wait(SECONDS_TO_END)

@@ -15,7 +15,7 @@ import time
 
 try:
     from domains import Domain
-    from linkage_ros import scene
+    from linkage_ros import command, scene
     from nodes import DemoError, Nodes
 except ImportError as error:
     sys.exit(f'view: {error}; `make view` installs and builds what is needed')
@@ -31,8 +31,13 @@ def main(scene_file, port=PORT) -> int:
     if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
         # The terminal is closed. With nohup it may be.
         signal.signal(signal.SIGHUP, signal.default_int_handler)
+    return command.run('view', lambda _: view(scene_file, port), None, '`make view` installs it')
+
+
+def view(scene_file, port):
+    """Run the nodes until they are interrupted; raise DemoError if one ends."""
+    scene.load(scene_file)
     try:
-        scene.load(scene_file)
         with Domain() as domain:
             # Nodes that listen elsewhere are heard where the user says.
             id_ = os.environ.get('ROS_DOMAIN_ID') or domain.id
@@ -41,11 +46,10 @@ def main(scene_file, port=PORT) -> int:
                 while True:
                     nodes.check()
                     time.sleep(SECONDS_BETWEEN_LOOKS)
-    except (DemoError, RuntimeError, OSError, scene.SceneError) as error:
-        print(f'view: {error}', file=sys.stderr)
-        return 1
     except KeyboardInterrupt:
-        return 0
+        pass
+    except RuntimeError as error:
+        raise DemoError(error) from None
 
 
 if __name__ == '__main__':

@@ -10,7 +10,6 @@ Bring up a scene: its nodes, and what it is looked at with.
 from importlib.util import find_spec
 from pathlib import Path
 import re
-import socket
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
@@ -21,6 +20,7 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from linkage_ros import scene
 from linkage_ros.robot_model import rviz, urdf
+from linkage_ros.words import meant
 import yaml
 
 PACKAGE = 'linkage_ros'
@@ -32,7 +32,7 @@ RVIZ_CONFIG = 'linkage.rviz'
 # Without a robot model nothing else publishes a transform, and RViz would know of no frame.
 FRAME = 'linkages'
 YES, NO = ('true', '1', 'yes', 'on'), ('false', '0', 'no', 'off')
-USUAL_PORT, LARGEST_PORT = 8020, 65535
+LARGEST_PORT = 65535
 
 # Name, default, and what it does.
 ARGUMENTS = (
@@ -64,7 +64,7 @@ def _started(context):
     apart, viewer, rviz_wanted, robot_model, use_sim_time = (
         switched(name, chosen[name])
         for name in ('apart', 'viewer', 'rviz', 'robot_model', 'use_sim_time'))
-    port = numbered('port', chosen['port'] or str(free_or_any(USUAL_PORT)))
+    listens = listening(chosen['port'])
     share = Path(get_package_share_directory(PACKAGE))
     path = _scene_path(share, chosen['scene'])
     shown = scene.load(str(path))
@@ -93,7 +93,7 @@ def _started(context):
     if viewer and not find_spec('aiohttp'):
         nodes.append(LogInfo(msg=NO_VIEWER))
     elif viewer:
-        nodes.append(Node(package=PACKAGE, executable=VIEWER, parameters=[{'port': port}],
+        nodes.append(Node(package=PACKAGE, executable=VIEWER, parameters=[listens],
                           **common))
     return nodes + [Node(package=PACKAGE, executable=name, **common,
                          parameters=[str(path), time, {'frame_prefix': prefix}])
@@ -115,15 +115,10 @@ def numbered(name, text):
     return int(text)
 
 
-def free_or_any(port):
-    """Return a port if nobody listens there on this machine, else 0."""
-    with socket.socket() as here:
-        here.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            here.bind(('127.0.0.1', port))
-        except OSError:
-            return 0
-    return port
+def listening(port):
+    """Return where the viewer listens, as its parameters."""
+    # A viewer of another namespace has the usual port, or is about to.
+    return {'port': numbered('port', port)} if port else {'or_any_port': True}
 
 
 def _transform(frame, child, time, common):
@@ -138,7 +133,8 @@ def _scene_path(share, name):
         path = share / 'config' / f'{name}.yaml'
     if not path.is_file():
         names = ', '.join(sorted(p.stem for p in (share / 'config').glob('*.yaml')))
-        raise RuntimeError(f'scene must be one of {names}, or the path of a file, not {name}')
+        raise RuntimeError(f'scene must be one of {names}, or the path of a file, not {name}'
+                           f'{meant(name, names.split(", "))}')
     return path
 
 

@@ -5,6 +5,7 @@
 
 import argparse
 import os
+import re
 import sys
 from typing import Callable, List, Mapping, NoReturn, Optional, Sequence
 
@@ -22,6 +23,14 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Raise RequestError."""
         raise RequestError(message)
+
+    def parse_args(self, args=None, namespace=None) -> argparse.Namespace:  # type: ignore
+        """Return the arguments; raise RequestError for unknown ones."""
+        found, unknown = self.parse_known_args(args, namespace)
+        if unknown:
+            options = re.findall(r'--[\w-]+', self.format_usage())
+            self.error(f'unrecognized arguments: {" ".join(unknown)}{meant(unknown[0], options)}')
+        return found
 
 
 def run(name: str, work: Callable, args: Optional[Sequence[str]], needs: str) -> int:
@@ -53,11 +62,19 @@ def run(name: str, work: Callable, args: Optional[Sequence[str]], needs: str) ->
     except ImportError as error:
         why = f'{(error.name or "").split(".")[0]} is not installed: {needs}'
     except OSError as error:
-        why = f'{error.filename}: {error.strerror}' if error.filename else error
+        why = f'{error.filename}: {error.strerror}{_beside(error)}' if error.filename else error
     except KeyboardInterrupt:
         why = 'interrupted'
     print(f'{name}: {" ".join(str(why).split())}', file=sys.stderr)
     return 1
+
+
+def _beside(error: OSError) -> str:
+    """Return the end of a sentence that suggests the file that is nearly a missing one."""
+    folder, name = os.path.split(str(error.filename))
+    if not isinstance(error, FileNotFoundError) or not os.path.isdir(folder or '.'):
+        return ''
+    return meant(name, os.listdir(folder or '.'))
 
 
 def chosen(machines: Mapping[str, SceneMechanism], names: Sequence[str]) -> List[SceneMechanism]:

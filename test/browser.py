@@ -62,6 +62,7 @@ class Browser:
         self._profile = profile
         self._numbers = itertools.count(1)
         self._answers = {}
+        self._fingers = 0
         self.complaints = []
         self.requests = []
 
@@ -173,6 +174,14 @@ class Browser:
                 await self._mouse('mouseMoved', *(
                     a + part * (b - a) for a, b in zip(start, end)))
         await self._mouse('mouseReleased', *places[-1])
+
+    async def touch(self, *fingers):
+        """Put fingers down, move those that are down, lift those that are not given."""
+        kind = ('touchEnd' if len(fingers) < self._fingers else
+                'touchStart' if len(fingers) > self._fingers else 'touchMove')
+        self._fingers = len(fingers)
+        await self._do('Input.dispatchTouchEvent', type=kind, touchPoints=[
+            {'x': x, 'y': y, 'id': number} for number, (x, y) in enumerate(fingers)])
 
     async def move(self, x, y):
         """Go to a place with the mouse, no button pressed."""

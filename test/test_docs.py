@@ -106,6 +106,13 @@ def test_what_a_page_says_to_type_is_there():
                 assert (ROOT / file).exists(), (page, words)
 
 
+def test_a_page_with_the_ros2_command_line_says_what_to_type_without_it():
+    with_ros2 = {page for page, words in typed() if words[0] == 'ros2'}
+    assert len(with_ros2) > 15
+    for page in with_ros2:
+        assert 'install.md#without-the-ros2-command-line' in page.read_text(), page
+
+
 def test_nobody_is_told_to_install_a_release_that_there_is_not():
     for file in (*PAGES, *(ROOT / 'linkage_ros').rglob('*.py')):
         assert not re.search(r"pip3? install[^\n]* '?linkage.ros", file.read_text()), file

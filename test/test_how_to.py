@@ -7,11 +7,14 @@ import cmath
 import doctest
 from importlib import import_module
 import math
+import os
 from pathlib import Path
 import re
 import shlex
 import shutil
+import signal
 import subprocess
+import sys
 from xml.etree import ElementTree
 
 import pytest
@@ -20,7 +23,7 @@ pytest.importorskip('rclpy')
 pytest.importorskip('linkage_interfaces')
 yaml = pytest.importorskip('yaml')
 
-from linkage_ros import scene  # noqa: E402
+from linkage_ros import mechanisms, scene  # noqa: E402
 from linkage_ros.c_code.command import main as c_code  # noqa: E402
 from linkage_ros.c_code.transmission import main as transmission  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
@@ -30,6 +33,7 @@ from linkage_ros.render.command import main as render  # noqa: E402
 from linkage_ros.robot_files.command import main as from_robot  # noqa: E402
 from linkage_ros.robot_model.command import main as urdf  # noqa: E402
 from robots import LIBRARIES  # noqa: E402
+from ros_harness import Process  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import Float64MultiArray  # noqa: E402
 
@@ -328,3 +332,22 @@ def test_ros2_control_moves_the_motors_of_the_scene(graph, follow):
     graph.until(lambda: commands or wanted.publish(JointState(name=['knee'], position=[0.9])))
     state = graph.crank(['knee_motor'], 'joint_states')(commands[0].data, answers)
     assert state.position[state.name.index('knee')] == pytest.approx(0.9, abs=1e-12)
+
+
+@pytest.mark.slow
+def test_what_is_typed_without_the_ros2_command_line_works_as_written():
+    code, = (text for _, language, text in BLOCK.findall((DOCS / 'install.md').read_text())
+             if language == 'python' and 'rclpy' in text)
+    running = Process('scene', ROOT / 'config' / 'all.yaml')
+    try:
+        done = subprocess.run(
+            [sys.executable, '-c', code], text=True, capture_output=True, timeout=60.0,
+            env={**os.environ, 'ROS_DOMAIN_ID': str(running.domain)})
+    finally:
+        running.interrupt(signal.SIGINT)
+        running.end()
+    assert done.returncode == 0, done.stderr
+    names, changed, angle = done.stdout.splitlines()
+    assert "'jansen_BC'" in names and 'successful=True' in changed
+    lever = mechanisms.create('slotted_lever').servo_angle(0.2)
+    assert float(re.search(r'\[([0-9.]+)\]', angle)[1]) == pytest.approx(lever, abs=1e-12)

@@ -10,7 +10,6 @@ import math
 from pathlib import Path
 import re
 import runpy
-import socket
 import sys
 
 from linkage_ros import scene
@@ -141,6 +140,17 @@ def test_rviz_opens_on_all_of_a_scene_and_sees_its_plane(shown, path):
     assert max(seen_by(view, machine)[0].max() for machine in machines.values()) > 0.3
 
 
+def test_rviz_opens_on_all_of_a_linkage_in_space(shown):
+    machines = scene.load(str(ROOT / 'examples' / 'ankle.yaml')).machines
+    view = rviz.adapted(shown, machines, 'world')['Visualization Manager']['Views']['Current']
+    focus = [view['Focal Point'][axis] for axis in 'XYZ']
+    linkage = machines['ankle'].linkage
+    places = np.array(list(linkage.solve([0.0, 0.0]).values()))
+    off = np.linalg.norm(places - focus, axis=1)
+    assert 0.3 < off.max() / view['Distance'] / math.sin(math.radians(22.5)) < 1.0
+    assert 0.1 < view['Pitch'] < 0.5
+
+
 @pytest.fixture
 def constants():
     """Return the launch file's constants and functions, without importing what it imports."""
@@ -177,7 +187,8 @@ def test_every_argument_of_the_launch_file_is_described(constants):
     documented = (ROOT / 'docs' / 'viewer.md').read_text()
     assert all(f'`{name}`' in documented for name in arguments)
     viewer = (ROOT / 'linkage_ros' / 'web' / 'viewer.py').read_text()
-    assert re.search(rf'^PORT = {constants["USUAL_PORT"]}$', viewer, re.MULTILINE)
+    usual = re.search('empty: ([0-9]+), or any', arguments['port'][1])[1]
+    assert re.search(rf'^PORT = {usual}$', viewer, re.MULTILINE)
 
 
 @pytest.mark.parametrize('text, wanted', [
@@ -257,18 +268,19 @@ def test_without_aiohttp_the_rest_is_started(monkeypatch):
 @needs_launch
 def test_what_cannot_be_is_refused_with_what_is_allowed():
     for name, text, complaint in (
-            ('scene', 'walker', 'must be one of all, .*, not walker'),
+            ('scene', 'walker', 'must be one of all, .*, not walker$'),
+            ('scene', 'strandbest', 'not strandbest; did you mean strandbeest'),
             ('port', 'abc', "port must be a whole number from 0 to 65535, not 'abc'"),
             ('viewer', 'maybe', "viewer must be true or false, not 'maybe'")):
         with pytest.raises(RuntimeError, match=complaint):
             started(**{name: text})
 
 
-def test_a_second_viewer_takes_another_port(constants):
-    with socket.socket() as taken:
-        taken.bind(('127.0.0.1', 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        constants['socket'] = socket
-        assert constants['free_or_any'](port) == 0
-    assert constants['free_or_any'](port) == port
+def test_viewers_that_are_launched_together_take_ports_of_their_own(constants, graph):
+    viewer = pytest.importorskip('linkage_ros.web.viewer')
+    ports = [re.search(r':(\d+)/$', graph.start(
+        viewer.Viewer, constants['listening'](''), namespace=space).url)[1]
+        for space in ('left', 'right')]
+    assert ports[0] != ports[1]
+    with pytest.raises(scene.SceneError, match='address already in use'):
+        graph.start(viewer.Viewer, constants['listening'](ports[0]))

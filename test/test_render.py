@@ -350,7 +350,9 @@ def test_several_cranks_turn_as_fast_as_they_were_told_to():
 
 @pytest.mark.parametrize('args, said', [
     (['nowhere.yaml', '--out', 'a.png'], 'nowhere.yaml: No such file'),
+    (['stil.yaml', '--out', 'a.png'], 'No such file or directory; did you mean still.yaml?'),
     (['jansen.yaml', '--out', 'a.png', '--bogus'], 'unrecognized arguments: --bogus'),
+    (['jansen.yaml', '--out', 'a.png', '--trce', 'none'], '--trce none; did you mean --trace?'),
     (['jansen.yaml', 'all.yaml', '--out', 'a.png'], 'unrecognized arguments: all.yaml'),
     (['foreign.yaml', '--out', 'a.png'], "foreign.yaml must be YAML with '/**:'"),
     (['empty.yaml', '--out', 'a.png'], "empty.yaml must be YAML with '/**:'"),

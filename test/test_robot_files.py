@@ -315,6 +315,8 @@ def test_what_is_left_out_is_named_with_the_reason(capsys, tmp_path):
     assert 'no joint of this robot closes a loop' in refused(capsys, ROBOTS / 'five_bar.urdf')
     assert "there is no joint 'nobody'; allowed: joint_A, joint_B, joint_C, joint_D" in refused(
         capsys, ROBOTS / 'four_bar.sdf', '--driven', 'nobody')
+    assert 'did you mean joint_A?' in refused(
+        capsys, ROBOTS / 'four_bar.sdf', '--driven', 'joint_a')
 
 
 BAD = [('<robot', 'is no XML: '), ('<a/>', 'must be MJCF, SDF or URDF, not <a>'),
@@ -652,7 +654,8 @@ def test_joints_of_the_tree_are_what_a_file_of_loops_makes_them(imported, capsys
         assert published(machine, motor=angle) == pytest.approx(
             {'motor': angle, 'shoulder': -angle}, abs=1e-14)
     loops.write_text(text.replace('elbow', 'elbwo'))
-    assert "there is no joint 'elbwo'" in refused(capsys, file, '--loops', loops)
+    said = refused(capsys, file, '--loops', loops)
+    assert "there is no joint 'elbwo'" in said and 'did you mean elbow?' in said
 
 
 def test_xacro_has_to_be_run_first(capsys, tmp_path):

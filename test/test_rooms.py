@@ -30,6 +30,12 @@ def parsed(module):
     return ast.parse(module.read_text())
 
 
+@cache
+def words(module):
+    """Return all words of a module."""
+    return set(re.findall(r'\w+', module.read_text()))
+
+
 def room(module):
     """Return the room that a module is in, '' for the package itself."""
     first = module.relative_to(PACKAGE).with_suffix('').parts[0]
@@ -82,3 +88,18 @@ def test_every_colour_is_in_the_palette():
     for file in (*MODULES, *files):
         colours = re.findall("#[0-9a-f]{6}|'#[0-9a-f]{3}'", file.read_text())
         assert not colours or file == PACKAGE / 'palette.py', f'{file.name} has {colours}'
+
+
+def test_what_other_folders_import_from_the_package_is_there():
+    others = [file for folder in ('benchmark', 'demo', 'docs', 'examples')
+              for file in (ROOT / folder).rglob('*.py')]
+    for file in others:
+        for node in ast.walk(parsed(file)):
+            if not isinstance(node, ast.ImportFrom) or not f'{node.module}.'.startswith(
+                    f'{PACKAGE.name}.'):
+                continue
+            path = ROOT.joinpath(*node.module.split('.'))
+            module = path / '__init__.py' if path.is_dir() else path.with_suffix('.py')
+            for name in (alias.name for alias in node.names):
+                assert name in words(module) or (path / name).is_dir() or (
+                    path / f'{name}.py').exists(), (file, node.module, name)

@@ -309,6 +309,7 @@ def test_one_servo_near_serves_any_number_of_values(graph):
     ({'servo_near': [1e308]}, 'servo_near must be finite and within 1e+06 rad of zero'),
     ({'servo_near': [-1.1 * scene.FARTHEST]}, 'servo_near must be finite and within'),
     ({'mechanism': 'x' * 10 ** 6}, "there is no mechanism 'xxx"),
+    ({'mechanism': 'slotted_levr'}, 'did you mean slotted_lever?'),
     ({'output': 'y' * 10 ** 6, 'mechanism': 'jansen'}, 'jansen has no output'),
     ({'output': '.x', 'mechanism': 'jansen'}, "jansen has no output '.x'"),
     ({'output': 'G.x.x', 'mechanism': 'jansen'}, "jansen has no output 'G.x.x'"),

@@ -462,7 +462,8 @@ def test_a_package_names_what_the_scene_names(tmp_path):
 @pytest.mark.parametrize('arguments, said', [
     (['--out', '{0}/My-Package'], "must end in the package's name"),
     (['--out', '{0}'], 'or one written by this command'), ([], 'required: --out'),
-    (['--out', '{0}/legs', '--joints', 'elbow'], "no mechanism has a joint 'elbow'")])
+    (['--out', '{0}/legs', '--joints', 'elbow'], "no mechanism has a joint 'elbow'"),
+    (['--out', '{0}/legs', '--joints', 'kneee'], 'did you mean knee?')])
 def test_what_cannot_be_written_is_one_sentence(tmp_path, capsys, arguments, said):
     folder = tmp_path / 'mine'
     folder.mkdir()

@@ -548,10 +548,11 @@ def test_velocity_and_acceleration_are_the_slopes_of_the_curves(name, output):
     position, velocity, acceleration, _, force = (
         curves.curve(machine, present, kind, None if kind == 'transmission angle' else output)
         for kind in curves.KINDS)
-    x, inner = position['x'], slice(40, -40)
+    x, inner = velocity['x'], slice(40, -40)
     for curve, slope in ((position, velocity), (velocity, acceleration)):
         slope = np.array(slope['y'], float)[inner]
-        np.testing.assert_allclose(np.gradient(np.array(curve['y'], float), x)[inner], slope,
+        y = np.array(curve['y'], float)[np.isin(curve['x'], x)]
+        np.testing.assert_allclose(np.gradient(y, x)[inner], slope,
                                    atol=2e-3 * np.abs(slope).max())
     if len(present) == 1:
         own, unit = machine.scale_of(position['input']), machine.scale_of(output)
@@ -635,12 +636,39 @@ def test_arrows_are_how_the_joints_move_in_the_picture(name, kind):
         assert arrow == pytest.approx(slope, rel=1e-4, abs=1e-6)
 
 
+@pytest.mark.parametrize('scale', [1e-12, 1.0, 1e12])
+def test_an_output_is_what_it_is_however_small_and_rounding_is_zero(scale):
+    lift = without_defaults(scene.load(str(ROOT / 'config' / 'scissor_lift.yaml')))
+    del lift['lift.carriage.start']
+    machine = scene.read({**lift, 'lift.scale': scale}).machines['lift']
+    at = 1.2
+    outputs = poses.described(machine, [at * scale])['outputs']
+    truth = machine.linkage.solve(at, ('P',))['P'] * scale
+    assert [outputs[name]['value'] for name in ('P.x', 'P.y')] == pytest.approx(list(truth))
+    assert outputs['P.x']['rates'] == [0.0] and abs(outputs['P.y']['rates'][0]) > 0.1
+
+
 def test_arrows_of_force_are_the_loads_and_what_holds_them():
     machine = scene.read({'mechanisms': ['lever'], 'lever.type': 'slotted_lever',
                           'lever.loads': ['L=3 -4', 'lever=2']}).machines['lever']
     found = poses.arrows(machine, [0.5], 'force', {})
     effort, = machine.efforts([0.5])
     assert found == {'unit': 'N', 'at': {'L': (3.0, -4.0)}, 'efforts': {'crank': [effort, 'N·m']}}
+
+
+@pytest.mark.parametrize('name, output', [
+    ('excavator', 'T.y'), ('jansen', 'G.x'), ('peaucellier', 'PB'), ('peaucellier', 'C.y')])
+def test_a_position_is_drawn_as_it_bends_even_next_to_a_dead_point(name, output):
+    machine, = scene.load(str(ROOT / 'config' / f'{name}.yaml')).machines.values()
+    present = [drive.start for drive in machine.inputs.values()]
+    curve = curves.curve(machine, present, 'position', output)
+    x, y = np.array(curve['x']), np.array(curve['y'], float)
+    middle = 0.5 * (x[:-1] + x[1:])
+    sizes = [machine.scale_of(key) for key in machine.inputs]
+    inputs = [middle / sizes[0], *(value / size for value, size in zip(present[1:], sizes[1:]))]
+    truth = machine.scale_of(output) * machine.linkage.joint_angles(
+        inputs if len(inputs) > 1 else inputs[0], [output])[output]
+    assert abs(truth - 0.5 * (y[:-1] + y[1:])).max() < np.ptp(y) / 500.0
 
 
 def test_no_line_goes_through_a_pole():
@@ -1017,6 +1045,15 @@ def test_the_page_is_served_with_nothing_from_outside(address, name):
                          'http://www.w3.org/2000/svg', 'https://github.com/leeoniya/uPlot'}
 
 
+def test_the_page_is_as_small_as_the_docs_say():
+    said = re.search(r'\| ([0-9]+) kB, and ([0-9]+) kB with the first plot',
+                     (ROOT / 'docs' / 'viewer.md').read_text())
+    for folder, kilobytes in zip((PAGE, PAGE / 'vendor'), said.groups()):
+        size = sum(file.stat().st_size for file in folder.iterdir()
+                   if file.suffix in ('.html', '.css', '.js', '.svg'))
+        assert size == pytest.approx(1000.0 * float(kilobytes), rel=0.1)
+
+
 @pytest.mark.parametrize('name', ['%2e%2e%2fserver.py', 'server.py', 'none.html', 'page/main.js'])
 def test_only_the_page_is_served(address, name):
     assert asyncio.run(status(address + name)) == 404
@@ -1112,6 +1149,21 @@ def test_make_view_says_where_to_look_and_ends_all_that_it_started(stop):
     finally:
         process.terminate()
         process.wait(browser.DEADLINE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('arguments', [
+    ('view.py', ROOT / 'config' / 'jansen.yaml', '0'), ('demo.py',)], ids=lambda some: some[0])
+def test_make_view_and_make_demo_end_quietly_when_nobody_reads_what_they_print(arguments):
+    name, *others = arguments
+    environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)}
+    process = subprocess.Popen(
+        [sys.executable, ROOT / 'demo' / name, *others], env=environment,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process.stdout.close()
+    said = process.stderr.read()
+    assert process.wait(browser.DEADLINE) == 0
+    assert [line for line in said.splitlines() if '[INFO]' not in line] == []
 
 
 @pytest.mark.long
@@ -1745,6 +1797,123 @@ def test_the_picture_is_zoomed_shifted_and_turned_by_keys_and_mouse(show, looked
     looked_at(running, doing)
 
 
+async def settled(seen):
+    """Return whether the picture is drawn and stands still."""
+    before = await seen.canvas()
+    return len(coloured(before, *GREEN)) > 100 and (await seen.canvas() == before).all()
+
+
+async def upright_lever(seen):
+    """Return where the tip and the pivot of a lever that stands upright are on the page."""
+    await browser.until(lambda: settled(seen))
+    await seen.page.click('document.getElementById("names")')
+    # The numbers of the grid are left out: they are grey too.
+    rows, columns = coloured((await seen.canvas())[:-40, 80:], *GREY).T + [[0], [80]]
+    top = await seen.page.value('document.getElementById("picture").getBoundingClientRect().y')
+    return ((float(columns[rows < rows.min() + 10].mean()), top + int(rows.min()) + 8),
+            (float(columns[rows > rows.max() - 10].mean()), top + int(rows.max()) - 8))
+
+
+@pytest.mark.long
+@needs_browser
+def test_a_second_finger_neither_moves_the_joint_of_the_first_nor_takes_one(show, looked_at):
+    running = show({**LEVER, 'lever.crank.speed': 0.0})
+
+    def crank():
+        return running.values('lever.crank.start')[0]
+
+    async def doing(seen):
+        page = seen.page
+        await seen.view('lever')
+        await seen.output('lever', 'lever')
+        x, y = (await upright_lever(seen))[0]
+        aside = x - 200.0, y + 100.0
+        await page.touch((x, y))
+        await page.touch((x - 30.0, y))
+        await browser.until(lambda: crank() > 0.1)
+        await page.touch((x - 30.0, y), aside)
+        before = crank()
+        for step in (20.0, 40.0, 60.0):
+            await page.touch((x - 30.0, y), (aside[0] - step, aside[1] + step))
+        # It follows the first finger still, from where it was.
+        await page.touch((x - 31.0, y), (aside[0] - 60.0, aside[1] + 60.0))
+        await browser.until(lambda: crank() != before)
+        assert crank() == pytest.approx(before, abs=0.05)
+        await page.touch((x - 31.0, y))
+        await page.touch()
+        before = crank()
+        # Two fingers zoom, though the second is put on a joint.
+        await page.touch(aside)
+        await page.touch(aside, (x - 31.0, y))
+        await page.touch(aside, (x + 60.0, y - 30.0))
+        await page.touch()
+        await browser.until(lambda: page.value('!document.getElementById("whole").hidden'))
+        assert crank() == before
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
+def test_what_is_refused_is_said_where_one_looks_and_leaves_the_picture_free(show, looked_at):
+    running = show({'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}, kinds=(Kinematics,))
+    crank_states = running.graph.node.create_publisher(JointState, 'crank_states', 10)
+
+    async def doing(seen):
+        page, notice = seen.page, 'document.getElementById("notice")'
+
+        async def moved():
+            crank_states.publish(JointState(name=['lever_crank'], position=[0.0]))
+            return await page.value(f'!!{seen.section("lever")}.querySelector("tbody tr")')
+
+        def reason():
+            return page.value(f'[...{seen.section("lever")}.querySelectorAll(".reason")].filter('
+                              'one => !one.hidden).map(one => one.textContent).join()')
+
+        await browser.until(moved)
+        (x, y), _ = await upright_lever(seen)
+        await page.drag((x, y), (x + 30.0, y))
+        why = 'the crank cannot be moved: no crank_driver is running'
+        await browser.until(lambda: page.value(f'{notice}.textContent === "{why}"'))
+        assert await reason() == why
+        await browser.until(lambda: page.value(f'{notice}.hidden'))
+        assert await reason() == why
+        await page.write(f'{seen.section("lever")}.querySelector("td input")', 'foo')
+
+        async def refused():
+            return await reason() == 'Refused: foo is not a number that can be set'
+
+        await browser.until(refused)
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
+def test_a_click_on_a_bar_goes_to_its_slider_and_a_drag_from_it_does_not(show, looked_at):
+    running = show({**LEVER, 'lever.crank.speed': 0.0})
+
+    async def doing(seen):
+        page = seen.page
+        await seen.view('lever')
+        await seen.output('lever', 'lever')
+        tip, pivot = await upright_lever(seen)
+        bar = tip[0], 0.8 * pivot[1] + 0.2 * tip[1]
+        focus = 'document.activeElement.type'
+        await page.drag(bar, (bar[0] + 80.0, bar[1]))
+        await browser.until(lambda: page.value('!document.getElementById("whole").hidden'))
+        assert await page.value(focus) != 'range'
+        await page.click('document.getElementById("whole")')
+
+        async def gone():
+            await page.drag(bar, bar)
+            return await page.value(focus) == 'range'
+
+        await browser.until(gone)
+
+    looked_at(running, doing)
+
+
 @pytest.mark.long
 @needs_browser
 def test_a_joint_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
@@ -1753,19 +1922,8 @@ def test_a_joint_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
     async def doing(seen):
         await seen.view('lever')
 
-        async def settled():
-            before = await seen.canvas()
-            return len(coloured(before, *GREEN)) > 100 and (
-                await seen.canvas() == before).all()
-
         await seen.output('lever', 'lever')
-        await browser.until(settled)
-        await seen.page.click('document.getElementById("names")')
-        # The numbers of the grid are left out: they are grey too.
-        rows, columns = coloured((await seen.canvas())[:-40, 80:], *GREY).T + [[0], [80]]
-        top = await seen.page.value('document.getElementById("picture").getBoundingClientRect().y')
-        tip = float(columns[rows < rows.min() + 10].mean()), top + int(rows.min()) + 8
-        pivot = float(columns[rows > rows.max() - 10].mean()), top + int(rows.max()) - 8
+        tip, pivot = await upright_lever(seen)
         length = pivot[1] - tip[1]
 
         def at(phi):
@@ -1777,7 +1935,7 @@ def test_a_joint_follows_the_mouse_and_stops_at_its_reach(show, looked_at):
         async def dragged(predicate, *places):
             """Drag as a person would: again if the page, laid out anew, missed the press."""
             for _ in range(3):
-                await browser.until(settled)
+                await browser.until(lambda: settled(seen))
                 await seen.page.drag(*places)
                 with contextlib.suppress(asyncio.TimeoutError):
                     return await asyncio.wait_for(browser.until(predicate), 10.0)
@@ -1826,6 +1984,11 @@ def test_an_input_is_moved_with_the_keys_by_steps_and_in_degrees(show, looked_at
         before = servo()
         await seen.page.press('ArrowLeft')
         await browser.until(lambda: before - 0.02 < servo() < before)
+        await seen.page.write(f'{seen.section("lever")}.querySelector("td input")', '80')
+        end = math.degrees(math.asin(80.0 / 150.0))
+        await browser.until(lambda: seen.page.value(
+            f'{seen.section("lever")}.innerText.includes('
+            f'"lever reaches [-{end:.3f}, {end:.3f}] \N{DEGREE SIGN}")'))
         await seen.page.click(f'{seen.section("lever")}.querySelector("button")')
         await browser.until(lambda: running.values('lever.crank.speed') == [1.5])
 
@@ -1891,8 +2054,9 @@ import('/picture.js').then(({ Picture }) => {
   return Array.from({ length: 2000 }, () => {
     const picture = new Picture(document.getElementById('picture')), written = [];
     picture.mechanisms = Array.from({ length: 16 }, (_, i) => (
-      { key: i, name: 'linkage'.slice(i % 5) }));
-    Object.assign(picture, { scale: 1, middle: [0, 0], centre: [0, 0], maps: new Map() });
+      { key: i, title: 'linkage'.slice(i % 5) }));
+    Object.assign(picture, {
+      scale: 1, middle: [0, 0], centre: [0, 0], maps: new Map(), canvas: CANVAS });
     const y = 4 ** (5 * random()), x = 4 ** (5 * random());
     for (const { key } of picture.mechanisms) {
       picture.maps.set(key, [[1, 0, 0, 0], [0, 1, 0, 0]]);
@@ -1908,17 +2072,27 @@ import('/picture.js').then(({ Picture }) => {
 
 @pytest.mark.slow
 @needs_browser
-def test_titles_are_written_beside_or_below_each_other_wherever_they_are(address, tmp_path):
+@pytest.mark.parametrize('width, height, fewest', [(1e5, 1e5, 16), (390, 380, 0)])
+def test_titles_are_written_beside_or_below_each_other_wherever_they_are(
+        address, tmp_path, width, height, fewest):
+    canvas = f'{{ clientWidth: {width}, clientHeight: {height} }}'
+
     async def look():
         async with browser.Browser(tmp_path) as page:
             await page.open(address)
-            return await page.value(TITLES)
+            return await page.value(TITLES.replace('CANVAS', canvas))
 
-    for written in asyncio.run(look()):
-        x, y, width = np.transpose(written)
+    pictures = asyncio.run(look())
+    assert min(map(len, pictures)) >= fewest
+    for written in filter(None, pictures):
+        x, y, wide = np.transpose(written)
+        seen = (x >= 0.0) & (x <= width)
+        assert (x - 0.5 * wide)[seen].min(initial=width) > 0.0
+        assert (x + 0.5 * wide)[seen].max(initial=0.0) < width
+        assert y.max() + 18.0 < height
         apart = np.maximum(abs(y[:, None] - y) / 18.0,
-                           2.0 * abs(x[:, None] - x) / (width[:, None] + width))
-        assert apart[~np.eye(len(x), dtype=bool)].min() > 1.0 - 1e-9
+                           2.0 * abs(x[:, None] - x) / (wide[:, None] + wide))
+        assert apart[~np.eye(len(x), dtype=bool)].min(initial=1.0) > 1.0 - 1e-9
 
 
 @pytest.mark.long
@@ -2023,7 +2197,8 @@ def test_a_plot_follows_what_is_tuned_and_all_can_be_downloaded(show, looked_at,
 
 @pytest.mark.long
 @needs_browser
-def test_a_reload_keeps_view_units_and_arrows_and_a_lost_connection_is_said(show, looked_at):
+def test_a_reload_and_another_viewer_keep_what_is_seen_and_a_lost_connection_is_said(
+        show, looked_at):
     running = show({**LEVER, 'drop.scale': 0.1})
 
     async def doing(seen):
@@ -2035,6 +2210,9 @@ def test_a_reload_keeps_view_units_and_arrows_and_a_lost_connection_is_said(show
         # A bar of 1, scale 0.1, is 100 mm long in the picture.
         await browser.until(lambda: seen.number('drop', 'a'))
         assert await seen.number('drop', 'a') == 100.0
+        await page.value('document.getElementById("picture").focus()')
+        for _ in range(3):
+            await page.press('+')
         await page.open(running.viewer.url)
         await browser.until(lambda: page.value(
             'document.querySelectorAll("section").length === 1 && '
@@ -2042,9 +2220,17 @@ def test_a_reload_keeps_view_units_and_arrows_and_a_lost_connection_is_said(show
         assert await page.value('document.getElementById("workshop").checked')
         assert await page.value('document.getElementById("arrows").value') == 'velocity'
         assert await page.value('document.getElementById("notice").hidden')
+        url = running.viewer.url
         running.graph.end(running.viewer)
         await browser.until(lambda: page.value(
             '/^Connection lost/.test(document.getElementById("notice").textContent)'))
+        running.viewer = running.graph.start(Viewer, {'port': int(re.search(r'(\d+)/$', url)[1])})
+        await browser.until(lambda: page.value('document.getElementById("notice").hidden'))
+        await browser.until(lambda: page.value(
+            f'document.querySelectorAll("section").length === 1 && !!{seen.section("drop")}'))
+        # It is zoomed still: there is a way back to the whole picture.
+        await seen.page.click('document.getElementById("whole")')
+        await browser.until(lambda: page.value('document.getElementById("whole").hidden'))
         page.complaints.clear()
 
     looked_at(running, doing)
@@ -2073,6 +2259,287 @@ def test_mechanisms_of_one_name_in_two_namespaces_are_told_apart(graph, show, lo
         await browser.until(beside)
 
     looked_at(running, doing)
+
+
+# A crank and a rocker whose names are as long as names may be.
+LONG = {'mechanisms': ['m' * 64], **{f'{"m" * 64}.{name}': value for name, value in {
+    'type': 'custom', 'crank' + 'k' * 59 + '.speed': 1.0, 'dimensions.r': 1.234567,
+    'loads': ['D=100 20', f'B{"y" * 63}=-4 200'],
+    'joints': [
+        'O ground 0 0', 'Q ground 3 0', f'A{"x" * 63} crank O r called crank{"k" * 59}',
+        f'B{"y" * 63} dyad A{"x" * 63} Q 2.5 2 left', f'D line O A{"x" * 63} 2'],
+}.items()}}
+
+
+@pytest.mark.long
+@needs_browser
+@pytest.mark.parametrize('scale', [1e-6, 1.0, 1e6])
+def test_nothing_is_cut_in_a_narrow_window_however_long(show, looked_at, scale):
+    name, = LONG['mechanisms']
+    running = show({**RATE, **LONG, f'{name}.scale': scale})
+
+    async def doing(seen):
+        page = seen.page
+        await page.value('document.getElementById("arrows").value = "force",'
+                         'document.getElementById("arrows").onchange()')
+        for width, click in ((320, False), (1200, False), (320, True)):
+            await page.resize(width, 568, 'light')
+            if click:
+                await page.value('document.getElementById("workshop").click()')
+            await seen.output(name, 'D.x')
+            assert await page.value('document.documentElement.scrollWidth') <= width
+            assert await page.value(
+                '[...document.querySelectorAll("button, th, td, h2, input[type=text], .row > *")]'
+                '.filter(one => one.offsetParent && one.scrollWidth > one.clientWidth + 1 &&'
+                ' getComputedStyle(one).display !== "inline").map(one => one.outerHTML)') == []
+
+    looked_at(running, doing)
+
+
+@pytest.mark.slow
+@needs_browser
+def test_a_number_has_room_in_its_field_and_all_the_digits_that_have(address, tmp_path):
+    given = [sign * value * 10.0 ** power for sign in (1.0, -1.0)
+             for value in (1.0, 1.234567891, 9.99999999) for power in range(-300, 300)]
+
+    async def look():
+        async with browser.Browser(tmp_path) as page:
+            await page.open(address)
+            return await page.value('import("/units.js").then(({ figures }) =>'
+                                    f' {given}.map(value => figures(value, 6)))')
+
+    for value, text in zip(given, asyncio.run(look())):
+        assert len(text) <= 9
+        digits = 3 if abs(math.log10(abs(value))) > 99.0 else 4
+        assert float(text) == pytest.approx(value, rel=10.0 ** (1 - digits))
+        if 1.0 <= abs(value) < 1e5:
+            assert float(text) == float(f'{value:.6g}')
+
+
+@pytest.mark.long
+@needs_browser
+def test_a_linkage_in_space_is_drawn_whole_and_says_what_the_page_does_not(
+        show, looked_at, tmp_path):
+    ankle = scene.load(str(ROOT / 'examples' / 'ankle.yaml'))
+    running = show({**without_defaults(ankle), 'rate': 20.0})
+
+    async def doing(seen):
+        async def whole():
+            picture = await seen.canvas()
+            places = coloured(picture, *BLUE)
+            if not len(places):
+                return False
+            height, width, _ = picture.shape
+            low, high = places.min(axis=0), places.max(axis=0)
+            return (low > 20).all() and (high < (height - 20, width - 20)).all() \
+                and high[0] - low[0] > 0.5 * height
+
+        await browser.until(whole)
+        text = await seen.page.value(f'{seen.section("ankle")}.innerText')
+        assert 'ankle is a linkage in space' in text
+        assert '+1' in text and '\N{MINUS SIGN}1' in text and 'Plot' not in text
+        await seen.page.downloads(tmp_path)
+        await seen.page.value(f"""[...{seen.section('ankle')}.querySelectorAll('button')].find(
+            button => button.textContent === 'C').click()""")
+        await browser.until((tmp_path / 'ankle.h').exists)
+
+    looked_at(running, doing)
+    assert (tmp_path / 'ankle.h').read_text() == header.written(ankle.machines['ankle'])
+
+
+@pytest.mark.long
+@needs_browser
+def test_an_enlarged_plot_fits_any_window_and_hides_no_message(show, looked_at):
+    running = show(LEG)
+
+    async def doing(seen):
+        page, plot = seen.page, f'{seen.section("leg")}.querySelector(".plot")'
+        await page.value(f'({plot}).closest("details").open = true')
+        await browser.until(lambda: page.value(f'/^Position/.test({plot}.ariaLabel)'))
+        await page.value('[...document.querySelectorAll("button")].find('
+                         'button => button.textContent === "Enlarge").click()')
+        for width, height in ((1400, 900), (390, 844), (844, 390)):
+            await page.resize(width, height, 'light')
+
+            async def fits(width=width):
+                wide = await page.value(f'{plot}.querySelector("canvas").clientWidth')
+                return 0.8 * width < wide < width
+
+            await browser.until(fits)
+            assert await page.value('document.querySelector(".large").scrollWidth') <= width
+        running.graph.end(running.viewer)
+        await browser.until(lambda: page.value('!document.getElementById("notice").hidden'))
+        assert await page.value(
+            '(({ x, y, width, height }) => document.elementFromPoint('
+            'x + width / 2, y + height / 2))'
+            '(document.getElementById("notice").getBoundingClientRect()).id') == 'notice'
+        page.complaints.clear()
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
+def test_a_curve_is_not_drawn_through_a_pole_however_small_the_plot(show, looked_at):
+    running = show(LEG)
+
+    async def doing(seen):
+        page, plot = seen.page, f'{seen.section("leg")}.querySelector(".plot")'
+        await page.resize(390, 844, 'light')
+        await browser.until(lambda: page.value(f"""(() => {{
+            ({plot}).closest('details').open = true;
+            const select = {seen.section('leg')}.querySelector('select[aria-label=Quantity]');
+            if (select.value !== 'force ratio') {{
+                select.value = 'force ratio';
+                select.dispatchEvent(new Event('change'));
+            }}
+            return /^Force ratio of BC: .* and beyond/.test({plot}.ariaLabel);
+        }})()"""))
+        # In each column, the part of the plot's height that is blue, however pale.
+        blue = await page.value(f"""(() => {{
+            const canvas = {plot}.querySelector('canvas'), {{ width, height }} = canvas;
+            const {{ data }} = canvas.getContext('2d').getImageData(0, 0, width, height);
+            return Array.from({{ length: width }}, (_, x) => Array.from({{ length: height }},
+                (_, y) => data.subarray(4 * (x + y * width), 4 * (x + y * width) + 4)).filter(
+                ([red, , blue, seen]) => seen && blue > red + 8).length / height);
+        }})()""")
+        assert max(blue) < 0.6 and sum(part > 0.0 for part in blue) > 200
+
+    looked_at(running, doing)
+
+
+# Names of joints, none on another, cut, or nearer to another's joint.
+NAMES = """
+import('/picture.js').then(({ Picture }) => {
+  let seed = 7;
+  const random = () => (seed = seed * 16807 % 2147483647) / 2147483647;
+  return Array.from({ length: 300 }, () => {
+    const picture = new Picture(document.getElementById('picture')), written = [];
+    const places = [];
+    while (places.length < 8) {
+      const [x, y] = [390 * random(), 380 * random()];
+      if (places.every(([a, b]) => Math.hypot(x - a, y - b) > 70)) places.push([x, y]);
+    }
+    const points = places.map((_, i) => 'joint'.slice(i % 4));
+    Object.assign(picture, { scale: 1, middle: [0, 0], centre: [0, 0],
+      canvas: { clientWidth: 390, clientHeight: 380 } });
+    picture.at = (x, y) => [x, y];
+    picture.text = (name, x, y) => written.push([x, y, picture.context.measureText(name).width]);
+    picture.names([{ mechanism: { value: () => points }, look: { kind: 'joints', width: 6 },
+      places: Float64Array.from(places.flat()) }]);
+    return [places, written];
+  });
+})"""
+
+
+@pytest.mark.slow
+@needs_browser
+def test_names_of_joints_are_whole_apart_and_beside_their_own(address, tmp_path):
+    async def look():
+        async with browser.Browser(tmp_path) as page:
+            await page.open(address)
+            return await page.value(NAMES)
+
+    for joints, written in asyncio.run(look()):
+        x, y, width = np.transpose(written)
+        assert (x - 0.5 * width).min() > 0.0 and (x + 0.5 * width).max() < 390.0
+        assert y.min() > 8.0 and y.max() < 372.0
+        apart = np.maximum(abs(y[:, None] - y) / 16.0,
+                           2.0 * abs(x[:, None] - x) / (width[:, None] + width))
+        assert apart[~np.eye(len(x), dtype=bool)].min() > 1.0 - 1e-9
+        away = np.hypot(*(np.maximum(abs(own[:, None] - of) - half, 0.0) for own, of, half in zip(
+            (x, y), np.transpose(joints), (0.5 * width[:, None], 8.0))))
+        assert (away.argmin(axis=1) == np.arange(len(x))).all()
+
+
+@pytest.mark.slow
+@needs_browser
+@pytest.mark.parametrize('width', [60, 250, 900])
+def test_a_long_line_in_the_picture_is_broken_where_it_ends(address, tmp_path, width):
+    words = f'longest force: 200 N at B{"y" * 63}, the crank holds -316 N·m'
+
+    async def look():
+        async with browser.Browser(tmp_path) as page:
+            await page.open(address)
+            return await page.value(
+                f"""import('/picture.js').then(({{ Picture }}) => {{
+                    const picture = new Picture(document.getElementById('picture'));
+                    return picture.broken({words!r}, {width}).map(
+                        line => [line, picture.context.measureText(line).width]);
+                }})""")
+
+    lines, wide = zip(*asyncio.run(look()))
+    assert ''.join(lines) == words and max(wide) < width
+    assert (len(lines) > 1) == (width < 900)
+
+
+@pytest.mark.long
+@needs_browser
+def test_arrows_are_asked_for_wherever_their_mechanism_s_part_of_the_panel_is(show, looked_at):
+    running = show(LEVER)
+
+    async def doing(seen):
+        page = seen.page
+        await page.resize(1200, 200, 'light')
+        await page.value("""(() => {
+            const { send } = WebSocket.prototype;
+            window.asked = new Set();
+            WebSocket.prototype.send = function (text) {
+                const { mechanism, arrows } = JSON.parse(text);
+                if (arrows) window.asked.add(mechanism);
+                send.call(this, text);
+            };
+            document.getElementById('arrows').value = 'velocity';
+            document.getElementById('arrows').onchange();
+        })()""")
+        await browser.until(lambda: page.value('window.asked.size === 2'))
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
+def test_a_picture_that_cannot_be_drawn_does_not_keep_the_next_one_from_being_drawn(
+        show, looked_at):
+    running = show(LEVER)
+
+    async def doing(seen):
+        page = seen.page
+        await page.value("""(() => {
+            const context = document.getElementById('picture').getContext('2d');
+            const { clearRect } = context;
+            window.drawn = 0;
+            context.clearRect = function (...where) {
+                window.drawn += 1;
+                if (window.drawn === 3) throw new Error('nothing can be drawn');
+                clearRect.apply(context, where);
+            };
+        })()""")
+        await browser.until(lambda: page.value('window.drawn > 10'))
+        assert len(page.complaints) == 1
+        page.complaints.clear()
+
+    looked_at(running, doing)
+
+
+def test_where_an_input_is_that_nobody_has_named_is_not_guessed(graph, show):
+    running = show(LEG, kinds=(Kinematics,))
+    crank_states = graph.node.create_publisher(JointState, 'crank_states', 10)
+
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/leg')
+            reason = (await page.ask('pose', '/leg'))['reason']
+
+            async def heard():
+                crank_states.publish(JointState(name=['leg_crank'], position=[2.0]))
+                return (await page.ask('pose', '/leg')).get('inputs')
+
+            return reason, (await browser.until(heard))['crank']['value']
+
+    reason, value = asyncio.run(use(running.viewer.url))
+    assert reason == 'the crank is not known yet: no message names leg_crank'
+    assert value == pytest.approx(2.0)
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from . import header
 from .axes import output_of
 from .. import command, scene
 from ..scene import SceneMechanism
-from ..words import listed
+from ..words import listed, meant
 
 NAME = 'c_code'
 NEEDS = 'pip install pyyaml, or apt install python3-yaml'
@@ -39,8 +39,9 @@ def with_joints(machines: Sequence[SceneMechanism], names: Sequence[str]
            for machine in machines]
     for name in names:
         if not any(name in chosen for _, chosen in own):
-            raise command.RequestError(f'no mechanism has a joint {name!r}; allowed: ' + listed(
-                (joint.name for machine in machines for joint in machine.joints.values()), 200))
+            known = [joint.name for machine in machines for joint in machine.joints.values()]
+            raise command.RequestError(f'no mechanism has a joint {name!r}; allowed: '
+                                       f'{listed(known, 200)}{meant(name, known)}')
     return own
 
 

@@ -53,7 +53,7 @@ from .spatial import (
 )
 from .window import Window, WindowRod
 from ..formula.expression import Real, real
-from ..words import listed, quoted
+from ..words import listed, meant, quoted
 
 FORMS = {
     'hinge': ('hinge LINK at X Y Z axis U V W [within ANGLE ANGLE]',),
@@ -108,7 +108,8 @@ def parse(texts: Iterable[str]) -> List[Line]:
                 raise line.error(
                     f'link {end} is written later, in line {later}: move it up'
                     if later > i and lines[later - 1].word not in _RODS else
-                    f'there is no link {quoted(end)} before this line; there are: {listed(links)}')
+                    f'there is no link {quoted(end)} before this line; there are: {listed(links)}'
+                    f'{meant(end, links)}')
         if len(set(ends)) < len(ends):
             raise line.error(f'both of its ends are on {ends[0]}')
         links += [name] * (line.word not in _RODS)

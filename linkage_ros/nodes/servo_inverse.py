@@ -21,7 +21,7 @@ from .. import scene
 from ..cache import Cache
 from ..robot_model import bodies
 from ..scene.inverse_request import InverseRequest, LEVER, present_inputs
-from ..words import elided, listed, MESSAGE, quoted
+from ..words import elided, listed, meant, MESSAGE, quoted
 
 try:
     from linkage_interfaces.srv import (  # type: ignore[attr-defined]
@@ -195,7 +195,8 @@ def _machine(scene_: scene.Scene, name: str, output: str) -> scene.SceneMechanis
         raise ValueError(f'{name} is a {scene_.machines[name].linkage.type}, not a slotted lever; '
                          f'name an output, or use one of: {allowed}')
     if name:
-        raise ValueError(f'there is no mechanism {quoted(name)}; allowed: {allowed}')
+        raise ValueError(f'there is no mechanism {quoted(name)}; allowed: {allowed}'
+                         f'{meant(name, machines)}')
     what = '' if output else ' slotted lever'
     raise ValueError(f'mechanism may be empty only if the scene has a single{what or " one"}; '
                      f'allowed: {allowed}')
@@ -208,7 +209,8 @@ def _machine_with_inputs(scene_: scene.Scene, name: str) -> scene.SceneMechanism
         next(iter(able.values())) if not name and len(able) == 1 else None)
     if found is None:
         raise ValueError(f'mechanism must be one of {listed(scene_.machines, MOST)}, or empty '
-                         f'if a single one has several inputs, not {quoted(name)}')
+                         f'if a single one has several inputs, not {quoted(name)}'
+                         f'{meant(name, scene_.machines)}')
     return found
 
 

@@ -12,7 +12,7 @@ from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple
 import numpy as np
 
 from ..command import RequestError
-from ..words import listed
+from ..words import listed, meant
 
 HINGE, SLIDE, BALL, FIXED, UNIVERSAL, FREE = (
     'hinge', 'slide', 'ball', 'fixed', 'universal', 'free')
@@ -177,7 +177,8 @@ class Robot:
         for name in names:
             if name not in self.positions:
                 raise RequestError(f'there is no joint {name!r}; allowed: '
-                                   f'{listed(self.positions, 200)}')
+                                   f'{listed(self.positions, 200)}'
+                                   f'{meant(name, self.positions)}')
 
     def source(self, name: str) -> Tuple[str, float, float]:
         """Return the joint that another depends on, or itself, with ratio and offset."""

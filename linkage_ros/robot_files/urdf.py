@@ -189,7 +189,8 @@ class Reader:
         """Change the type of a joint of the tree; the axes of `UJOINT_XY` are in its frame."""
         joint = next((joint for joint in self.robot.joints if joint.name == name), None)
         if joint is None:
-            raise RequestError(f'there is no joint {name!r} to be made {kind}')
+            names = [joint.name for joint in self.robot.joints]
+            raise RequestError(f'there is no joint {name!r} to be made {kind}{meant(name, names)}')
         if kind.startswith('UJOINT'):
             self.robot.joints.remove(joint)
             first, second = (np.eye(3)['XYZ'.index(way)] for way in kind[-2:])

@@ -22,6 +22,8 @@ AWAY = 1.1 / math.sin(math.radians(22.5))
 DOWN, STEEPEST = 0.15, 1.56
 # Values of one input by which it is found where a mechanism reaches; of several, their share.
 SAMPLES = 25
+# A linkage in space is seen from the front, from the right and above, as on the viewer's page.
+OBLIQUE = np.array([0.576, -0.768, 0.28])
 
 
 def adapted(config: dict, machines: Mapping[str, SceneMechanism], frame_id: str,
@@ -65,15 +67,17 @@ def _camera(machines: Iterable[SceneMechanism]) -> Dict[str, Any]:
 
 
 def _seen(machine: SceneMechanism) -> Tuple[np.ndarray, np.ndarray]:
-    """Return points that a mechanism's joints come to [m], (n, 3), and its plane's normal."""
+    """Return points that a mechanism's joints come to [m], (n, 3), and the way to the camera."""
     values = input_values(machine, -(-SAMPLES // len(machine.inputs)))
     found = machine.linkage.solve(values, machine.points)
-    places = machine.scale * np.concatenate([place.reshape(-1, 2) for place in found.values()])
+    places = machine.scale * np.concatenate(
+        [place.reshape(-1, place.shape[-1]) for place in found.values()])
     places = places[np.isfinite(places).all(axis=1)]
     if machine.mirrored:
         places = np.concatenate([places, places * (-1.0, 1.0)])
     seen = pose(*machine.pose)
-    return places @ seen[:3, :2].T + seen[:3, 3], seen[:3, 2]
+    normal = OBLIQUE if machine.in_space else seen[:3, 2]
+    return places @ seen[:3, :places.shape[1]].T + seen[:3, 3], normal
 
 
 def _renamed(group: Mapping[str, Any], name: str, namespace: str) -> Dict[str, Any]:

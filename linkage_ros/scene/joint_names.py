@@ -13,7 +13,7 @@ from typing import Any, Dict, Iterable, Mapping, NamedTuple, Optional, Tuple
 import numpy as np
 
 from .parameters import SceneError
-from ..words import elided, listed
+from ..words import elided, listed, meant
 
 # A sign and a digit after a name begin an offset; a hyphen before a letter belongs to the name.
 _PLAIN = r'[A-Za-z_][\w./:]*(?:-[A-Za-z_][\w./:]*)*'
@@ -70,7 +70,7 @@ def read_joint_names(mechanism: str, joints: Mapping[str, bool], lines: Iterable
             raise SceneError(
                 f"{mechanism}.joint_names must be texts such as 'BC=left_shin' or "
                 f"'EF=-\"ankle-2\"+0.35', each for a different one of {listed(joints, 90)}, not "
-                f'{elided(line)!r}')
+                f'{elided(line)!r}{meant(match and match[1], {*joints} - {*own})}')
         offset = float(match[4] or 0.0)
         own[match[1]] = JointName(name, -1.0 if match[2] else 1.0, offset,
                                   wraps=joints[match[1]] and offset != 0.0)

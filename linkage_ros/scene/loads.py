@@ -10,7 +10,7 @@ from typing import Dict, Iterable, Tuple, Union
 
 from .parameters import SceneError
 from ..linkage.mechanism import Mechanism
-from ..words import elided, listed
+from ..words import elided, listed, meant
 
 # A moment [N m], or a force [N]: x, y and, in a spatial linkage, z.
 Load = Union[float, Tuple[float, ...]]
@@ -22,6 +22,7 @@ _LINE = re.compile(rf'(\w+)=({_FIGURE})(?: +({_FIGURE}))?(?: +({_FIGURE}))?', re
 def read_loads(mechanism: str, linkage: Mechanism, lines: Iterable[str]) -> Dict[str, Load]:
     """Return forces by joint and moments by link; raise SceneError if a line is neither."""
     loads: Dict[str, Load] = {}
+    names = (*linkage.points, *linkage.joints)
     for line in lines:
         match = _LINE.fullmatch(line)
         if not match or match[1] in loads or match[1] not in (
@@ -29,7 +30,8 @@ def read_loads(mechanism: str, linkage: Mechanism, lines: Iterable[str]) -> Dict
             raise SceneError(
                 f"{mechanism}.loads must be texts such as 'C=0 -9.81', a force [N] at a joint, or "
                 f"'EF=2.5', a moment [N m] on a link, each for a different one of "
-                f'{listed((*linkage.points, *linkage.joints), 90)}, not {elided(line)!r}')
+                f'{listed(names, 90)}, not {elided(line)!r}'
+                f'{meant(match and match[1], {*names} - {*loads})}')
         first, *others = (float(figure) for figure in match.groups()[1:] if figure)
         if others and len(others) + 1 != len(linkage.axes):
             raise SceneError(f'{mechanism}.loads: a force must have the components '

@@ -30,8 +30,7 @@ from ..linkage.mechanism import Mechanism
 from ..linkage.walker import Assembly
 from ..words import listed, meant, quoted
 
-IN_SPACE = ('a linkage in space: pictures, the page and robot models are of linkages in a '
-            'plane')
+IN_SPACE = 'a linkage in space: pictures and robot models are of linkages in a plane'
 TYPES = (*mechanisms.TYPES, *mechanisms.WRITTEN)
 
 # Frame names are as free as link names in URDF; tf2 forbids a leading slash.
@@ -224,8 +223,9 @@ def _linkage(name: str, type_: str, values: Values) -> Tuple[Mechanism, Tuple[Ar
         # Changed dimensions come first, since a long list is shortened.
         usual = sorted(dimensions, key=lambda key: dimensions[key] == design.dimensions[key])
         lengths = listed(f'{key}={dimensions[key]:g}' for key in usual)
-        raise SceneError(f'{name}.dimensions must let the {type_} be assembled at some '
-                         f'{linkage.inputs[0].kind}, which {lengths} do not')
+        raise SceneError(f'{name}.{"dimensions" if dimensions else "joints"} must let the {type_} '
+                         f'be assembled at some {linkage.inputs[0].kind}'
+                         + f', which {lengths} do not' * bool(dimensions))
     return linkage, reach
 
 

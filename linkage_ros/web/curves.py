@@ -11,6 +11,7 @@ import numpy as np
 from .poses import Refused, theta_of
 from .settings import shown
 from ..c_code import header
+from ..linkage.curves import sampled
 from ..robot_model import urdf
 from ..scene import SceneMechanism
 from ..words import listed, meant, quoted
@@ -18,24 +19,33 @@ from ..words import listed, meant, quoted
 SAMPLES = 361
 KINDS = POSITION, VELOCITY, ACCELERATION, TRANSMISSION, FORCE = (
     'position', 'velocity', 'acceleration', 'transmission angle', 'force ratio')
+# What has no pole.
+BOUNDED = POSITION, TRANSMISSION
 # Units of the force ratio, by the units of output and input.
 FORCES = {('rad', 'm'): 'N·m/N', ('m', 'rad'): 'N/(N·m)'}
 
 
 class Sweep:
-    """A sweep of the first input over its reach at 1 rad/s or 1 m/s; the others are fixed."""
+    """
+    A sweep of the first input over its reach at 1 rad/s or 1 m/s; the others are fixed.
 
-    def __init__(self, machine: SceneMechanism, present: Sequence[float]) -> None:
+    It is sampled evenly, or ever denser towards the ends of the reach: next to a dead point a
+    position bends too much for even samples.
+    """
+
+    def __init__(self, machine: SceneMechanism, present: Sequence[float],
+                 dense_ends: bool = False) -> None:
         self.linkage, self.input, self._machine = machine.linkage, machine.first.input, machine
         sizes = [machine.scale_of(name) for name in machine.inputs]
         others = [value / size for value, size in zip(present, sizes)][1:]
         reach, dead = self.linkage.reach(*others), self.linkage.dead_points(*others)
         if not reach:
             raise Refused(f'{machine.name} cannot be assembled where its other inputs are')
-        lows, highs = zip(*reach)
         # A NaN separates two arcs.
-        own = np.unique([*np.linspace(lows, highs, SAMPLES).ravel(), *(
-            0.5 * (before + after) for (_, before), (after, _) in zip(reach, reach[1:]))])
+        own = np.unique(np.concatenate([
+            *(sampled(low, high, 0, SAMPLES) if dense_ends and not self.input.is_whole(reach)
+              else np.linspace(low, high, SAMPLES) for low, high in reach),
+            [0.5 * (before + after) for (_, before), (after, _) in zip(reach, reach[1:])]]))
         self._size, still = sizes[0], [0.0] * len(others)
         self._inputs, self._speeds, self._still = (theta_of(values) for values in (
             [own, *others], [1.0 / sizes[0], *still], [0.0, *still]))
@@ -76,7 +86,7 @@ class Sweep:
 
     def poles(self, kind: str, name: str) -> np.ndarray:
         """Return inputs [rad or m] at which a quantity may be infinite."""
-        if kind in (POSITION, TRANSMISSION):
+        if kind in BOUNDED:
             return np.empty(0)
         rate = self.of(VELOCITY, (name,))[name]
         with np.errstate(all='ignore'):
@@ -92,7 +102,7 @@ def curve(machine: SceneMechanism, present: Sequence[float], kind: str = POSITIO
     """Return one of KINDS over the first input: x and y in `units`, y None where it has none."""
     if kind not in KINDS:
         raise ValueError(f'kind must be one of {", ".join(KINDS)}, not {quoted(kind)}')
-    sweep = Sweep(machine, present)
+    sweep = Sweep(machine, present, dense_ends=kind in BOUNDED)
     names = sweep.names(kind)
     output = names[0] if names and output is None else output or ''
     if not (output in names or kind != TRANSMISSION and sweep.linkage.has_output(output)):

@@ -3,9 +3,10 @@
 
 """The page's requests to the library: requested poses, and ranges of dimensions."""
 
+from dataclasses import dataclass
 from itertools import combinations
 import math
-from typing import Any, Mapping, Sequence
+from typing import Any, Mapping, Optional, Sequence
 
 from .settings import is_number, shown
 from ..linkage.arithmetic import Formula
@@ -22,10 +23,24 @@ _, ACCELERATION, FORCE = ARROWS
 NUDGE = 1e-6
 # Tolerance of an input at its end.
 CLOSE = 1e-9
+# What is rounding, as a fraction of a linkage's size, or in rad.
+ROUNDING = 1e-12
 
 
 class Refused(Exception):
     """A refused request; the text has the reason."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """The values that an input or output reaches [unit], and what the page is told of them."""
+
+    name: str
+    arcs: tuple[Arc, ...]
+    unit: str
+
+    def __str__(self) -> str:
+        return f'{self.name} reaches {in_words(self.arcs)} {self.unit}'
 
 
 def described(machine: SceneMechanism, present: Sequence[float]) -> dict[str, Any]:
@@ -33,7 +48,7 @@ def described(machine: SceneMechanism, present: Sequence[float]) -> dict[str, An
     Describe a mechanism at inputs `present` [rad or m], in the scene's size.
 
     Each input has value, allowed arcs and unit; each output of the first leg has value, unit, and
-    d output / d input for each input.
+    d output / d input for each input, zero where it is rounding.
     """
     linkage, names = machine.linkage, [
         *(name for name in machine.linkage.joints if name not in machine.inputs),
@@ -42,14 +57,23 @@ def described(machine: SceneMechanism, present: Sequence[float]) -> dict[str, An
     theta = theta_of([value / size for value, size in zip(present, own)])
     values = linkage.joint_angles(theta, names)
     rates = [linkage.joint_rates(theta, names, i) for i in range(len(own))]
+    sizes = {name: machine.scale_of(name) * (1.0 if linkage.is_angle(name) else linkage.longest)
+             for name in names}
+    units = [machine.scale_of(name) * (1.0 if drive.input.turns else linkage.longest)
+             for name, drive in machine.inputs.items()]
     return {
         'inputs': {name: {'value': value, 'unit': drive.input.unit, 'arcs': arcs(drive)}
                    for (name, drive), value in zip(machine.inputs.items(), present)},
         'outputs': {name: {
-            'value': shown(float(values[name]) * machine.scale_of(name)),
+            'value': _rounded(float(values[name]) * machine.scale_of(name), sizes[name]),
             'unit': 'rad' if linkage.is_angle(name) else 'm',
-            'rates': [shown(float(by[name]) * machine.scale_of(name) / size)
-                      for by, size in zip(rates, own)]} for name in names}}
+            'rates': [_rounded(float(by[name]) * machine.scale_of(name) / size, sizes[name] / unit)
+                      for by, size, unit in zip(rates, own, units)]} for name in names}}
+
+
+def _rounded(value: float, size: float) -> Any:
+    """Return a value as JSON can say it; zero where it is rounding beside a size."""
+    return shown(0.0 if abs(value) < ROUNDING * size else value)
 
 
 def arrows(machine: SceneMechanism, present: Sequence[float], kind: str,
@@ -94,9 +118,9 @@ def number(text: str) -> dict[str, Any]:
 
 
 def reached(machine: SceneMechanism, present: Sequence[float],
-            want: Mapping[str, Any]) -> tuple[list[float], str]:
+            want: Mapping[str, Any]) -> tuple[list[float], Optional[Reach]]:
     """
-    Return the inputs [rad or m] for a request, or the nearest possible ones and the reason.
+    Return the inputs [rad or m] for a request, or the nearest possible ones and what is reached.
 
     Parameters
     ----------
@@ -117,7 +141,7 @@ def reached(machine: SceneMechanism, present: Sequence[float],
 
     """
     if 'joint' in want:
-        return _joint_at(machine, present, **want), ''
+        return _joint_at(machine, present, **want), None
     name, value = want['output'], want['value']
     if not is_number(value):
         raise ValueError(f'value must be a finite number, not {quoted(value)}')
@@ -129,7 +153,7 @@ def reached(machine: SceneMechanism, present: Sequence[float],
 
 
 def _input_at(machine: SceneMechanism, present: Sequence[float], name: str,
-              value: float) -> tuple[list[float], str]:
+              value: float) -> tuple[list[float], Optional[Reach]]:
     drive, ends = machine.inputs[name], arcs(machine.inputs[name])
     near = min((min(max(float(drive.input.beside(value, (low + high) / 2.0)), low), high)
                 for low, high in ends), key=lambda end: drive.input.apart(end, value))
@@ -141,24 +165,23 @@ def _input_at(machine: SceneMechanism, present: Sequence[float], name: str,
     if not all(math.isfinite(part) for place in places.values() for part in place):
         raise Refused(f'{machine.name} cannot be assembled there')
     missed = not whole and drive.input.apart(near, value) > CLOSE * drive.input.size
-    return inputs, f'{name} reaches {in_words(ends)} {drive.input.unit}' if missed else ''
+    return inputs, Reach(name, tuple(ends), drive.input.unit) if missed else None
 
 
 def _output_at(machine: SceneMechanism, present: float, name: str,
-               value: float) -> tuple[list[float], str]:
+               value: float) -> tuple[list[float], Optional[Reach]]:
     linkage, drive = machine.linkage, machine.first
     own, unit = machine.scale_of(drive.input.name), machine.scale_of(name)
     ends = drive.ends and (drive.ends[0] / own, drive.ends[1] / own)
     found = float(linkage.servo_for(name, value / unit, present / own, ends)[0])
     if math.isfinite(found):
-        return [found * own], ''
+        return [found * own], None
     spans = linkage.extremes(name, [(low / own, high / own) for low, high in arcs(drive)])
     turn = math.tau if linkage.is_angle(name) else math.inf
     _, nearest = min((abs(math.remainder(reached - value / unit, turn)), at)
                      for span in spans for reached, at in span)
-    reach = in_words((low * unit, high * unit) for (low, _), (high, _) in spans)
-    return [nearest * own], (f'{name} reaches {reach} '
-                             f'{"rad" if linkage.is_angle(name) else "m"}')
+    reach = tuple((low * unit, high * unit) for (low, _), (high, _) in spans)
+    return [nearest * own], Reach(name, reach, 'rad' if linkage.is_angle(name) else 'm')
 
 
 def _joint_at(machine: SceneMechanism, present: Sequence[float], joint: str, place: Any,

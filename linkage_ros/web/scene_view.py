@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import partial
 import math
 import re
@@ -40,7 +40,6 @@ from .poses import Refused
 from .settings import Described, RemoteNode, Setting
 from .. import scene
 from ..scene import writing
-from ..scene.scene_mechanism import IN_SPACE
 from ..words import quoted
 
 MARKERS, LOCUS, LIST = '/markers', '/locus', '/list_parameters'
@@ -217,14 +216,19 @@ class SceneView:
         Describe a mechanism's pose; with a request, move it there first and hold it.
 
         Arguments are those of `poses.reached` and `poses.arrows`. The result is that of
-        `poses.described`, with requested arrows, and the reason if the request is not met exactly.
+        `poses.described`, with requested arrows, and the reason, and what is reached, if the
+        request is not met exactly.
         """
         mechanism = self._find(key)
-        (machine, inputs), reason = self._state(mechanism), ''
-        if want is not None:
-            inputs, reason = poses.reached(machine, inputs, dict(want))
+        (machine, inputs), reach = self._state(mechanism), None
+        if want is None:
+            self._check_known(mechanism, machine)
+        else:
+            inputs, reach = poses.reached(machine, inputs, dict(want))
             await self._hold(mechanism, machine, inputs)
-        found = {**poses.described(machine, inputs), 'reason': reason}
+        found = {**poses.described(machine, inputs), 'reason': str(reach or '')}
+        if reach:
+            found['reach'] = asdict(reach)
         if arrows:
             found['arrows'] = poses.arrows(machine, inputs, arrows, dict(speeds))
         return found
@@ -257,7 +261,8 @@ class SceneView:
 
     async def export(self, key: str, form: str) -> Answer:
         """Return the result of `curves.exported`."""
-        machine, inputs = self._state(self._find(key))
+        mechanism = self._find(key)
+        machine, inputs = (_machine(mechanism), []) if form == 'c' else self._state(mechanism)
         frame_id = self._general.get(_space(key), {}).get('frame_id', 'world')
         return {'text': await self._aside(
             lambda: curves.exported(machine, inputs, form, frame_id))}
@@ -283,16 +288,14 @@ class SceneView:
 
     def _state(self, mechanism: ShownMechanism) -> tuple[scene.SceneMechanism, list[float]]:
         """Return a mechanism and its last received inputs [rad or m], or their starts."""
-        if mechanism.machine is None:
-            mechanism.machine = mechanism.scene().machines[mechanism.name]
-        if mechanism.machine.in_space:
-            raise Refused(f'{mechanism.name} is {IN_SPACE}')
-        machine, inputs = mechanism.machine, []
+        machine, inputs = _machine(mechanism), []
+        if machine.in_space:
+            raise Refused(f'{machine.name} is a linkage in space: the page draws and tunes it, '
+                          'and moves, plots and describes linkages in a plane')
         if self._bridge.loop.time() > mechanism.until:
             mechanism.held = {}
         for name, drive in machine.inputs.items():
-            told = next((self._told[topic][drive.source] for topic in mechanism.sources
-                         if drive.source in self._told.get(topic, ())), None)
+            told = self._heard_from(mechanism, drive.source)
             now = drive.start if told is None else machine.from_source(drive, told, None, None)[0]
             now = now if math.isfinite(now) else drive.start
             held = mechanism.held.get(name, now)
@@ -300,6 +303,18 @@ class SceneView:
                 mechanism.held.pop(name, None)
             inputs.append(mechanism.held.get(name, now))
         return machine, inputs
+
+    def _heard_from(self, mechanism: ShownMechanism, source: str) -> Optional[float]:
+        """Return the last position of an input's source, or None."""
+        return next((self._told[topic][source] for topic in mechanism.sources
+                     if source in self._told.get(topic, ())), None)
+
+    def _check_known(self, mechanism: ShownMechanism, machine: scene.SceneMechanism) -> None:
+        """Raise Refused if an input has neither been received nor a start."""
+        for name, drive in machine.inputs.items():
+            if f'{name}.start' not in mechanism.settings and self._heard_from(
+                    mechanism, drive.source) is None:
+                raise Refused(f'the {name} is not known yet: no message names {drive.source}')
 
     def _find(self, key: str) -> ShownMechanism:
         if key not in self._mechanisms:
@@ -340,7 +355,9 @@ class SceneView:
         keys = [key for key in keys if LOCUS_TYPE in topics.get(f'{key}{LOCUS}', ())]
         marked = tuple((key, tuple(sorted(
             (_joined(info.node_namespace, info.node_name), bytes(info.endpoint_gid))
-            for info in node.get_publishers_info_by_topic(f'{key}{MARKERS}')))) for key in keys)
+            for info in node.get_publishers_info_by_topic(f'{key}{MARKERS}')
+            # Of a node that starts, the name is unknown at first.
+            if info.node_namespace.startswith('/')))) for key in keys)
         heard = {owner: self._heard_by(owner) for _, owners in marked for owner, _ in owners}
         nodes = tuple(sorted(name[:-len(LIST)] for name, types in services
                              if name.endswith(LIST) and LIST_TYPE in types))
@@ -495,6 +512,13 @@ class SceneView:
         for client in self.clients:
             client.tell((mechanism.key, name), {'op': 'value', 'mechanism': mechanism.key,
                                                 'name': name, 'value': setting.value})
+
+
+def _machine(mechanism: ShownMechanism) -> scene.SceneMechanism:
+    """Return a mechanism as its scene has it, read once."""
+    if mechanism.machine is None:
+        mechanism.machine = mechanism.scene().machines[mechanism.name]
+    return mechanism.machine
 
 
 def _read(given: Mapping[str, Any]) -> scene.Scene:

@@ -60,8 +60,15 @@ class Viewer(Node):
                               'on this machine alone. Whoever reaches it can move the scene.')
         port = self._declared('port', PORT, 'Port to listen at; 0: any that is free.',
                               integer_range=[IntegerRange(from_value=0, to_value=65535, step=1)])
+        or_any = self._declared('or_any_port', False, 'Whether to listen at any free port where '
+                                'that one is taken.')
         bridge = Bridge(self)
-        return Server(SceneView(bridge), bridge, host, port)
+        try:
+            return Server(SceneView(bridge), bridge, host, port)
+        except OSError as error:
+            if not or_any or error.errno != EADDRINUSE:
+                raise
+            return Server(SceneView(bridge), bridge, host, 0)
 
     def _declared(self, name: str, default: Any, description: str, **ranges: Any) -> Any:
         return self.declare_parameter(name, default, ParameterDescriptor(

@@ -3,7 +3,7 @@
 
 // A slider with a number, a choice and a switch; a refused value springs back, with the reason.
 
-import { units } from './units.js';
+import { figures, units } from './units.js';
 
 const STOPS = 1000;
 const FINE = 0.1;
@@ -35,6 +35,9 @@ export async function typed(text, unit, factor) {
   const { value = NaN, turns } = await arithmetic.ask(text);
   return turns && unit?.startsWith('rad') ? value : value / factor;
 }
+
+/** Why a text is refused that says no number. */
+export const noNumber = text => `Refused: ${text} is not a number that can be set`;
 
 export function element(tag, properties = {}, ...children) {
   const made = Object.assign(document.createElement(tag), properties);
@@ -154,7 +157,7 @@ export class Slider {
   async type(text) {
     const value = text ? await typed(text, this.unit, this.factor) : 0;
     this.mistyped = !Number.isFinite(value);
-    if (this.mistyped) this.explain(`Refused: ${text} is not a number that can be set`);
+    if (this.mistyped) this.explain(noNumber(text));
     else if (text) this.offer(value);
   }
 
@@ -214,7 +217,7 @@ export class Slider {
   }
 
   shortened(value) {
-    return String(Number((value * this.factor).toPrecision(this.digits)));
+    return figures(value * this.factor, this.digits);
   }
 }
 

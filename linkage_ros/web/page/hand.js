@@ -21,8 +21,9 @@ export class Hand {
     this.canvas.addEventListener('pointerdown', event => this.grab(event));
     this.canvas.addEventListener('pointermove', event => this.move(event));
     this.canvas.addEventListener('pointerleave', () => this.light(null, ''));
+    this.canvas.addEventListener('click', event => this.click(event));
     for (const end of ['pointerup', 'pointercancel']) {
-      this.canvas.addEventListener(end, () => { this.grabbed = null; });
+      this.canvas.addEventListener(end, ({ pointerId }) => { if (pointerId === this.grabbed?.pointerId) this.grabbed = null; });
     }
   }
 
@@ -30,6 +31,7 @@ export class Hand {
   joint([x, y], reach) {
     let best = null;
     for (const leg of this.picture.legsSeen()) {
+      if (leg.mechanism.inSpace) continue;
       for (const [name, at] of leg.seen) {
         const away = Math.hypot(at[0] - x, at[1] - y);
         if (leg.mechanism.tunable.fixed.includes(name) || away > reach || best?.away < away) continue;
@@ -54,16 +56,22 @@ export class Hand {
     return best;
   }
 
-  grab(event) {
-    const pointer = [event.offsetX, event.offsetY];
-    const found = this.joint(pointer, GRAB[event.pointerType] ?? GRAB.mouse);
-    if (!found) {
-      const bar = this.bar(pointer);
-      if (bar) this.choose(bar.mechanism, bar.dimension);
-      return;
-    }
-    this.grabbed = { key: found.mechanism.key, leg: found.leg, joint: found.joint, pointer };
-    this.canvas.setPointerCapture(event.pointerId);
+  grab({ offsetX, offsetY, button, pointerId, pointerType }) {
+    const pointer = this.pressed = [offsetX, offsetY];
+    // Another finger zooms, or holds a joint; another button turns.
+    if (button || this.grabbed || this.picture.view.pointers.size) return;
+    const found = this.joint(pointer, GRAB[pointerType] ?? GRAB.mouse);
+    if (!found) return;
+    this.grabbed = { key: found.mechanism.key, leg: found.leg, joint: found.joint, pointer, pointerId };
+    this.canvas.setPointerCapture(pointerId);
+  }
+
+  /** Go to the slider of a bar, unless the picture was dragged. */
+  click({ offsetX, offsetY }) {
+    const [x, y] = this.pressed;
+    if (Math.hypot(offsetX - x, offsetY - y) > BAR || this.joint(this.pressed, GRAB.mouse)) return;
+    const bar = this.bar(this.pressed);
+    if (bar) this.choose(bar.mechanism, bar.dimension);
   }
 
   move(event) {
@@ -76,6 +84,7 @@ export class Hand {
       this.light(bar?.mechanism ?? null, bar?.dimension ?? '');
       return;
     }
+    if (event.pointerId !== this.grabbed.pointerId) return;
     this.grabbed.pointer = pointer;
     const held = this.held();
     if (!held) return;

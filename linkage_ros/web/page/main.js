@@ -12,14 +12,16 @@ import { Picture } from './picture.js';
 import { units } from './units.js';
 import { View } from './view.js';
 
+const REFUSED = 4000;
 const mechanisms = new Map();
 const at = id => document.getElementById(id);
 const [views, status, names, workshop, arrows, whole, notice] = [
   'views', 'status', 'names', 'workshop', 'arrows', 'whole', 'notice'].map(at);
 const naming = names.closest('label');
 /** What a reload keeps. */
-const kept = { shown: '', names: true, workshop: false, arrows: '', ...JSON.parse(sessionStorage.getItem('kept') ?? '{}') };
+const kept = { shown: '', from: {}, names: true, workshop: false, arrows: '', ...JSON.parse(sessionStorage.getItem('kept') ?? '{}') };
 let { shown } = kept;
+let fading = 0;
 let scheduled = false;
 let frames = 0;
 
@@ -35,10 +37,12 @@ const hand = new Hand(picture, {
   choose: (mechanism, dimension) => panel.goTo(mechanism.key, dimension),
 });
 picture.pull = () => hand.pull;
-picture.view = new View(picture.canvas, () => hand.grabbed !== null, () => {
+picture.view = new View(picture.canvas, () => hand.grabbed !== null, kept.from, () => {
   whole.hidden = picture.view.whole;
+  keep({ from: picture.view.from });
   draw();
 });
+whole.hidden = picture.view.whole;
 whole.onclick = () => picture.view.reset();
 
 /** Light up the bars of a dimension, and its slider. */
@@ -51,7 +55,14 @@ function light(mechanism, dimension) {
 
 /** Show over the picture why it is not available or cannot be moved; an empty text hides it. */
 function say(words) {
+  clearTimeout(fading);
   put(notice, { textContent: words, hidden: !words });
+}
+
+/** Say for a while why a joint is not dragged; its part of the panel says so till it is. */
+function refuse(words) {
+  say(words);
+  fading = setTimeout(say, REFUSED, '');
 }
 
 const connection = new Connection({
@@ -78,8 +89,8 @@ const connection = new Connection({
     }
     at('empty').hidden = mechanisms.size > 0;
     say('');
-    // What was shown before a reload may be found later.
-    show(mechanisms.has(kept.shown) ? kept.shown : '');
+    // What was shown before a reload, or before the viewer ended, may be found later.
+    show(mechanisms.has(kept.shown) || !mechanisms.size ? kept.shown : '');
   },
 
   look({ number, mechanism, ...look }) {
@@ -112,13 +123,14 @@ const connection = new Connection({
       }
       from += 8 + 12 * count;
     }
+    panel.follow();
     draw(() => connection.tell({ op: 'drawn' }));
     frames += 1;
   },
 });
 arithmetic.ask = text => connection.ask({ op: 'read', text });
 
-const panel = new Panel(at('panel'), connection, light, say);
+const panel = new Panel(at('panel'), connection, light, refuse);
 
 /** Draw once before the next refresh of the screen, then call `after`. */
 function draw(after) {
@@ -126,8 +138,11 @@ function draw(after) {
   scheduled = true;
   requestAnimationFrame(() => {
     scheduled = false;
-    picture.draw();
-    after?.();
+    try {
+      picture.draw();
+    } finally {
+      after?.();
+    }
   });
 }
 

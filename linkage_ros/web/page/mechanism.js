@@ -40,6 +40,11 @@ export class Mechanism {
     }
   }
 
+  /** Whether it is no linkage in a plane. */
+  get inSpace() {
+    return this.value('type') === 'rods';
+  }
+
   /** How many pairs of legs there are, and how many legs. */
   get pairs() {
     return this.value('leg_pairs') ?? 1;

@@ -3,8 +3,8 @@
 
 // The motion of a mechanism: a slider for each input, play and step, and its present outputs.
 
-import { element, LINEAR, Newest, put, Reason, Slider, typed } from './control.js';
-import { units } from './units.js';
+import { element, LINEAR, Newest, noNumber, put, Reason, Slider, typed } from './control.js';
+import { figures, units } from './units.js';
 
 const STEP = Math.PI / 180;
 const STEPS_A_STROKE = 100;
@@ -16,10 +16,15 @@ function button(textContent, ariaLabel, onclick) {
   return element('button', { type: 'button', textContent, ariaLabel, title: ariaLabel, onclick });
 }
 
-function shown(value, unit, figures = FIGURES) {
+function shown(value, unit, digits = FIGURES) {
   if (value === null) return '—';
-  const seen = value * units.of(unit).factor;
-  return Math.abs(seen) < 1e-9 ? '0' : String(Number(seen.toPrecision(figures)));
+  return figures(value * units.of(unit).factor, digits);
+}
+
+/** What is reached, in the units that are shown. */
+function inWords({ name, arcs, unit }) {
+  const ends = arcs.map(([low, high]) => `[${shown(low, unit)}, ${shown(high, unit)}]`);
+  return `${name} reaches ${ends.join(' or ')} ${units.of(unit).name}`;
 }
 
 /** An input: its slider, which follows it, and buttons for a step back and on. */
@@ -63,20 +68,22 @@ class InputRow {
 
 /** An output: its value, which is editable with a single input, and d output / d input. */
 class OutputRow {
-  constructor(name, editable, count, want) {
+  constructor(name, editable, count, want, say) {
     this.editable = editable;
     this.value = editable
       ? element('input', { type: 'text', autocomplete: 'off', ariaLabel: name })
       : element('span');
     this.unit = element('span', { className: 'unit' });
     this.rates = Array.from({ length: count }, () => element('td'));
-    this.row = element('tr', {}, element('th', { scope: 'row', textContent: name }),
+    this.row = element('tr', {}, element('th', { scope: 'row' }, element('span', { textContent: name })),
       element('td', {}, this.value, ' ', this.unit), ...this.rates);
     this.value.onchange = async () => {
       const { unit } = this.output;
-      const value = await typed(this.value.value.trim(), unit, units.of(unit).factor);
+      const text = this.value.value.trim();
+      const value = text ? await typed(text, unit, units.of(unit).factor) : NaN;
       this.value.blur();
       if (Number.isFinite(value)) want({ output: name, value });
+      else say({ reason: text && noNumber(text) });
       this.render();
     };
     this.value.onblur = () => this.render();
@@ -104,7 +111,7 @@ class OutputRow {
 
 /** The part of the panel that moves one mechanism; calls `onshow` when its pose has been received. */
 export class Motion {
-  constructor(mechanism, connection, open, sayInPicture) {
+  constructor(mechanism, connection, open, refuse) {
     this.mechanism = mechanism;
     this.connection = connection;
     this.speeds = new Map([...mechanism.settings.keys()].filter(name => name.endsWith('.speed')).map(name => [name, 0]));
@@ -120,7 +127,7 @@ export class Motion {
     this.dragged = new Newest(async want => {
       const answer = await this.want(want);
       this.say(answer);
-      if (this.connection.opened) sayInPicture(answer.reason);
+      if (this.connection.opened) refuse(answer.reason);
     });
     this.renderPlay();
   }
@@ -175,6 +182,7 @@ export class Motion {
   async want(want) {
     const answer = await this.connection.ask({ op: 'pose', mechanism: this.mechanism.key, want });
     if (answer.inputs) this.show(answer);
+    if (answer.reach) answer.reason = inWords(answer.reach);
     return answer;
   }
 
@@ -196,6 +204,7 @@ export class Motion {
     const answer = await this.connection.ask({ op: 'pose', mechanism: this.mechanism.key, ...this.arrows });
     this.looking = false;
     if (answer.inputs) this.show(answer);
+    else if (!this.inputs.size) this.say(answer);
   }
 
   show({ inputs, outputs, arrows }) {
@@ -210,6 +219,7 @@ export class Motion {
 
   build(names, inputs, outputs) {
     this.built = names;
+    this.say({});
     const want = async what => {
       const answer = await this.want(what);
       if (!inputs[what.output]) this.say(answer);
@@ -217,12 +227,12 @@ export class Motion {
     };
     const [all, one] = [Object.keys(inputs), Object.keys(inputs).length === 1];
     this.inputs = new Map(Object.entries(inputs).map(([name, input]) => [name, new InputRow(name, input, want)]));
-    this.outputs = new Map(Object.keys(outputs).map(name => [name, new OutputRow(name, one, all.length, want)]));
+    this.outputs = new Map(Object.keys(outputs).map(name => [name, new OutputRow(name, one, all.length, want, answer => this.say(answer))]));
     this.place.replaceChildren(...[...this.inputs.values()].map(({ slider }) => slider.row));
     this.table.replaceChildren(
       element('thead', {}, element('tr', {}, element('th', { scope: 'col', textContent: 'output' }),
         element('th', { scope: 'col', textContent: 'value' }),
-        ...all.map(name => element('th', { scope: 'col', textContent: `d / d ${name}` })))),
+        ...all.map(name => element('th', { scope: 'col' }, 'd / d ', element('span', { textContent: name }))))),
       element('tbody', {}, ...[...this.outputs.values()].map(({ row }) => row)));
     this.folding.hidden = !this.outputs.size;
   }

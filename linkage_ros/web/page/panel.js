@@ -15,12 +15,13 @@ const LOOKS = 120;
 
 /** The section of one mechanism. Its `parts` have a method render(). */
 class Section {
-  constructor(mechanism, { connection, light, say }, folded) {
+  constructor(mechanism, { connection, light, refuse }, folded) {
     const { key, name, title } = mechanism;
     const type = mechanism.value('type') ?? '';
     this.mechanism = mechanism;
-    this.motion = new Motion(mechanism, connection, !folded, say);
+    this.motion = new Motion(mechanism, connection, !folded, refuse);
     this.plot = new Plot(mechanism, connection, this.motion);
+    this.plot.element.hidden = mechanism.inSpace;
     this.motion.place.after(this.plot.element);
     this.motion.onshow = () => this.plot.look();
     this.tuning = new Tuning(mechanism, connection, !folded, own => light(mechanism, own));
@@ -59,9 +60,9 @@ class Section {
 
 /** All displayed sections. */
 export class Panel {
-  /** Calls `light`, and `say` with the reason why a joint is not dragged. */
-  constructor(place, connection, light, say) {
-    Object.assign(this, { place, connection, light, say });
+  /** Calls `light`, and `refuse` with the reason why a joint is not dragged. */
+  constructor(place, connection, light, refuse) {
+    Object.assign(this, { place, connection, light, refuse });
     this.sections = new Map();
     units.onchange(() => this.render());
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.render());
@@ -92,7 +93,15 @@ export class Panel {
   }
 
   look() {
-    for (const { motion, inSight } of this.sections.values()) if (inSight || !motion.inputs.size) motion.look();
+    for (const { motion, mechanism, inSight } of this.sections.values()) {
+      if (inSight || mechanism.arrows.kind || !motion.inputs.size) motion.look();
+    }
+  }
+
+  /** Keep arrows in step with the picture; those of many mechanisms come as often as all else. */
+  follow() {
+    if (this.sections.size > 1) return;
+    for (const { motion, mechanism } of this.sections.values()) if (mechanism.arrows.kind) motion.look();
   }
 
   /** Undo by Ctrl-Z, except in a text field. */

@@ -3,12 +3,17 @@
 
 // The picture: markers to scale, seen at a right angle to the plane of the linkage.
 
-import { units } from './units.js';
+import { figures, units } from './units.js';
 
 const MARGIN = 44;
+/** What is seen is not smaller [m]. */
+const LEAST = 1e-33;
+const LEGEND = 64;
 const SLACK = 0.06;
 const SHRUNK = 10;
 const LINE = 18;
+/** How long a number at the grid may be, and its figures where it would be longer. */
+const [LONGEST, FIGURES] = [10, 6];
 const MARK = 13;
 const ARROW = 90;
 const HEAD = 9;
@@ -17,10 +22,14 @@ const TURNS = [1, 1.9].flatMap(ring => [0, 1, -1, 2, -2, 3, -3, 4].map(eighth =>
 const MOST_LINES = 100;
 /** The number of coordinates of a line, a triangle, a joint. */
 const PIECE = { lines: 4, triangles: 6, joints: 2 };
+/** A linkage in space is seen from the front, from the right and above. */
+const OBLIQUE = { right: [0.8, 0.6, 0], up: [-0.168, 0.224, 0.96], out: [0.576, -0.768, 0.28] };
 const FONT = "13px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
 
 /** A colour of the style sheet, which the server fills in. */
 export const paint = name => getComputedStyle(document.documentElement).getPropertyValue(name);
+
+const clamp = (value, low, high) => Math.max(low, Math.min(value, high));
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
@@ -51,6 +60,10 @@ function below(y, others) {
   return others.sort((a, b) => a - b).reduce((free, other) => Math.abs(other - free) < LINE ? other + LINE : free, y);
 }
 
+/** How far a text is from a place. */
+const apart = ({ x, y, half, high }, [left, top]) => Math.hypot(
+  Math.max(Math.abs(x - left) - half, 0), Math.max(Math.abs(y - top) - high, 0));
+
 const dark = matchMedia('(prefers-color-scheme: dark)');
 
 /** A colour mixed with that of the paper, or of the ink. */
@@ -62,17 +75,18 @@ function mixed([r, g, b, a], part, towards) {
 /** A colour, stronger for the legs in front; all are visible against the paper. */
 const colour = (rgba, front = 0) => mixed(rgba, 0.55 * front, 'ink');
 
+/** A box along the axes, of two dimensions or three. */
 class Box {
-  constructor() {
-    this.low = [Infinity, Infinity];
-    this.high = [-Infinity, -Infinity];
+  constructor(dimension = 2) {
+    this.low = Array(dimension).fill(Infinity);
+    this.high = Array(dimension).fill(-Infinity);
   }
 
-  add(x, y) {
-    if (x < this.low[0]) this.low[0] = x;
-    if (y < this.low[1]) this.low[1] = y;
-    if (x > this.high[0]) this.high[0] = x;
-    if (y > this.high[1]) this.high[1] = y;
+  add(...at) {
+    for (let i = 0; i < this.low.length; i++) {
+      if (at[i] < this.low[i]) this.low[i] = at[i];
+      if (at[i] > this.high[i]) this.high[i] = at[i];
+    }
   }
 
   get size() {
@@ -80,12 +94,12 @@ class Box {
   }
 
   holds(other) {
-    return [0, 1].every(i => this.low[i] <= other.low[i] && other.high[i] <= this.high[i]);
+    return this.low.every((low, i) => low <= other.low[i] && other.high[i] <= this.high[i]);
   }
 
   /** Return the box around both, with a margin. */
   grown(other) {
-    const box = new Box();
+    const box = new Box(this.low.length);
     box.add(...this.low.map((low, i) => Math.min(low, other.low[i])));
     box.add(...this.high.map((high, i) => Math.max(high, other.high[i])));
     const slack = SLACK * box.size;
@@ -137,7 +151,7 @@ export class Picture {
     if (!shapes.length) return;
     // The picture is not refitted while a joint is dragged.
     if (!this.scale || !this.pull()) this.fit(shapes, width, height);
-    if (!this.view.turned) this.grid(width, height);
+    if (!this.view.turned && !this.mechanisms[0].inSpace) this.grid(width, height);
     this.planes();
     // Slots are drawn first, so that they do not hide bars.
     shapes.sort((a, b) => this.isSlot(b) - this.isSlot(a) || a.depth - b.depth);
@@ -158,7 +172,7 @@ export class Picture {
     for (const mechanism of this.mechanisms) {
       for (const { look, points } of mechanism.drawn()) {
         const [x, y, z] = axes(look.pose);
-        this.seen ??= this.view.axes({ right: x, up: y, out: z });
+        this.seen ??= this.view.axes(mechanism.inSpace ? OBLIQUE : { right: x, up: y, out: z });
         const depth = dot(this.seen.out, look.pose.slice(0, 3));
         const map = [this.seen.right, this.seen.up].map(way => [
           dot(way, x), dot(way, y), dot(way, z), dot(way, look.pose.slice(0, 3))]);
@@ -179,18 +193,19 @@ export class Picture {
   fit(shapes, width, height) {
     const now = new Map();
     this.maps = new Map();
-    for (const { mechanism: { key }, points, map } of shapes) {
-      if (!now.has(key)) now.set(key, new Box());
-      for (let i = 0; i < points.length; i += 3) now.get(key).add(points[i], points[i + 1]);
+    for (const { mechanism: { key, inSpace }, points, map } of shapes) {
+      if (!now.has(key)) now.set(key, new Box(inSpace ? 3 : 2));
+      for (let i = 0; i < points.length; i += 3) now.get(key).add(points[i], points[i + 1], points[i + 2]);
       this.maps.set(key, map);
     }
     const all = new Box();
     const frames = new Map(shapes.map(({ mechanism: { key }, look }) => [key, look.frame]));
     const inFrames = new Map();
     for (const [key, box] of now) {
-      let known = this.boxes.get(key) ?? new Box();
+      const empty = new Box(box.low.length);
+      let known = this.boxes.get(key) ?? empty;
       // It was never so large: something far off was drawn that is gone.
-      if (box.size > 0 && known.size > SHRUNK * box.size) known = new Box();
+      if (box.size > 0 && known.size > SHRUNK * box.size) known = empty;
       if (!known.holds(box)) this.boxes.set(key, known.grown(box));
       const frame = frames.get(key);
       if (!inFrames.has(frame)) inFrames.set(frame, new Box());
@@ -200,7 +215,7 @@ export class Picture {
       }
     }
     this.setAside(inFrames);
-    const span = [0, 1].map(i => Math.max(all.high[i] - all.low[i], 1e-9));
+    const span = [0, 1].map(i => Math.max(all.high[i] - all.low[i], LEAST));
     this.scale = Math.min((width - 2 * MARGIN) / span[0], (height - 2 * MARGIN) / span[1]);
     this.middle = [0, 1].map(i => (all.high[i] + all.low[i]) / 2);
     this.scale *= this.view.zoom;
@@ -218,10 +233,11 @@ export class Picture {
     }
   }
 
-  /** Return the corners of a box in a mechanism's plane, one after the other, as they are seen. */
-  corners(key, { low: [left, bottom], high: [right, top] }) {
-    return [[left, bottom], [right, bottom], [right, top], [left, top]].map(
-      ([x, y]) => this.maps.get(key).map(([a, b, , d]) => a * x + b * y + d));
+  /** Return the corners of a mechanism's box as they are seen, one after the other in its plane. */
+  corners(key, { low: [left, bottom, back = 0], high: [right, top, front = back] }) {
+    return [back, front].slice(0, front > back ? 2 : 1).flatMap(
+      z => [[left, bottom], [right, bottom], [right, top], [left, top]].map(
+        ([x, y]) => this.maps.get(key).map(([a, b, c, d]) => a * x + b * y + c * z + d)));
   }
 
   /** Draw the planes of mechanisms that are oblique to the view. */
@@ -232,7 +248,7 @@ export class Picture {
     context.fillStyle = paint('--shade');
     for (const [key, box] of this.boxes) {
       const [[a, b], [c, d]] = this.maps.get(key) ?? [[1, 0], [0, 1]];
-      if (Math.abs(a * d - b * c) > 0.9999) continue;
+      if (box.low.length > 2 || Math.abs(a * d - b * c) > 0.9999) continue;
       context.beginPath();
       for (const corner of this.corners(key, box)) context.lineTo(...this.at(...corner));
       context.closePath();
@@ -256,6 +272,10 @@ export class Picture {
     const { name, factor } = units.of('m');
     const step = round(90 / this.scale * factor) / factor;
     const digits = Math.max(0, -Math.floor(Math.log10(step * factor) + 1e-9));
+    const said = value => {
+      const text = (value * factor).toFixed(digits);
+      return text.length < LONGEST ? text : figures(value * factor, FIGURES);
+    };
     // One mechanism is seen in its own plane, in which its outputs count; several in the scene's frame.
     const [one, ...others] = this.maps.values();
     const [across, up] = others.length ? [0, 0] : one.map(([, , , from]) => from);
@@ -272,14 +292,14 @@ export class Picture {
     for (const value of multiples(step, left - across, right - across)) {
       const [x] = this.at(value + across, 0);
       this.line(x, 0, x, height);
-      if (x > room && x < width - 30) context.fillText((value * factor).toFixed(digits), x, height - 5);
+      if (x > room && x < width - 30) context.fillText(said(value), x, height - 5);
     }
     context.textAlign = 'left';
     context.textBaseline = 'middle';
     for (const value of multiples(step, bottom - up, top - up)) {
       const [, y] = this.at(0, value + up);
       this.line(0, y, width, y);
-      if (y < height - 30 && y > 12) context.fillText((value * factor).toFixed(digits), 6, y);
+      if (y < height - 30 && y > 12) context.fillText(said(value), 6, y);
     }
     context.textBaseline = 'bottom';
     context.fillText(unit, 6, height - 5);
@@ -406,37 +426,62 @@ export class Picture {
       const middle = [0, 1].map(i => seen.reduce((sum, at) => sum + at[i], 0) / seen.length);
       const away = look.width * this.scale / 2 + 12;
       const written = seen.map(([x, y]) => ({ x, y, half: 5, high: 5 }));
-      names.forEach((name, i) => {
+      names.forEach((whole, i) => {
+        if (!this.isSeen(...seen[i])) return;
+        const name = this.shortened(whole);
         const half = context.measureText(name).width / 2;
         const start = Math.atan2(seen[i][1] - middle[1], seen[i][0] - middle[0]);
-        const tried = TURNS.map(([ring, turn]) => ({
+        const tried = TURNS.map(([ring, turn]) => this.inside({
           x: seen[i][0] + Math.cos(start + turn) * (ring * away + half - 5), y: seen[i][1] + Math.sin(start + turn) * ring * away, half, high: 8,
         }));
-        const free = at => written.every(other => Math.abs(other.x - at.x) > other.half + half || Math.abs(other.y - at.y) > other.high + 8);
-        const place = tried.find(free) ?? tried[0];
+        const free = tried.filter(at => written.every(other => Math.abs(other.x - at.x) > other.half + half || Math.abs(other.y - at.y) > other.high + 8));
+        // A name beside another's joint would be taken for that one's.
+        const own = free.find(at => seen.every(joint => apart(at, joint) >= apart(at, seen[i])));
+        const place = own ?? free[0] ?? tried[0];
         written.push(place);
         this.text(name, place.x, place.y);
       });
     }
   }
 
-  /** Write the mechanisms' names below them, none over another. */
+  /** Whether a place is in the picture. */
+  isSeen(x, y) {
+    return x >= 0 && y >= 0 && x <= this.canvas.clientWidth && y <= this.canvas.clientHeight;
+  }
+
+  /** Shift a text so that it is not cut. */
+  inside({ x, y, half, high }) {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    return { x: clamp(x, half + 2, width - half - 2), y: clamp(y, high + 2, height - high - 2), half, high };
+  }
+
+  /** A name as far as the picture is wide enough for it. */
+  shortened(name) {
+    const room = this.canvas.clientWidth - 8;
+    let end = name.length;
+    while (end > 1 && this.context.measureText(name.slice(0, end)).width > room) end -= 1;
+    return end < name.length ? `${name.slice(0, end - 2)}…` : name;
+  }
+
+  /** Write the mechanisms' names below them, none over another, where the picture has room. */
   titles() {
     const { context } = this;
     context.font = `600 ${FONT}`;
     context.textAlign = 'center';
     context.textBaseline = 'top';
     const written = [];
-    for (const { key, title: name } of this.mechanisms) {
+    for (const { key, title } of this.mechanisms) {
       const box = this.boxes.get(key);
       if (!box) continue;
+      const name = this.shortened(title);
       const half = context.measureText(name).width / 2 + 4;
       const corners = this.corners(key, box).map(corner => this.at(...corner));
-      const x = corners.reduce((sum, [one]) => sum + one / corners.length, 0);
+      const middle = corners.reduce((sum, [one]) => sum + one / corners.length, 0);
+      const { x } = this.isSeen(middle, 0) ? this.inside({ x: middle, y: 0, half, high: 0 }) : { x: middle };
       const beside = written.filter(other => Math.abs(other.x - x) < other.half + half);
       const y = below(Math.max(...corners.map(([, one]) => one)), beside.map(other => other.y));
       written.push({ x, y, half });
-      this.text(name, x, y);
+      if (y + LINE < this.canvas.clientHeight) this.text(name, x, y);
     }
   }
 
@@ -479,7 +524,8 @@ export class Picture {
 
   /** Draw the requested arrows at the joints of the first legs; the longest one has a fixed length. */
   arrows() {
-    const { context } = this;
+    const { context, canvas } = this;
+    const length = Math.min(ARROW, canvas.clientHeight / 6);
     context.strokeStyle = context.fillStyle = paint('--ink');
     context.lineWidth = 2;
     for (const { mechanism: { arrows }, leg, map, seen } of this.legsSeen()) {
@@ -487,7 +533,7 @@ export class Picture {
       const most = Math.max(0, ...at.map(([, way]) => Math.hypot(...way)));
       const [longest] = at.find(([, way]) => Math.hypot(...way) === most) ?? [];
       for (const [joint, [x, y]] of most ? at : []) {
-        const [right, up] = map.map(([a, b]) => (a * x + b * y) * ARROW / most);
+        const [right, up] = map.map(([a, b]) => (a * x + b * y) * length / most);
         this.arrow(seen.get(joint), [right, -up]);
       }
       if (this.mechanisms.length === 1 && arrows.kind && !leg) this.legend(arrows, longest, most);
@@ -510,13 +556,27 @@ export class Picture {
   /** Write the value of the longest arrow, and the efforts that balance the loads. */
   legend({ kind, unit, efforts = {} }, joint, most) {
     const { name, factor } = units.of(unit);
-    const figure = value => value === null ? 'without bound' : Number(value.toPrecision(3));
+    const figure = value => value === null ? 'without bound' : figures(value, 3);
     const holds = Object.entries(efforts).map(([input, [value, of]]) => `, the ${input} holds ${figure(value)} ${of}`);
     this.context.font = FONT;
     this.context.textAlign = 'left';
     this.context.textBaseline = 'top';
-    this.text(joint ? `longest ${kind}: ${figure(most * factor)} ${name} at ${joint}${holds.join('')}`
-      : kind === 'force' ? `no loads on its joints${holds.join('')}` : `no ${kind}`, 64, 12);
+    const words = joint ? `longest ${kind}: ${figure(most * factor)} ${name} at ${joint}${holds.join('')}`
+      : kind === 'force' ? `no loads on its joints${holds.join('')}` : `no ${kind}`;
+    this.broken(words, this.canvas.clientWidth - LEGEND).forEach((line, i) => this.text(line, LEGEND, 12 + i * LINE));
+  }
+
+  /** Break a text into lines of a width, at spaces or, in a word that is too long, anywhere. */
+  broken(words, width) {
+    const lines = [''];
+    const has = text => this.context.measureText(text).width < width;
+    for (const word of words.split(/(?<= )/)) {
+      for (const part of has(word) ? [word] : word) {
+        if (has(lines.at(-1) + part)) lines.push(lines.pop() + part);
+        else lines.push(part);
+      }
+    }
+    return lines;
   }
 
   /** Draw a line from the dragged joint to the pointer. */

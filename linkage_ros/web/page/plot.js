@@ -5,7 +5,7 @@
 
 import { element, Newest, put, Reason } from './control.js';
 import { multiples, paint } from './picture.js';
-import { units } from './units.js';
+import { figures, units } from './units.js';
 
 const KINDS = ['position', 'velocity', 'acceleration', 'transmission angle', 'force ratio'];
 // Quantities that grow with the input's speed: the power of the speed.
@@ -28,7 +28,7 @@ function library() {
   return loading;
 }
 
-const shown = value => value === null || value === undefined ? '—' : String(Number(value.toPrecision(FIGURES)));
+const shown = value => value === null || value === undefined ? '—' : figures(value, FIGURES);
 
 /** The range of the drawn values: all, except those that grow without bound. */
 function bounds(values) {
@@ -50,6 +50,18 @@ function between(xs, ys, x) {
   const [a, b] = [ys[after - 1], ys[after]];
   if (a === null || b === null) return null;
   return a + (b - a) * (x - xs[after - 1]) / (xs[after] - xs[after - 1]);
+}
+
+/** The curve, which ends where it has no value: a gap of the library's own is joined where it is narrow. */
+function path(plot) {
+  const stroke = new Path2D();
+  const [xs, ys] = plot.data;
+  let drawn = false;
+  for (let i = 0; i < xs.length; i++) {
+    if (ys[i] !== null) stroke[drawn ? 'lineTo' : 'moveTo'](plot.valToPos(xs[i], 'x', true), plot.valToPos(ys[i], 'y', true));
+    drawn = ys[i] !== null;
+  }
+  return { stroke };
 }
 
 export class Plot {
@@ -183,13 +195,13 @@ export class Plot {
       grid: { stroke: () => paint('--grid'), width: 1 }, ticks: { show: false },
       // The library's own function adds steps up to the end, which may never be reached.
       splits: (_, side, low, high, step) => multiples(step, low, high),
-      values: (_, splits) => splits.map(value => String(Number(value.toPrecision(6)))),
+      values: (_, splits) => splits.map(value => figures(value, 6)),
     });
     return {
       ...this.size, pxAlign: 0, legend: { show: false },
       cursor: { y: false, drag: { x: false, y: false } },
       scales: { x: { time: false, range: (_, low, high) => [low, high] }, y: { range: () => this.bounds } },
-      series: [{}, { stroke: () => paint('--accent'), width: 2, points: { show: false } }],
+      series: [{}, { stroke: () => paint('--accent'), width: 2, points: { show: false }, paths: path }],
       axes: [
         { ...axis(across), size: 24, ...(this.units[0].name === '°' && { incrs: DEGREES }) },
         { ...axis(up), size: (_, values) => 10 + DIGIT * Math.max(2, ...(values ?? []).map(text => text.length)) },

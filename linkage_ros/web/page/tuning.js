@@ -129,7 +129,7 @@ export class Tuning {
       if ([...this.controls.values()].some(({ held }) => held)) return this.refresh();
       if (tunable.reason) return;
       this.mechanism.tunable = tunable;
-      for (const [joint, [plus, minus]] of Object.entries(tunable.sides)) {
+      for (const [joint, [plus = SIGNS[1], minus = SIGNS[-1]]] of Object.entries(tunable.sides)) {
         this.controls.get(BRANCH + joint)?.name({ 1: plus, '-1': minus });
       }
       for (const [name, ends] of Object.entries(tunable.travel)) {

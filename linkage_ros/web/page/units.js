@@ -4,6 +4,8 @@
 // Units: values are in radians and metres; they are displayed so, or in degrees and millimetres.
 
 const WORKSHOP = { rad: ['°', 180 / Math.PI], m: ['mm', 1000] };
+/** How many characters a field shows. */
+const ROOM = 9;
 const listeners = [];
 
 export const units = {
@@ -26,3 +28,13 @@ export const units = {
     listeners.push(listener);
   },
 };
+
+/** A number of at most so many figures that has room in a field. */
+export function figures(value, most) {
+  for (let digits = most; digits > 1; digits--) {
+    const number = Number(value.toPrecision(digits));
+    const [short] = [String(number), number.toExponential().replace('+', '')].filter(text => text.length <= ROOM);
+    if (short) return short;
+  }
+  return value.toExponential(0).replace('+', '');
+}

@@ -13,9 +13,9 @@ const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDo
 const middle = points => [0, 1].map(i => points.reduce((sum, at) => sum + at[i], 0) / points.length);
 
 export class View {
-  /** Calls `changed()`; leaves alone what `busy()` says that somebody else drags. */
-  constructor(canvas, busy, changed) {
-    Object.assign(this, { canvas, busy, changed, pointers: new Map(), ...WHOLE });
+  /** Calls `changed()`; leaves alone what `busy()` says that somebody else drags; begins as `from`. */
+  constructor(canvas, busy, from, changed) {
+    Object.assign(this, { canvas, busy, changed, pointers: new Map(), ...WHOLE, ...from });
     canvas.addEventListener('pointerdown', event => this.press(event));
     canvas.addEventListener('pointermove', event => this.move(event));
     for (const end of ['pointerup', 'pointercancel']) {
@@ -33,6 +33,12 @@ export class View {
   reset() {
     Object.assign(this, WHOLE);
     this.changed();
+  }
+
+  /** From where it is seen. */
+  get from() {
+    const { zoom, shift, yaw, pitch } = this;
+    return { zoom, shift, yaw, pitch };
   }
 
   get turned() {
