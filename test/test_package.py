@@ -1,5 +1,12 @@
 # Copyright 2026 linkage_ros contributors
-# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
 
 """The package as colcon, pip and a reader of the changelog see it."""
 
@@ -53,6 +60,21 @@ def test_all_files_name_one_version(arguments):
     services = (ROOT / 'linkage_interfaces' / 'CHANGELOG.rst').read_text()
     assert f'\n{version} ({released[0][1]})\n---' in services
     assert f"\nversion: {version}\ndate-released: '{released[0][1]}'\n" in citation
+
+
+def test_every_source_begins_with_the_notice_that_ament_copyright_knows():
+    # As it reads files: comment marks and the way the lines are broken do not count.
+    sources = [path for path in ROOT.glob('**/*') if path.suffix in (
+        '.py', '.c', '.cpp', '.hpp', '.h', '.cmake') and not any(
+            part.startswith(('.', 'build', 'install')) for part in path.relative_to(ROOT).parts)]
+    heads = {path: ' '.join(re.findall(r'[^\s#/*]\S*', path.read_text()[:1000]))
+             for path in sources if not (path.parent / 'AMENT_IGNORE').exists()}
+    notice, = {head[:head.index(' limitations under the License.')] for head in heads.values()
+               if 'limitations under the License.' in head}
+    assert notice.startswith('Copyright 2026 linkage_ros contributors Licensed under the Apache')
+    assert notice.endswith('the specific language governing permissions and')
+    assert len(heads) > 300 and not [
+        path for path, head in heads.items() if not head.startswith(notice)]
 
 
 def test_setup_names_the_package_of_the_manifest(arguments):

@@ -1,5 +1,12 @@
 # Copyright 2026 linkage_ros contributors
-# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
 
 """The inverse as C functions: from the positions of axes to the inputs."""
 
@@ -55,7 +62,7 @@ class Inverses:
         """Return the function that keeps the input in its reach, and its call, if it has ends."""
         first, code = self._linkage.inputs[0], self._code
         turn, inside = first.turn if first.turns else 0.0, INSIDE[code.number]
-        return {'within': filled(template('within.h'), {
+        return {'within': filled(template('within.h.in'), {
             **self._values, 'arc_count': len(self._arcs), 'turn': code.literal(turn),
             'by_turn': code.literal(turn and 1.0 / turn), 'arcs': code.rows(
                 (0.5 * (low + high) / first.size, 0.5 * (high - low) / first.size - inside)
@@ -82,7 +89,7 @@ class Inverses:
             way.update(changed)
             way['inside'] = '' if side else f' && {code.name}_inside(start[next])'
         self.poses = max(self.poses, int(str(way['poses'])))
-        return modes + filled(template('inverse.h'), {
+        return modes + filled(template('inverse.h.in'), {
             'inside': '', **self._values, **way, 'tag': tag, 'side': side,
             'at': f'{code.name}_at' + (f'_{tag}' if side > 1 else ''),
             'given_inputs': '\n'.join(

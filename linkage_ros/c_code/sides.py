@@ -1,5 +1,12 @@
 # Copyright 2026 linkage_ros contributors
-# SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
 
 """
 Actuators to joints and joints to actuators, as C functions.
@@ -68,7 +75,7 @@ class Sides:
         machine, (first, second) = self.machine, self.pairs['']
         tables = [first, *(own for _, own in self.pairs.values())]
         tags = ['actuators', 'joints', *(tag[1:] for tag in self.pairs if tag)]
-        return filled(template('transmission.h'), {
+        return filled(template('transmission.h.in'), {
             **self.values, **self._inverses.within(), 'at': '\n'.join(map(self._at, self.pairs)),
             'inverses': '\n'.join(map(self._inverses.function, range(len(tags)), tags, tables)),
             'about': self._about(),
