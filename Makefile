@@ -160,12 +160,16 @@ $(venv)/.tools: $(venv)/.installed $(tools)
 	  || echo 'planegcs and SolveSpace cannot be built here, and are left out.'
 	@touch $@
 
+# A plugin of flake8 comes as source.
+.venv-ament/.installed: $(lock)/ament.txt
+	@about='what ament checks style with.' wheels/install.sh --to-compile '$(PYTHON)' .venv-ament $<
+	@touch $@
+
 # Environments beside that of the nodes, each of one lock file.
 .venv-docs/.installed: private export about := what draws and what makes the pages.
 .venv-lint/.installed: private export about := what checks style and types.
-.venv-ament/.installed: private export about := what ament checks style with.
 .venv-lock/.installed: private export about := what pins the rest.
-.venv-docs/.installed .venv-lint/.installed .venv-ament/.installed .venv-lock/.installed: \
+.venv-docs/.installed .venv-lint/.installed .venv-lock/.installed: \
 .venv-%/.installed: $(lock)/%.txt
 	@wheels/install.sh '$(PYTHON)' .venv-$* $<
 	@touch $@

@@ -62,14 +62,16 @@ class Inverses:
         """Return the function that keeps the input in its reach, and its call, if it has ends."""
         first, code = self._linkage.inputs[0], self._code
         turn, inside = first.turn if first.turns else 0.0, INSIDE[code.number]
-        return {'within': filled(template('within.h.in'), {
+        if not self._arcs:
+            return {'within': '', 'clamped': ''}
+        arcs = ((0.5 * (low + high) / first.size, 0.5 * (high - low) / first.size - inside)
+                for low, high in self._arcs)
+        within = filled(template('within.h.in'), {
             **self._values, 'arc_count': len(self._arcs), 'turn': code.literal(turn),
-            'by_turn': code.literal(turn and 1.0 / turn), 'arcs': code.rows(
-                (0.5 * (low + high) / first.size, 0.5 * (high - low) / first.size - inside)
-                for low, high in self._arcs)}),
-            'clamped': f' && !(is_strict && {code.name}_within(q, 1)\n            && at('
-                       f'{self._values["pass"]}q, side < 2, p))',
-        } if self._arcs else {'within': '', 'clamped': ''}
+            'by_turn': code.literal(turn and 1.0 / turn), 'arcs': code.rows(arcs)})
+        return {'within': within, 'clamped': (
+            f' && !(is_strict && {code.name}_within(q, 1)\n            && at('
+            f'{self._values["pass"]}q, side < 2, p))')}
 
     def function(self, side: int, tag: str, axes: Sequence[Axis]) -> str:
         """Return the function from positions of axes, in the table at `side`, to the inputs."""

@@ -46,7 +46,7 @@ MOST = 100
 def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Callable,
          places: Callable) -> List[Arc]:
     """
-    Return the arcs (lo, hi) of the first input on which every margin is at least zero.
+    Return the parts of the first input's range, each (lo, hi), on which no margin is negative.
 
     Parameters
     ----------

@@ -694,7 +694,7 @@ class Inverse:
         return np.append(np.flatnonzero(~(own < np.fmin.reduce(away))), inputs.shape[2] - 1)
 
     def _continued(self, inputs: np.ndarray, start: Sequence[float], limits: Sequence
-                  ) -> np.ndarray:
+                   ) -> np.ndarray:
         """Return inputs that continue from a start, whole turns included, up to the ends."""
         places = inputs.copy()
         for row, begin, pair, (_, turn, _) in zip(places, start, limits, self._turned):

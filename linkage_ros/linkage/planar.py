@@ -333,7 +333,7 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) 
     u, turning = 0.5 + skew, spin(arm.vector)
 
     def bar(along: Real, length: Real) -> Complex:
-        """Return the bar (along + i v) times the arm, whose spin it adds to its own."""
+        """Return the product of along + i v and the arm, whose spin it adds to its own."""
         return with_spin(arm.vector * Complex(along, v), Rate(
             (v, skew, *turning.of), lambda dv, dskew, *rates: turning.formula(*rates) + (
                 (along * dv - v * dskew) * arm.square / square(length))))

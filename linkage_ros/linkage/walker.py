@@ -46,7 +46,7 @@ class Layout(NamedTuple):
 
     @property
     def posed(self) -> int:
-        """Number of a row's values without velocities."""
+        """Return the number of a row's values without velocities."""
         return self.coordinates + self.joints
 
     @property

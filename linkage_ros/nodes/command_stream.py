@@ -86,7 +86,7 @@ class Command(NamedTuple):
 
     @property
     def efforts(self) -> list[float]:
-        """The static efforts of the actuators that balance the loads [N m or N]."""
+        """Return the static efforts of the actuators that balance the loads [N m or N]."""
         machine = self.target.machine
         if not machine.loads:
             return [0.0] * len(self.inputs)

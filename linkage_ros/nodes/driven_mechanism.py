@@ -69,7 +69,7 @@ class DrivenMechanism:
 
     @property
     def model(self) -> MechanismModel:
-        """The adopted model; it exists before the first message arrives."""
+        """Return the adopted model; it exists before the first message arrives."""
         assert self._model
         return self._model
 

@@ -84,7 +84,7 @@ class MechanismModel:
 
     @cached_property
     def marker_array(self) -> messages.Markers:
-        """The builder of its marker messages."""
+        """Return the builder of its marker messages."""
         return messages.Markers(*self._drawn)
 
     def latched(self) -> Tuple[str, Optional[Any]]:

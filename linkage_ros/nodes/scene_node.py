@@ -82,7 +82,7 @@ class SceneNode(Node):
 
     @property
     def scene(self) -> scenes.Scene:
-        """The scene of the present parameters."""
+        """Return the scene of the present parameters."""
         return self._parameters_of_scene.scene
 
     @property
@@ -92,7 +92,7 @@ class SceneNode(Node):
 
     @property
     def fields(self) -> Mapping[str, scenes.Field]:
-        """The Field of each parameter that the node uses, by name."""
+        """Return the Field of each parameter that the node uses, by name."""
         return self._parameters_of_scene.fields
 
     @property

@@ -95,17 +95,17 @@ class Drawing(Dyads):
 
     @property
     def allowed(self) -> float:
-        """Allowed distance of a pose from the file's, of the size."""
+        """Return the allowed distance of a pose from the file's, of the size."""
         return max(ROUNDING, 30.0 * self.loop.gap / self.loop.size + self.loop.lean)
 
     @property
     def places(self) -> Iterator[Pin]:
-        """The places of the lines' joints in the pose of the file, on each of their bodies."""
+        """Return the places of the lines' joints, on each of their bodies, in the file's pose."""
         return (pin for body in self.parts for pin in self.on[body].items())
 
     @property
     def linkage(self) -> Mechanism:
-        """The linkage of the lines."""
+        """Return the linkage of the lines."""
         return mechanisms.create('custom', joints=self.lines)
 
     def apart(self, linkage: Mechanism, *names: str) -> float:
@@ -117,7 +117,7 @@ class Drawing(Dyads):
 
     @property
     def ends(self) -> Dict[str, Tuple[float, float]]:
-        """The range of each source in a check [rad or m]."""
+        """Return the range of each source in a check [rad or m]."""
         if joint := self.measured:
             start = joint.start
             return {joint.name: joint.limits or (start - 0.5 * math.pi, start + 0.5 * math.pi)}
@@ -134,12 +134,12 @@ class Drawing(Dyads):
 
     @property
     def holders(self) -> List[Joint]:
-        """The joints of bodies that are left."""
+        """Return the joints of bodies that are left."""
         return [joint for joint in self.loop.joints if {*joint.bodies} & {*self.left}]
 
     @property
     def freedom(self) -> int:
-        """The degrees of freedom of the bodies that are left."""
+        """Return the degrees of freedom of the bodies that are left."""
         return 3 * len(self.left) - 2 * len(self.holders) - sum(
             joint in self.driven for joint in self.holders)
 

@@ -63,22 +63,22 @@ def write(model: Assembled) -> str:
                 add(equality, 'connect', name=point.name, site1=point.meets, site2=point.name)
     for gear in model.gears:
         add(equality, 'joint', joint1=gear.joint, joint2=gear.input,
-             polycoef=numbers(0.0, gear.ratio, 0.0, 0.0, 0.0))
+            polycoef=numbers(0.0, gear.ratio, 0.0, 0.0, 0.0))
     for motor in model.motors:
         _add_motor(actuator, motor)
     add(add(root, 'keyframe'), 'key', name='start',
-         ctrl=numbers(*(motor.start for motor in model.motors)))
+        ctrl=numbers(*(motor.start for motor in model.motors)))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding='unicode')
 
 
 def _add_solid(parent: ElementTree.Element, solid: Solid) -> ElementTree.Element:
     body = add(parent, 'body', name=solid.name, pos=numbers(*solid.pose[:3]),
-                euler=numbers(*solid.pose[3:]))
+               euler=numbers(*solid.pose[3:]))
     if joint := solid.joint:
         kind = 'slide' if joint.kind == 'prismatic' else 'hinge'
         add(body, 'joint', name=joint.name, type=kind, axis=numbers(*joint.axis),
-             ref=numbers(solid.position))
+            ref=numbers(solid.position))
     for piece in solid.pieces:
         _add_piece(body, piece)
     for point in solid.points:
@@ -92,7 +92,7 @@ def _add_weight(body: ElementTree.Element, solid: Solid) -> None:
         raise SceneError(f'{solid.name} is too light for MuJoCo: give a larger scale, --width or '
                          '--density')
     add(body, 'inertial', pos=numbers(*centre, 0.0), mass=numbers(mass),
-         fullinertia=numbers(xx, yy, zz, xy, 0.0, 0.0))
+        fullinertia=numbers(xx, yy, zz, xy, 0.0, 0.0))
 
 
 def _add_piece(body: ElementTree.Element, piece: Piece) -> None:
@@ -100,8 +100,8 @@ def _add_piece(body: ElementTree.Element, piece: Piece) -> None:
     sizes = {ROD: (thickness, half), BOX: (half, 0.5 * thickness, 0.5 * thickness),
              BALL: (thickness,)}[piece.shape]
     add(body, 'geom', type=piece.shape, pos=numbers(*piece.pose[:3]),
-         euler=numbers(*piece.pose[3:]), size=numbers(*sizes),
-         rgba=numbers(*palette.rgb(COLOURS[piece.colour]), 1.0))
+        euler=numbers(*piece.pose[3:]), size=numbers(*sizes),
+        rgba=numbers(*palette.rgb(COLOURS[piece.colour]), 1.0))
 
 
 def _add_motor(actuator: ElementTree.Element, motor: Motor) -> None:
@@ -110,6 +110,6 @@ def _add_motor(actuator: ElementTree.Element, motor: Motor) -> None:
     most = 10.0 * force * (motor.arm if motor.turns else 1.0)
     stiffness = STIFFNESS * force * (motor.arm if motor.turns else 1.0 / motor.arm)
     servo = add(actuator, 'position', name=motor.joint, joint=motor.joint, kp=numbers(stiffness),
-                 dampratio='1', forcerange=numbers(-most, most))
+                dampratio='1', forcerange=numbers(-most, most))
     if motor.sweep:
         servo.set('ctrlrange', numbers(*motor.sweep))

@@ -67,7 +67,7 @@ def write(model: Assembled) -> str:
 
 def _add_plugin(robot: ElementTree.Element, file: str, name: str, **values: str) -> None:
     plugin = add(robot, 'plugin', filename=f'gz-sim-{file}-system',
-                  name=f'gz::sim::systems::{name}')
+                 name=f'gz::sim::systems::{name}')
     for tag, text in values.items():
         add(plugin, tag, text)
 

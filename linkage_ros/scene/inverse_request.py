@@ -282,7 +282,7 @@ class InverseRequest:
 
     @property
     def _arcs(self) -> Sequence[Arc]:
-        """The allowed arcs of the input, one period at most."""
+        """Return the allowed arcs of the input, one period at most."""
         drive = self._drives[0]
         if not drive.ends:
             return drive.reach

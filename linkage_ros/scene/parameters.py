@@ -100,7 +100,7 @@ class Field:
 
     @property
     def allowed(self) -> str:
-        """The allowed values, in words."""
+        """Return the allowed values, in words."""
         words = [KINDS[self.kind][1]]
         if self.positive:
             words.append('above 0')

@@ -115,7 +115,7 @@ class SceneMechanism:
 
     @property
     def first(self) -> InputSettings:
-        """The settings of the first input; most linkages have only one."""
+        """Return the settings of the first input; most linkages have only one."""
         return next(iter(self.inputs.values()))
 
     def scale_of(self, output: str) -> float:
@@ -177,7 +177,7 @@ class SceneMechanism:
 
     @property
     def tracer(self) -> str:
-        """The joint that draws the locus: the linkage's tracer if in `points`, else their last."""
+        """Return the joint that draws the locus: the tracer if in `points`, else their last."""
         return self.linkage.tracer if self.linkage.tracer in self.points else self.points[-1]
 
 

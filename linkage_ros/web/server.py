@@ -98,7 +98,7 @@ class Server:
 
     @property
     def url(self) -> str:
-        """The page's address for a browser on this machine."""
+        """Return the page's address for a browser on this machine."""
         host = {'0.0.0.0': '127.0.0.1', '::': '::1', '': '127.0.0.1'}.get(self._host, self._host)
         return f'http://{f"[{host}]" if ":" in host else host}:{self.port}/'
 
