@@ -23,6 +23,8 @@ from .errors import ENDLESS
 from .timing import BATCHES
 
 RESULTS = Path(__file__).with_name('results')
+# Outputs whose errors may be twice as large.
+RATES = 'rate', 'acceleration'
 TITLES = {'water_drop': 'Water drop', 'jansen': 'Jansen leg', 'peaucellier': 'Peaucellier cell',
           'slotted_lever': 'Slotted lever'}
 FAILURES = ('nan', 'raised', 'astray', 'made_up')
@@ -364,8 +366,9 @@ def stability(found):
     several = found['linkages']
     lines += [f'| {several["linkages"]} random linkages: error / sensitivity of | results | rule '
               '| largest | 99.9 % are below |', '|---|--:|--:|--:|--:|']
-    lines += [f'| {row["output"]} | {row["samples"]} | {8 if "rate" in row["output"] else 4} '
-              f'| {row["max"]:.2g} | {row["p99.9"]:.2g} |' for row in several['outputs']]
+    lines += [f'| {row["output"]} | {row["samples"]} '
+              f'| {8 if row["output"].endswith(RATES) else 4} | {row["max"]:.2g} '
+              f'| {row["p99.9"]:.2g} |' for row in several['outputs']]
     problems = ', '.join(f'{row["count"]} x {row["kind"].replace(" rule", " beyond the rule")}'
                          for row in several['problems'])
     lines += ['', 'Problems with these random linkages, in the library or in the check: '

@@ -57,6 +57,8 @@ CHUNK = 50
 # Random linkages of a task, and how many of them also run in machine code, which is slow to make.
 LINKAGES, ACCELERATED = 20, 1
 UNIT = 2.0 ** -53
+# Last letters of an example of a problem: a hundred arcs may come before the linkage.
+EXAMPLE = 1000
 
 
 def main(args=None):
@@ -340,7 +342,8 @@ def linkages_table(results):
         'inverse': quantiles([x for result in results for x in result[4]]),
         'outputs': [{'output': output, **quantiles(values)}
                     for output, values in sorted(ratios.items())],
-        'problems': [{'kind': kind, 'count': len(texts), 'examples': texts[:3]}
+        'problems': [{'kind': kind, 'count': len(texts),
+                      'examples': [text[-EXAMPLE:] for text in texts[:3]]}
                      for kind, texts in sorted(problems.items(), key=lambda item: -len(item[1]))]}
 
 
