@@ -316,13 +316,17 @@ class Inverse:
                 answer = self._judged(inputs, row[:n], row[n:n + n * n], [
                     margin + FAR * limit.tolerance
                     for margin, limit in zip(row[n + n * n:], limits)])
-                parts += [*answer, *(_inverse(mode.rates) if n < 3 else row[n:n + n * n])]
+                # Of one input, the rate of the mode is exact next to a dead point, too.
+                parts += [*answer, *([1.0 / mode.rates[0][0]] if n == 1 else row[n:n + n * n])]
         return parts
 
     def _own_mode(self, mode: Mode) -> List[Real]:
         """Return verdict, inputs and rates of a mode that needs no check."""
+        (a, b), (c, d) = mode.rates
+        det = a * d - b * c
         return [where(abs(sum(mode.inputs, real(0.0))) < LARGE, 1.0, 0.0),
-                *map(self._counted, range(self._n), mode.inputs), *_inverse(mode.rates)]
+                *map(self._counted, range(self._n), mode.inputs),
+                d / det, -c / det, -b / det, a / det]
 
     def _judged(self, inputs: Sequence[Real], reached: Sequence[Real], rates: Sequence[Real],
                 margins: Sequence[Real]) -> List[Real]:
@@ -913,15 +917,6 @@ def _columns(inputs: np.ndarray, rates: np.ndarray) -> List[Found]:
     found = [(tuple(row), tuple(rate)) for row, rate in zip(
         inputs[:, :, 0].tolist(), rates[:, :, 0].tolist()) if row[0] == row[0]]
     return sorted(found)
-
-
-def _inverse(rates: Sequence[Sequence[Real]]) -> List[Real]:
-    """Return d output / d input, by each input, of the rates of up to two inputs by outputs."""
-    if len(rates) == 1:
-        return [1.0 / rates[0][0]]
-    (a, b), (c, d) = rates
-    det = a * d - b * c
-    return [d / det, -c / det, -b / det, a / det]
 
 
 def _greater(x: Real, y: Real) -> Real:
