@@ -358,7 +358,7 @@ static inline int lever_from_actuators(const float position[1], float q[1], leve
             break;
         far = away[next];
         ended = lever_reached(0, lever_at, 4, 0, position, start[next], &found);
-        away[next] = ended < 0 ? far + 1e+06f : (INFINITY);
+        away[next] = ended < 0 ? far + 1000000.0f : (INFINITY);
         if (ended > 0) {
             if (far < best) {
                 *p = found;
@@ -419,8 +419,8 @@ static inline int lever_from_joints(const float position[1], float q[1], lever_p
         if (!isfinite(away[next]))
             break;
         far = away[next];
-        ended = lever_reached(1, lever_at, 4, far < 1e+06f, position, start[next], &found);
-        away[next] = ended < 0 ? far + 1e+06f : (INFINITY);
+        ended = lever_reached(1, lever_at, 4, far < 1000000.0f, position, start[next], &found);
+        away[next] = ended < 0 ? far + 1000000.0f : (INFINITY);
         if (ended > 0) {
             if (far < best) {
                 *p = found;
@@ -481,8 +481,8 @@ static inline int lever_from_angle_lever(const float position[1], float q[1], le
         if (!isfinite(away[next]))
             break;
         far = away[next];
-        ended = lever_reached(2, lever_at_angle_lever, 4, far < 1e+06f, position, start[next], &found);
-        away[next] = ended < 0 ? far + 1e+06f : (INFINITY);
+        ended = lever_reached(2, lever_at_angle_lever, 4, far < 1000000.0f, position, start[next], &found);
+        away[next] = ended < 0 ? far + 1000000.0f : (INFINITY);
         if (ended > 0) {
             if (far < best) {
                 *p = found;

@@ -183,6 +183,5 @@ def _dialect(single: bool, name: str) -> Dialect:
 
 
 def _shortest(value: float) -> str:
-    """Return the shortest text of a float32."""
-    text = str(np.float32(value))
-    return text if re.search(r'[.e]', text) else text + '.0'
+    """Return the shortest text of a float32, as Python writes it: versions of numpy differ."""
+    return repr(float(str(np.float32(value))))

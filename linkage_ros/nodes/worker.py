@@ -104,7 +104,11 @@ class Worker:
             if executor is None or self._ended.is_set():
                 return
             self._called.clear()
-        executor.create_task(partial(self._act, kind, act))
+        try:
+            executor.create_task(partial(self._act, kind, act))
+        except AttributeError:
+            # Jazzy's executor has been shut down.
+            return
         self._called.wait()
 
     def _act(self, kind: str, act: Callable[[], None]) -> None:
