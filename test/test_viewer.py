@@ -2473,6 +2473,8 @@ def test_a_long_line_in_the_picture_is_broken_where_it_ends(address, tmp_path, w
             return await page.value(
                 f"""import('/picture.js').then(({{ Picture }}) => {{
                     const picture = new Picture(document.getElementById('picture'));
+                    // The page draws on the same canvas, and may have set another font.
+                    picture.context.font = '10px sans-serif';
                     return picture.broken({words!r}, {width}).map(
                         line => [line, picture.context.measureText(line).width]);
                 }})""")
