@@ -549,3 +549,33 @@ def test_an_end_of_the_reach_is_within_it_any_turn_and_nothing_beyond_is():
                     beyond = leg.side * outwards * 2e-12
                     assert legs.within_reach(crank)[i]
                     assert not legs.within_reach(crank + beyond)[i]
+
+
+def test_crank_driver_reads_whatever_its_motions_depend_on():
+    values = {
+        'mechanisms': ['boom', 'bar', 'leg'], 'boom.type': 'custom',
+        'boom.joints': ['O ground 0 0', 'P ground 1 0', 'B cylinder P O 1.5 left'],
+        'bar.type': 'four_bar', 'bar.leg_pairs': 1, 'leg.type': 'jansen',
+        **{f'bar.dimensions.{name}': length for name, length in zip(
+            'abcd', (120.0, 60.0, 50.0, 100.0))}}
+    before, found = scene.read(values), set()
+    for parameter in before.parameters:
+        value = parameter.value
+        if isinstance(value, (bool, int, float)) and not parameter.field.read_only:
+            other = not value if isinstance(value, bool) else value + 1 if isinstance(
+                value, int) else 1.1 * value + 0.05
+            try:
+                after = scene.read({**values, parameter.name: other})
+            except scene.SceneError:
+                continue
+            if any(after.machines[name].inputs != machine.inputs
+                   for name, machine in before.machines.items()):
+                found.add(parameter.name.rpartition('.')[2])
+                assert 'crank_driver' in parameter.field.readers, parameter.name
+    assert found >= {'scale', 'a', 'speed', 'ratio', 'offset'}
+
+
+@pytest.mark.parametrize('turns, value', [(0, 0.3), (2, 0.3), (-4, 0.3), (1, -1.0), (-1, -1.0)])
+def test_a_start_may_be_off_by_whole_periods_but_not_by_a_part_of_one(turns, value):
+    motion = Motion(1.0, (-1.0, 1.0), 0.3 + math.tau * turns, period=2)
+    assert motion.at(0)[0] == pytest.approx(value, abs=1e-14)

@@ -107,11 +107,12 @@ def search_for(linkage: Mechanism, outputs: Names, inputs: Sequence[Input],
 
 
 class BranchSearch:
-    """One output as a function of the only input, in monotone branches."""
+    """One output as a function of the first input, in monotone branches; `others` are fixed."""
 
-    def __init__(self, linkage: Mechanism, output: str, input_: Input):
-        self._input, self._linkage = input_, linkage
-        self._branches = Analysis(linkage).branches(output)
+    def __init__(self, linkage: Mechanism, output: str, input_: Input,
+                 others: Sequence[float] = ()):
+        self._input, self._linkage, self._others = input_, linkage, others
+        self._branches = Analysis(linkage, others).branches(output)
         self._pose = linkage.posed((), (output,), (output,))
 
     def answers(self, values: np.ndarray) -> np.ndarray:
@@ -125,7 +126,8 @@ class BranchSearch:
         turns = self._input.turns_of(near[0])
         found, rate = self._branches.follow(
             self._pose.at, self._input.size, values[0], near[0] - turns)
-        if self._branches.is_one and self._input.is_whole(self._linkage.reach()):
+        if self._branches.is_one and self._input.is_whole(
+                self._linkage.reach(*self._others)):
             # The output turns all round with the crank: beyond pi they go on together.
             turns = float(self._input.beside(found, near[0])) - found
         return (found + turns,), (rate,)
@@ -197,9 +199,9 @@ class StepSearch:
     def _on_branches(self, q: np.ndarray, target: np.ndarray, rows: List[int], _: List[int]
                      ) -> np.ndarray:
         """Return what `solutions` does if the first input alone is unknown."""
-        branches = Analysis(self._linkage, (q * self.sizes)[1:].tolist()).branches(
-            self.outputs[rows[0]])
-        first = self.inputs[0].wrapped(branches.answers(target[rows]).ravel())
+        search = BranchSearch(self._linkage, self.outputs[rows[0]], self._linkage.inputs[0],
+                              (q * self.sizes)[1:].tolist())
+        first = search.answers(target[rows][None]).ravel() / self.sizes[0]
         first = first[np.isfinite(first)]
         return np.column_stack([first, np.tile(q[1:], (len(first), 1))])
 
