@@ -40,7 +40,7 @@ class Refused(Exception):
 
 @dataclass(frozen=True)
 class Reach:
-    """The values that an input or output reaches [unit], and what the page is told of them."""
+    """The values that an input or output reaches [unit], and their entry for the page."""
 
     name: str
     arcs: tuple[Arc, ...]

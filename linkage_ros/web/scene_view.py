@@ -86,15 +86,15 @@ class ShownMechanism:
     """
     A mechanism on the page: the prefix of its topics, its settings, and its inputs' sources.
 
-    An input that was moved is `held` at its new value until a time, or until messages confirm it:
-    earlier messages may have the old value.
+    An input that was moved is `pending` at its new value `until` a time, or until messages confirm
+    it: earlier messages may have the old value.
     """
 
     key: str
     settings: dict[str, Setting]
     sources: tuple[str, ...] = ()
     machine: Optional[scene.SceneMechanism] = None
-    held: dict[str, float] = field(default_factory=dict)
+    pending: dict[str, float] = field(default_factory=dict)
     until: float = 0.0
 
     @property
@@ -149,7 +149,7 @@ class SceneView:
         # The following attributes are changed in the executor's thread alone.
         self._nodes: dict[str, RemoteNode] = {}
         self._sources: dict[str, Any] = {}
-        self._told: dict[str, dict[str, float]] = {}
+        self._received: dict[str, dict[str, float]] = {}
         self._feeds: dict[str, tuple[Feed, Any]] = {}
         self._numbers: dict[tuple[str, int], int] = {}
         self._events: Any = None
@@ -253,7 +253,7 @@ class SceneView:
                 value = math.nextafter(value, sum(poses.arcs(drive)[0]) / 2.0)
             values.update({f'{name}.start': value, f'{name}.speed': 0.0})
         await self.set(mechanism.key, values)
-        mechanism.held = dict(zip(machine.inputs, inputs))
+        mechanism.pending = dict(zip(machine.inputs, inputs))
         mechanism.until = self._bridge.loop.time() + SECONDS_TO_ARRIVE
 
     async def tune(self, key: str) -> Answer:
@@ -300,26 +300,27 @@ class SceneView:
             raise Refused(f'{machine.name} is a linkage in space: the page draws and tunes it, '
                           'and moves, plots and describes linkages in a plane')
         if self._bridge.loop.time() > mechanism.until:
-            mechanism.held = {}
+            mechanism.pending = {}
         for name, drive in machine.inputs.items():
-            told = self._heard_from(mechanism, drive.source)
-            now = drive.start if told is None else machine.from_source(drive, told, None, None)[0]
+            position = self._position_of(mechanism, drive.source)
+            now = drive.start if position is None else machine.from_source(
+                drive, position, None, None)[0]
             now = now if math.isfinite(now) else drive.start
-            held = mechanism.held.get(name, now)
-            if drive.input.apart(held, now) < ARRIVED * drive.input.size:
-                mechanism.held.pop(name, None)
-            inputs.append(mechanism.held.get(name, now))
+            pending = mechanism.pending.get(name, now)
+            if drive.input.apart(pending, now) < ARRIVED * drive.input.size:
+                mechanism.pending.pop(name, None)
+            inputs.append(mechanism.pending.get(name, now))
         return machine, inputs
 
-    def _heard_from(self, mechanism: ShownMechanism, source: str) -> Optional[float]:
+    def _position_of(self, mechanism: ShownMechanism, source: str) -> Optional[float]:
         """Return the last position of an input's source, or None."""
-        return next((self._told[topic][source] for topic in mechanism.sources
-                     if source in self._told.get(topic, ())), None)
+        return next((self._received[topic][source] for topic in mechanism.sources
+                     if source in self._received.get(topic, ())), None)
 
     def _check_known(self, mechanism: ShownMechanism, machine: scene.SceneMechanism) -> None:
         """Raise Refused if an input has neither been received nor a start."""
         for name, drive in machine.inputs.items():
-            if f'{name}.start' not in mechanism.settings and self._heard_from(
+            if f'{name}.start' not in mechanism.settings and self._position_of(
                     mechanism, drive.source) is None:
                 raise Refused(f'the {name} is not known yet: no message names {drive.source}')
 
@@ -365,12 +366,13 @@ class SceneView:
             for info in node.get_publishers_info_by_topic(f'{key}{MARKERS}')
             # Of a node that starts, the name is unknown at first.
             if info.node_namespace.startswith('/')))) for key in keys)
-        heard = {owner: self._heard_by(owner) for _, owners in marked for owner, _ in owners}
+        topics = {owner: self._subscriptions_of(owner)
+                  for _, owners in marked for owner, _ in owners}
         nodes = tuple(sorted(name[:-len(LIST)] for name, types in services
                              if name.endswith(LIST) and LIST_TYPE in types))
-        return tuple(shown for shown in marked if shown[1]), nodes, heard
+        return tuple(shown for shown in marked if shown[1]), nodes, topics
 
-    def _heard_by(self, name: str) -> list[str]:
+    def _subscriptions_of(self, name: str) -> list[str]:
         """Return the topics from which a node receives its inputs."""
         space, own = name.rsplit('/', 1)
         with suppress(NodeNameNonExistentError):
@@ -455,9 +457,9 @@ class SceneView:
         for name in set(nodes) - set(self._nodes):
             self._nodes[name] = RemoteNode(self._bridge, name)
         for topic in set(sources) - set(self._sources):
-            self._told[topic] = {}
+            self._received[topic] = {}
             self._sources[topic] = self._bridge.node.create_subscription(
-                JointState, topic, partial(_store, self._told[topic]), NEWEST)
+                JointState, topic, partial(_store, self._received[topic]), NEWEST)
         for name in set(topics) - set(self._feeds):
             self._feeds[name] = self._feed(name, *topics[name])
 
@@ -477,7 +479,7 @@ class SceneView:
             self._nodes.pop(name).close()
         for topic in set(self._sources) - set(sources):
             node.destroy_subscription(self._sources.pop(topic))
-            del self._told[topic]
+            del self._received[topic]
         for name in set(self._feeds) - set(topics):
             node.destroy_subscription(self._feeds.pop(name)[1])
 

@@ -19,13 +19,13 @@ const [views, status, names, workshop, arrows, whole, notice] = [
   'views', 'status', 'names', 'workshop', 'arrows', 'whole', 'notice'].map(at);
 const naming = names.closest('label');
 /** What a reload keeps. */
-const kept = { shown: '', from: {}, names: true, workshop: false, arrows: '', ...JSON.parse(sessionStorage.getItem('kept') ?? '{}') };
-let { shown } = kept;
+const stored = { shown: '', from: {}, names: true, workshop: false, arrows: '', ...JSON.parse(sessionStorage.getItem('kept') ?? '{}') };
+let { shown } = stored;
 let fading = 0;
 let scheduled = false;
 let frames = 0;
 
-const keep = values => sessionStorage.setItem('kept', JSON.stringify(Object.assign(kept, values)));
+const store = values => sessionStorage.setItem('kept', JSON.stringify(Object.assign(stored, values)));
 
 const picture = new Picture(at('picture'));
 const hand = new Hand(picture, {
@@ -37,9 +37,9 @@ const hand = new Hand(picture, {
   choose: (mechanism, dimension) => panel.goTo(mechanism.key, dimension),
 });
 picture.pull = () => hand.pull;
-picture.view = new View(picture.canvas, () => hand.grabbed !== null, kept.from, () => {
+picture.view = new View(picture.canvas, () => hand.grabbed !== null, stored.from, () => {
   whole.hidden = picture.view.whole;
-  keep({ from: picture.view.from });
+  store({ from: picture.view.from });
   draw();
 });
 whole.hidden = picture.view.whole;
@@ -90,7 +90,7 @@ const connection = new Connection({
     at('empty').hidden = mechanisms.size > 0;
     say('');
     // What was shown before a reload, or before the viewer ended, may be found later.
-    show(mechanisms.has(kept.shown) || !mechanisms.size ? kept.shown : '');
+    show(mechanisms.has(stored.shown) || !mechanisms.size ? stored.shown : '');
   },
 
   look({ number, mechanism, ...look }) {
@@ -154,13 +154,13 @@ function show(key) {
   views.replaceChildren(...labels.map(([value, textContent]) => {
     const button = element('button', { type: 'button', textContent, ariaPressed: value === key });
     button.onclick = () => {
-      keep({ shown: value });
+      store({ shown: value });
       show(value);
     };
     return button;
   }));
   const selected = [...mechanisms.values()].filter(mechanism => !key || mechanism.key === key);
-  for (const mechanism of selected) mechanism.arrows.kind = kept.arrows;
+  for (const mechanism of selected) mechanism.arrows.kind = stored.arrows;
   picture.show(selected);
   panel.show(selected, several && !key);
   naming.hidden = selected.length !== 1 || selected[0].legs > 1;
@@ -169,14 +169,14 @@ function show(key) {
 
 /** Apply the options above the picture, and save them for a reload. */
 function choose() {
-  keep({ names: names.checked, workshop: workshop.checked, arrows: arrows.value });
-  picture.named = kept.names;
-  if (units.workshop !== kept.workshop) units.choose(kept.workshop);
-  for (const mechanism of mechanisms.values()) mechanism.arrows = { kind: kept.arrows, at: {} };
+  store({ names: names.checked, workshop: workshop.checked, arrows: arrows.value });
+  picture.named = stored.names;
+  if (units.workshop !== stored.workshop) units.choose(stored.workshop);
+  for (const mechanism of mechanisms.values()) mechanism.arrows = { kind: stored.arrows, at: {} };
   draw();
 }
 
-[names.checked, workshop.checked, arrows.value] = [kept.names, kept.workshop, kept.arrows];
+[names.checked, workshop.checked, arrows.value] = [stored.names, stored.workshop, stored.arrows];
 names.onchange = workshop.onchange = arrows.onchange = choose;
 choose();
 
