@@ -214,3 +214,36 @@ def test_one_input_may_be_asked_for_as_several_are():
     leg = mechanisms.create('jansen')
     assert [answer.inputs for answer in leg.inputs_for(('G.x',), (-31.0,))] == [
         (theta,) for theta in leg.input_for('G.x', -31.0)]
+
+
+def test_an_output_that_only_rounding_moves_has_no_answers():
+    # The corner is the pivot itself, and the mirror's line has no length.
+    linkage = custom('A ground 0 0', 'B ground -0.803093 2.0884554493679546',
+                     'D cylinder B A 2.237544308085028 right', 'E antiparallelogram A B D',
+                     'F mirror B A E')
+    assert np.isnan(linkage.input_for('E.x', 0.0)).tolist() == [True]
+    (low, high), = linkage.extremes('E.x')
+    assert low <= high
+
+
+@pytest.mark.sample(3)
+@pytest.mark.parametrize('kind', mechanisms.TYPES)
+def test_a_value_alone_has_the_answers_that_it_has_in_an_array(kind):
+    linkage, rng = mechanisms.create(kind), np.random.default_rng(8)
+    several = len(linkage.inputs) > 1
+    for outputs in [('P.x', 'P.y')] if several else [(name,) for name in outputs_of(linkage)]:
+        inverse = linkage.inverse(outputs)
+        inputs = [rng.uniform(each.low, each.high, 5) for each in linkage.inputs]
+        rows = [*linkage.posed((), outputs).over(*inputs)] if inverse.closed else ()
+        near = [values + rng.uniform(-0.1, 0.1, 5) for values in inputs]
+        for part in zip(*rows):
+            alone = inverse.all([*map(float, part)])
+            found, _ = inverse.over(*part)
+            assert [each.inputs for each in alone] == [
+                tuple(row) for row in found.T.tolist() if row[0] == row[0]]
+        if inverse.closed:
+            chosen, rates = inverse.nearest(rows, near)
+            for k, one in enumerate(zip(*rows)):
+                alone = inverse.nearest([*map(float, one)], [float(x[k]) for x in near])
+                assert np.array_equal([x[k] for x in (*chosen, *rates)], [*alone[0], *alone[1]],
+                                      equal_nan=True)

@@ -40,8 +40,13 @@ def sampled(lo: float, hi: float, samples: int = TURN_SAMPLES, fewest: int = 9) 
     """Return angles [rad] on an arc, evenly spaced, with more of them towards both ends."""
     even = np.linspace(lo, hi, max(fewest, math.ceil(samples * (hi - lo) / math.tau)))
     steps = (hi - lo) * 0.5 ** np.arange(2, END_HALVINGS)
-    theta = np.concatenate([even, lo + steps, hi - steps])
-    return np.unique(np.clip(theta, lo, hi))
+    return ascending(np.clip(np.concatenate([even, lo + steps, hi - steps]), lo, hi))
+
+
+def ascending(values: np.ndarray) -> np.ndarray:
+    """Return values in order, each once; np.unique would take 8 ms to import masked arrays."""
+    values = np.sort(values)
+    return values[np.append(True, values[1:] > values[:-1])]
 
 
 def drawn(curve: Callable, lo: float, hi: float) -> np.ndarray:

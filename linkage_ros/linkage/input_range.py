@@ -23,7 +23,7 @@ from typing import Any, Callable, Iterable, List, Sequence
 
 import numpy as np
 
-from .curves import lowest, near_misses, refined, sampled
+from .curves import ascending, lowest, near_misses, refined, sampled
 from .inputs import Arc, CRANK, Input, NARROWEST
 from .planar import Limit
 
@@ -101,12 +101,12 @@ def _limits(margins: Callable, lo: float, hi: float) -> List[float]:
     """
     ends = [lo, hi]
     for _ in range(ROUNDS):
-        theta = np.unique(np.concatenate([
+        theta = ascending(np.concatenate([
             sampled(*arc, SAMPLES, FEWEST) for arc in zip(ends, ends[1:])]))
         values = margins(theta)
         touches = _touches(margins, theta, values)
         if len(touches):
-            theta = np.unique(np.concatenate([theta, touches]))
+            theta = ascending(np.concatenate([theta, touches]))
             values = margins(theta)
         first = _first_below(values)
         place = np.flatnonzero(first[1:] != first[:-1])

@@ -44,7 +44,7 @@ from .arguments import numbers
 from .curves import LEAST
 from .input_range import is_periodic
 from .inputs import Input, spread
-from .inverse_linkage import InverseLinkage, Mode, taken_apart
+from .inverse_linkage import InverseLinkage, taken_apart
 from .inverse_rods import taken_apart as rods_taken_apart
 from .planar import TOLERANCE
 from .search import blocks, search_for, SINGULAR
@@ -175,7 +175,7 @@ class Inverse:
         self._angular = [linkage.is_angle(name) for name in outputs]
         self._scales = [1.0 if angular else linkage.longest for angular in self._angular]
         self._sizes = [input_.size for input_ in linkage.inputs]
-        self._check, self._programs = linkage.checked(outputs), Cache()
+        self._forward, self._programs = linkage.checked(outputs), Cache()
         self.inputs = tuple(map(self._coming_round, range(self._n), linkage.inputs))
         # The period of each output: a turn, or that of the input that it is.
         fixed = {input_.name: input_ for input_ in self.inputs}
@@ -187,13 +187,10 @@ class Inverse:
                         (math.inf, math.inf, LEAST * input_.size) for input_ in self.inputs]
         self.closed: Optional[InverseLinkage] = (
             taken_apart if linkage.axes == 'xy' else rods_taken_apart)(linkage, outputs)
-        if self.closed:
-            # For each mode: 1 if it is a solution, 0 if not, NaN if `_own` has to decide; the
-            # inputs and the rates.
-            self._rows = self._judged_modes(self.closed)
-            self._row = 1 + self._n * (self._n + 1)
-            self._solve = linkage.bind(Program(self._rows, self._n, self.closed.arguments))
-        else:
+        # Where all modes are the linkage's own nothing is checked, and nothing else has the rates.
+        self._is_own = bool(self.closed and self.closed.is_own and self._n == 2)
+        self._row = self._n * (1 + self._n if self._is_own or self._n == 1 else 1)
+        if not self.closed:
             self._search = search_for(linkage, outputs, self.inputs, self._periods)
 
     @cached_property
@@ -220,7 +217,7 @@ class Inverse:
         """Return the outputs, angles as directions, over one input; the others are spread."""
         inputs = spread(self.linkage.inputs, len(values))
         inputs[by] = values
-        rows = zip(self._check.over(*inputs), self._angular, self._scales)
+        rows = zip(self._forward.over(*inputs), self._angular, self._scales)
         return np.concatenate([[np.cos(row), np.sin(row)] if angular else [row / scale]
                                for row, angular, scale in rows])
 
@@ -283,50 +280,94 @@ class Inverse:
         return inputs, rates
 
     def _all(self, values: Tuple[float, ...]) -> List[Found]:
-        """Return all solutions for finite values, in order; [] for others."""
+        """Return all solutions, in order, one of those that differ by rounding."""
+        return self._distinct(list(self._solutions(values)))
+
+    def _solutions(self, values: Tuple[float, ...]) -> Iterator[Found]:
+        """Yield the solutions for finite values; none for others."""
         if not all(map(math.isfinite, values)):
-            return []
+            return
         values = self._reduced(values)
         if not self.closed:
-            return self._distinct(_columns(*self._searched(np.array(values)[:, None])))
-        found, n = [], 1 + self._n
-        for mode, row in enumerate(self._at(values)):
-            if row[0] == 1.0:
-                found.append((row[1:n], row[n:]))
-            elif row[0] != row[0] and (own := self._own(mode, row[1:n], values)):
-                found.append(own)
-        return self._distinct(found) if len(found) > 1 else found
+            yield from _columns(*self._searched(np.array(values)[:, None]))
+            return
+        n = 1 + self._n
+        for mode, row in self._assembled(values):
+            verdict = (1.0, *row) if self._is_own else self._check.at(*values, *row)
+            if verdict[0] == 1.0:
+                yield verdict[1:n], verdict[n:]
+            elif verdict[0] != verdict[0] and (own := self._own(mode, verdict[1:n], values)):
+                yield own
 
-    def _at(self, values: Sequence[float]) -> List[Tuple[float, ...]]:
-        """Return the verdict, inputs and rates of each assembly mode; see `_judged_modes`."""
-        flat, size = self._solve.at(*values), self._row
-        return [flat[start:start + size] for start in range(0, len(flat), size)]
+    def _assembled(self, values: Sequence[float]) -> Iterator[Tuple[int, Tuple[float, ...]]]:
+        """Yield number and row of each assembly mode that has inputs; see `_rows`."""
+        flat, size = self._modes.at(*values), self._row
+        for mode, start in enumerate(range(0, len(flat), size)):
+            row = flat[start:start + size]
+            if -LARGE < sum(row[:self._n]) < LARGE:
+                yield mode, row
 
-    def _judged_modes(self, closed: InverseLinkage) -> List[Real]:
-        """Return verdict, inputs and rates of all modes, checked by the forward formula."""
-        n, structure, parts = self._n, self.linkage.structure, []
-        if n == 2 and closed.is_own:
-            return [part for mode in closed.modes for part in self._own_mode(mode)]
+    @cached_property
+    def _rows(self) -> List[List[Real]]:
+        """
+        Return a row of expressions of the outputs for each assembly mode, in each of its turns.
+
+        It has the inputs and, of one input or where all modes are solutions, the rates of the
+        mode: those of one input are exact next to a dead point, too.
+        """
+        closed = cast(InverseLinkage, self.closed)
+        if self._is_own:
+            return [[*map(self._counted, range(self._n), mode.inputs), *_inverted(mode.rates)]
+                    for mode in closed.modes]
+        return [[*(value + turn for value, turn in zip(mode.inputs, turns)),
+                 *(_inverted(mode.rates) if self._n == 1 else ())]
+                for mode in closed.modes for turns in product(*closed.turns)]
+
+    @cached_property
+    def _verdict(self) -> List[Real]:
+        """
+        Return what decides about a mode, as expressions of the outputs and of its row.
+
+        It is 1 if the row is a solution, 0 if not, NaN if `_own` has to decide; then the inputs,
+        more exact, and the rates: NaN if it is none.
+        """
+        n, structure = self._n, self.linkage.structure
+        row = [argument(n + i) for i in range(self._row)]
+        inputs = row[:n]
+        if self._is_own:
+            return [real(1.0), *row]
         limits = [limit for limit in structure.built.limits if limit.margin.varies]
-        forward = [*structure.checked(self.outputs), *(limit.margin for limit in limits)]
-        for mode in closed.modes:
-            for turns in product(*closed.turns):
-                inputs = [value + turn for value, turn in zip(mode.inputs, turns)]
-                row = substituted(forward, inputs)
-                answer = self._judged(inputs, row[:n], row[n:n + n * n], [
-                    margin + FAR * limit.tolerance
-                    for margin, limit in zip(row[n + n * n:], limits)])
-                # Of one input, the rate of the mode is exact next to a dead point, too.
-                parts += [*answer, *([1.0 / mode.rates[0][0]] if n == 1 else row[n:n + n * n])]
-        return parts
+        forward = substituted([*structure.checked(self.outputs), *(
+            limit.margin + FAR * limit.tolerance for limit in limits)], inputs)
+        rates = forward[n:n + n * n]
+        verdict, *answer = self._judged(inputs, forward[:n], rates, forward[n + n * n:])
+        return [verdict, *(where(verdict <= 0.5, math.nan, each)
+                           for each in (*answer, *(row[n:] or rates)))]
 
-    def _own_mode(self, mode: Mode) -> List[Real]:
-        """Return verdict, inputs and rates of a mode that needs no check."""
-        (a, b), (c, d) = mode.rates
-        det = a * d - b * c
-        return [where(abs(sum(mode.inputs, real(0.0))) < LARGE, 1.0, 0.0),
-                *map(self._counted, range(self._n), mode.inputs),
-                d / det, -c / det, -b / det, a / det]
+    def _program(self, outputs: Sequence[Real], arguments: int) -> Pose:
+        replaced = self.closed.arguments if self.closed else {}
+        return self.linkage.bind(Program(outputs, arguments, replaced))
+
+    @cached_property
+    def _modes(self) -> Pose:
+        """Return the code from the outputs to the rows of all modes."""
+        return self._program([*chain(*self._rows)], self._n)
+
+    @cached_property
+    def _check(self) -> Pose:
+        """Return the code from the outputs and a row to its verdict."""
+        return self._program(self._verdict, self._n + self._row)
+
+    @cached_property
+    def _checked_rows(self) -> List[List[Real]]:
+        """Return the verdict of each mode, as expressions of the outputs."""
+        values = list(map(argument, range(self._n)))
+        return [substituted(self._verdict, [*values, *row]) for row in self._rows]
+
+    @cached_property
+    def _checked_modes(self) -> Pose:
+        """Return the code from the outputs to the verdicts of all modes, for arrays."""
+        return self._program([*chain(*self._checked_rows)], self._n)
 
     def _judged(self, inputs: Sequence[Real], reached: Sequence[Real], rates: Sequence[Real],
                 margins: Sequence[Real]) -> List[Real]:
@@ -390,7 +431,7 @@ class Inverse:
     def _own(self, mode: int, inputs: Tuple[float, ...], values: Sequence[float],
              within: bool = True) -> Optional[Found]:
         """Return the inputs of a mode and the rates if they are a solution, else None."""
-        n, at, slack = self._n, self._check.at, ROUNDING
+        n, at, slack = self._n, self._forward.at, ROUNDING
         row = at(*inputs)
         if row[0] != row[0] or n > 1 and any(x != x for x in row[1:n]):
             # This is an end of the reach, up to rounding.
@@ -428,11 +469,11 @@ class Inverse:
         if np.abs(self._jacobian(rates)).max() < (STEEP if n > 1 else 1.0):
             return rates
         if not np.isfinite(rates).all():
-            rows = (self._check.at(*beside) for beside in self._beside(inputs))
+            rows = (self._forward.at(*beside) for beside in self._beside(inputs))
             rates = next((row[n:] for row in rows if np.isfinite(row).all()), rates)
         mode //= math.prod(map(len, closed.turns))
-        pose = self._programs.get_or_make(('rates', mode), lambda: self.linkage.bind(Program(
-            [*chain(*closed.modes[mode].rates)], n, closed.arguments)))
+        pose = self._programs.get_or_make(('rates', mode), lambda: self._program(
+            [*chain(*closed.modes[mode].rates)], n))
         turning = np.reshape(pose.at(*values), (n, n))
         with np.errstate(invalid='ignore'):
             # The identity up to rounding; a dyad on its other side turns a sign.
@@ -530,15 +571,12 @@ class Inverse:
         if not self.closed:
             return self._searched(values)
         n, count = self._n, values.shape[1]
-        rows = self._solve.over(*values).reshape(-1, self._row, count) if count else np.empty(
-            (1, self._row, 0))
-        if not (rows[:, 0] == 1.0).all():
-            for mode, place in zip(*np.nonzero(np.isnan(rows[:, 0]))):
-                own = self._own(mode, tuple(rows[mode, 1:n + 1, place].tolist()),
-                                tuple(values[:, place].tolist()))
-                rows[mode, :, place] = (1.0, *own[0], *own[1]) if own else 0.0
-            rows.swapaxes(0, 1)[:, rows[:, 0] == 0.0] = np.nan
-        return rows[:, 1:n + 1], rows[:, n + 1:]
+        found = self._checked_modes.over(*values).reshape(len(self._rows), -1, count)
+        for mode, place in zip(*np.nonzero(np.isnan(found[:, 0]))):
+            own = self._own(int(mode), tuple(found[mode, 1:n + 1, place].tolist()),
+                            tuple(values[:, place].tolist()))
+            found[mode, 1:, place] = [*own[0], *own[1]] if own else math.nan
+        return found[:, 1:n + 1], found[:, n + 1:]
 
     def _within_turns(self, values: np.ndarray) -> np.ndarray:
         """Return values (outputs, n) as `_reduced` does; NaN for those that are not finite."""
@@ -581,6 +619,8 @@ class Inverse:
 
     def _one_each(self, values: Any, name: str = 'values') -> Tuple[float, ...]:
         """Return one number for each output; raise ValueError if there are not as many."""
+        if type(values) is list and len(values) == self._n and set(map(type, values)) == {float}:
+            return tuple(values)
         found = numbers(name, values)
         if found.shape != (self._n,) and not (self._n == 1 and found.shape == ()):
             raise ValueError(f'{self.linkage.type} has {self._n} inputs: {name} must be as many '
@@ -616,22 +656,20 @@ class Inverse:
         limits = tuple(ends or (None,) * self._n)
         near = None if near is None else tuple(near)
         given = (*values, *(near or ()), *(float(end) for pair in limits if pair for end in pair))
-        if not self.closed:
-            return self._chosen(self._each(values), near, limits)[1:]
-        choose = self._choice(0, near is not None, tuple(map(bool, limits)))
         if set(map(type, given)) == {float}:
-            rank, *found = choose.at(*given)
-            if rank != rank:
-                return self._chosen(self._all(tuple(values)), near, limits)[1:]
-            return tuple(found[:self._n]), tuple(found[self._n:])
+            return self._chosen(list(self._solutions(tuple(values))), near, limits)[1:]
+        if not self.closed:
+            inputs, rates = self.over(*values)
+            return self._chosen([(inputs[..., k], rates[..., k])
+                                 for k in range(inputs.shape[-1])], near, limits)[1:]
         arrays = np.broadcast_arrays(*given)
         flat = np.stack([each.ravel() for each in arrays])
         flat[:self._n] = self._within_turns(flat[:self._n])
-        rows = choose.over(*flat)
+        rows = self._choice(0, near is not None, tuple(map(bool, limits))).over(*flat)
         for place in np.flatnonzero(np.isnan(rows[0])):
             one = flat[:2 * self._n, place].tolist()
-            rows[1:, place] = [*chain(*self._chosen(
-                self._all(tuple(one[:self._n])), near and one[self._n:], limits)[1:])]
+            rows[1:, place] = [*chain(*self._chosen(list(self._solutions(
+                tuple(one[:self._n]))), near and one[self._n:], limits)[1:])]
         found = [row.reshape(arrays[0].shape) for row in rows[1:]]
         return tuple(found[:self._n]), tuple(found[self._n:])
 
@@ -663,11 +701,11 @@ class Inverse:
             at = int(known[k])
             answers = [(tuple(x), tuple(r)) for x, r in zip(inputs[:, :, at].tolist(), rates[
                 :, :, at].tolist())]
-            rank, place, rate = self._chosen(answers, beside, limits)
+            rank, place, _ = self._chosen(answers, beside, limits)
+            mode = int(rank)
             if place[0] != place[0]:
                 at += 1
                 continue
-            mode = int(rank)
             if mode not in breaks:
                 breaks[mode] = self._breaks(inputs, mode)
             stop = min(int(breaks[mode][breaks[mode].searchsorted(at)]) + 1, at + BLOCK)
@@ -712,13 +750,6 @@ class Inverse:
                 places = places[:, :beyond[0]]
         return places
 
-    def _each(self, values: Sequence[Any]) -> Sequence[Any]:
-        """Return all solutions, floats for floats and arrays for arrays."""
-        if set(map(type, values)) == {float}:
-            return self._all(tuple(values))
-        inputs, rates = self.over(*values)
-        return [(inputs[..., k], rates[..., k]) for k in range(inputs.shape[-1])]
-
     def _chosen(self, answers: Sequence[Any], near: Optional[Sequence[Any]],
                 limits: Sequence) -> Tuple[Any, Any, Any]:
         """Return the number, inputs and rates of the chosen one of some solutions."""
@@ -749,15 +780,12 @@ class Inverse:
         values, given = given[:count * size or n], given[count * size or n:]
         near, ends = given[:n] if follows else [], iter(given[n * follows:])
         limits = [(next(ends), next(ends)) if each else () for each in ended]
-        rows = [[where(values[i] <= values[i], 1.0, 0.0), *values[i:i + size]] for i in range(
-            0, count * size, size)] or [self._rows[i:i + size + 1] for i in range(
-                0, len(self._rows), size + 1)]
+        rows = [[real(1.0), *values[i:i + size]] for i in range(
+            0, count * size, size)] or self._checked_rows
         unknown = reduce(lambda found, row: where(row[0] <= 1.0, found, math.nan), rows, real(0.0))
-        for value, turn in zip(values, () if count else self._periods):
-            if math.isfinite(turn):
-                unknown = unknown + where(abs(value) <= turn, 0.0, math.nan)
+        solutions = [row for _, *row in rows]
         choices = []
-        for rank, (verdict, *row) in enumerate(rows):
+        for rank, row in enumerate(solutions):
             places, misses = zip(*(self._place(by, row, near, limit)
                                    for by, limit in enumerate(limits)))
             if follows:
@@ -766,15 +794,14 @@ class Inverse:
             else:
                 order = [where(row[1] < 0.0, 1.0, 0.0) if n == 1 else real(0.0), *row[:n]]
             order[0] = reduce(lambda far, miss: where(miss, math.inf, far), chain(*misses),
-                              where(0.5 < verdict, order[0], math.inf))
+                              where(row[0] <= row[0], order[0], math.inf))
             choices.append([*order, real(float(rank)), *places, *row[n:]])
         many = len(choices[0]) - 1 - size
         best = reduce(lambda best, other: [where(
             _before(other[:many], best[:many]), mine, its) for mine, its in zip(
                 other, best)], choices)
-        return self.linkage.bind(Program([best[many] + unknown, *(
-            gated(part, LARGE - best[0], 0.0) for part in best[many + 1:])], total,
-            self.closed.arguments if self.closed and not count else {}))
+        return self._program([best[many] + unknown, *(
+            gated(part, LARGE - best[0], 0.0) for part in best[many + 1:])], total)
 
     def _place(self, by: int, row: Sequence[Real], near: Sequence[Real],
                ends: Sequence[Real]) -> Tuple[Real, List[Real]]:
@@ -834,20 +861,20 @@ class Inverse:
 
     def _along(self, values: Tuple[float, ...], near: Tuple[float, ...]) -> Optional[Found]:
         """Return the end of the motion in the mode of the present inputs."""
-        start = self._check.at(*near)[:self._n]
+        start = self._forward.at(*near)[:self._n]
         if any(x != x for x in start):
             return None
         gaps = [math.remainder(value - now, turn)
                 for value, now, turn in zip(values, start, self._periods)]
         steps = math.ceil(max(abs(gap) / scale for gap, scale in zip(gaps, self._scales)) / STEP)
-        at = {mode: near for mode, place in self._modes(start, near)
+        at = {mode: near for mode, place in self._modes_near(start, near)
               if max(abs(x - y) / size for x, y, size in zip(place, near, self._sizes)) < ALIKE}
         found: List[Found] = []
         for k in range(1, max(steps, 1) + 1):
             aim = values if k == max(steps, 1) else tuple(
                 now + k / steps * gap for now, gap in zip(start, gaps))
             going, found = at, []
-            places = dict(self._modes(aim, near))
+            places = dict(self._modes_near(aim, near))
             at = {}
             for mode, last in going.items():
                 if (place := places.get(mode)) and (own := self._own(
@@ -856,13 +883,11 @@ class Inverse:
                     found.append(own)
         return min(found, key=lambda own: math.dist(own[0], near)) if found else None
 
-    def _modes(self, values: Sequence[float], near: Sequence[float]
-               ) -> Iterator[Tuple[int, Tuple[float, ...]]]:
+    def _modes_near(self, values: Sequence[float], near: Sequence[float]
+                    ) -> Iterator[Tuple[int, Tuple[float, ...]]]:
         """Yield number and inputs of each mode that can be assembled, nearest to others."""
-        for mode, row in enumerate(self._at(values)):
-            inputs = row[1:self._n + 1]
-            if not any(x != x for x in inputs):
-                yield mode, self._next_to(inputs, near)
+        for mode, row in self._assembled(values):
+            yield mode, self._next_to(row[:self._n], near)
 
     def _next_to(self, inputs: Sequence[float], near: Sequence[float]) -> Tuple[float, ...]:
         return tuple(x + input_.turn * round((y - x) / input_.turn) if input_.turns else x
@@ -917,6 +942,15 @@ def _columns(inputs: np.ndarray, rates: np.ndarray) -> List[Found]:
     found = [(tuple(row), tuple(rate)) for row, rate in zip(
         inputs[:, :, 0].tolist(), rates[:, :, 0].tolist()) if row[0] == row[0]]
     return sorted(found)
+
+
+def _inverted(rates: Sequence[Sequence[Real]]) -> Sequence[Real]:
+    """Return rates of outputs from those of inputs, of one or two."""
+    if len(rates) == 1:
+        return [1.0 / rates[0][0]]
+    (a, b), (c, d) = rates
+    det = a * d - b * c
+    return [d / det, -c / det, -b / det, a / det]
 
 
 def _greater(x: Real, y: Real) -> Real:

@@ -23,7 +23,7 @@ from typing import Any, Callable, Iterable, Iterator, List, NamedTuple, Optional
 
 import numpy as np
 
-from .curves import LEAST, refined, sampled, turns
+from .curves import LEAST, refined, sampled, TURN_SAMPLES, turns
 from .inputs import Arc, Input
 
 # Solutions no farther apart than this [rad] are one.
@@ -101,6 +101,9 @@ class MonotoneBranches:
         self._rounding = rounding
         arcs = list(arcs)
         self.jumps = [at for arc in cut(arcs, marks) for at in self._jumps(*arc)]
+        if len(self.jumps) > TURN_SAMPLES:
+            # The linkage is singular nearly everywhere, and all changes are rounding.
+            arcs, self.jumps = [], []
         runs = [run for arc in cut(arcs, sorted({*marks, *self.jumps}))
                 for run in self._runs(*arc)]
         self._range = max((np.ptp(value) for _, value, *_ in runs), default=0.0)

@@ -18,7 +18,7 @@ import numpy as np
 from .poses import Refused, theta_of
 from .settings import shown
 from ..c_code import header
-from ..linkage.curves import sampled
+from ..linkage.curves import ascending, sampled
 from ..robot_model import urdf
 from ..scene import SceneMechanism
 from ..words import listed, meant, quoted
@@ -49,7 +49,7 @@ class Sweep:
         if not reach:
             raise Refused(f'{machine.name} cannot be assembled where its other inputs are')
         # A NaN separates two arcs.
-        own = np.unique(np.concatenate([
+        own = ascending(np.concatenate([
             *(sampled(low, high, 0, SAMPLES) if dense_ends and not self.input.is_whole(reach)
               else np.linspace(low, high, SAMPLES) for low, high in reach),
             [0.5 * (before + after) for (_, before), (after, _) in zip(reach, reach[1:])]]))
