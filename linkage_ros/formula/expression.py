@@ -271,6 +271,11 @@ def where(condition: Real, chosen: Number, otherwise: Number) -> Real:
     return operation('where', condition, real(chosen), real(otherwise))
 
 
+def greater(x: Real, y: Real) -> Real:
+    """Return the greater of two numbers, the first if one is NaN."""
+    return where(x < y, y, x)
+
+
 class Complex:
     """A vector or a rotation in the plane, as a pair of Reals."""
 

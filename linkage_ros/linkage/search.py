@@ -26,13 +26,14 @@ from __future__ import annotations
 
 from itertools import chain, combinations
 import math
-from typing import Callable, List, Optional, Sequence, Set, Tuple, TYPE_CHECKING, Union
+from typing import Callable, Iterator, List, Optional, Sequence, Set, Tuple, TYPE_CHECKING
 
 import numpy as np
 
 from .analysis import Analysis
 from .curves import LEAST
 from .inputs import Input
+from .inverse_problem import Found, InverseProblem
 from .quantities import Names
 from ..words import listed
 
@@ -54,7 +55,6 @@ ROUNDED, CLOSE = 32 * 2.0 ** -53, 1e-13
 PIECES, SHORTEST, REFINED = 40, 1e-10, 30
 
 _Pair = Tuple[np.ndarray, np.ndarray]
-_Found = Tuple[Tuple[float, ...], Tuple[float, ...]]
 
 
 def blocks(linkage: Mechanism, outputs: Names) -> List[Tuple[List[int], List[int]]]:
@@ -85,25 +85,30 @@ def dependent(outputs: Names, rows: Sequence[int]) -> ValueError:
                       f'{listed(outputs[row] for row in rows)} depends on too few')
 
 
-def search_for(linkage: Mechanism, outputs: Names, inputs: Sequence[Input],
-               turns: Sequence[float]) -> Union[BranchSearch, StepSearch]:
-    """
-    Return the search for the inputs of outputs.
+class Search:
+    """The solutions of a problem without a closed form; the methods are those of `ClosedForm`."""
 
-    Parameters
-    ----------
-    linkage : Mechanism
-        The linkage.
-    outputs : sequence of str
-        As many as there are inputs.
-    inputs : sequence of Input
-        Those of the linkage, with the periods of the outputs.
-    turns : sequence of float
-        For each output after how much it is the same [rad], or inf.
+    def __init__(self, problem: InverseProblem):
+        self._problem, linkage, outputs = problem, problem.linkage, problem.outputs
+        self._way = StepSearch(linkage, outputs, problem.periods) if len(outputs) > 1 else (
+            BranchSearch(linkage, outputs[0], problem.inputs[0]))
 
-    """
-    return StepSearch(linkage, outputs, turns) if len(outputs) > 1 else BranchSearch(
-        linkage, outputs[0], inputs[0])
+    def solutions(self, values: Tuple[float, ...]) -> Iterator[Found]:
+        """Yield the solutions for finite values, those that differ by rounding included."""
+        inputs, rates = self.over(np.array(values)[:, None])
+        for row, rate in zip(inputs[:, :, 0].tolist(), rates[:, :, 0].tolist()):
+            if row[0] == row[0]:
+                yield tuple(row), tuple(rate)
+
+    def over(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Return the solutions for values (outputs, n), NaN where there are fewer."""
+        inputs = self._way.answers(values)
+        rates = self._problem.rated.over(*inputs.swapaxes(0, 1))[len(values):].swapaxes(0, 1)
+        return inputs, rates
+
+    def follow(self, values: Tuple[float, ...], near: Tuple[float, ...]) -> Found:
+        """Return what `Inverse.follow` does."""
+        return self._way.follow(values, near)
 
 
 class BranchSearch:
@@ -121,8 +126,8 @@ class BranchSearch:
         return np.asarray(self._input.wrapped(
             np.where(np.abs(inputs) < LEAST * self._input.size, 0.0, inputs)))
 
-    def follow(self, values: Sequence[float], near: Sequence[float]) -> _Found:
-        """Return what `Inverse.follow` does."""
+    def follow(self, values: Sequence[float], near: Sequence[float]) -> Found:
+        """Return the solution that is continuous from given inputs, and the rates."""
         turns = self._input.turns_of(near[0])
         found, rate = self._branches.follow(
             self._pose.at, self._input.size, values[0], near[0] - turns)
@@ -274,8 +279,8 @@ class StepSearch:
                 distinct.append((q[i], CLOSE * (1.0 + values[i, 0]) / max(values[i, -1], CLOSE)))
         return np.array([each for each, _ in distinct]).reshape(-1, q.shape[1])
 
-    def follow(self, values: Sequence[float], near: Sequence[float]) -> _Found:
-        """Return what `Inverse.follow` does."""
+    def follow(self, values: Sequence[float], near: Sequence[float]) -> Found:
+        """Return the solution that is continuous from given inputs, and the rates."""
         inputs, jacobian = self._followed(near / self.sizes, np.array(values))
         inputs, rates = inputs * self.sizes, (jacobian * self.scale[:, None] / self.sizes).T
         if not self._are_assembled(inputs[None])[0]:
