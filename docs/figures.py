@@ -32,10 +32,9 @@ def bucket(folder):
     inputs = np.array([1.0, 1.15, 1.05])
     start = np.array([float(linkage.joint_angles(inputs, [name])[name]) for name in outputs])
     way = np.linspace(0.0, 1.0, 61)
-    found = []
+    found, inverse = [], linkage.inverse(outputs)
     for part in way:
-        inputs, _ = linkage.follow_inputs(outputs, start + part * np.array([-1.2, 0.0, -0.3]),
-                                          inputs)
+        inputs, _ = inverse.follow(start + part * np.array([-1.2, 0.0, -0.3]), inputs)
         found.append(inputs)
     figure, (left, right) = pyplot.subplots(1, 2, figsize=(7.5, 3.0), layout='constrained')
     for inputs, shade in zip(found[::20], (0.25, 0.45, 0.7, 1.0)):

@@ -540,11 +540,6 @@ class Mechanism:
         return (self.inverse((output, *(input_.name for input_ in self.inputs[1:]))),
                 list(map(float, others)))
 
-    def servos(self, output: str, value: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
-        """Return all solutions as `input_for` does, and d output / d input there."""
-        inputs, rates = self._with_others(output, ())[0].over(numbers('value', value))
-        return inputs[0], rates[0]
-
     def servo_for(self, output: str, value: ArrayLike, near: Optional[ArrayLike] = None,
                   ends: Optional[Tuple[float, float]] = None) -> Sequence:
         """
@@ -574,12 +569,6 @@ class Mechanism:
                    near: Optional[ArrayLike] = None) -> List[Answer]:
         """Return all values of the inputs for values of the outputs; see `Inverse.all`."""
         return self.inverse(outputs).all(values, near)
-
-    def follow_inputs(self, outputs: Sequence[str], values: ArrayLike,
-                      near: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
-        """Return the arrays (inputs,) and (outputs, inputs) of `Inverse.follow`."""
-        inputs, rates = self.inverse(outputs).follow(values, near)
-        return np.array(inputs), np.reshape(rates, (len(inputs), -1)).T
 
     # --- the whole motion; other inputs are fixed at the values `others` ---
 
