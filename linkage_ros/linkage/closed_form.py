@@ -49,12 +49,16 @@ BESIDE = 16 * 2.0 ** -52 * math.pi
 # Next to an end of the reach rates are unbounded: the error allowed for an output there, as a part
 # of its size, and the rate from which on that error is allowed.
 ENDED, STEEP = 1e-7, 1e4
+# Below this rate by the outputs the inputs are at an end, where rounding decides about the side.
+END = 1e-14
 # A larger error than this part of the output's size belongs to another assembly.
 OTHER = 1e-2
 # A margin below minus this many tolerances, a thousandth of its size, is outside the reach.
 FAR = 1e-3 / TOLERANCE
 # Newton steps at most that remove a closed form's rounding; each doubles the number of digits.
 POLISHING = 5
+# An error up to this multiple of the noise of an output is rounding, and this part of its size.
+NOISY, MOST_NOISE = 16.0, 1e-9
 # Below this rate the inputs are ill-conditioned, and a Newton step does not improve them.
 SOUND = 0.1
 # Largest step of an output while it is followed, as a part of its size; and the distance below
@@ -222,7 +226,8 @@ class ClosedForm:
             steepest = reduce(greater, map(operator.mul, speeds, self._problem.sizes))
             verdict = where(abs(gap) <= allowed, where(
                 steepest <= STEEP * scale, verdict, math.nan), other)
-        polished = [self._counted(by, x - step)
+        # Without an error, as beyond an end of the reach, there is no step.
+        polished = [self._counted(by, x - where(abs(step) < LARGE, step, 0.0))
                     for by, (x, step) in enumerate(zip(inputs, self._steps(gaps, rates)))]
         return [verdict, *polished]
 
@@ -252,22 +257,23 @@ class ClosedForm:
                 (gaps[1] * rates[0] - gaps[0] * rates[1]) / det]
 
     def _confirmed(self, mode: int, inputs: Tuple[float, ...], values: Sequence[float],
-             within: bool = True) -> Optional[Found]:
+                   within: bool = True) -> Optional[Found]:
         """Return the inputs of a mode and the rates if they are a solution, else None."""
         n, at, slack = self._n, self._problem.forward.at, ROUNDING
         row = at(*inputs)
-        if row[0] != row[0] or n > 1 and any(x != x for x in row[1:n]):
-            # This is an end of the reach, up to rounding.
+        if any(x != x for x in row) and not self._missed(row, inputs, values, slack)[1]:
+            # This is an end of the reach, up to rounding; it may have values and no rates.
             for beside in self._beside(inputs):
-                row, slack = at(*beside), BESIDE
-                if not any(x != x for x in row[:n]):
-                    inputs = beside
+                other, slack = at(*beside), BESIDE
+                if not any(x != x for x in other):
+                    row, inputs = (other, beside) if any(x != x for x in row[:n]) else (
+                        (*row[:n], *other[n:]), inputs)
                     break
             else:
                 return None
-        for _ in range(POLISHING):
+        for step in range(1, POLISHING + 1):
             gaps, sure, away = self._missed(row, inputs, values, slack)
-            if sure:
+            if sure or step > 1 and self._are_noise(gaps, inputs, row):
                 rates = self._rates_at_end(mode, inputs, values, row[n:])
                 return None if rates is None else (
                     self._within(inputs) if within else inputs, rates)
@@ -302,7 +308,9 @@ class ClosedForm:
             # The identity up to rounding; a dyad on its other side turns a sign.
             both = turning @ np.reshape(rates, (n, n)).T
             if np.linalg.det(both) < 0.0 or (np.diag(both) < 0.0).any():
-                return None
+                sizes = np.divide.outer(self._problem.scales, self._problem.sizes).T
+                return rates if np.linalg.svd(turning * sizes, compute_uv=False)[
+                    -1] <= END else None
         try:
             with np.errstate(all='ignore'):
                 found = 1.0 / turning if n == 1 else np.linalg.inv(turning)
@@ -336,6 +344,20 @@ class ClosedForm:
             if not away / scale <= most:
                 most = away / scale
         return gaps, sure, most
+
+    def _are_noise(self, gaps: Sequence[float], inputs: Tuple[float, ...],
+                   row: Sequence[float]) -> bool:
+        """Return whether errors are no larger than changes of the outputs next to the inputs."""
+        n, periods, noise = self._n, self._problem.periods, [0.0] * self._n
+        for k, beside in enumerate(self._beside(inputs)):
+            by, other = k // 2, self._problem.forward.at(*beside)
+            for i, rate in enumerate(row[n + n * by:][:n]):
+                # What the rate does not explain is rounding, as of the direction of a short arm.
+                change = math.remainder(other[i] - row[i], periods[i]) if other[
+                    i] == other[i] else 0.0
+                noise[i] = max(noise[i], abs(change - rate * (beside[by] - inputs[by])))
+        return all(abs(gap) <= min(NOISY * most, MOST_NOISE * scale)
+                   for gap, most, scale in zip(gaps, noise, self._problem.scales))
 
     def _stepped(self, inputs: Tuple[float, ...], rates: Sequence[float],
                  gaps: Sequence[float]) -> Tuple[float, ...]:
