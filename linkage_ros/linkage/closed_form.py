@@ -44,8 +44,8 @@ from ..formula.program import Pose, Program
 # Bound of an output's rounding error through both formulas, as a part of the output's size.
 ROUNDING = 32 * 2.0 ** -53
 # Where the forward formula has no value, the reach may end: it is evaluated this far to each side
-# of a solution [rad, sizes].
-BESIDE = 16 * 2.0 ** -52 * math.pi
+# of a solution [rad, sizes], the farther the less an output tells about the input.
+BESIDE = 16 * 2.0 ** -52 * math.pi, 1024 * 2.0 ** -52 * math.pi
 # Next to an end of the reach rates are unbounded: the error allowed for an output there, as a part
 # of its size, and the rate from which on that error is allowed.
 ENDED, STEEP = 1e-7, 1e4
@@ -263,17 +263,18 @@ class ClosedForm:
         row = at(*inputs)
         if any(x != x for x in row) and not self._missed(row, inputs, values, slack)[1]:
             # This is an end of the reach, up to rounding; it may have values and no rates.
-            for beside in self._beside(inputs):
-                other, slack = at(*beside), BESIDE
+            for far, beside in self._beside(inputs):
+                other = at(*beside)
                 if not any(x != x for x in other):
+                    slack = far
                     row, inputs = (other, beside) if any(x != x for x in row[:n]) else (
                         (*row[:n], *other[n:]), inputs)
                     break
             else:
                 return None
-        for step in range(1, POLISHING + 1):
+        for _ in range(POLISHING):
             gaps, sure, away = self._missed(row, inputs, values, slack)
-            if sure or step > 1 and self._are_noise(gaps, inputs, row):
+            if sure or self._are_noise(gaps, inputs, row):
                 rates = self._rates_at_end(mode, inputs, values, row[n:])
                 return None if rates is None else (
                     self._within(inputs) if within else inputs, rates)
@@ -298,7 +299,7 @@ class ClosedForm:
         if np.abs(self._problem.jacobian(rates)).max() < (STEEP if n > 1 else 1.0):
             return rates
         if not np.isfinite(rates).all():
-            rows = (self._problem.forward.at(*beside) for beside in self._beside(inputs))
+            rows = (self._problem.forward.at(*beside) for _, beside in self._beside(inputs))
             rates = next((row[n:] for row in rows if np.isfinite(row).all()), rates)
         mode //= math.prod(map(len, closed.turns))
         pose = self._programs.get_or_make(('rates', mode), lambda: self._program(
@@ -318,11 +319,12 @@ class ClosedForm:
             return rates
         return tuple(found.T.ravel().tolist())
 
-    def _beside(self, inputs: Tuple[float, ...]) -> Iterator[Tuple[float, ...]]:
-        """Yield inputs of which one differs by little more than rounding."""
-        for i, size in enumerate(self._problem.sizes):
-            for step in (BESIDE * size, -BESIDE * size):
-                yield (*inputs[:i], inputs[i] + step, *inputs[i + 1:])
+    def _beside(self, inputs: Tuple[float, ...]) -> Iterator[Tuple[float, Tuple[float, ...]]]:
+        """Yield how far, and inputs of which one differs by little more than rounding."""
+        for far in BESIDE:
+            for i, size in enumerate(self._problem.sizes):
+                for step in (far * size, -far * size):
+                    yield far, (*inputs[:i], inputs[i] + step, *inputs[i + 1:])
 
     def _missed(self, row: Sequence[float], inputs: Sequence[float], values: Sequence[float],
                 slack: float) -> Tuple[List[float], bool, float]:
@@ -349,8 +351,8 @@ class ClosedForm:
                    row: Sequence[float]) -> bool:
         """Return whether errors are no larger than changes of the outputs next to the inputs."""
         n, periods, noise = self._n, self._problem.periods, [0.0] * self._n
-        for k, beside in enumerate(self._beside(inputs)):
-            by, other = k // 2, self._problem.forward.at(*beside)
+        for k, (_, beside) in enumerate(self._beside(inputs)):
+            by, other = k // 2 % n, self._problem.forward.at(*beside)
             for i, rate in enumerate(row[n + n * by:][:n]):
                 # What the rate does not explain is rounding, as of the direction of a short arm.
                 change = math.remainder(other[i] - row[i], periods[i]) if other[
