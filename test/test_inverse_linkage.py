@@ -10,6 +10,7 @@
 
 """The inverse linkage: what comes apart, its joint lines, and that its answers are all."""
 
+from itertools import permutations
 import math
 
 from linkage_ros import mechanisms
@@ -271,3 +272,32 @@ def test_next_to_equal_bars_and_at_ends_no_answer_is_lost(seed):
                     found = [answer.inputs[0] for answer in linkage.inverse(output).all([value])]
                     assert min((linkage.inputs[0].apart(each, at) for each in found),
                                default=math.inf) < 1e-6, (joints, base, bar, output, at, value)
+
+
+def test_the_order_of_the_outputs_does_not_matter():
+    arm = mechanisms.create('five_bar')
+    place = arm.solve((1.9, 1.24), ('P',))['P'].tolist()
+    assert [answer.inputs for answer in arm.inputs_for(('P.y', 'P.x'), place[::-1])] == [
+        answer.inputs for answer in arm.inputs_for(('P.x', 'P.y'), place)]
+    lift = custom('O ground 0 0', 'Q ground 2 0', 'A crank O 0.5', 'B carriage Q along O -1 1',
+                  'P dyad A B 1.5 1.7 left')
+    names, inputs = ('P.x', 'A.y', 'AP', 'distance(B,P)', 'angle(A,P)'), (0.7, 0.4)
+    values = {name: float(angle) for name, angle in lift.joint_angles(inputs, names).items()}
+    for outputs in permutations(names, 2):
+        try:
+            answers = lift.inverse(outputs).all([values[name] for name in outputs], inputs)
+        except ValueError:
+            continue  # these do not determine the inputs
+        assert answers and answers[0].inputs == pytest.approx(inputs, abs=1e-9), outputs
+
+
+@pytest.mark.parametrize('shape', [(0,), (2, 0, 3)])
+def test_no_values_have_no_answers(shape):
+    none = np.zeros(shape)
+    for kind, outputs in (('four_bar', ('B.x',)), ('five_bar', ('P.x', 'P.y'))):
+        inverse = mechanisms.create(kind).inverse(outputs)
+        inputs, rates = inverse.over(*[none] * len(outputs))
+        assert inputs.shape == (len(outputs), *shape, 1)
+        assert rates.shape == (len(outputs) ** 2, *shape, 1)
+        found, _ = inverse.path([none.ravel()] * len(outputs))
+        assert found[0].shape == (0,)

@@ -93,7 +93,7 @@ class ClosedForm:
         Their shapes are (modes, inputs, n) and (modes, inputs * outputs, n).
         """
         n, count = self._n, values.shape[1]
-        found = self._checked_modes.over(*values).reshape(len(self._rows), -1, count)
+        found = self._checked_modes.over(*values).reshape(len(self._rows), 1 + n + n * n, count)
         for mode, place in zip(*np.nonzero(np.isnan(found[:, 0]))):
             own = self._confirmed(int(mode), tuple(found[mode, 1:n + 1, place].tolist()),
                             tuple(values[:, place].tolist()))

@@ -347,7 +347,8 @@ class _Sketch(Dyads):
             return
         self._at[output] = self._place(joint), 1.0 + 0.0j
         motors.append(Slide((GROUND, output), (0.0j, 0.0j), (along, along), output))
-        slides.append(self._guided(joint, body, output, 1j * along))
+        # Along the other axis, whose coordinate may drive it.
+        slides.append(self._guided(joint, body, output, 1.0 + 1.0j - along))
 
     def _aimed(self, output: str, first: str, second: str, along: complex,
                slides: List[Slide]) -> Hinge:
