@@ -62,7 +62,7 @@ NOISY, MOST_NOISE = 16.0, 1e-9
 # Below this rate the inputs are ill-conditioned, and a Newton step does not improve them.
 SOUND = 0.1
 # Largest step of an output while it is followed, as a part of its size; and the distance below
-# which a mode is the one that the inputs are in [rad, sizes].
+# which a mode is the one that the inputs are in [rad, sizes], or the part of its rates.
 STEP, ALIKE = 0.3, 1e-5
 
 
@@ -173,8 +173,10 @@ class ClosedForm:
             limit.margin + FAR * limit.tolerance for limit in limits)], inputs)
         rates = forward[n:n + n * n]
         verdict, *answer = self._judged(inputs, forward[:n], rates, forward[n + n * n:])
-        return [verdict, *(where(verdict <= 0.5, math.nan, each)
-                           for each in (*answer, *(row[n:] or rates)))]
+        # Another mode may pass through the same inputs, at another rate.
+        rates = [where(abs(own - rate) <= ALIKE * abs(rate), own, rate)
+                 for own, rate in zip(row[n:], rates)] or rates
+        return [verdict, *(where(verdict <= 0.5, math.nan, each) for each in (*answer, *rates))]
 
     def _program(self, outputs: Sequence[Real], arguments: int) -> Pose:
         """Return the code for expressions of the outputs and of further arguments."""
@@ -296,7 +298,8 @@ class ClosedForm:
         than the linkage: the inputs turn back, and their rates have the other sign.
         """
         n, closed = self._n, self._inverse
-        if np.abs(self._problem.jacobian(rates)).max() < (STEEP if n > 1 else 1.0):
+        is_steep = not np.abs(self._problem.jacobian(rates)).max() < STEEP
+        if n > 1 and not is_steep:
             return rates
         if not np.isfinite(rates).all():
             rows = (self._problem.forward.at(*beside) for _, beside in self._beside(inputs))
@@ -308,6 +311,9 @@ class ClosedForm:
         with np.errstate(invalid='ignore'):
             # The identity up to rounding; a dyad on its other side turns a sign.
             both = turning @ np.reshape(rates, (n, n)).T
+            if not is_steep:
+                return tuple((1.0 / turning).ravel().tolist()) if abs(
+                    both[0, 0] - 1.0) <= ALIKE else rates
             if np.linalg.det(both) < 0.0 or (np.diag(both) < 0.0).any():
                 sizes = np.divide.outer(self._problem.scales, self._problem.sizes).T
                 return rates if np.linalg.svd(turning * sizes, compute_uv=False)[

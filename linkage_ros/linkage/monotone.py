@@ -138,39 +138,43 @@ class MonotoneBranches:
                      float(sign * value[k])) for i, k in zip(places, places[1:])]
         return cut
 
-    @property
-    def is_one(self) -> bool:
-        """Whether the output is monotone over the whole reach."""
-        return len(self._branches) == 1
-
-    def follow(self, pose: Callable, size: float, value: float,
-               near: float) -> Tuple[float, float]:
+    def follow(self, pose: Callable, size: float, value: float, near: float,
+               turn: float) -> Tuple[float, float]:
         """
         Return the input at which the output has a value on the branch of `near`, and the rate.
 
-        `pose` is the curve for a float, with inputs in rad or m, `size` of them in a unit of the
-        curve. NaN if the value is outside the branch.
+        The output goes straight there, an angle the shorter way. `pose` is the curve for a float,
+        with inputs in rad or m, `size` of them in a unit of the curve. A branch that ends where a
+        `turn` does goes on at the other end. NaN if the value is outside the branch.
         """
+        now, at = pose(near)[0], near / size
+        gap = math.remainder(value - now, math.tau) if self._angular and math.isfinite(
+            value - now) else value - now
         for branch in self._branches:
-            lo, hi = branch.theta[0], branch.theta[-1]
-            if lo <= near / size <= hi:
-                bracket = self._bracket(branch, value)
-                if bracket:
-                    return self._refined(pose, branch.sign, *bracket, size)
+            if branch.theta[0] <= at <= branch.theta[-1]:
+                start = float(np.interp(at, branch.theta, branch.value))
+                start += float(self._difference(branch.sign * now - start))
+                found = self._reached(pose, size, branch, start + branch.sign * gap, turn)
+                if found:
+                    return found
         return math.nan, math.nan
 
-    def _bracket(self, branch: _Branch, value: float) -> Optional[Tuple[float, float, float]]:
-        """Return the samples on both sides of a value, and the value in turns of the branch."""
-        low, high, slack = float(branch.value[0]), float(branch.value[-1]), self._rounding
-        target = branch.sign * value
-        if self._angular and math.isfinite(target):
-            if abs(target) > math.tau:
-                target = math.atan2(math.sin(target), math.cos(target))
-            target += math.tau * math.ceil((low - slack - target) / math.tau)
-        if not low - slack <= target <= high + slack:
-            return None
+    def _reached(self, pose: Callable, size: float, branch: _Branch, target: float, turn: float
+                 ) -> Optional[Tuple[float, float]]:
+        """Return input and rate at a value of a branch or of those that continue it."""
+        passed, slack = 0.0, self._rounding
+        while not branch.value[0] - slack <= target <= branch.value[-1] + slack:
+            end, start, step = (-1, 0, turn) if target > branch.value[-1] else (0, -1, -turn)
+            following = [each for each in self._branches if each.sign == branch.sign
+                         and each.theta[start] + step == branch.theta[end]]
+            if not following or abs(passed) > turn:
+                return None
+            target += float(following[0].value[start] - branch.value[end])
+            branch, passed = following[0], passed + step
         i = min(max(int(branch.value.searchsorted(target)), 1), len(branch.theta) - 1)
-        return float(branch.theta[i - 1]), float(branch.theta[i]), target
+        theta, rate = self._refined(
+            pose, branch.sign, float(branch.theta[i - 1]), float(branch.theta[i]), target, size)
+        return theta + passed * size, rate
 
     def _refined(self, pose: Callable, sign: float, lo: float, hi: float, target: float,
                  size: float) -> Tuple[float, float]:

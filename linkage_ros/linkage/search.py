@@ -128,13 +128,10 @@ class BranchSearch:
 
     def follow(self, values: Sequence[float], near: Sequence[float]) -> Found:
         """Return the solution that is continuous from given inputs, and the rates."""
-        turns = self._input.turns_of(near[0])
-        found, rate = self._branches.follow(
-            self._pose.at, self._input.size, values[0], near[0] - turns)
-        if self._branches.is_one and self._input.is_whole(
-                self._linkage.reach(*self._others)):
-            # The output turns all round with the crank: beyond pi they go on together.
-            turns = float(self._input.beside(found, near[0])) - found
+        input_ = self._input
+        turns = input_.turns_of(near[0])
+        found, rate = self._branches.follow(self._pose.at, input_.size, values[0], near[0] - turns,
+                                            input_.turn if input_.turns else math.inf)
         return (found + turns,), (rate,)
 
 
