@@ -301,3 +301,33 @@ def test_no_values_have_no_answers(shape):
         assert rates.shape == (len(outputs) ** 2, *shape, 1)
         found, _ = inverse.path([none.ravel()] * len(outputs))
         assert found[0].shape == (0,)
+
+
+def test_the_rate_is_that_of_the_linkage_where_another_mode_passes():
+    bar = mechanisms.create('four_bar')
+    for at in (-math.pi, 0.0):
+        value = float(bar.solve(at)['B'][0])
+        (inputs,), rates = bar.inverse('B.x').over(value)
+        for x, rate in zip(inputs, rates[0]):
+            assert rate == pytest.approx(float(bar.velocity(x)['B'][0]), rel=1e-9)
+    frame = custom('O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'B parallelogram O A Q')
+    for value in (1e-12, 1e-7, 1e-4):
+        assert frame.inverse('AB').over(value)[1].tolist() == [[pytest.approx(-1.0)]]
+
+
+@pytest.mark.parametrize('output, near, far', [
+    ('A.y', -3.2, -3.0), ('AB', 0.33, 0.9), ('AB', 3.0, 3.3), ('AB', 9.3, 9.6)])
+def test_an_input_of_two_turns_is_followed_in_its_turn(output, near, far):
+    linkage = custom('O ground 0 0', 'Q ground 4 0', 'A crank O 1',
+                     'D crank Q 1 geared crank 1/2 0', 'B dyad A D 3.5 3 left')
+    value = float(linkage.joint_angles(far, [output])[output])
+    assert linkage.follow(output, value, near)[0] == pytest.approx(far, abs=1e-12)
+
+
+@pytest.mark.parametrize('turns', [0, 2, -3])
+def test_a_searched_output_is_followed_past_the_end_of_a_turn(turns):
+    leg = mechanisms.create('jansen')
+    for near, far in ((3.1, 3.2), (3.2, 3.1)):
+        value = float(leg.solve(far)['G'][0])
+        found, _ = leg.follow('G.x', value, near + turns * math.tau)
+        assert found == pytest.approx(far + turns * math.tau, abs=1e-12)

@@ -109,20 +109,24 @@ class ClosedForm:
         gaps = [math.remainder(value - now, turn)
                 for value, now, turn in zip(values, start, problem.periods)]
         steps = math.ceil(max(abs(gap) / scale for gap, scale in zip(gaps, problem.scales)) / STEP)
-        at = {mode: near for mode, place in self._modes_near(start, near)
+        # In all turns of its inputs a mode is the same; which of them goes on is the nearest.
+        turns = math.prod(map(len, self._inverse.turns))
+        at = {mode // turns: near for mode, place in self._modes_near(start, near)
               if max(abs(x - y) / size for x, y, size in zip(place, near, problem.sizes)) < ALIKE}
         found: List[Found] = []
         for k in range(1, max(steps, 1) + 1):
             aim = values if k == max(steps, 1) else tuple(
                 now + k / steps * gap for now, gap in zip(start, gaps))
             going, found = at, []
-            places = dict(self._modes_near(aim, near))
+            places = list(self._modes_near(aim, near))
             at = {}
-            for mode, last in going.items():
-                if (place := places.get(mode)) and (own := self._confirmed(
-                        mode, self._problem.next_to(place, last), aim, False)):
-                    at[mode] = own[0]
-                    found.append(own)
+            for own, last in going.items():
+                beside = [(problem.next_to(place, last), mode) for mode, place in places
+                          if mode // turns == own]
+                place, mode = min(beside, key=lambda x: math.dist(x[0], last), default=(None, 0))
+                if place and (answer := self._confirmed(mode, place, aim, False)):
+                    at[own] = answer[0]
+                    found.append(answer)
         return min(found, key=lambda own: math.dist(own[0], near)) if found else nothing
 
     def _modes_near(self, values: Sequence[float], near: Sequence[float]
@@ -274,14 +278,16 @@ class ClosedForm:
                     break
             else:
                 return None
+        last = math.inf
         for _ in range(POLISHING):
             gaps, sure, away = self._missed(row, inputs, values, slack)
-            if sure or self._are_noise(gaps, inputs, row):
+            if sure or away > 0.5 * last and self._are_noise(gaps, inputs, row):
                 rates = self._rates_at_end(mode, inputs, values, row[n:])
                 return None if rates is None else (
                     self._within(inputs) if within else inputs, rates)
             if not away <= OTHER:
                 break
+            last = away
             inputs = self._stepped(inputs, row[n:], gaps)
             if any(x != x for x in inputs):
                 break
@@ -297,25 +303,26 @@ class ClosedForm:
         and those of the mode replace them. Beyond the end the mode has its dyads on other sides
         than the linkage: the inputs turn back, and their rates have the other sign.
         """
-        n, closed = self._n, self._inverse
-        is_steep = not np.abs(self._problem.jacobian(rates)).max() < STEEP
+        n, closed, problem = self._n, self._inverse, self._problem
+        is_steep = not all(abs(rate) * size < STEEP * scale for rate, (size, scale) in zip(
+            rates, product(problem.sizes, problem.scales)))
         if n > 1 and not is_steep:
             return rates
-        if not np.isfinite(rates).all():
-            rows = (self._problem.forward.at(*beside) for _, beside in self._beside(inputs))
-            rates = next((row[n:] for row in rows if np.isfinite(row).all()), rates)
         mode //= math.prod(map(len, closed.turns))
         pose = self._programs.get_or_make(('rates', mode), lambda: self._program(
             [*chain(*closed.modes[mode].rates)], n))
-        turning = np.reshape(pose.at(*values), (n, n))
+        rows = pose.at(*values)
+        if not is_steep:
+            return (1.0 / rows[0],) if abs(rows[0] * rates[0] - 1.0) <= ALIKE else rates
+        turning = np.reshape(rows, (n, n))
+        if not np.isfinite(rates).all():
+            others = (problem.forward.at(*beside) for _, beside in self._beside(inputs))
+            rates = next((row[n:] for row in others if np.isfinite(row).all()), rates)
         with np.errstate(invalid='ignore'):
             # The identity up to rounding; a dyad on its other side turns a sign.
             both = turning @ np.reshape(rates, (n, n)).T
-            if not is_steep:
-                return tuple((1.0 / turning).ravel().tolist()) if abs(
-                    both[0, 0] - 1.0) <= ALIKE else rates
             if np.linalg.det(both) < 0.0 or (np.diag(both) < 0.0).any():
-                sizes = np.divide.outer(self._problem.scales, self._problem.sizes).T
+                sizes = np.divide.outer(problem.scales, problem.sizes).T
                 return rates if np.linalg.svd(turning * sizes, compute_uv=False)[
                     -1] <= END else None
         try:

@@ -166,7 +166,7 @@ class MonotoneBranches:
         while not branch.value[0] - slack <= target <= branch.value[-1] + slack:
             end, start, step = (-1, 0, turn) if target > branch.value[-1] else (0, -1, -turn)
             following = [each for each in self._branches if each.sign == branch.sign
-                         and each.theta[start] + step == branch.theta[end]]
+                         and abs(each.theta[start] + step - branch.theta[end]) <= CLOSE]
             if not following or abs(passed) > turn:
                 return None
             target += float(following[0].value[start] - branch.value[end])
