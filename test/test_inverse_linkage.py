@@ -10,8 +10,10 @@
 
 """The inverse linkage: what comes apart, its joint lines, and that its answers are all."""
 
+from copy import deepcopy
 from itertools import permutations
 import math
+import pickle
 
 from linkage_ros import mechanisms
 import numpy as np
@@ -331,3 +333,34 @@ def test_a_searched_output_is_followed_past_the_end_of_a_turn(turns):
         value = float(leg.solve(far)['G'][0])
         found, _ = leg.follow('G.x', value, near + turns * math.tau)
         assert found == pytest.approx(far + turns * math.tau, abs=1e-12)
+
+
+def test_the_default_of_several_inputs_does_not_depend_on_rounding():
+    inverse = mechanisms.create('five_bar').inverse(('P.x', 'P.y'))
+    height = np.linspace(0.10, 0.16, 200)
+    together = np.array(inverse.nearest((np.full(200, 0.05), height))[0])
+    alone = np.transpose([inverse.nearest((0.05, y))[0] for y in height.tolist()])
+    np.testing.assert_allclose(together, alone, atol=1e-14)
+    assert abs(np.diff(alone)).max() < 0.05
+
+
+@pytest.mark.parametrize('ends', [
+    (0.0, math.inf), (math.nan, 1.0), (2.0, 1.0), (1.0, 2.0, 3.0), 5, 'ab'])
+def test_ends_are_two_finite_numbers_in_order(ends):
+    with pytest.raises(ValueError, match='ends must be two finite numbers in order'):
+        mechanisms.create('four_bar').servo_for('B.x', 100.0, ends=ends)
+
+
+def test_there_is_one_value_for_each_output():
+    inverse = mechanisms.create('five_bar').inverse(('P.x', 'P.y'))
+    for ask in (lambda: inverse.over(0.05), lambda: inverse.nearest((0.05,)),
+                lambda: inverse.nearest((0.05, 0.15, 0.2))):
+        with pytest.raises(ValueError, match='values of 2 outputs are needed'):
+            ask()
+
+
+def test_answers_go_to_other_processes():
+    answers = mechanisms.create('five_bar').inputs_for(('P.x', 'P.y'), (0.05, 0.15))
+    for each in (pickle.loads(pickle.dumps(answers)), deepcopy(answers)):
+        assert [(answer.inputs, answer.mode) for answer in each] == [
+            (answer.inputs, answer.mode) for answer in answers]

@@ -33,6 +33,8 @@ from ..formula.expression import (
 
 # Distance to an end of a sweep that counts as that end, in sizes and as a part of the end.
 CLOSE, ULPS = 1e-7, 4 * 2.0 ** -52
+# Inputs that differ by less are the same one, of which the next input decides [rad, sizes].
+TIE = 1e-9
 
 
 def choice(problem: InverseProblem, rows: Sequence[Sequence[Real]], arguments: int, follows: bool,
@@ -75,7 +77,8 @@ def choice(problem: InverseProblem, rows: Sequence[Sequence[Real]], arguments: i
             order = [square_root(sum((square((x - y) / size) for x, y, size in zip(
                 places, near, problem.sizes)), real(0.0)))]
         else:
-            order = [where(row[1] < 0.0, 1.0, 0.0) if n == 1 else real(0.0), *row[:n]]
+            order = [where(row[1] < 0.0, 1.0, 0.0) if n == 1 else real(0.0), *(
+                x / size for x, size in zip(row[:n], problem.sizes))]
         order[0] = reduce(lambda far, miss: where(miss, math.inf, far), chain(*misses),
                           where(row[0] <= row[0], order[0], math.inf))
         choices.append([*order, real(float(rank)), *places, *row[n:]])
@@ -115,7 +118,7 @@ def _place(problem: InverseProblem, by: int, row: Sequence[Real], near: Sequence
 
 
 def _before(one: Sequence[Real], other: Sequence[Real]) -> Real:
-    """Return whether numbers precede others in lexicographic order."""
+    """Return whether numbers precede others in lexicographic order; rounding is a tie."""
     (x, *rest), (y, *others) = one, other
-    return 0.5 < where(x < y, 1.0, where(y < x, 0.0, where(_before(rest, others), 1.0, 0.0))) \
-        if rest else x < y
+    return 0.5 < where(x < y - TIE, 1.0, where(y < x - TIE, 0.0, where(
+        _before(rest, others), 1.0, 0.0))) if rest else x < y

@@ -40,7 +40,7 @@ from .arguments import numbers
 from .choice import choice
 from .closed_form import ClosedForm
 from .inverse_linkage import InverseLinkage, taken_apart
-from .inverse_problem import Found, InverseProblem, NEIGHBOURS, rounded, SAME
+from .inverse_problem import Found, InverseProblem, LARGE, NEIGHBOURS, rounded, SAME
 from .inverse_rods import taken_apart as rods_taken_apart
 from .search import blocks, Search, SINGULAR
 from ..cache import Cache
@@ -133,6 +133,10 @@ class Inverse:
         self._solver: Union[ClosedForm, Search] = ClosedForm(
             problem, self.closed) if self.closed else Search(problem)
 
+    def __reduce__(self) -> Tuple[Any, ...]:
+        """Pickle the linkage and the outputs only."""
+        return self.linkage.inverse, (self.outputs,)
+
     def __str__(self) -> str:
         what = listed(self.outputs)
         if not self.closed:
@@ -188,6 +192,7 @@ class Inverse:
             output by the first input, by the second and so on.
 
         """
+        self._check_count(values)
         rows = np.broadcast_arrays(*(numbers('values', each) for each in values))
         inputs, rates = self._found(np.stack([row.ravel() for row in rows]))
         self._single(inputs, rates)
@@ -257,6 +262,25 @@ class Inverse:
                              f'numbers, got {quoted(found.tolist())}')
         return tuple(found.ravel().tolist())
 
+    def _check_count(self, values: Sequence[Any]) -> None:
+        if len(values) != self._n:
+            raise ValueError(f'{self.linkage.type} has {self._n} inputs: values of {self._n} '
+                             f'outputs are needed, got {len(values)}')
+
+    def _limits(self, ends: Ends) -> Tuple[Tuple[float, ...], ...]:
+        """Return the ends of each input as floats, () if it has none."""
+        try:
+            limits = ((),) * self._n if ends is None else tuple(
+                () if pair is None else tuple(map(float, pair)) for pair in ends)
+            if len(limits) == self._n and all(
+                    len(pair) == 2 and -LARGE < pair[0] <= pair[1] < LARGE
+                    for pair in limits if pair):
+                return limits
+        except (TypeError, ValueError):
+            pass
+        raise ValueError('ends must be two finite numbers in order, or None, for each input, got '
+                         + quoted(ends))
+
     # --- one of the solutions ---
 
     def nearest(self, values: Sequence[Any], near: Optional[Sequence[Any]] = None,
@@ -272,7 +296,8 @@ class Inverse:
             Values of the inputs [rad or m]: the solution is the nearest to them, whole turns
             included; the unit of a length is about its stroke. Default: with one input, the least
             at which the output increases, else the least (on this working branch of a lever, lever
-            and crank turn the same way); with several, the one whose first input is the least.
+            and crank turn the same way); with several, the one with the least first input; where
+            that is equal up to 1e-9 [rad, strokes], the least next one.
         ends : sequence of (float, float) or None, optional
             For each input the range [rad or m] that the solution has to lie in, or None.
 
@@ -282,10 +307,15 @@ class Inverse:
             The inputs [rad or m], and the rate of each output by the first input, by the second
             and so on; NaN where there is no solution.
 
+        Raises
+        ------
+        ValueError
+            If there is not one value for each output, or ends are not finite and in order.
+
         """
-        limits = tuple(ends or (None,) * self._n)
-        near = None if near is None else tuple(near)
-        given = (*values, *(near or ()), *(float(end) for pair in limits if pair for end in pair))
+        limits, near = self._limits(ends), None if near is None else tuple(near)
+        self._check_count(values)
+        given = (*values, *(near or ()), *chain(*limits))
         if set(map(type, given)) == {float}:
             return self._chosen(self._solutions(tuple(values)), near, limits)[1:]
         if not self.closed:
@@ -323,7 +353,7 @@ class Inverse:
 
         """
         inputs, rates = self._found(np.array(values, float))
-        limits, beside = tuple(ends or (None,) * self._n), near and tuple(np.ravel(near).tolist())
+        limits, beside = self._limits(ends), near and tuple(np.ravel(near).tolist())
         found = np.full((self._n + self._n ** 2, inputs.shape[2]), np.nan)
         breaks: Dict[int, np.ndarray] = {}
         at, known = 0, np.flatnonzero(self._may_be_inside(inputs, limits))
@@ -389,7 +419,7 @@ class Inverse:
             return 0.0, (math.nan,) * n, (math.nan,) * (n * n)
         choose = self._choice(len(answers), near is not None, tuple(map(bool, limits)))
         rank, *found = choose(*chain.from_iterable(chain(*answer) for answer in answers),
-                              *(near or ()), *(end for pair in limits if pair for end in pair))
+                              *(near or ()), *chain(*limits))
         return rank, tuple(found[:n]), tuple(found[n:])
 
     def _choice(self, count: int, *way: Any) -> Pose:
