@@ -364,3 +364,14 @@ def test_answers_go_to_other_processes():
     for each in (pickle.loads(pickle.dumps(answers)), deepcopy(answers)):
         assert [(answer.inputs, answer.mode) for answer in each] == [
             (answer.inputs, answer.mode) for answer in answers]
+
+
+def test_a_value_at_which_equal_bars_of_the_inverse_lie_on_each_other_is_answered():
+    drop = mechanisms.create('water_drop')
+    inverse = drop.inverse('B.x')
+    assert [answer.inputs for answer in inverse.all(0.0)] == [(-math.pi,), (0.0,)]
+    (inputs,), rates = inverse.over([0.0, 99.0])
+    assert inputs[0].tolist() == [-math.pi, 0.0] and np.isnan(inputs[1]).all()
+    np.testing.assert_allclose(rates[0, 0], [4.0, -4.0 / 3.0], rtol=1e-9)
+    assert drop.servo_for('B.x', np.zeros(1))[0].tolist() == [-math.pi]
+    assert drop.servo_for('B.x', 0.0, 0.1)[0] == 0.0

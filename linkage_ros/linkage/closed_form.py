@@ -55,6 +55,8 @@ END = 1e-14
 OTHER = 1e-2
 # A margin below minus this many tolerances, a thousandth of its size, is outside the reach.
 FAR = 1e-3 / TOLERANCE
+# Distance of neighbouring values where a mode's equal bars lie on each other [rad, sizes].
+KITE = 1e-9
 # Newton steps at most that remove a closed form's rounding; each doubles the number of digits.
 POLISHING = 5
 # An error up to this multiple of the noise of an output is rounding, and this part of its size.
@@ -75,11 +77,16 @@ class ClosedForm:
         # Where all modes are the linkage's own nothing is checked, and nothing else has the rates.
         self._is_own = inverse.is_own and self._n == 2
         self._row = self._n * (1 + self._n if self._is_own or self._n == 1 else 1)
+        # Two equal bars may lie on each other, in a direction that only neighbouring values have.
+        lines = map(str.split, inverse.lines)
+        self.has_kite = self._n == 1 and any(word == 'dyad' and args[2] == args[3]
+                                              for _, word, *args in lines)
 
     def solutions(self, values: Tuple[float, ...]) -> Iterator[Found]:
         """Yield the solutions for finite values, those that differ by rounding included."""
         n = 1 + self._n
-        for mode, row in self._assembled(values):
+        rows = list(self._assembled(values))
+        for mode, row in rows or self.has_kite and self._next_to_kite(values) or ():
             verdict = (1.0, *row) if self._is_own else self._check.at(*values, *row)
             if verdict[0] == 1.0:
                 yield verdict[1:n], verdict[n:]
@@ -142,6 +149,11 @@ class ClosedForm:
             row = flat[start:start + size]
             if -LARGE < sum(row[:self._n]) < LARGE:
                 yield mode, row
+
+    def _next_to_kite(self, values: Sequence[float]) -> List[Tuple[int, Tuple[float, ...]]]:
+        """Return the modes at neighbouring values, from where Newton's method leads to these."""
+        step = KITE * self._problem.scales[0]
+        return [*self._assembled((values[0] + step,)), *self._assembled((values[0] - step,))]
 
     @cached_property
     def _rows(self) -> List[List[Real]]:

@@ -214,7 +214,13 @@ class Inverse:
 
     def _found(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return what the solver's `over` does, for values of any size."""
-        return self._solver.over(self._problem.within_turns(values))
+        values = self._problem.within_turns(values)
+        inputs, rates = self._solver.over(values)
+        if self._solver.has_kite:
+            for place in np.flatnonzero(np.isnan(inputs[:, 0]).all(axis=0)):
+                for k, answer in enumerate(self._all(tuple(values[:, place].tolist()))):
+                    inputs[k, :, place], rates[k, :, place] = answer
+        return inputs, rates
 
     def _distinct(self, found: Sequence[Found]) -> List[Found]:
         """Return solutions in order, one of those that differ by rounding."""
@@ -326,7 +332,7 @@ class Inverse:
         flat = np.stack([each.ravel() for each in arrays])
         flat[:self._n] = self._problem.within_turns(flat[:self._n])
         rows = self._choice(0, near is not None, tuple(map(bool, limits))).over(*flat)
-        for place in np.flatnonzero(np.isnan(rows[0])):
+        for place in np.flatnonzero(np.isnan(rows[0] + self._solver.has_kite * rows[1])):
             one = flat[:2 * self._n, place].tolist()
             rows[1:, place] = [*chain(*self._chosen(self._solutions(
                 tuple(one[:self._n])), near and one[self._n:], limits)[1:])]

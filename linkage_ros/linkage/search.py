@@ -88,6 +88,8 @@ def dependent(outputs: Names, rows: Sequence[int]) -> ValueError:
 class Search:
     """The solutions of a problem without a closed form; the methods are those of `ClosedForm`."""
 
+    has_kite = False
+
     def __init__(self, problem: InverseProblem):
         self._problem, linkage, outputs = problem, problem.linkage, problem.outputs
         self._way = StepSearch(linkage, outputs, problem.periods) if len(outputs) > 1 else (
