@@ -375,3 +375,15 @@ def test_a_value_at_which_equal_bars_of_the_inverse_lie_on_each_other_is_answere
     np.testing.assert_allclose(rates[0, 0], [4.0, -4.0 / 3.0], rtol=1e-9)
     assert drop.servo_for('B.x', np.zeros(1))[0].tolist() == [-math.pi]
     assert drop.servo_for('B.x', 0.0, 0.1)[0] == 0.0
+
+
+def test_next_to_where_two_joints_meet_their_direction_is_noise():
+    linkage = custom('O ground -0.2 -0.22', 'Q ground 2.03 -0.4', 'A crank O 0.05',
+                     'B dyad A Q 1 1.65 left', 'S slider O 1 A along B out')
+    for at in np.linspace(-3.1, 3.1, 40).tolist():
+        value = float(linkage.joint_angles(at, ['angle(S,B)'])['angle(S,B)'])
+        found = linkage.input_for('angle(S,B)', value)
+        assert np.nanmin(abs(found - at)) < 1e-9
+        back = linkage.joint_angles(found[np.isfinite(found)], ['angle(S,B)'])['angle(S,B)']
+        assert max(abs(math.remainder(each - value, math.tau)) for each in back) < 1e-9
+    assert all(high - low < 0.12 for (low, _), (high, _) in linkage.extremes('angle(S,B)'))

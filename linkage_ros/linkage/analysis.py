@@ -24,7 +24,7 @@ import numpy as np
 from .curves import extremes
 from .dead_points import NEAR, near_zeros, NearZero
 from .inputs import Arc
-from .monotone import cut, distinct, MonotoneBranches
+from .monotone import distinct, MonotoneBranches
 from .planar import TOLERANCE
 
 if TYPE_CHECKING:
@@ -47,9 +47,9 @@ class Analysis:
         linkage.check_output(output)
         pose, angular = linkage.bound('output', output), np.array([linkage.is_angle(output)])
         size = self._first.size
-        jumps = [at * size for at in self.branches(output).jumps] if arcs is None else []
-        parts = [(low + 8.0 * np.spacing(abs(low)) * (low in jumps), high) for low, high in cut(
-            linkage.reach() if arcs is None else arcs, jumps)]
+        parts = linkage.reach() if arcs is None else arcs
+        if arcs is None and (branches := self.branches(output)).jumps:
+            parts = [(low * size, high * size) for low, high in branches.arcs]
         found = [extremes(lambda value: pose.searched(value)[:1], low, high, angular)[0].tolist()
                  for low, high in parts]
         return [(tuple(least), tuple(greatest)) for least, greatest in found]

@@ -126,6 +126,16 @@ class MonotoneBranches:
                 row[place] = np.where(target >= branch.value[-1] - near, branch.theta[-1], part)
         return found
 
+    @property
+    def arcs(self) -> List[Arc]:
+        """Return the reach without jumps, cut at them."""
+        joined: List[Arc] = []
+        for low, high in sorted((float(branch.theta[0]), float(branch.theta[-1]))
+                                for branch in self._branches):
+            joined.append((joined.pop()[0], high) if joined and low == joined[-1][1] else (
+                low, high))
+        return joined
+
     def pieces(self, most: float) -> List[Tuple[float, float, float, float]]:
         """Return pieces of the branches, each two inputs and outputs at most `most` apart."""
         cut = []
@@ -231,9 +241,12 @@ class MonotoneBranches:
                            - rate[0] * (around[1:] - theta)).max(axis=0)
         noise[~np.isfinite(noise)] = 0.0
         known = np.isfinite(value[0])
+        # The direction of two joints is noise next to where they meet.
+        clear = known & ~(self._angular & (noise > BROKEN * math.pi))
         for run in np.split(np.arange(len(theta)), np.flatnonzero(~known)):
-            run = run[known[run]]
-            if len(run) > 1:
+            within = np.flatnonzero(clear[run])
+            if len(within) > 1:
+                run = run[within[0]:within[-1] + 1]
                 values = np.unwrap(value[0, run]) if self._angular else value[0, run]
                 yield theta[run], values, rate[0, run], noise[run]
 
