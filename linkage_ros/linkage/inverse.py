@@ -332,7 +332,7 @@ class Inverse:
         flat = np.stack([each.ravel() for each in arrays])
         flat[:self._n] = self._problem.within_turns(flat[:self._n])
         rows = self._choice(0, near is not None, tuple(map(bool, limits))).over(*flat)
-        for place in np.flatnonzero(np.isnan(rows[0] + self._solver.has_kite * rows[1])):
+        for place in np.flatnonzero(np.isnan(rows[:1 + self._solver.has_kite]).any(axis=0)):
             one = flat[:2 * self._n, place].tolist()
             rows[1:, place] = [*chain(*self._chosen(self._solutions(
                 tuple(one[:self._n])), near and one[self._n:], limits)[1:])]
