@@ -387,3 +387,21 @@ def test_next_to_where_two_joints_meet_their_direction_is_noise():
         back = linkage.joint_angles(found[np.isfinite(found)], ['angle(S,B)'])['angle(S,B)']
         assert max(abs(math.remainder(each - value, math.tau)) for each in back) < 1e-9
     assert all(high - low < 0.12 for (low, _), (high, _) in linkage.extremes('angle(S,B)'))
+
+
+def test_an_extreme_as_the_library_says_it_has_an_answer():
+    leg = mechanisms.create('jansen')
+    for output in ('distance(O,G)', 'G.x', 'G.y', 'BC'):
+        for extremes in leg.extremes(output):
+            for value, at in extremes:
+                found = leg.input_for(output, value)
+                assert np.nanmin(abs(found - at), initial=9.0) < 1e-6, (output, value)
+
+
+def test_the_rate_next_to_an_end_is_not_that_of_a_mode_that_ends_there():
+    cell = mechanisms.create('peaucellier')
+    at = cell.reach()[0][0] + 1e-13
+    value = float(cell.joint_angles(at, ['DC'])['DC'])
+    (inputs,), (rates,) = cell.inverse('DC').over(value)
+    assert inputs[0] == pytest.approx(at, abs=1e-14)
+    assert rates[0] == pytest.approx(float(cell.joint_rates(at, ('DC',))['DC']), rel=0.05)

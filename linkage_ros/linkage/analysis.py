@@ -76,7 +76,7 @@ class Analysis:
         marks = distinct((near.value for near in self._near_zeros()
                           if near.gap <= NEAR * near.size), self._first.counted())
         return MonotoneBranches(self._curve('output', output), self._reach(), marks, angular,
-                                TOLERANCE * (math.pi if angular else self._linkage.longest))
+                                TOLERANCE * (math.pi if angular else 2.0 * self._linkage.longest))
 
     def _reach(self) -> List[Arc]:
         """Return the reach in arcs, none of them on both sides of an end of a turn."""
