@@ -39,13 +39,18 @@ class Difference(ValueError):
 
 
 class Track(NamedTuple):
-    """Poses along paths: positions of motors and joints, which are closed, and their stiffness."""
+    """
+    Poses along paths: positions of motors and joints, which are closed, and their stiffness.
+
+    `last` are the last poses of the paths that are closed to their ends.
+    """
 
     motors: np.ndarray
     joints: Dict[str, np.ndarray]
     alive: np.ndarray
     margin: np.ndarray
     volume: np.ndarray
+    last: Poses
 
 
 def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
@@ -76,32 +81,44 @@ def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
                      if {*driven} & {joint.name for joint in each.joints})
     start = np.array([robot.positions[source] for source in ends])
     targets = np.array([*ends.values()]).T
+    inside, near = np.clip(start, *targets), machine.first.start
     if len(ends) > 1:
         low, high = targets
         targets = np.random.default_rng(1).uniform(low, high, (PATHS, len(ends)))
     tracker, sources = _Tracker(robot, component, driven, [*ends], slack), [*ends]
+    if (inside != start).any():
+        track = tracker.track(start, inside[None])
+        apart, names, last = _differences(machine, component, sources, track, near)
+        if track.alive.all() and (apart <= _allowed(track, slack)).all():
+            start, near, tracker.poses = inside, last, track.last
     good, beyond = np.zeros((0, 1), bool), ''
     for _ in range(3):
         targets = targets[np.max(np.abs(targets - start), axis=1) > 1e-9]
         if not len(targets):
             break
         track = tracker.track(start, targets)
-        apart, names = _differences(machine, component, sources, track)
-        allowed = (EXACT + 30.0 * slack) / np.maximum(track.margin, 1e-4)
-        good = np.logical_and.accumulate(track.alive & (apart <= allowed), axis=1)
+        apart, names, _ = _differences(machine, component, sources, track, near)
+        good = np.logical_and.accumulate(
+            track.alive & (apart <= _allowed(track, slack)), axis=1)
         _check_ends(track, sources, apart, names, good)
         if not good.all():
             beyond = '; not beyond ' + (
                 'a change point' if (track.alive & ~good).any() else 'where its loops end')
         if good.sum() >= FEWEST:
             worst = np.unravel_index(np.argmax(np.where(good, apart, -1.0)), good.shape)
-            moved = ', '.join(f'{source} from {values.min():.4g} to {values.max():.4g}'
-                              for source, values in zip(sources, track.motors[good].T))
+            moved = ', '.join(
+                f'{source} from {min(*values, first):.4g} to {max(*values, first):.4g}'
+                for source, first, values in zip(sources, start, track.motors[good].T))
             return (f'Checked: {machine.name}: in {good.sum()} poses of the robot, its loops '
                     f'closed in space, {moved}, the worst difference is {apart[worst]:.0e}, of '
                     f'{names[worst]}{beyond}.')
         targets = start + (targets - start) * good.mean(axis=1)[:, None]
     raise Difference(f'it could not be checked in more than {good.sum()} poses')
+
+
+def _allowed(track: Track, slack: float) -> np.ndarray:
+    """Return the allowed difference in each pose [rad, or of the size]."""
+    return (EXACT + 30.0 * slack) / np.maximum(track.margin, 1e-4)
 
 
 def _check_ends(track: Track, sources: List[str], apart: np.ndarray, names: np.ndarray,
@@ -124,13 +141,17 @@ def _check_ends(track: Track, sources: List[str], apart: np.ndarray, names: np.n
 
 
 def _differences(machine: scene.SceneMechanism, component: Component, sources: List[str],
-                 track: Track) -> Tuple[np.ndarray, np.ndarray]:
-    """Return the largest difference in each pose [rad, or of the size], and its joint."""
+                 track: Track, first: float) -> Tuple[np.ndarray, np.ndarray, float]:
+    """
+    Return the largest difference in each pose [rad, or of the size], its joint, the last input.
+
+    A measured input continues from `first`.
+    """
     values = [drive.ratio * track.motors[..., sources.index(drive.source)] + drive.offset
               for drive in machine.inputs.values()]
     if output := machine.first.measures:
         for path in values[0]:
-            near = machine.first.start
+            near = first
             for i, value in enumerate(path):
                 path[i] = machine.measured(output, value, near)[0]
                 near = near if math.isnan(path[i]) else path[i]
@@ -145,7 +166,8 @@ def _differences(machine: scene.SceneMechanism, component: Component, sources: L
     apart = apart or {'': np.full(track.alive.shape, math.nan)}
     every = np.array([*apart.values()])
     worst = np.argmax(np.where(np.isnan(every), math.inf, every), axis=0)
-    return np.take_along_axis(every, worst[None], axis=0)[0], np.array([*apart])[worst]
+    return (np.take_along_axis(every, worst[None], axis=0)[0], np.array([*apart])[worst],
+            float(values[0][-1, -1]))
 
 
 class _Tracker:
@@ -155,6 +177,8 @@ class _Tracker:
                  sources: List[str], slack: float):
         self._component, self._slack = component, slack
         self._fixed = component.columns_of(driven)
+        # Where paths start: the pose of the file.
+        self.poses = component.at_start()
         # For each driven joint its source, ratio and offset.
         self._movers = {name: (sources.index(source), ratio, offset) for name in driven
                         for source, ratio, offset in [robot.source(name)]}
@@ -163,7 +187,7 @@ class _Tracker:
         """Return poses on straight paths of the motors, each closed from the one before."""
         component, fixed, count = self._component, self._fixed, len(targets)
         steps = -(-POSES // count)
-        poses = component.closed(component.at_start(count), fixed)
+        poses = component.closed(self.poses.some(np.zeros(count, int)), fixed)
         self._base = component.errors(poses)[0][0]
         nullity = component.nullity(fixed)
         motors = start + (targets - start)[:, None] * (np.arange(steps + 1) / steps)[:, None]
@@ -190,7 +214,7 @@ class _Tracker:
             margin[going, k], volume[going, k] = component.stiffness(poses, fixed, nullity)
             for name, values in component.read(poses).items():
                 joints.setdefault(name, np.full(alive.shape, math.nan))[going, k] = values
-        return Track(motors[:, 1:], joints, alive, margin, volume)
+        return Track(motors[:, 1:], joints, alive, margin, volume, poses)
 
     def _advanced(self, poses: Poses, before: np.ndarray, after: np.ndarray, drift: np.ndarray,
                   halvings: int) -> Tuple[Poses, np.ndarray]:

@@ -46,6 +46,9 @@ def read(path: str, loops: Optional[str] = None) -> Robot:
         given = _loops(loops)
         with _blaming(loops):
             reader.of_file(given)
+    with _blaming(path):
+        for name in robot.follows:
+            robot.source(name)
     return robot
 
 

@@ -151,7 +151,8 @@ class Rods:
         if joint.limits is None or joint.position is None:
             return None
         low, high = (end - joint.position for end in joint.limits)
-        return (low, high) if joint.kind == SLIDE or -_ANY < low < high < _ANY else None
+        widest = math.inf if joint.kind == SLIDE else _ANY
+        return (low, high) if -widest < low < high < widest else None
 
     def parameters(self, lines: Sequence[str]) -> Iterator[Tuple[str, Any]]:
         """Yield the parameters of its mechanism."""
