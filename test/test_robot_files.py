@@ -454,6 +454,8 @@ BAD = [('<robot', 'is no XML: '),
        ('<sdf><model><joint/></model></sdf>', ''), ('<mujoco><b/></mujoco>', 'Schema violation'),
        ('<robot><link name="a"/><joint name="j"><child link="b"/></joint></robot>',
         "joint j is on '', which is no link"),
+       ('<robot><link name="a"/><link name="b"/><joint type="continuous"><parent link="a"/>'
+        '<child link="b"/></joint></robot>', 'robot.xml: a joint has no name'),
        ('<robot><link name="a"/><link name="b"/><joint name="j" type="revolute">'
         '<parent link="a"/><child link="b"/><axis xyz="0 a"/></joint></robot>',
         "cannot be read: could not convert string to float: 'a'")]
@@ -1025,6 +1027,17 @@ def check_comes_back(linkage, values, robot, steps, zeros=None):
                 assert abs(apart) < 1e-9 * size, (link.name, step)
                 moved += 1
     return said, moved
+
+
+@pytest.mark.parametrize('bars, start', [
+    (('B ground 0.6 0', 'C crank A 0.7', 'D dyad C B 0.3 0.5 left'), -0.5),
+    (('B ground 0 0.63', 'C crank A 0.36', 'D dyad C B 0.86 0.44 left'), 0.5)])
+def test_a_coupler_s_range_ends_where_the_crank_turns_back(bars, start):
+    linkage = mechanisms.create('custom', joints=['A ground 0 0', *bars])
+    robot = robot_of(linkage, start)
+    robot.driven = ['CD']
+    (_, worst), = checked(said := '\n'.join(command.described(robot)[1]))
+    assert worst < 1e-9 and said.endswith('; not beyond where its input turns back.')
 
 
 @pytest.mark.sample(4)

@@ -28,6 +28,8 @@ PATHS, POSES, FEWEST = 12, 240, 200
 EXACT = 1e-9
 # Stiffness next to a change point, as a part of the largest.
 CHANGE = 0.25
+# A measured input within this of an end of its reach [rad, or of its size] turns back there.
+TURN = 0.1
 # The first step, as a part of the others.
 LITTLE = 1e-3
 # A step that turns joints by more [rad] is halved, at most so many times.
@@ -88,21 +90,24 @@ def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
     tracker, sources = _Tracker(robot, component, driven, [*ends], slack), [*ends]
     if (inside != start).any():
         track = tracker.track(start, inside[None])
-        apart, names, last = _differences(machine, component, sources, track, near)
+        apart, names, inputs = _differences(machine, component, sources, track, near)
         if track.alive.all() and (apart <= _allowed(track, slack)).all():
-            start, near, tracker.poses = inside, last, track.last
+            start, near, tracker.poses = inside, float(inputs[0, -1]), track.last
     good, beyond = np.zeros((0, 1), bool), ''
     for _ in range(3):
         targets = targets[np.max(np.abs(targets - start), axis=1) > 1e-9]
         if not len(targets):
             break
         track = tracker.track(start, targets)
-        apart, names, _ = _differences(machine, component, sources, track, near)
+        apart, names, inputs = _differences(machine, component, sources, track, near)
         good = np.logical_and.accumulate(
             track.alive & (apart <= _allowed(track, slack)), axis=1)
-        _check_ends(track, sources, apart, names, good)
+        turned = [i for i, count in enumerate(good.sum(axis=1)) if not good[i].all()
+                  and _turns_back(machine.first, *[near, *inputs[i]][count:count + 2])]
+        _check_ends(track, sources, apart, names, good, turned)
         if not good.all():
             beyond = '; not beyond ' + (
+                'where its input turns back' if turned else
                 'a change point' if (track.alive & ~good).any() else 'where its loops end')
         if good.sum() >= FEWEST:
             worst = np.unravel_index(np.argmax(np.where(good, apart, -1.0)), good.shape)
@@ -121,11 +126,26 @@ def _allowed(track: Track, slack: float) -> np.ndarray:
     return (EXACT + 30.0 * slack) / np.maximum(track.margin, 1e-4)
 
 
+def _turns_back(drive: scene.InputSettings, last: float, following: float) -> bool:
+    """
+    Return whether a measured input does not continue after its last pose, at an end of its reach.
+
+    The motor that measures it is between two moving links, and can move on from there.
+    """
+    near = TURN * drive.input.size
+    return bool(drive.measures) and not drive.input.apart(last, following) < near and any(
+        drive.input.apart(last, end) < near for arc in drive.reach for end in arc)
+
+
 def _check_ends(track: Track, sources: List[str], apart: np.ndarray, names: np.ndarray,
-                good: np.ndarray) -> None:
-    """Raise Difference for a path with good poses up to a wrong one, unless it branches there."""
+                good: np.ndarray, turned: Sequence[int]) -> None:
+    """
+    Raise Difference for a path with good poses up to a wrong one, unless it branches there.
+
+    Paths that `turned` end.
+    """
     largest = np.max(track.volume, where=track.alive, initial=0.0)
-    for i in np.flatnonzero(~good.all(axis=1)):
+    for i in {*np.flatnonzero(~good.all(axis=1)).tolist()}.difference(turned):
         at = i, good[i].sum()
         # Past a change point a robot can continue in two ways.
         if not track.alive[at] or np.min(track.volume[i, :at[1] + 1]) < CHANGE * largest:
@@ -141,9 +161,9 @@ def _check_ends(track: Track, sources: List[str], apart: np.ndarray, names: np.n
 
 
 def _differences(machine: scene.SceneMechanism, component: Component, sources: List[str],
-                 track: Track, first: float) -> Tuple[np.ndarray, np.ndarray, float]:
+                 track: Track, first: float) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
     """
-    Return the largest difference in each pose [rad, or of the size], its joint, the last input.
+    Return the largest difference in each pose [rad, or of the size], its joint, and the input.
 
     A measured input continues from `first`.
     """
@@ -167,7 +187,7 @@ def _differences(machine: scene.SceneMechanism, component: Component, sources: L
     every = np.array([*apart.values()])
     worst = np.argmax(np.where(np.isnan(every), math.inf, every), axis=0)
     return (np.take_along_axis(every, worst[None], axis=0)[0], np.array([*apart])[worst],
-            float(values[0][-1, -1]))
+            values[0])
 
 
 class _Tracker:
