@@ -19,34 +19,22 @@ from __future__ import annotations
 from cmath import phase
 from itertools import combinations
 import math
-from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from . import check, loops
+from . import check, loops, sweeps
 from .robot import Joint, Limits, plain, Robot, SLIDE
+from .sweeps import Source
 from .. import mechanisms, scene
 from ..linkage.dyads import bar_name, Dyads, Hinge, Motor, Pin, ROUNDING, short, Slide
 from ..linkage.mechanism import Mechanism
 from ..robot_model.bodies import coordinates
-from ..scene.input_settings import FARTHEST
 from ..scene.joint_names import quoted_name
 
 # The most joints of which pairs are tried as motors.
 MANY = 30
-# Why no motion is within limits.
-EMPTY, UNREACHED = 'they leave no range', 'its loops do not reach them'
 _OTHER = {'left': 'right', 'right': 'left', 'out': 'in', 'in': 'out'}
-
-
-class Source(NamedTuple):
-    """An input: ratio * position + offset of its source."""
-
-    name: str
-    source: str
-    ratio: float
-    offset: float
-    value: float
 
 
 class Drawing(Dyads):
@@ -239,19 +227,11 @@ def described(robot: Robot, group: loops.Group, others: Sequence[str]
     said = [f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.'] if drawing.left else []
     drawing.limits, more = robot.limits(drawing.moved_by)
     said += more
-    for drive in drawing.drives:
-        source = drawing.measured.name if drawing.measured else drive.source
-        if limits := drawing.limits.get(source):
-            sweep, why = (None, 'its motor is between two moving links') if drawing.measured \
-                else _sweep(drive, limits, machine.inputs[drive.name])
-            if sweep:
-                start = f'{name}.{drive.name}.start'
-                given[f'{name}.{drive.name}.sweep'] = [*sweep]
-                given[start] = min(max(given[start], sweep[0]), sweep[1])
-            else:
-                said.append(f'Left out: the limits of {limits.text(source)}: {why}.')
-                if why in (UNREACHED, EMPTY):
-                    del drawing.limits[source]
+    if drawing.measured:
+        said += [f'Left out: the limits of {limits.text(source)}: its motor is between two moving '
+                 'links.' for source, limits in drawing.limits.items()]
+    else:
+        said += sweeps.added(given, name, drawing.drives, drawing.limits, machine.inputs)
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if drawing.apart(machine.linkage) > drawing.allowed:
         raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
@@ -317,24 +297,6 @@ def _why(drawing: Drawing) -> str:
     return f'not driven: {free} more of {names} must be, named by --driven' if free > 0 else (
         'not of dyads: all of them hold each other, as on a platform on three bars'
         if free == 0 else f'held more than once by {names}')
-
-
-def _sweep(drive: Source, limits: Limits, read: scene.InputSettings
-           ) -> Tuple[Optional[Tuple[float, float]], str]:
-    """Return the limits of an input within its reach, or None and why it has no such ends."""
-    if limits.low >= limits.high:
-        return None, EMPTY
-    low, high = (float(short(end, 1e-15)) if abs(end) < FARTHEST else math.copysign(math.inf, end)
-                 for end in sorted(drive.ratio * end + drive.offset for end in limits[:2]))
-    for start, end in () if read.input.is_whole(read.reach) else read.reach:
-        turns = math.tau * math.floor((drive.value - start) / math.tau) * read.input.turns
-        if start + turns <= drive.value <= end + turns:
-            # An end that is a dead point is not quite reached.
-            edge = ROUNDING * (end - start)
-            low, high = max(low, start + turns + edge), min(high, end + turns - edge)
-    if not low + 1e-6 * read.input.size < high:
-        return None, UNREACHED
-    return (None, 'its reach has no end there') if math.isinf(high - low) else ((low, high), '')
 
 
 def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
