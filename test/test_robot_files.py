@@ -207,8 +207,8 @@ def test_limits_of_a_motor_become_a_sweep_or_a_sentence(
 
 def mimicking(tmp_path, *servos, more=''):
     """Return a four-bar whose motor follows servos, each its name, its limits and its mimic."""
-    def joint(name, limits, mimic):
-        return (f'<link name="{name}"/><joint name="{name}" type="revolute"><parent '
+    def joint(name, limits, mimic, kind='revolute'):
+        return (f'<link name="{name}"/><joint name="{name}" type="{kind}"><parent '
                 f'link="base_link"/><child link="{name}"/>{limits}{mimic}</joint>')
 
     mimic = f'<mimic joint="{servos[0][0]}" multiplier="-0.5" offset="0.1"/>'
@@ -229,6 +229,8 @@ SERVO = '<transmission name="t"><joint name="servo"/></transmission>'
     ([('middle', '<limit lower="0" upper="2"/>',
        '<mimic joint="servo" multiplier="2" offset="1"/>'),
       ('servo', '<limit lower="-0.3" upper="3"/>', '')], (-0.3, 0.5)),
+    ([('middle', '', '<mimic joint="servo" multiplier="2" offset="1"/>', 'fixed'),
+      ('servo', '<limit lower="-0.3" upper="3"/>', '')], (-0.3, 0.8)),
     ([('servo', '<limit lower="5" upper="9"/>', '')], None)])
 def test_limits_of_a_joint_are_those_of_all_that_it_follows(
         imported, tmp_path, servos, ends, more):

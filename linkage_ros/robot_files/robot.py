@@ -230,12 +230,14 @@ class Robot:
         """
         found: Dict[str, Limits] = {}
         said: Dict[str, str] = {}
+        named = {joint.name: joint for joint in self.joints if joint.position is not None}
         for joint in joints:
             own = self.sources(joint.name)
             source, ratio, offset = own[-1]
             for name, factor, start in own:
-                each = next(each for each in self.joints if each.name == name
-                            and each.position is not None)
+                if name not in named:
+                    continue
+                each = named[name]
                 if each.limits:
                     ends = sorted(factor / ratio * end + (start - offset) / ratio
                                   for end in each.limits)
