@@ -164,6 +164,124 @@ def test_an_input_swings_within_the_limits_of_its_joint_and_its_reach(imported, 
     assert wide.first.ends == pytest.approx([free.first.reach[0][0], limited.first.ends[1]])
 
 
+LIMIT, MOTOR = 'lower="-1.2" upper="1.2"', '<joint name="motor" axis="0 1 0"/>'
+SDF_AXIS = '<axis><xyz>0 1 0</xyz></axis>'
+SDF_LIMIT = SDF_AXIS.replace('</axis>', '<limit><lower>-0.4</lower>{}</limit></axis>')
+LIMITS = [
+    # Both ends are 0 by default in a URDF, and infinite in an SDF.
+    ('four_bar.urdf', LIMIT, 'upper="1.2"', (0.0, 1.2), ''),
+    ('four_bar.urdf', LIMIT, 'lower="-0.5"', (-0.5, 0.0), ''),
+    ('four_bar.urdf', LIMIT, '', None, 'from 0 to 0: they are no range'),
+    ('four_bar.urdf', LIMIT, 'lower="1.2" upper="-1.2"', None,
+     'from 1.2 to -1.2: they are no range'),
+    ('four_bar.urdf', LIMIT, 'lower="nan" upper="1"', None, 'from nan to 1: they are no range'),
+    ('four_bar.urdf', LIMIT, 'lower="-1e7" upper="1"', None,
+     'from -1e+07 to 1: its reach has no end there'),
+    ('four_bar.urdf', 'name="motor" type="revolute"', 'name="motor" type="continuous"', None,
+     'from -1.2 to 1.2: it is continuous'),
+    ('boom.urdf', 'lower="-0.3" upper="0.3"', 'upper="0.2"', (0.0, 0.2), ''),
+    ('boom.urdf', 'lower="-0.3" upper="0.3"', 'lower="-inf" upper="0.2"', (-0.43633, 0.2), ''),
+    ('boom.urdf', 'lower="-0.3" upper="0.3"', 'lower="5" upper="9"', None,
+     'from 5 to 9: its loops do not reach them'),
+    ('four_bar.sdf', SDF_AXIS, SDF_LIMIT.format(''), None,
+     'from -0.4 to inf: its reach has no end there'),
+    ('four_bar.sdf', SDF_AXIS, SDF_LIMIT.format('<upper>1</upper>'), (-0.4, 1.0), ''),
+    ('four_bar.xml', MOTOR, MOTOR.replace('/>', ' range="-inf 40" limited="true"/>'), None,
+     'from -inf to 0.6981: its reach has no end there'),
+    ('four_bar.xml', MOTOR, MOTOR.replace('/>', ' range="-40 40"/>'),
+     (math.radians(-40.0), math.radians(40.0)), '')]
+
+
+@pytest.mark.sample(6)
+@pytest.mark.parametrize('file, old, new, ends, why', LIMITS, ids=range(len(LIMITS)))
+def test_limits_of_a_motor_become_a_sweep_or_a_sentence(
+        imported, tmp_path, file, old, new, ends, why):
+    path = tmp_path / file
+    path.write_text((ROBOTS / file).read_text().replace(old, new, 1))
+    machine, = imported(path).values()
+    drive = machine.first
+    assert (f'# Left out: the limits of {drive.source}, {why}.\n' in printed(path)) == bool(why)
+    assert (drive.ends and [(end - drive.offset) / drive.ratio for end in drive.ends]) == (
+        ends and pytest.approx(ends, abs=1e-5))
+
+
+def mimicking(tmp_path, *servos, more=''):
+    """Return a four-bar whose motor follows servos, each its name, its limits and its mimic."""
+    def joint(name, limits, mimic, kind='revolute'):
+        return (f'<link name="{name}"/><joint name="{name}" type="{kind}"><parent '
+                f'link="base_link"/><child link="{name}"/>{limits}{mimic}</joint>')
+
+    mimic = f'<mimic joint="{servos[0][0]}" multiplier="-0.5" offset="0.1"/>'
+    return written(tmp_path, 'four_bar.urdf', (
+        '<limit lower="-1.2"', f'{mimic}<limit lower="-1.2"'), ('</robot>', ''.join(
+            joint(*servo) for servo in servos) + more + '</robot>'))
+
+
+SERVO = '<transmission name="t"><joint name="servo"/></transmission>'
+
+
+@pytest.mark.parametrize('more', ['', SERVO])
+@pytest.mark.parametrize('servos, ends', [
+    ([('servo', '<limit lower="-0.4" upper="2"/>', '')], (-0.4, 2.0)),
+    ([('servo', '<limit lower="-0.4" upper="9"/>', '')], (-0.4, 2.6)),
+    ([('servo', '', '')], (-2.2, 2.6)),
+    # The motor is at 0.1 - 0.5 * (1 + 2 * servo).
+    ([('middle', '<limit lower="0" upper="2"/>',
+       '<mimic joint="servo" multiplier="2" offset="1"/>'),
+      ('servo', '<limit lower="-0.3" upper="3"/>', '')], (-0.3, 0.5)),
+    ([('middle', '', '<mimic joint="servo" multiplier="2" offset="1"/>', 'fixed'),
+      ('servo', '<limit lower="-0.3" upper="3"/>', '')], (-0.3, 0.8)),
+    ([('servo', '<limit lower="5" upper="9"/>', '')], None)])
+def test_limits_of_a_joint_are_those_of_all_that_it_follows(
+        imported, tmp_path, servos, ends, more):
+    file = mimicking(tmp_path, *servos, more=more)
+    machine, = imported(file).values()
+    drive = machine.first
+    assert drive.source == 'servo'
+    assert ('the limits of motor, servo, servo from 5 to 2.6: they leave no range' in printed(
+        file)) == (ends is None)
+    assert (drive.ends and sorted((end - drive.offset) / drive.ratio for end in drive.ends)) == (
+        ends and pytest.approx(ends))
+    if ends:
+        assert f'closed in space, servo from {ends[0]:.4g} to {ends[1]:.4g}, ' in printed(file)
+
+
+def test_limits_of_a_passive_joint_bound_what_follows_it(imported, tmp_path):
+    axis = '<axis xyz="0 -1 0"/>'
+    file = written(tmp_path, 'four_bar.urdf', (
+        axis, f'<mimic joint="motor" multiplier="-1"/>{axis}'))
+    machine, = imported(file).values()
+    drive = machine.first
+    assert drive.source == 'motor' and drive.ratio == -1.0
+    assert drive.ends == pytest.approx([drive.offset - 1.2, drive.offset + 1.2])
+
+
+def test_limits_of_all_joints_that_follow_a_motor_bound_it(imported, tmp_path):
+    axis, loops = '<axis xyz="0 -1 0"/>', tmp_path / 'loops.yaml'
+    ends = '<limit lower="-0.1" upper="0.15"/>'
+    file = written(tmp_path, 'five_bar.urdf', (
+        axis, f'{axis}{ends}<mimic joint="mot_front" multiplier="0.5"/>'), (
+        '"mot_back" type="continuous"', '"mot_back" type="revolute"'))
+    loops.write_text('{closed_loop: [[front_foot, back_foot]], type: [3d], name_mot: [mot_front]}')
+    machine, = imported(file, '--loops', loops).values()
+    drive = machine.first
+    assert (np.array(drive.ends) - drive.offset) / drive.ratio == pytest.approx([-0.2, 0.3])
+
+
+def test_a_check_stays_within_limits_that_the_pose_is_outside_of(imported, tmp_path):
+    file = written(tmp_path, 'four_bar.urdf', (LIMIT, 'lower="0.2" upper="1.2"'))
+    machine, = imported(file).values()
+    assert machine.first.start == pytest.approx(machine.first.ends[0])
+    assert 'in 240 poses of the robot' in printed(file)
+    assert 'motor from 0.2 to 1.2,' in printed(file)
+
+
+def test_what_follows_a_joint_that_is_held_is_held(capsys, tmp_path):
+    file = mimicking(tmp_path, ('servo', '', ''), more=SERVO)
+    assert 'it cannot move, as its joints hold each other' in refused(
+        capsys, file, '--hold', 'servo=0.1')
+
+
 def checked(text):
     """Return in how many poses each mechanism was checked, and the worst difference."""
     return [(int(count), float(worst)) for count, worst in re.findall(
@@ -326,12 +444,20 @@ def test_what_is_left_out_is_named_with_the_reason(capsys, tmp_path):
         capsys, ROBOTS / 'four_bar.sdf', '--driven', 'joint_a')
 
 
-BAD = [('<robot', 'is no XML: '), ('<a/>', 'must be MJCF, SDF or URDF, not <a>'),
+BAD = [('<robot', 'is no XML: '),
+       ('<?xml version="1.0" encoding="foo-1"?><robot/>', 'is no XML: unknown encoding: foo-1'),
+       ('<?xml version="1.0" encoding="utf-7"?><robot/>', 'is no XML: multi-byte encodings'),
+       ('<robot><link name="a"/><link name="b"/><joint name="knee" type="continuous">'
+        '<parent link="a"/><child link="b"/><mimic joint="kne"/></joint></robot>',
+        "robot.xml: knee follows 'kne', which is no joint; did you mean knee?"),
+       ('<a/>', 'must be MJCF, SDF or URDF, not <a>'),
        ('<robot/>', 'a URDF has one root link, not 0'),
        ('<sdf/>', 'the SDF has no model with joints'),
        ('<sdf><model><joint/></model></sdf>', ''), ('<mujoco><b/></mujoco>', 'Schema violation'),
        ('<robot><link name="a"/><joint name="j"><child link="b"/></joint></robot>',
         "joint j is on '', which is no link"),
+       ('<robot><link name="a"/><link name="b"/><joint type="continuous"><parent link="a"/>'
+        '<child link="b"/></joint></robot>', 'robot.xml: a joint has no name'),
        ('<robot><link name="a"/><link name="b"/><joint name="j" type="revolute">'
         '<parent link="a"/><child link="b"/><axis xyz="0 a"/></joint></robot>',
         "cannot be read: could not convert string to float: 'a'")]
@@ -903,6 +1029,17 @@ def check_comes_back(linkage, values, robot, steps, zeros=None):
                 assert abs(apart) < 1e-9 * size, (link.name, step)
                 moved += 1
     return said, moved
+
+
+@pytest.mark.parametrize('bars, start', [
+    (('B ground 0.6 0', 'C crank A 0.7', 'D dyad C B 0.3 0.5 left'), -0.5),
+    (('B ground 0 0.63', 'C crank A 0.36', 'D dyad C B 0.86 0.44 left'), 0.5)])
+def test_a_coupler_s_range_ends_where_the_crank_turns_back(bars, start):
+    linkage = mechanisms.create('custom', joints=['A ground 0 0', *bars])
+    robot = robot_of(linkage, start)
+    robot.driven = ['CD']
+    (_, worst), = checked(said := '\n'.join(command.described(robot)[1]))
+    assert worst < 1e-9 and said.endswith('; not beyond where its input turns back.')
 
 
 @pytest.mark.sample(4)

@@ -105,6 +105,31 @@ def test_an_ankle_on_a_cross_is_imported(tmp_path, capsys, seed):
     assert np.abs(np.array(rods.gaps(ankle, motors, *found))[:, there]).max() < 1e-15
 
 
+@pytest.mark.parametrize('left, right, sweep, said', [
+    ('-0.1 0.08', '0.02 0.1', (0.02, 0.1), ''),
+    ('-0.1 0.08', '-inf 0.1', None, 'Left out: the limits of r, from -inf to 0.1: its reach has')])
+def test_limits_of_its_motors_are_sweeps(tmp_path, capsys, left, right, sweep, said):
+    ankle, file = turning(1), tmp_path / 'robot.xml'
+    written = mjcf(ankle, ([-0.15, -0.12], [0.15, 0.12]))
+    for name, ends in ('l', left), ('r', right):
+        joint = f'<joint name="{name}" '
+        written = written.replace(joint, f'{joint}limited="true" range="{ends}" ')
+    file.write_text(written)
+    assert from_robot([str(file)]) == 0
+    out, err = capsys.readouterr()
+    file.with_suffix('.yaml').write_text(out)
+    (machine,) = scene.load(file.with_suffix('.yaml')).machines.values()
+    drives = {drive.source: drive for drive in machine.inputs.values()}
+    assert drives['l'].ends == pytest.approx((-0.1, 0.08)) and said in err
+    assert drives['r'].ends == (sweep and pytest.approx(sweep))
+    assert drives['r'].start == (sweep[0] if sweep else 0.0)
+
+
+def test_a_foot_without_one_end_is_said_to_have_none(tmp_path, capsys):
+    _, said = imported(tmp_path, turning(1), ([-math.inf, -0.12], [0.15, 0.12]), capsys)
+    assert 'Left out: the limits of pitch, from -inf to 0.15: it has no end there.' in said
+
+
 @pytest.mark.slow
 def test_without_limits_the_largest_are_taken_and_said(tmp_path, capsys):
     machine, said = imported(tmp_path, turning(4), None, capsys)

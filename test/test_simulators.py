@@ -179,10 +179,11 @@ def published(machines, motors):
 
 
 @pytest.mark.sample(2)
-@pytest.mark.parametrize('form', [mjcf, sdf], ids=['mjcf', 'sdf'])
+@pytest.mark.parametrize('form', [sdf, mjcf], ids=['sdf', 'mjcf'])
 @pytest.mark.parametrize('name', some_quick(
-    sorted({*MACHINES, 'excavator', 'parallelogram arm', 'scissor lift', 'rack steering'} - FOLDS),
-    ('jansen', 'boom and arm', 'boxer engine')))
+    sorted({*MACHINES, 'excavator', 'parallelogram arm', 'scissor lift', 'rack steering',
+            'Scotch yoke', 'trammel of Archimedes', 'geared five-bar'} - FOLDS),
+    ('jansen', 'boom and arm', 'boxer engine', 'Scotch yoke')))
 def test_a_linkage_comes_back_from_its_simulator_s_file(tmp_path, form, name):
     if form is mjcf:
         pytest.importorskip('mujoco', reason='pip install mujoco')

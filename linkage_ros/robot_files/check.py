@@ -28,6 +28,8 @@ PATHS, POSES, FEWEST = 12, 240, 200
 EXACT = 1e-9
 # Stiffness next to a change point, as a part of the largest.
 CHANGE = 0.25
+# A measured input within this of an end of its reach [rad, or of its size] turns back there.
+TURN = 0.1
 # The first step, as a part of the others.
 LITTLE = 1e-3
 # A step that turns joints by more [rad] is halved, at most so many times.
@@ -39,13 +41,18 @@ class Difference(ValueError):
 
 
 class Track(NamedTuple):
-    """Poses along paths: positions of motors and joints, which are closed, and their stiffness."""
+    """
+    Poses along paths: positions of motors and joints, which are closed, and their stiffness.
+
+    `last` are the last poses of the paths that are closed to their ends.
+    """
 
     motors: np.ndarray
     joints: Dict[str, np.ndarray]
     alive: np.ndarray
     margin: np.ndarray
     volume: np.ndarray
+    last: Poses
 
 
 def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
@@ -76,27 +83,37 @@ def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
                      if {*driven} & {joint.name for joint in each.joints})
     start = np.array([robot.positions[source] for source in ends])
     targets = np.array([*ends.values()]).T
+    inside, near = np.clip(start, *targets), machine.first.start
     if len(ends) > 1:
         low, high = targets
         targets = np.random.default_rng(1).uniform(low, high, (PATHS, len(ends)))
     tracker, sources = _Tracker(robot, component, driven, [*ends], slack), [*ends]
+    if (inside != start).any():
+        track = tracker.track(start, inside[None])
+        apart, names, inputs = _differences(machine, component, sources, track, near)
+        if track.alive.all() and (apart <= _allowed(track, slack)).all():
+            start, near, tracker.poses = inside, float(inputs[0, -1]), track.last
     good, beyond = np.zeros((0, 1), bool), ''
     for _ in range(3):
         targets = targets[np.max(np.abs(targets - start), axis=1) > 1e-9]
         if not len(targets):
             break
         track = tracker.track(start, targets)
-        apart, names = _differences(machine, component, sources, track)
-        allowed = (EXACT + 30.0 * slack) / np.maximum(track.margin, 1e-4)
-        good = np.logical_and.accumulate(track.alive & (apart <= allowed), axis=1)
-        _check_ends(track, sources, apart, names, good)
+        apart, names, inputs = _differences(machine, component, sources, track, near)
+        good = np.logical_and.accumulate(
+            track.alive & (apart <= _allowed(track, slack)), axis=1)
+        turned = [i for i, count in enumerate(good.sum(axis=1)) if not good[i].all()
+                  and _turns_back(machine.first, *[near, *inputs[i]][count:count + 2])]
+        _check_ends(track, sources, apart, names, good, turned)
         if not good.all():
             beyond = '; not beyond ' + (
+                'where its input turns back' if turned else
                 'a change point' if (track.alive & ~good).any() else 'where its loops end')
         if good.sum() >= FEWEST:
             worst = np.unravel_index(np.argmax(np.where(good, apart, -1.0)), good.shape)
-            moved = ', '.join(f'{source} from {values.min():.4g} to {values.max():.4g}'
-                              for source, values in zip(sources, track.motors[good].T))
+            moved = ', '.join(
+                f'{source} from {min(*values, first):.4g} to {max(*values, first):.4g}'
+                for source, first, values in zip(sources, start, track.motors[good].T))
             return (f'Checked: {machine.name}: in {good.sum()} poses of the robot, its loops '
                     f'closed in space, {moved}, the worst difference is {apart[worst]:.0e}, of '
                     f'{names[worst]}{beyond}.')
@@ -104,11 +121,31 @@ def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
     raise Difference(f'it could not be checked in more than {good.sum()} poses')
 
 
+def _allowed(track: Track, slack: float) -> np.ndarray:
+    """Return the allowed difference in each pose [rad, or of the size]."""
+    return (EXACT + 30.0 * slack) / np.maximum(track.margin, 1e-4)
+
+
+def _turns_back(drive: scene.InputSettings, last: float, following: float) -> bool:
+    """
+    Return whether a measured input does not continue after its last pose, at an end of its reach.
+
+    The motor that measures it is between two moving links, and can move on from there.
+    """
+    near = TURN * drive.input.size
+    return bool(drive.measures) and not drive.input.apart(last, following) < near and any(
+        drive.input.apart(last, end) < near for arc in drive.reach for end in arc)
+
+
 def _check_ends(track: Track, sources: List[str], apart: np.ndarray, names: np.ndarray,
-                good: np.ndarray) -> None:
-    """Raise Difference for a path with good poses up to a wrong one, unless it branches there."""
+                good: np.ndarray, turned: Sequence[int]) -> None:
+    """
+    Raise Difference for a path with good poses up to a wrong one, unless it branches there.
+
+    Paths that `turned` end.
+    """
     largest = np.max(track.volume, where=track.alive, initial=0.0)
-    for i in np.flatnonzero(~good.all(axis=1)):
+    for i in {*np.flatnonzero(~good.all(axis=1)).tolist()}.difference(turned):
         at = i, good[i].sum()
         # Past a change point a robot can continue in two ways.
         if not track.alive[at] or np.min(track.volume[i, :at[1] + 1]) < CHANGE * largest:
@@ -124,13 +161,17 @@ def _check_ends(track: Track, sources: List[str], apart: np.ndarray, names: np.n
 
 
 def _differences(machine: scene.SceneMechanism, component: Component, sources: List[str],
-                 track: Track) -> Tuple[np.ndarray, np.ndarray]:
-    """Return the largest difference in each pose [rad, or of the size], and its joint."""
+                 track: Track, first: float) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """
+    Return the largest difference in each pose [rad, or of the size], its joint, and the input.
+
+    A measured input continues from `first`.
+    """
     values = [drive.ratio * track.motors[..., sources.index(drive.source)] + drive.offset
               for drive in machine.inputs.values()]
     if output := machine.first.measures:
         for path in values[0]:
-            near = machine.first.start
+            near = first
             for i, value in enumerate(path):
                 path[i] = machine.measured(output, value, near)[0]
                 near = near if math.isnan(path[i]) else path[i]
@@ -145,7 +186,8 @@ def _differences(machine: scene.SceneMechanism, component: Component, sources: L
     apart = apart or {'': np.full(track.alive.shape, math.nan)}
     every = np.array([*apart.values()])
     worst = np.argmax(np.where(np.isnan(every), math.inf, every), axis=0)
-    return np.take_along_axis(every, worst[None], axis=0)[0], np.array([*apart])[worst]
+    return (np.take_along_axis(every, worst[None], axis=0)[0], np.array([*apart])[worst],
+            values[0])
 
 
 class _Tracker:
@@ -155,6 +197,8 @@ class _Tracker:
                  sources: List[str], slack: float):
         self._component, self._slack = component, slack
         self._fixed = component.columns_of(driven)
+        # Where paths start: the pose of the file.
+        self.poses = component.at_start()
         # For each driven joint its source, ratio and offset.
         self._movers = {name: (sources.index(source), ratio, offset) for name in driven
                         for source, ratio, offset in [robot.source(name)]}
@@ -163,7 +207,7 @@ class _Tracker:
         """Return poses on straight paths of the motors, each closed from the one before."""
         component, fixed, count = self._component, self._fixed, len(targets)
         steps = -(-POSES // count)
-        poses = component.closed(component.at_start(count), fixed)
+        poses = component.closed(self.poses.some(np.zeros(count, int)), fixed)
         self._base = component.errors(poses)[0][0]
         nullity = component.nullity(fixed)
         motors = start + (targets - start)[:, None] * (np.arange(steps + 1) / steps)[:, None]
@@ -190,7 +234,7 @@ class _Tracker:
             margin[going, k], volume[going, k] = component.stiffness(poses, fixed, nullity)
             for name, values in component.read(poses).items():
                 joints.setdefault(name, np.full(alive.shape, math.nan))[going, k] = values
-        return Track(motors[:, 1:], joints, alive, margin, volume)
+        return Track(motors[:, 1:], joints, alive, margin, volume, poses)
 
     def _advanced(self, poses: Poses, before: np.ndarray, after: np.ndarray, drift: np.ndarray,
                   halvings: int) -> Tuple[Poses, np.ndarray]:

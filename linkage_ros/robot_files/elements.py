@@ -42,7 +42,7 @@ def parse(path: str) -> Element:
     try:
         with open(path, 'rb') as file:
             parser.ParseFile(file)
-    except expat.ExpatError as error:
+    except (expat.ExpatError, LookupError, ValueError) as error:
         raise RequestError(f'{path} is no XML: {error}') from None
     if has_xacro:
         raise RequestError(f'{path} is xacro: run xacro first, as in xacro {path} > robot.urdf')

@@ -46,7 +46,7 @@ def read(path: str) -> Robot:
             robot.join(names[j], kind, (above, below), at(data.xanchor[j]),
                        data.xaxis[j] if one else (0.0, 0.0, 1.0), None,
                        float(data.qpos[model.jnt_qposadr[j]]) if one else None,
-                       model.jnt_range[j].tolist() if model.jnt_limited[j] else ('', ''))
+                       model.jnt_range[j].tolist() if model.jnt_limited[j] else (-np.inf, np.inf))
             above = below
     for i in np.flatnonzero(model.eq_active0).tolist():
         _tie(robot, model, i, bodies, names)

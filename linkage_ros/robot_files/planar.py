@@ -19,12 +19,13 @@ from __future__ import annotations
 from cmath import phase
 from itertools import combinations
 import math
-from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from . import check, loops
-from .robot import Joint, plain, Robot, SLIDE
+from . import check, loops, sweeps
+from .robot import Joint, Limits, plain, Robot, SLIDE
+from .sweeps import Source
 from .. import mechanisms, scene
 from ..linkage.dyads import bar_name, Dyads, Hinge, Motor, Pin, ROUNDING, short, Slide
 from ..linkage.mechanism import Mechanism
@@ -34,17 +35,6 @@ from ..scene.joint_names import quoted_name
 # The most joints of which pairs are tried as motors.
 MANY = 30
 _OTHER = {'left': 'right', 'right': 'left', 'out': 'in', 'in': 'out'}
-
-
-class Source(NamedTuple):
-    """An input: ratio * position + offset of its source; `ends` are the limits of its joint."""
-
-    name: str
-    source: str
-    ratio: float
-    offset: float
-    value: float
-    ends: Optional[Tuple[float, ...]]
 
 
 class Drawing(Dyads):
@@ -59,6 +49,8 @@ class Drawing(Dyads):
         The joints of the inputs.
     measured : Joint, optional
         The motor between two moving links that measures the input.
+    limits : dict
+        The limits of sources, if they have any.
 
     """
 
@@ -66,6 +58,7 @@ class Drawing(Dyads):
         self.loop, self._robot = loop, robot
         self.drives: List[Source] = []
         self.measured: Optional[Joint] = None
+        self.limits: Dict[str, Limits] = {}
         self.driven = [joint for joint in loop.joints if joint.name in drives]
         pins: List[Dict[str, complex]] = []
         for joint in loop.joints:
@@ -118,18 +111,15 @@ class Drawing(Dyads):
     @property
     def ends(self) -> Dict[str, Tuple[float, float]]:
         """Return the range of each source in a check [rad or m]."""
-        if joint := self.measured:
-            start = joint.start
-            return {joint.name: joint.limits or (start - 0.5 * math.pi, start + 0.5 * math.pi)}
+        arounds = {drive.source: (math.pi if drive.name[:5] == 'crank' else 0.5 * self.loop.size)
+                   / abs(drive.ratio) for drive in self.drives}
         found: Dict[str, Tuple[float, float]] = {}
-        for drive in self.drives:
-            around = math.pi if drive.name[:5] == 'crank' else 0.5 * self.loop.size
-            low, high = drive.value - around, drive.value + around
-            if drive.ends:
-                low, high = max(drive.ends[0], low - around), min(drive.ends[1], high + around)
-                low, high = (low, high) if low < high else drive.ends
-            low, high = sorted((end - drive.offset) / drive.ratio for end in (low, high))
-            found[drive.source] = low, high
+        for source, around in {self.measured.name: 0.5 * math.pi}.items() if self.measured \
+                else arounds.items():
+            start = self._robot.positions[source] or 0.0
+            low, high, _ = self.limits.get(source, (start - around, start + around, ()))
+            near = min(max(start, low), high)
+            found[source] = max(low, near - 2.0 * around), min(high, near + 2.0 * around)
         return found
 
     @property
@@ -151,15 +141,17 @@ class Drawing(Dyads):
         if joint.kind == SLIDE:
             block = child if self.parts[child].slide is joint else parent
             part = self.parts[block]
+            if part.slide is not joint:
+                return None
             sign = math.copysign(1.0, (part.along / joint.motion(block)).real)
             way = (self.on[block][part.joint] - part.start) / part.along
-            return (part.link, sign, way.real) if part.slide is joint else None
+            return part.link, sign, way.real
         pin = self.joint_at(child, joint.places[1]) or ''
         base, body = (parent, child) if self.home[pin] == parent else (child, parent)
         if self.home[pin] != base:
             return None
         link, hangs, along, slide, _ = self.parts[body]
-        if hangs != pin or slide:
+        if not link or hangs != pin or slide:
             # The angle of a triangle on this link is the angle between the two links.
             try:
                 start, (other, end) = self.on[body][pin], self.other(body, pin)
@@ -175,7 +167,6 @@ class Drawing(Dyads):
     def drive(self, word: str, joint: Joint, ratio: float, offset: float) -> Tuple[str, str]:
         """Add an input, as `Dyads` requires; inputs of one source are geared to the first."""
         source, factor, start = self._robot.source(joint.name)
-        ends = joint.limits and tuple(sorted(ratio * limit + offset for limit in joint.limits))
         ratio, offset, number = ratio * factor, offset + ratio * start, self.number(word)
         for other in self.drives:
             if other.source == source and (word == 'crank') == (other.name[:5] == 'crank'):
@@ -185,7 +176,7 @@ class Drawing(Dyads):
                     math.remainder(offset, math.tau))
                 return number, f' geared {other.name} {gear!r} {angle_or_length}'
         self.drives.append(Source(word + number, source, ratio, offset, ratio * (
-            self._robot.positions.get(source) or 0.0) + offset, ends))
+            self._robot.positions.get(source) or 0.0) + offset))
         return number, ''
 
     def position(self, joint: Joint) -> float:
@@ -233,17 +224,19 @@ def described(robot: Robot, group: loops.Group, others: Sequence[str]
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if not any(called.published for called in machine.joints.values()):
         raise NotPlaced(drawing)
-    for drive in drawing.drives:
-        start = f'{name}.{drive.name}.start'
-        if sweep := None if drawing.measured else _sweep(drive, machine.inputs[drive.name]):
-            given[f'{name}.{drive.name}.sweep'] = [*sweep]
-            given[start] = min(max(given[start], sweep[0]), sweep[1])
+    said = [f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.'] if drawing.left else []
+    drawing.limits, more = robot.limits(drawing.moved_by)
+    said += more
+    if drawing.measured:
+        said += [f'Left out: the limits of {limits.text(source)}: its motor is between two moving '
+                 'links.' for source, limits in drawing.limits.items()]
+    else:
+        said += sweeps.added(given, name, drawing.drives, drawing.limits, machine.inputs)
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if drawing.apart(machine.linkage) > drawing.allowed:
         raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
     report = check.compared(robot, machine, [joint.name for joint in drawing.moved_by],
                             drawing.ends, loop.lean + loop.gap / loop.size)
-    said = [f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.'] if drawing.left else []
     said.append(report)
     said += [f'{joint} has its ends {gap:.2g} m apart along its axis, on which no angle depends.'
              for joint, gap in loop.across.items()]
@@ -304,20 +297,6 @@ def _why(drawing: Drawing) -> str:
     return f'not driven: {free} more of {names} must be, named by --driven' if free > 0 else (
         'not of dyads: all of them hold each other, as on a platform on three bars'
         if free == 0 else f'held more than once by {names}')
-
-
-def _sweep(drive: Source, read: scene.InputSettings) -> Optional[Tuple[float, float]]:
-    """Return the limits of an input: those of its joint, within its reach."""
-    if drive.ends is None:
-        return None
-    low, high = (float(short(end, 1e-15)) for end in drive.ends)
-    for start, end in () if read.input.is_whole(read.reach) else read.reach:
-        turns = math.tau * math.floor((drive.value - start) / math.tau) * read.input.turns
-        if start + turns <= drive.value <= end + turns:
-            # An end that is a dead point is not quite reached.
-            edge = ROUNDING * (end - start)
-            low, high = max(low, start + turns + edge), min(high, end + turns - edge)
-    return (low, high) if low + 1e-6 * read.input.size < high else None
 
 
 def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:

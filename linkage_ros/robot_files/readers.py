@@ -37,15 +37,18 @@ def read(path: str, loops: Optional[str] = None) -> Robot:
         else:
             reader = urdf.Reader(root)
             robot = reader.robot
-        twice = [name for name, count in Counter(
-            joint.name for joint in robot.joints if joint.position is not None).items()
-            if count > 1]
-        if twice:
+        names = Counter(joint.name for joint in robot.joints if joint.position is not None)
+        if '' in names:
+            raise RequestError('a joint has no name')
+        if twice := [name for name, count in names.items() if count > 1]:
             raise RequestError(f'two joints are called {twice[0]!r}')
     if loops:
         given = _loops(loops)
         with _blaming(loops):
             reader.of_file(given)
+    with _blaming(path):
+        for name in robot.follows:
+            robot.source(name)
     return robot
 
 

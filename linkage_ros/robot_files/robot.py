@@ -13,8 +13,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+import math
 import re
-from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -30,6 +31,19 @@ KINDS = {'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE, 'spherical'
 FARTHEST = 1e9
 
 
+class Limits(NamedTuple):
+    """Between which positions a joint moves [rad or m], by the limits of some joints."""
+
+    low: float
+    high: float
+    joints: Tuple[str, ...]
+
+    def text(self, joint: str) -> str:
+        """Return the limits of a joint as text."""
+        own = '' if self.joints == (joint,) else f' {joint}'
+        return f'{", ".join(self.joints)},{own} from {self.low:.4g} to {self.high:.4g}'
+
+
 @dataclass(eq=False)
 class Joint:
     """
@@ -43,6 +57,10 @@ class Joint:
         Its unit axis on each body.
     turns : pair of array
         Rotation matrices of its frame on each body.
+    limits : pair of float, optional
+        Its lower and upper limit [rad or m], one of which may be infinite.
+    no_limits : str
+        The limits of the file and why they do not count, if they do not.
     is_cut : bool
         Whether it closes a loop of a tree, so that its two frames may be apart.
     parts : tuple of Joint
@@ -57,6 +75,7 @@ class Joint:
     axes: Any
     position: Optional[float] = None
     limits: Optional[Tuple[float, float]] = None
+    no_limits: str = ''
     turns: Any = (np.eye(3), np.eye(3))
     is_cut: bool = False
     parts: Tuple['Joint', ...] = ()
@@ -126,8 +145,8 @@ class Robot:
 
     def join(self, name: str, kind: str, bodies: Tuple[str, str], frame: np.ndarray,
              axis: Any = (0.0, 0.0, 1.0), other: Optional[np.ndarray] = None,
-             position: Optional[float] = None, limits: Sequence[Any] = ('', ''),
-             second: Any = None) -> None:
+             position: Optional[float] = None,
+             limits: Sequence[Any] = (-math.inf, math.inf), second: Any = None) -> None:
         """
         Add a joint by its frame on the first body, and on the second where it closes a loop.
 
@@ -136,6 +155,7 @@ class Robot:
         for body in bodies:
             if body not in self.frames:
                 raise RequestError(f'joint {name} is on {body!r}, which is no link')
+        ends, no_limits = _limits(limits, kind.lower() == 'continuous')
         kind = KINDS.get(kind.lower(), kind.lower())
         frames, ways = (frame, frame if other is None else other), [
             axis, axis if second is None else second]
@@ -154,13 +174,11 @@ class Robot:
             self.join(name, HINGE, (bodies[0], cross), frame, axis)
             self.join(f'{name}/second', HINGE, (cross, bodies[1]), frame, ways[1], other)
             return
-        low, high = (float(str(limit) or 'nan') for limit in limits)
         turns = tuple(each[:3, :3] for each in frames)
         self.joints.append(Joint(
             name, kind, bodies, places,
             tuple(turn @ way / (size or 1.0) for turn, way, size in zip(turns, ways, sizes)),
-            position if kind in (HINGE, SLIDE) else None,
-            (low, high) if -FARTHEST < low < high < FARTHEST else None, turns,
+            position if kind in (HINGE, SLIDE) else None, ends, no_limits, turns,
             other is not None))
 
     def close(self, name: str, kind: str, bodies: Tuple[str, str], own: Sequence[np.ndarray],
@@ -187,13 +205,58 @@ class Robot:
                                    f'{listed(self.positions, 200)}'
                                    f'{meant(name, self.positions)}')
 
-    def source(self, name: str) -> Tuple[str, float, float]:
-        """Return the joint that another depends on, or itself, with ratio and offset."""
-        ratio, offset, passed = 1.0, 0.0, [*self.driven]
+    def sources(self, name: str) -> List[Tuple[str, float, float]]:
+        """Return a joint and those that it depends on in turn, each with ratio and offset."""
+        found, passed = [(name, 1.0, 0.0)], [*self.driven]
         while name in self.follows and name not in passed:
             passed.append(name)
+            _, ratio, offset = found[-1]
             name, factor, start = self.follows[name]
-            ratio, offset = ratio * factor, offset + ratio * start
+            found.append((name, ratio * factor, offset + ratio * start))
         if name not in self.positions:
-            raise ValueError(f'{passed[-1]} follows {name!r}, which is no joint')
-        return name, ratio, offset
+            raise RequestError(f'{passed[-1]} follows {name!r}, which is no joint'
+                               f'{meant(name, self.positions)}')
+        return found
+
+    def source(self, name: str) -> Tuple[str, float, float]:
+        """Return the joint that another depends on, or itself, with ratio and offset."""
+        return self.sources(name)[-1]
+
+    def limits(self, joints: Iterable[Joint]) -> Tuple[Dict[str, Limits], List[str]]:
+        """
+        Return the limits of each source, and a report on those that do not count.
+
+        They are those of joints and of all that these depend on.
+        """
+        found: Dict[str, Limits] = {}
+        said: Dict[str, str] = {}
+        named = {joint.name: joint for joint in self.joints if joint.position is not None}
+        for joint in joints:
+            own = self.sources(joint.name)
+            source, ratio, offset = own[-1]
+            for name, factor, start in own:
+                if name not in named:
+                    continue
+                each = named[name]
+                if each.limits:
+                    ends = sorted(factor / ratio * end + (start - offset) / ratio
+                                  for end in each.limits)
+                    low, high, names = found.get(source, (-math.inf, math.inf, ()))
+                    found[source] = Limits(max(low, ends[0]), min(high, ends[1]), (
+                        *names, *[name] * (name not in names)))
+                if each.no_limits:
+                    said[name] = f'Left out: the limits of {name}, {each.no_limits}.'
+        return found, [*said.values()]
+
+
+def _limits(limits: Sequence[Any], is_continuous: bool
+            ) -> Tuple[Optional[Tuple[float, float]], str]:
+    """Return the limits that count, None without any, and those that do not, with the reason."""
+    low, high = (math.copysign(math.inf, end) if abs(end) >= FARTHEST else end
+                 for end in map(float, limits))
+    if -low == high == math.inf:
+        return None, ''
+    said = f'from {low:.4g} to {high:.4g}'
+    if is_continuous:
+        return None, f'{said}: it is continuous' if low < high else ''
+    return ((low, high), '') if low < high else (None, f'{said}: they are no range')

@@ -24,7 +24,7 @@ from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Set, 
 
 import numpy as np
 
-from . import check
+from . import check, sweeps
 from .loops import Group
 from .robot import BALL, HINGE, Joint, plain, Robot, SLIDE
 from .. import mechanisms, scene
@@ -151,7 +151,14 @@ class Rods:
         if joint.limits is None or joint.position is None:
             return None
         low, high = (end - joint.position for end in joint.limits)
-        return (low, high) if joint.kind == SLIDE or -_ANY < low < high < _ANY else None
+        widest = math.inf if joint.kind == SLIDE else _ANY
+        return (low, high) if -widest < low < high < widest else None
+
+    @staticmethod
+    def one_sided(joint: Joint) -> str:
+        """Return a joint's limits if one of them is infinite, and that it needs both; else ''."""
+        low, high = joint.limits or (0.0, 0.0)
+        return f'from {low:.4g} to {high:.4g}: it has no end there' * math.isinf(high - low)
 
     def parameters(self, lines: Sequence[str]) -> Iterator[Tuple[str, Any]]:
         """Yield the parameters of its mechanism."""
@@ -189,6 +196,14 @@ def described(robot: Robot, group: Group, others: Sequence[str]
     name = f'{next(iter(found.inputs))}_rods'
     name = f'{name}_{len(others)}' if name in others else name
     given = {f'{name}.{key}': value for key, value in found.parameters(lines)}
+    machine = scene.read({'mechanisms': [name], **given}).machines[name]
+    limits, more = robot.limits(found.inputs.values())
+    said += more + [
+        f'Left out: the limits of {joint.name}, {why}.' for link, joint in found.links.items()
+        if link not in found.inputs and (why := joint.no_limits or found.one_sided(joint))]
+    said += sweeps.added(given, name, [
+        sweeps.Source(link, joint.name, 1.0, found.zeros[link] - joint.start, found.zeros[link])
+        for link, joint in found.inputs.items()], limits, machine.inputs)
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     ends = _ranges(machine, found)
     report = check.compared(robot, machine, [joint.name for joint in found.inputs.values()],

@@ -150,7 +150,8 @@ class _Model:
         if KINDS.get(kind, kind) == UNIVERSAL:
             second = self._axis(name, part.find('axis2'))
         robot.join(name, kind, ends, self.frame(name), self._axis(name, part.find('axis')), None,
-                   0.0, [text(part, f'axis/limit/{end}') for end in ('lower', 'upper')], second)
+                   0.0, [text(part, f'axis/limit/{end}', otherwise) for end, otherwise in (
+                       ('lower', '-inf'), ('upper', 'inf'))], second)
         mimic = part.find('axis/mimic')
         if mimic is not None:
             ratio, start, offset = (float(text(mimic, tag, otherwise)) for tag, otherwise in (

@@ -90,11 +90,12 @@ class Reader:
             *root.findall('ros2_control/joint[command_interface]'))]
 
     def _tree_joint(self, joint: Element, ends: Tuple[str, str]) -> None:
-        name, mimic = joint.get('name', ''), joint.find('mimic')
+        name, mimic, limit = joint.get('name', ''), joint.find('mimic'), joint.find('limit')
         self.robot.join(
             name, joint.get('type', ''), ends, self.robot.frames[ends[1]],
             numbers(attribute(joint, 'axis', 'xyz', '1 0 0')), position=0.0,
-            limits=[attribute(joint, 'limit', end) for end in ('lower', 'upper')])
+            limits=('-inf', 'inf') if limit is None else (
+                limit.get('lower', '0'), limit.get('upper', '0')))
         if mimic is not None:
             ratio, start = numbers(f'{mimic.get("multiplier", 1)} {mimic.get("offset", 0)}', 2)
             self.robot.follow(name, mimic.get('joint', ''), ratio, start)
@@ -205,7 +206,7 @@ class Reader:
                             first, second=second)
         else:
             joint.kind = KINDS.get(kind.lower(), kind)
-            joint.position, joint.limits = None, None
+            joint.position, joint.limits, joint.no_limits = None, None, ''
 
 
 def _check_keys(where: str, given: Iterable[Any], allowed: Sequence[str]) -> None:
