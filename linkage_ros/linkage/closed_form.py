@@ -81,8 +81,8 @@ class ClosedForm:
         self._row = self._n * (1 + self._n if self._is_own or self._n == 1 else 1)
         # Two equal bars may lie on each other, in a direction that only neighbouring values have.
         lines = map(str.split, inverse.lines)
-        self.has_kite = self._n == 1 and any(word == 'dyad' and args[2] == args[3]
-                                              for _, word, *args in lines)
+        self.has_kite = self._n == 1 and any(
+            word == 'dyad' and args[2] == args[3] for _, word, *args in lines)
 
     def solutions(self, values: Tuple[float, ...]) -> Iterator[Found]:
         """Yield the solutions for finite values, those that differ by rounding included."""
@@ -105,7 +105,7 @@ class ClosedForm:
         found = self._checked_modes.over(*values).reshape(len(self._rows), 1 + n + n * n, count)
         for mode, place in zip(*np.nonzero(np.isnan(found[:, 0]))):
             own = self._confirmed(int(mode), tuple(found[mode, 1:n + 1, place].tolist()),
-                            tuple(values[:, place].tolist()))
+                                  tuple(values[:, place].tolist()))
             found[mode, 1:, place] = [*own[0], *own[1]] if own else math.nan
         return found[:, 1:n + 1], found[:, n + 1:]
 
