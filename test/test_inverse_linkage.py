@@ -405,3 +405,15 @@ def test_the_rate_next_to_an_end_is_not_that_of_a_mode_that_ends_there():
     (inputs,), (rates,) = cell.inverse('DC').over(value)
     assert inputs[0] == pytest.approx(at, abs=1e-14)
     assert rates[0] == pytest.approx(float(cell.joint_rates(at, ('DC',))['DC']), rel=0.05)
+
+
+def test_a_coordinate_is_not_answered_at_a_point_where_its_line_has_no_direction():
+    linkage = custom(
+        'A ground 0 0', 'B ground -2.1604150371152997 -1.8587897168211125',
+        'C ground 0 0.378002153336404', 'D crank A 0.29639043443440444',
+        'E antiparallelogram A D C', 'F image C A B', 'G mirror C A E', 'H mirror A F G',
+        'J yoke D H along G')
+    found = linkage.input_for('J.x', 0.09335359724163826)
+    back = linkage.solve(found)['J'][:, 0]
+    np.testing.assert_allclose(back, 0.09335359724163826, atol=1e-12)
+    assert len(found) == 2

@@ -37,6 +37,8 @@ STEPS = 200
 JUMP = 0.05
 # A change by no more than this multiple of its rounding leaves an output constant.
 STILL = 64.0
+# Samples at the ends of an arc with more than this multiple of an output's rounding are noise.
+NOISE = 1e9
 # A larger error than this part of the output's range is a jump across the value, not a solution.
 MISSED = 1e-9
 
@@ -242,7 +244,7 @@ class MonotoneBranches:
         noise[~np.isfinite(noise)] = 0.0
         known = np.isfinite(value[0])
         # The direction of two joints is noise next to where they meet.
-        clear = known & ~(self._angular & (noise > BROKEN * math.pi))
+        clear = known & (noise <= NOISE * self._rounding)
         for run in np.split(np.arange(len(theta)), np.flatnonzero(~known)):
             within = np.flatnonzero(clear[run])
             if len(within) > 1:
