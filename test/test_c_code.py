@@ -239,6 +239,31 @@ def test_single_precision_is_as_good_as_it_says(machines, tmp_path):
         assert 0.1 * said < worst < 3.0 * said < 1e-4
 
 
+@pytest.mark.slow
+def test_an_ankle_in_single_precision_is_that_of_python(tmp_path):
+    machine, = scene.load(str(ROOT / 'examples' / 'ankle.yaml')).machines.values()
+    library = loaded(tmp_path, header.written(machine, single=True) + """
+int pose(float right, float left, float *angle)
+{
+    ankle_pose p;
+    ankle_side motors = { { right, left }, { 0 }, { 0 } }, joints, back;
+    ankle_memory m;
+    int is_whole = ankle_solve(right, left, &p) && ankle_begin(&m);
+    angle[0] = p.angle_pitch;
+    angle[1] = p.angle_roll;
+    is_whole = is_whole && !ankle_actuators_to_joints(&m, &motors, &joints);
+    is_whole = is_whole && !ankle_joints_to_actuators(&m, &joints, &back);
+    return is_whole && fabsf(back.position[0] - right) + fabsf(back.position[1] - left) < 1e-4f;
+}
+""")
+    inputs = np.random.default_rng(4).uniform(-0.2, 0.2, (300, 2)).astype(np.float32)
+    for given in inputs:
+        found = (ctypes.c_float * 2)()
+        angles = machine.linkage.joint_angles([*map(float, given)])
+        assert library.pose(*map(ctypes.c_float, given), found)
+        assert list(found) == pytest.approx([angles['pitch'], angles['roll']], abs=1e-5)
+
+
 def test_the_sketch_has_the_header_that_is_printed(capsys):
     sketch = ROOT / 'examples' / 'hobby_servo'
     assert command.main([str(sketch / 'lever.yaml'), '--output', 'lever', '--float']) == 0
