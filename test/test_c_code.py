@@ -11,6 +11,7 @@
 """Linkages as C: compiled without a warning, and solved to the same numbers as in Python."""
 
 import ctypes
+import math
 from pathlib import Path
 import re
 
@@ -237,6 +238,52 @@ def test_single_precision_is_as_good_as_it_says(machines, tmp_path):
         exact = expected(machine, inputs.astype(float))[:, :points]
         worst = np.abs(found - exact).max() / (machine.scale * machine.linkage.longest)
         assert 0.1 * said < worst < 3.0 * said < 1e-4
+
+
+@pytest.mark.parametrize('turns', [100, 10_000])
+def test_an_inverse_is_found_after_any_number_of_turns(library, machines, turns):
+    whole, lever = math.tau * turns, machines['slotted_lever'].linkage
+    invert = library('slotted_lever').slotted_lever_crank_for_angle_lever_
+    for value in np.linspace(-0.4, 0.4, 50):
+        found = ctypes.c_double()
+        assert invert((ctypes.c_double * 2)(value, whole), ctypes.byref(found)) == 1
+        assert found.value - whole == pytest.approx(
+            lever.input_for('lever', value, 0.0), abs=1e-15 * whole)
+
+
+GEARED = ['O ground 0 0', 'Q ground 1.49 -0.6', 'A crank O 0.427',
+          'D crank Q 0.27 geared crank -2 -1.4', 'B dyad A D 2.661 2.4 left']
+ENDING = ['O ground 0 0', 'Q ground 2 0', 'A crank O 1.5', 'B dyad A Q 1 1 left',
+          'C rigid A B 0.6 0.8 left']
+END = mechanisms.create('custom', joints=ENDING).reach()[0][1]
+STEEP = ['O ground 0 0', 'Q ground 0.5 0.25', 'A crank O 0.8',
+         'D crank Q 0.288 geared crank 0.5 0.96', 'B dyad A D 2.05 2.54 left']
+
+
+@pytest.mark.parametrize('joints, output, inputs, nears', [
+    # A geared link counts turns, so that one input is right.
+    (GEARED, 'crank2', [-0.86844, 40.0], [2.3, 0.0, -5.3]),
+    # At an end of the reach an output changes infinitely fast, which is no excuse for an error.
+    (ENDING, 'C.y', [END, END - 1e-12, END - 1e-9, END - 1e-6], [END, END - 1e-3, END + 1.0]),
+    # An angle that turns by more than half a turn from one extreme to the other.
+    (STEEP, 'angle(A,B)', [6.151306541], [6.52, 6.2, 6.15, 5.0])])
+def test_the_input_of_an_output_is_found_from_anywhere(tmp_path, joints, output, inputs, nears):
+    machine, = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': joints}
+                          ).machines.values()
+    text = header.written(machine, [output])
+    called, = re.findall(r'int (m_crank_for_\w+)', text)
+    invert = loaded(tmp_path, f"""{text}
+int found(double value, double near, double *crank) {{ return {called}(value, near, crank); }}
+""").found
+    for value in inputs:
+        wanted = float(machine.linkage.joint_angles(value, [output])[output])
+        for near in nears:
+            found = ctypes.c_double()
+            assert invert(*map(ctypes.c_double, (wanted, near)), ctypes.byref(found)) == 1
+            assert found.value == pytest.approx(value, abs=1e-8)
+            assert machine.linkage.joint_angles(min(found.value, END) if joints is ENDING else
+                                                found.value, [output])[output] == pytest.approx(
+                wanted, abs=2e-8)
 
 
 @pytest.mark.slow
