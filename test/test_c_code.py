@@ -14,6 +14,7 @@ import ctypes
 import math
 from pathlib import Path
 import re
+import subprocess
 
 from c_libraries import COMPILER, loaded
 from linkage_ros import mechanisms, scene
@@ -324,6 +325,31 @@ def test_a_scene_file_is_printed_as_c(capsys):
                          '--output', 'lever']) == 0
     printed = capsys.readouterr().out
     assert 'slotted_lever_crank_for_angle_lever' in printed and 'jansen' not in printed
+
+
+@pytest.mark.parametrize('language', ['c', 'c++'])
+def test_any_names_of_a_scene_are_names_in_c(tmp_path, language):
+    inputs = ['q', 'p', 'near', 'value', 'x0', 'new', 'for', 'sin', 'double', 'NAN', 'linux']
+    given = {'mechanisms': ['Arm', 'arm', 'ARM', 'rail', *(f'm{i}' for i in range(len(inputs)))],
+             'rail.type': 'custom', 'rail.joints': [
+                 'O ground 0 0', 'R ground 1 0', 'slide carriage O along R 0 2 called x',
+                 'Q ground 0 1', 'B dyad slide Q 0.9 0.6 left']}
+    for name in ('Arm', 'arm', 'ARM'):
+        given.update({f'{name}.type': 'custom', f'{name}.joints': [
+            'O ground 0 0', 'Q ground 1 0', 'Arm crank O 0.3', 'Tip dyad Arm Q 1 0.6 left']})
+    for i, name in enumerate(inputs):
+        given.update({f'm{i}.type': 'custom', f'm{i}.joints': [
+            'O ground 0 0', 'Q ground 1 0', f'A crank O 0.3 called {name}']})
+    outputs = {'Arm': ['Arm_Tip', 'angle(Arm,Tip)', 'Arm_Tip'], 'm0': ['q'], 'm1': ['A.x']}
+    file = tmp_path / 'code.c'
+    file.write_text(''.join(header.written(machine, outputs.get(name, ()))
+                            for name, machine in scene.read(given).machines.items()))
+    text = file.read_text()
+    assert 'Arm_crank_for_angle_Arm_Tip_2(' in text and 'slide_x_2;' in text
+    ended = subprocess.run([COMPILER, '-x', language, '-fsyntax-only', '-Wall', '-Wextra',
+                            '-Werror', '-Wno-unused-function', file],
+                           capture_output=True, text=True)
+    assert not ended.returncode, ended.stderr[:2000]
 
 
 @pytest.mark.parametrize('arguments, said', [

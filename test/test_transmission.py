@@ -364,6 +364,20 @@ def test_every_scene_is_proved_at_a_hundred_thousand_states(tmp_path, path, comp
         proved(package, name, compiler, 5000, *SANITIZED)
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(not shutil.which('g++'), reason='g++ is not installed')
+def test_mechanisms_of_any_names_are_classes_of_their_own(tmp_path):
+    names = ['linkage', 'a_b', 'aB', 'Arm', 'arm', 'arm2', 'class']
+    file = tmp_path / 'odd.yaml'
+    file.write_text('/**:\n  ros__parameters:\n    mechanisms: [%s]\n' % ', '.join(names) + ''.join(
+        f'    {name}: {{type: four_bar}}\n' for name in names))
+    package = written(tmp_path, file)
+    (package / 'all.cpp').write_text(''.join(f'#include "{name}.hpp"\n' for name in names))
+    subprocess.run(['g++', '-std=c++17', *STRICT, '-fsyntax-only', '-Wno-unused-function',
+                    '-isystem', STAND_IN / 'include', '-I', package / 'src',
+                    package / 'all.cpp'], check=True)
+
+
 @pytest.fixture(scope='module')
 def refusals(tmp_path_factory):
     """Return what says how a slotted lever is configured, compiled."""

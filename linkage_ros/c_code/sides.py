@@ -21,7 +21,7 @@ from typing import Dict, Iterator, List, Sequence, Tuple
 from .axes import actuators, Axis, axis, joints, start
 from .code import Code, open_linkage
 from .inverses import Inverses
-from .names import comment, constants, field, filled, literal, template
+from .names import comment, constants, distinct, field, filled, literal, prefix, template
 from ..formula.expression import arctangent, Real, real
 from ..formula.program import Program
 from ..linkage.builder import in_metres
@@ -58,11 +58,12 @@ class Sides:
         self.sizes = [input_.size for input_ in machine.linkage.inputs]
         # Pairs of what stands in a point, and the tag of their function.
         self.pairs = {'': (actuators(machine), joints(machine, names))}
-        for group in outputs:
-            own = [axis(machine, output) for output in group]
-            self.pairs['_' + '_'.join(field(self.linkage, each) for each in group)] = [], own
+        tags = distinct('_'.join(['', *(field(self.linkage, each) for each in group)])
+                        for group in outputs)
+        self.pairs.update((tag, ([], [axis(machine, output) for output in group]))
+                          for tag, group in zip(tags, outputs))
         self.values: Dict[str, object] = {
-            'name': machine.name, 'N': machine.name.upper(), 'n': len(self.sizes),
+            'name': machine.name, 'N': prefix(machine.name), 'n': len(self.sizes),
             'number': self.code.number, 'f': self.code.suffix, 'sides': len(self.pairs) + 1,
             'given': f'const {machine.name}_linkage *c, ' if is_open else '',
             'types': f'const {machine.name}_linkage *, ' if is_open else '',
@@ -113,7 +114,7 @@ class Sides:
             yield low - slack, high + slack
 
     def _enum(self, side: str, axes: Sequence[Axis]) -> str:
-        upper = f'{self.name}_{side}'.upper()
+        upper = f'{prefix(self.name)}_{side.upper()}'
         return 'enum { ' + ', '.join(f'{upper}_{name} = {i}' for i, name in enumerate(
             constants(each.name for each in axes))) + ' };'
 
