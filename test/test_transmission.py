@@ -369,8 +369,9 @@ def test_every_scene_is_proved_at_a_hundred_thousand_states(tmp_path, path, comp
 def test_mechanisms_of_any_names_are_classes_of_their_own(tmp_path):
     names = ['linkage', 'a_b', 'aB', 'Arm', 'arm', 'arm2', 'class']
     file = tmp_path / 'odd.yaml'
-    file.write_text('/**:\n  ros__parameters:\n    mechanisms: [%s]\n' % ', '.join(names) + ''.join(
-        f'    {name}: {{type: four_bar}}\n' for name in names))
+    file.write_text('\n'.join([
+        '/**:', '  ros__parameters:', f'    mechanisms: [{", ".join(names)}]',
+        *(f'    {name}: {{type: four_bar}}' for name in names)]))
     package = written(tmp_path, file)
     (package / 'all.cpp').write_text(''.join(f'#include "{name}.hpp"\n' for name in names))
     subprocess.run(['g++', '-std=c++17', *STRICT, '-fsyntax-only', '-Wno-unused-function',

@@ -122,8 +122,9 @@ static inline int lever_reaches(float crank)
     return isfinite(crank);
 }
 
-/* Status of a call: 0, or a sum of these. OUT_OF_REACH: outside the reach or the sweep. SINGULAR: a
-   velocity or an effort would be infinite. NOT_KNOWN: a value is NaN or infinite. */
+/* Status of a call: 0, or a sum of these. OUT_OF_REACH: outside the reach or the sweep, or not found
+   by a search. SINGULAR: a velocity or an effort would be infinite. NOT_KNOWN: a value is NaN or
+   infinite. */
 enum { LEVER_OK = 0, LEVER_OUT_OF_REACH = 1, LEVER_SINGULAR = 2, LEVER_NOT_KNOWN = 4 };
 enum { LEVER_ACTUATOR_LEVER_CRANK = 0 };
 enum { LEVER_JOINT_LEVER_LEVER = 0 };

@@ -200,9 +200,10 @@ class _Header:
                                   for name in ('near', 'value', 'inputs'))
             head = f'const {number} value[{n}], const {number} near[{n}], {number} inputs[{n}]'
         known = ' && '.join(f'isfinite({value})' for value in values)
+        lack = 'is none' if n == 1 or linkage.inverse(outputs).closed else 'are none near'
         return '\n'.join([
             f'/* The {what} for {said}, nearest to `near`, whole turns included. Returns 0, and',
-            f'   leaves {what} alone, where there is none. */',
+            f'   leaves {what} alone, where there {lack}. */',
             f'static inline int {self.name}_{what}_for_{tag}({head})', '{',
             f'    {number} q[{n}];', f'    {self.name}_point p;',
             *(f'    q[{i}] = {self._times(code, 1.0 / units[i])};'

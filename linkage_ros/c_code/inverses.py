@@ -158,7 +158,7 @@ class Inverses:
         if len(outputs) == 1 and not code.is_open:
             pieces, _ = self._linkage.monotone(outputs[0], math.inf)
             middles = [0.5 * (low + high) / self._sizes[0] for low, high, *_ in pieces]
-        return {'count': 1 + len(middles), 'steps': SEARCHED, 'how': 'By a search',
+        return {'count': 1 + len(middles), 'steps': SEARCHED, 'how': 'By a search from q',
                 'poses': (1 + len(middles)) * (SEARCHED + 1),
                 'starts': '\n'.join([f'    {self._begin()}', *(
                     f'    start[{k}][0] = {code.literal(value)};'
@@ -183,7 +183,7 @@ class Inverses:
             return modes, {'count': count, 'how': 'In closed form', 'starts': f'    {call}',
                            'strict': strict, 'poses': poses}
         return modes, {
-            'count': count, 'how': 'In closed form; with other dimensions by a search',
+            'count': count, 'how': 'In closed form; with other dimensions by a search from q',
             'starts': f'    if (c->is_own) {{\n        {call}\n    }} else {{\n        '
                       f'{self._begin()}\n        for (k = 1; k < {count}; k++)\n            '
                       f'for (i = 0; i < {len(self._sizes)}; i++)\n'
