@@ -179,6 +179,10 @@ def test_a_command_beyond_the_sweep_is_held_and_stands_still(library, machines):
     (GEARED, {}, [], 1, [(value, -0.5 * value) for value in (1.0, -6.4, -7.0, -20.0)]),
     (GEARED, {}, [], 0, [(40.0, -80.0)]),
     (GEARED, {'m.crank.measures': 'crank2'}, ['m_crank'], 0, [(-20.0, 10.0), (1e4, -5e3)]),
+    # With an offset it is published within a turn, so that half a turn of the crank is free.
+    (GEARED, {'m.crank.start': 3.0, 'm.joint_names': ['crank2=wheel+0.5']}, ['wheel'], 1,
+     [(1.0, math.pi - 0.25), (-3.0, 1.75), (-3.0 - math.tau, 1.75)]),
+    (GEARED, {'m.joint_names': ['crank2=wheel+0.5']}, ['wheel'], 0, [(-2.0, 4.5 - math.tau)]),
     # A command is answered within the sweep, though another answer is nearer.
     (SLOT, {'m.crank.start': -0.2, 'm.crank.sweep': [-0.3, 2.0]}, ['m_A.y'], 1,
      [(0.02 * math.cos(0.9), 0.9)]),

@@ -89,9 +89,6 @@ class Inverses:
         for k, i, ratio, offset in self._gears(axes):
             value = values[k] + (f' - {code.literal(offset)}' if offset else '')
             value = code.times(value, 1.0 / (ratio * sizes[i]))
-            given[i] = value
-            if axes[k].wraps:
-                continue
             given[i] = f'near[{i}] - whole[{i}]'
             counted += [f'    near[{i}] = {value};']
             if inputs[i].turns:
@@ -122,7 +119,7 @@ class Inverses:
                                       for i, value in given.items()), 'turns': code.rows(turns)})
 
     def _gears(self, axes: Sequence[Axis]) -> Iterator[Tuple[int, int, float, float]]:
-        """Yield the axes that are inputs but for gears: number, input, ratio and offset."""
+        """Yield the axes that count an input, maybe geared: number, input, ratio and offset."""
         linkage = self._linkage
         for k, each in enumerate(axes):
             for i, input_ in enumerate(linkage.inputs):
@@ -138,7 +135,7 @@ class Inverses:
             f'            p->position[{side}][{k}] += '
             f'{self._code.times(f"q[{i}] - {given}[{i}]", axes[k].factor * ratio)};'
             for side, axes in enumerate(self._sides) for k, i, ratio, _ in self._gears(axes)
-            if self._linkage.inputs[i].turns and not axes[k].wraps)
+            if self._linkage.inputs[i].turns)
 
     def _pieces(self, axes: Sequence[Axis]) -> Dict[str, object]:
         """Return the pieces of the reach for a search in them; nothing if they are not known."""
