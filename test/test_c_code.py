@@ -11,8 +11,10 @@
 """Linkages as C: compiled without a warning, and solved to the same numbers as in Python."""
 
 import ctypes
+import math
 from pathlib import Path
 import re
+import subprocess
 
 from c_libraries import COMPILER, loaded
 from linkage_ros import mechanisms, scene
@@ -239,6 +241,77 @@ def test_single_precision_is_as_good_as_it_says(machines, tmp_path):
         assert 0.1 * said < worst < 3.0 * said < 1e-4
 
 
+@pytest.mark.parametrize('turns', [100, 10_000])
+def test_an_inverse_is_found_after_any_number_of_turns(library, machines, turns):
+    whole, lever = math.tau * turns, machines['slotted_lever'].linkage
+    invert = library('slotted_lever').slotted_lever_crank_for_angle_lever_
+    for value in np.linspace(-0.4, 0.4, 50):
+        found = ctypes.c_double()
+        assert invert((ctypes.c_double * 2)(value, whole), ctypes.byref(found)) == 1
+        assert found.value - whole == pytest.approx(
+            lever.input_for('lever', value, 0.0), abs=1e-15 * whole)
+
+
+GEARED = ['O ground 0 0', 'Q ground 1.49 -0.6', 'A crank O 0.427',
+          'D crank Q 0.27 geared crank -2 -1.4', 'B dyad A D 2.661 2.4 left']
+ENDING = ['O ground 0 0', 'Q ground 2 0', 'A crank O 1.5', 'B dyad A Q 1 1 left',
+          'C rigid A B 0.6 0.8 left']
+END = mechanisms.create('custom', joints=ENDING).reach()[0][1]
+STEEP = ['O ground 0 0', 'Q ground 0.5 0.25', 'A crank O 0.8',
+         'D crank Q 0.288 geared crank 0.5 0.96', 'B dyad A D 2.05 2.54 left']
+
+
+@pytest.mark.parametrize('joints, output, inputs, nears', [
+    # A geared link counts turns, so that one input is right.
+    (GEARED, 'crank2', [-0.86844, 40.0], [2.3, 0.0, -5.3]),
+    # At an end of the reach an output changes infinitely fast, which is no excuse for an error.
+    (ENDING, 'C.y', [END, END - 1e-12, END - 1e-9, END - 1e-6], [END, END - 1e-3, END + 1.0]),
+    # An angle that turns by more than half a turn from one extreme to the other.
+    (STEEP, 'angle(A,B)', [6.151306541], [6.52, 6.2, 6.15, 5.0])])
+def test_the_input_of_an_output_is_found_from_anywhere(tmp_path, joints, output, inputs, nears):
+    machine, = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': joints}
+                          ).machines.values()
+    text = header.written(machine, [output])
+    called, = re.findall(r'int (m_crank_for_\w+)', text)
+    invert = loaded(tmp_path, f"""{text}
+int found(double value, double near, double *crank) {{ return {called}(value, near, crank); }}
+""").found
+    for value in inputs:
+        wanted = float(machine.linkage.joint_angles(value, [output])[output])
+        for near in nears:
+            found = ctypes.c_double()
+            assert invert(*map(ctypes.c_double, (wanted, near)), ctypes.byref(found)) == 1
+            assert found.value == pytest.approx(value, abs=1e-8)
+            assert machine.linkage.joint_angles(min(found.value, END) if joints is ENDING else
+                                                found.value, [output])[output] == pytest.approx(
+                wanted, abs=2e-8)
+
+
+@pytest.mark.slow
+def test_an_ankle_in_single_precision_is_that_of_python(tmp_path):
+    machine, = scene.load(str(ROOT / 'examples' / 'ankle.yaml')).machines.values()
+    library = loaded(tmp_path, header.written(machine, single=True) + """
+int pose(float right, float left, float *angle)
+{
+    ankle_pose p;
+    ankle_side motors = { { right, left }, { 0 }, { 0 } }, joints, back;
+    ankle_memory m;
+    int is_whole = ankle_solve(right, left, &p) && ankle_begin(&m);
+    angle[0] = p.angle_pitch;
+    angle[1] = p.angle_roll;
+    is_whole = is_whole && !ankle_actuators_to_joints(&m, &motors, &joints);
+    is_whole = is_whole && !ankle_joints_to_actuators(&m, &joints, &back);
+    return is_whole && fabsf(back.position[0] - right) + fabsf(back.position[1] - left) < 1e-4f;
+}
+""")
+    inputs = np.random.default_rng(4).uniform(-0.2, 0.2, (300, 2)).astype(np.float32)
+    for given in inputs:
+        found = (ctypes.c_float * 2)()
+        angles = machine.linkage.joint_angles([*map(float, given)])
+        assert library.pose(*map(ctypes.c_float, given), found)
+        assert list(found) == pytest.approx([angles['pitch'], angles['roll']], abs=1e-5)
+
+
 def test_the_sketch_has_the_header_that_is_printed(capsys):
     sketch = ROOT / 'examples' / 'hobby_servo'
     assert command.main([str(sketch / 'lever.yaml'), '--output', 'lever', '--float']) == 0
@@ -252,6 +325,31 @@ def test_a_scene_file_is_printed_as_c(capsys):
                          '--output', 'lever']) == 0
     printed = capsys.readouterr().out
     assert 'slotted_lever_crank_for_angle_lever' in printed and 'jansen' not in printed
+
+
+@pytest.mark.parametrize('language', ['c', 'c++'])
+def test_any_names_of_a_scene_are_names_in_c(tmp_path, language):
+    inputs = ['q', 'p', 'near', 'value', 'x0', 'new', 'for', 'sin', 'double', 'NAN', 'linux']
+    given = {'mechanisms': ['Arm', 'arm', 'ARM', 'rail', *(f'm{i}' for i in range(len(inputs)))],
+             'rail.type': 'custom', 'rail.joints': [
+                 'O ground 0 0', 'R ground 1 0', 'slide carriage O along R 0 2 called x',
+                 'Q ground 0 1', 'B dyad slide Q 0.9 0.6 left']}
+    for name in ('Arm', 'arm', 'ARM'):
+        given.update({f'{name}.type': 'custom', f'{name}.joints': [
+            'O ground 0 0', 'Q ground 1 0', 'Arm crank O 0.3', 'Tip dyad Arm Q 1 0.6 left']})
+    for i, name in enumerate(inputs):
+        given.update({f'm{i}.type': 'custom', f'm{i}.joints': [
+            'O ground 0 0', 'Q ground 1 0', f'A crank O 0.3 called {name}']})
+    outputs = {'Arm': ['Arm_Tip', 'angle(Arm,Tip)', 'Arm_Tip'], 'm0': ['q'], 'm1': ['A.x']}
+    file = tmp_path / 'code.c'
+    file.write_text(''.join(header.written(machine, outputs.get(name, ()))
+                            for name, machine in scene.read(given).machines.items()))
+    text = file.read_text()
+    assert 'Arm_crank_for_angle_Arm_Tip_2(' in text and 'slide_x_2;' in text
+    ended = subprocess.run([COMPILER, '-x', language, '-fsyntax-only', '-Wall', '-Wextra',
+                            '-Werror', '-Wno-unused-function', file],
+                           capture_output=True, text=True)
+    assert not ended.returncode, ended.stderr[:2000]
 
 
 @pytest.mark.parametrize('arguments, said', [

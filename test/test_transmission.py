@@ -58,6 +58,9 @@ SCENE = {
     'lift.crank.sweep': [0.2, 2.2],
     'rocker.type': 'four_bar', 'rocker.crank.start': 1.0, 'rocker.loads': ['P=1 2'],
     'beast.type': 'jansen', 'beast.leg_pairs': 3}
+GEARED = ['O ground 0 0', 'Q ground 1.49 -0.6', 'A crank O 0.427',
+          'D crank Q 0.27 geared crank -2 0', 'B dyad A D 2.661 2.4 left']
+SLOT = ['O ground 0 0', 'Q ground 0 -0.045', 'A crank O 0.02 up', 'L slot Q A 0 out 0.08']
 CALLER = """
 static {name}_memory {name}_m;
 int {name}_started(void) {{ return {name}_begin(&{name}_m); }}
@@ -169,6 +172,32 @@ def test_a_command_beyond_the_sweep_is_held_and_stands_still(library, machines):
     actuator, _, joint, _ = expected(machine, [0.45])
     status, (position, *_) = memory.send(0, actuator)
     assert status == 0 and position == pytest.approx(joint)
+
+
+@pytest.mark.parametrize('joints_, given, names, side, pairs', [
+    # A geared joint counts turns both ways, and so does an encoder on it.
+    (GEARED, {}, [], 1, [(value, -0.5 * value) for value in (1.0, -6.4, -7.0, -20.0)]),
+    (GEARED, {}, [], 0, [(40.0, -80.0)]),
+    (GEARED, {'m.crank.measures': 'crank2'}, ['m_crank'], 0, [(-20.0, 10.0), (1e4, -5e3)]),
+    # With an offset it is published within a turn, so that half a turn of the crank is free.
+    (GEARED, {'m.crank.start': 3.0, 'm.joint_names': ['crank2=wheel+0.5']}, ['wheel'], 1,
+     [(1.0, math.pi - 0.25), (-3.0, 1.75), (-3.0 - math.tau, 1.75)]),
+    (GEARED, {'m.joint_names': ['crank2=wheel+0.5']}, ['wheel'], 0, [(-2.0, 4.5 - math.tau)]),
+    # A command is answered within the sweep, though another answer is nearer.
+    (SLOT, {'m.crank.start': -0.2, 'm.crank.sweep': [-0.3, 2.0]}, ['m_A.y'], 1,
+     [(0.02 * math.cos(0.9), 0.9)]),
+    (SLOT, {'m.crank.start': 7.0, 'm.crank.sweep': [6.5, 8.0]}, ['m_A.y'], 1,
+     [(0.02 * math.cos(0.9), math.tau + 0.9)]),
+    # A measured link may be beyond it.
+    (SLOT, {'m.crank.measures': 'A.y', 'm.crank.start': 0.5, 'm.crank.sweep': [0.2, 0.8]},
+     ['m_crank'], 0, [(0.02 * math.cos(0.9), 0.9)])])
+def test_the_right_one_of_several_inputs_is_chosen(tmp_path, joints_, given, names, side, pairs):
+    machine, = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': joints_, **given}
+                          ).machines.values()
+    library = compiled(tmp_path, [machine], *names)
+    for position, expected_ in pairs:
+        status, (found, *_) = Memory(library, 'm', 1).send(side, [position])
+        assert status == 0 and found[0] == pytest.approx(expected_, rel=1e-12)
 
 
 def test_what_is_missing_is_held_and_said(library, machines):
@@ -337,6 +366,21 @@ def test_every_scene_is_proved_at_a_hundred_thousand_states(tmp_path, path, comp
     for name in scene.load(path).machines:
         proved(package, name, compiler, 100_000)
         proved(package, name, compiler, 5000, *SANITIZED)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not shutil.which('g++'), reason='g++ is not installed')
+def test_mechanisms_of_any_names_are_classes_of_their_own(tmp_path):
+    names = ['linkage', 'a_b', 'aB', 'Arm', 'arm', 'arm2', 'class']
+    file = tmp_path / 'odd.yaml'
+    file.write_text('\n'.join([
+        '/**:', '  ros__parameters:', f'    mechanisms: [{", ".join(names)}]',
+        *(f'    {name}: {{type: four_bar}}' for name in names)]))
+    package = written(tmp_path, file)
+    (package / 'all.cpp').write_text(''.join(f'#include "{name}.hpp"\n' for name in names))
+    subprocess.run(['g++', '-std=c++17', *STRICT, '-fsyntax-only', '-Wno-unused-function',
+                    '-isystem', STAND_IN / 'include', '-I', package / 'src',
+                    package / 'all.cpp'], check=True)
 
 
 @pytest.fixture(scope='module')

@@ -122,8 +122,9 @@ static inline int lever_reaches(float crank)
     return isfinite(crank);
 }
 
-/* Status of a call: 0, or a sum of these. OUT_OF_REACH: outside the reach or the sweep. SINGULAR: a
-   velocity or an effort would be infinite. NOT_KNOWN: a value is NaN or infinite. */
+/* Status of a call: 0, or a sum of these. OUT_OF_REACH: outside the reach or the sweep, or not found
+   by a search. SINGULAR: a velocity or an effort would be infinite. NOT_KNOWN: a value is NaN or
+   infinite. */
 enum { LEVER_OK = 0, LEVER_OUT_OF_REACH = 1, LEVER_SINGULAR = 2, LEVER_NOT_KNOWN = 4 };
 enum { LEVER_ACTUATOR_LEVER_CRANK = 0 };
 enum { LEVER_JOINT_LEVER_LEVER = 0 };
@@ -268,6 +269,19 @@ static inline int lever_solved(const lever_point *p, int side, int transposed, f
     return sign;
 }
 
+/* Whether a pose at inputs q is at positions, but for rounding: of the inputs, where it moves fast. */
+static inline int lever_near(const lever_point *p, int side, const float q[1], float left)
+{
+    float steepest = 1;
+    int i, j;
+    for (i = 0; i < 1; i++)
+        for (j = 0; j < 1; j++)
+            steepest = fmaxf(steepest, fabsf(p->rate[side > 0][i][j]) * lever_scale(side, i, 0)
+                * fmaxf(1, fabsf(q[j])));
+    /* At an end of the reach the rate is infinite, yet rounding is not. */
+    return left <= 4e-06f * fminf(steepest, 1000.0f);
+}
+
 /* Newton's method from inputs q to positions: each step comes nearer, and stays on its side of
    singular poses. Returns 0, with any q, if it does not converge; -1 if it is strict and q misses
    by so much that it belongs to another assembly. */
@@ -276,8 +290,7 @@ static inline int lever_reached(int side, int (*at)(const float *, int, lever_po
 {
     lever_point next;
     float gap[1], x[1] = { 0 }, y[1] = { 0 }, to[1], share = 1, longest, left, now;
-    float steepest = 1;
-    int i, j, sign, other = 0;
+    int i, sign, other = 0;
     if (!at(q, side < 2, p))
         return 0;
     left = lever_gap(position, p, side, gap);
@@ -308,31 +321,34 @@ static inline int lever_reached(int side, int (*at)(const float *, int, lever_po
         } else
             share = left <= 4e-06f ? 0 : 0.5f * share;
     }
-    for (i = 0; i < 1; i++)
-        for (j = 0; j < 1; j++)
-            steepest = fmaxf(steepest, fabsf(p->rate[side > 0][i][j]) * lever_scale(side, i, 0));
-    return left <= 0.01f && left <= 4e-06f * steepest;
+    return lever_near(p, side, q, left);
 }
 
-/* How far inputs are from others. */
-static inline float lever_away(const float q[1], const float near[1])
-{
-    float sum = fabsf(q[0] - near[0]);
-    int i;
-    for (i = 1; i < 1; i++)
-        sum += fabsf(q[i] - near[i]);
-    return sum;
-}
-
-/* Whether inputs are within the sweeps that are set. */
-static inline int lever_inside(const float q[1])
+/* Inputs x plus whole turns, and those that bring them nearest to others; returns how far they are.
+   What is commanded has to be in the sweeps: infinitely far if it is not. What is measured may be
+   outside, which counts as further. */
+static inline float lever_turned(int side, const float turn[1][2], const float whole[1],
+    const float x[1], const float near[1], float q[1])
 {
     static const float end[1][2] = { { (-INFINITY), (INFINITY) } };
+    float sum = 0, to;
     int i;
-    for (i = 0; i < 1; i++)
-        if (!(q[i] >= end[i][0] - 1e-05f && q[i] <= end[i][1] + 1e-05f))
-            return 0;
-    return 1;
+    for (i = 0; i < 1; i++) {
+        to = near[i];
+        if (side == 1)
+            to = to < end[i][0] ? end[i][0] : to > end[i][1] ? end[i][1] : to;
+        q[i] = x[i] + whole[i];
+        if (turn[i][0] > 0)
+            q[i] += turn[i][0] * floorf((to - q[i]) * turn[i][1] + 0.5f);
+        if (side == 1 && q[i] < end[i][0])
+            q[i] += turn[i][0];
+        else if (side == 1 && q[i] > end[i][1])
+            q[i] -= turn[i][0];
+        sum += fabsf(q[i] - near[i]);
+        if (side < 2 && (q[i] < end[i][0] || q[i] > end[i][1]))
+            sum += side ? (INFINITY) : 10.0f * fabsf(q[i] - end[i][q[i] > end[i][1]]);
+    }
+    return sum;
 }
 
 /* From positions to the inputs nearest to q. By its gear, 4 poses at most. */
@@ -340,35 +356,36 @@ static inline int lever_from_actuators(const float position[1], float q[1], leve
 {
     /* The inputs' turns, and one over them; 0 where there is none. */
     static const float turn[1][2] = { { 0.0f, 0.0f } };
-    float start[1][1], away[1], far, best = (INFINITY), near[1];
+    /* Whole turns that a position counts are taken away, so that they cost no digits. */
+    float whole[1] = { 0 }, to[1], near[1];
+    float start[1][1], away[1], far;
     lever_point found;
     int i, k, next, ended;
-    for (i = 0; i < 1; i++)
-        start[0][i] = near[i] = q[i];
+    for (i = 0; i < 1; i++) {
+        to[i] = position[i];
+        near[i] = q[i];
+    }
+    near[0] = position[0];
+    whole[0] = 6.2831855f * floorf(near[0] * 0.15915494f + 0.5f);
+    to[0] -= whole[0];
     for (k = 0; k < 1; k++) {
-        start[k][0] = position[0];
-        for (i = 0; i < 1; i++)
-            start[k][i] += turn[i][0] * floorf((near[i] - start[k][i]) * turn[i][1] + 0.5f);
-        away[k] = lever_away(start[k], near);
+        start[k][0] = near[0] - whole[0];
+        away[k] = lever_turned(0, turn, whole, start[k], near, q);
     }
     for (;;) {
         for (next = 0, k = 1; k < 1; k++)
             next = away[k] < away[next] || !isfinite(away[next]) ? k : next;
         if (!isfinite(away[next]))
-            break;
+            return 0;
         far = away[next];
-        ended = lever_reached(0, lever_at, 4, 0, position, start[next], &found);
+        ended = lever_reached(0, lever_at, 4, 0, to, start[next], &found);
         away[next] = ended < 0 ? far + 1000000.0f : (INFINITY);
-        if (ended > 0) {
-            if (far < best) {
-                *p = found;
-                for (best = far, i = 0; i < 1; i++)
-                    q[i] = start[next][i];
-            }
-            break;
+        if (ended > 0 && isfinite(lever_turned(0, turn, whole, start[next], near, q))) {
+            *p = found;
+            p->position[0][0] += q[0] - start[next][0];
+            return 1;
         }
     }
-    return best < (INFINITY);
 }
 
 /* The inputs in each assembly mode, NAN where there is none. */
@@ -402,35 +419,33 @@ static inline int lever_from_joints(const float position[1], float q[1], lever_p
 {
     /* The inputs' turns, and one over them; 0 where there is none. */
     static const float turn[1][2] = { { 6.2831855f, 0.15915494f } };
-    float start[2][1], away[2], far, best = (INFINITY), near[1];
+    /* Whole turns that a position counts are taken away, so that they cost no digits. */
+    float whole[1] = { 0 }, to[1], near[1];
+    float start[2][1], away[2], far;
     lever_point found;
     int i, k, next, ended;
-    for (i = 0; i < 1; i++)
-        start[0][i] = near[i] = q[i];
-    lever_modes_joints(position, start);
+    for (i = 0; i < 1; i++) {
+        to[i] = position[i];
+        near[i] = q[i];
+    }
+    lever_modes_joints(to, start);
     for (k = 0; k < 2; k++) {
-        for (i = 0; i < 1; i++)
-            start[k][i] += turn[i][0] * floorf((near[i] - start[k][i]) * turn[i][1] + 0.5f);
-        away[k] = lever_away(start[k], near);
+        away[k] = lever_turned(1, turn, whole, start[k], near, q);
     }
     for (;;) {
         for (next = 0, k = 1; k < 2; k++)
             next = away[k] < away[next] || !isfinite(away[next]) ? k : next;
         if (!isfinite(away[next]))
-            break;
+            return 0;
         far = away[next];
-        ended = lever_reached(1, lever_at, 4, far < 1000000.0f, position, start[next], &found);
+        ended = lever_reached(1, lever_at, 4, far < 1000000.0f, to, start[next], &found);
         away[next] = ended < 0 ? far + 1000000.0f : (INFINITY);
-        if (ended > 0) {
-            if (far < best) {
-                *p = found;
-                for (best = far, i = 0; i < 1; i++)
-                    q[i] = start[next][i];
-            }
-            break;
+        if (ended > 0 && isfinite(lever_turned(1, turn, whole, start[next], near, q))) {
+            *p = found;
+            p->position[0][0] += q[0] - start[next][0];
+            return 1;
         }
     }
-    return best < (INFINITY);
 }
 
 /* The inputs in each assembly mode, NAN where there is none. */
@@ -464,35 +479,32 @@ static inline int lever_from_angle_lever(const float position[1], float q[1], le
 {
     /* The inputs' turns, and one over them; 0 where there is none. */
     static const float turn[1][2] = { { 6.2831855f, 0.15915494f } };
-    float start[2][1], away[2], far, best = (INFINITY), near[1];
+    /* Whole turns that a position counts are taken away, so that they cost no digits. */
+    float whole[1] = { 0 }, to[1], near[1];
+    float start[2][1], away[2], far;
     lever_point found;
     int i, k, next, ended;
-    for (i = 0; i < 1; i++)
-        start[0][i] = near[i] = q[i];
-    lever_modes_angle_lever(position, start);
+    for (i = 0; i < 1; i++) {
+        to[i] = position[i];
+        near[i] = q[i];
+    }
+    lever_modes_angle_lever(to, start);
     for (k = 0; k < 2; k++) {
-        for (i = 0; i < 1; i++)
-            start[k][i] += turn[i][0] * floorf((near[i] - start[k][i]) * turn[i][1] + 0.5f);
-        away[k] = lever_away(start[k], near);
+        away[k] = lever_turned(2, turn, whole, start[k], near, q);
     }
     for (;;) {
         for (next = 0, k = 1; k < 2; k++)
             next = away[k] < away[next] || !isfinite(away[next]) ? k : next;
         if (!isfinite(away[next]))
-            break;
+            return 0;
         far = away[next];
-        ended = lever_reached(2, lever_at_angle_lever, 4, far < 1000000.0f, position, start[next], &found);
+        ended = lever_reached(2, lever_at_angle_lever, 4, far < 1000000.0f, to, start[next], &found);
         away[next] = ended < 0 ? far + 1000000.0f : (INFINITY);
-        if (ended > 0) {
-            if (far < best) {
-                *p = found;
-                for (best = far, i = 0; i < 1; i++)
-                    q[i] = start[next][i];
-            }
-            break;
+        if (ended > 0 && isfinite(lever_turned(2, turn, whole, start[next], near, q))) {
+            *p = found;
+            return 1;
         }
     }
-    return best < (INFINITY);
 }
 
 /* Sample i of the inputs, all over their ranges; 0 is where they start. */
@@ -536,9 +548,8 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
     if (status == LEVER_OK && !(side ? lever_from_joints(from->position, q, &found)
             : lever_from_actuators(from->position, q, &found)))
         status = LEVER_OUT_OF_REACH;
-    /* Only a command has to be in the sweep: a measurement may be outside. */
-    if (status == LEVER_OK && side && !lever_inside(q))
-        status = LEVER_OUT_OF_REACH;
+    for (i = 0; status == LEVER_OK && i < 1; i++)
+        status = isfinite(found.position[other][i]) ? LEVER_OK : LEVER_OUT_OF_REACH;
     if (status == LEVER_OK) {
         m->point[side] = found;
         for (i = 0; i < 1; i++) {

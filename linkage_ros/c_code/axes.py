@@ -48,7 +48,7 @@ def axis(machine: SceneMechanism, output: str, name: str = '', factor: float = 1
     """Return the axis of an output, with a factor and an offset from its value in the scene."""
     linkage = machine.linkage
     factor *= machine.scale_of(output)
-    counts_turns = output in (*machine.inputs, *linkage.geared)
+    counts_turns = output in (*machine.inputs, *linkage.geared) and not wraps
     angular = linkage.is_angle(output)
     return Axis(name, output, factor, offset, abs(factor) * (1.0 if angular else linkage.longest),
                 math.tau * abs(factor) if angular and not counts_turns else 0.0, wraps)

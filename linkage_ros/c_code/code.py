@@ -14,18 +14,23 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Callable, Dict, Iterable, Iterator, List, Sequence, Tuple
+from typing import Any, Callable, Dict, Iterable, Iterator, List, Sequence, Tuple
 
 import numpy as np
 
 from .names import literal as text_literal
 from ..formula.expression import Real, real, unknown
 from ..formula.operations import OPERATIONS
-from ..formula.program import Dialect, Pose
+from ..formula.program import Dialect, evaluate, Pose
 from ..linkage.mechanism import Mechanism
+from ..linkage.planar import TOLERANCE
+from ..linkage.spatial import EDGE, LAST_STEP
 
 # Expressions that are true or false.
 _CONDITIONS = ('less', 'less_equal')
+# What formulas count as rounding, and what that is in float.
+_IN_FLOAT = {TOLERANCE: 8 * 2.0 ** -24, -TOLERANCE: -8 * 2.0 ** -24, LAST_STEP: 2.0 ** -11,
+             EDGE: 2.0 ** -17}
 
 
 class Code:
@@ -49,8 +54,11 @@ class Code:
                  is_open: bool = False):
         self.name, self.linkage, self.is_open = name, linkage, is_open
         self.number, self.suffix = ('float', 'f') if single else ('double', '')
-        self.dialect = _dialect(single, name)
-        self.literal = self.dialect.number
+        self.literal = _literal(single)
+        self.dialect = Dialect(
+            {operation: row.c.replace('{f}', self.suffix).replace('{name}', name)
+             for operation, row in OPERATIONS.items()}, {},
+            lambda value: self.literal(_IN_FLOAT.get(value, value) if single else value))
         self._constants: Dict[Real, int] = {}
 
     def rows(self, rows: Iterable[Iterable[float]]) -> str:
@@ -84,9 +92,17 @@ class Code:
     def constant(self, node: Real, value: float) -> str:
         """Return the code of an expression of dimensions, and its value as a constant."""
         if not self.is_open:
-            return self.literal(value)
+            return self.literal(self._in_float(node, value) if self.suffix else value)
         code = f'c->k[{self._constants.setdefault(node, len(self._constants))}]'
         return f'{code} > 0.5' if node.op in _CONDITIONS else code
+
+    def _in_float(self, node: Real, value: float) -> float:
+        """Return the value of an expression of dimensions with the rounding of float."""
+        known: Dict[Real, Any] = {}
+        for x in unknown(node, lambda x: x.operands, known):
+            known[x] = None if x.value is None else _IN_FLOAT.get(x.value)
+        known = {x: rounding for x, rounding in known.items() if rounding is not None}
+        return float(evaluate(node, self.linkage.lengths, known)) if known else value
 
     def helpers(self) -> str:
         """Return the helper functions for roots and gates, which are NaN out of reach."""
@@ -163,7 +179,8 @@ def _kind(node: Real, number: str) -> str:
     return 'int' if node.op in _CONDITIONS else number
 
 
-def _dialect(single: bool, name: str) -> Dialect:
+def _literal(single: bool) -> Callable[[float], str]:
+    """Return the function that writes a number in C."""
     f = 'f' if single else ''
 
     def literal(value: float) -> str:
@@ -178,8 +195,7 @@ def _dialect(single: bool, name: str) -> Dialect:
         text = _shortest(value) if single else repr(float(value))
         return f'({text}{f})' if value < 0.0 else text + f
 
-    return Dialect({operation: row.c.replace('{f}', f).replace('{name}', name)
-                    for operation, row in OPERATIONS.items()}, {}, literal)
+    return literal
 
 
 def _shortest(value: float) -> str:

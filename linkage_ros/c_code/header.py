@@ -18,11 +18,11 @@ library's sine, cosine and arctangent.
 from __future__ import annotations
 
 from itertools import islice
-from typing import Callable, Iterable, List, Sequence, Tuple
+from typing import Callable, Iterable, List, Sequence
 
 import numpy as np
 
-from .names import field
+from .names import distinct, field, parameter, prefix
 from .sides import Sides
 from ..formula.program import Pose
 from ..scene import SceneMechanism
@@ -69,7 +69,7 @@ def opened(machine: SceneMechanism, joints: Sequence[str] = ()) -> str:
 def guarded(sides: Sides, about: Sequence[str], parts: Sequence[str]) -> str:
     """Join the parts of a header, with comments, includes and a guard."""
     name, single = sides.machine.name, sides.code.number == 'float'
-    guard = f'{name.upper()}_LINKAGE_H'
+    guard = f'{prefix(name)}_LINKAGE_H'
     lines = [f'{name}: {sides.linkage.type}, written by linkage_ros.', *about,
              'C99 and C++17 without heap, lock or recursion; compile without -ffast-math, which '
              'drops the checks.', f'A call of the transmission takes at most {sides.poses} poses.']
@@ -100,16 +100,19 @@ class _Header:
         # Points in space are of no use on a board.
         self.points = () if machine.in_space else self.linkage.points
         # The fields of a pose: their names in C, and as outputs.
-        self.fields = {**{f'{point}_{axis}': f'{point}.{axis}'
-                          for point in self.points for axis in 'xy'},
-                       **{field(self.linkage, link): link for link in self.linkage.joints}}
+        outputs = [*(f'{point}.{axis}' for point in self.points for axis in 'xy'),
+                   *self.linkage.joints]
+        self.fields = dict(zip(distinct(field(self.linkage, each) for each in outputs), outputs))
+        # The inputs as parameters.
+        self.given = [*map(parameter, self.inputs)]
 
     def text(self) -> str:
         """Return the whole header."""
         text = self.sides.text()
         return guarded(self.sides, self._about(), [
             self.code.helpers(), self._struct(), self._solve(), self._rates(), self._reach(), text,
-            *map(self._inverse, self.outputs)])
+            *(self._inverse(tag[1:], [each.output for each in own])
+              for tag, (_, own) in self.sides.pairs.items() if tag)])
 
     def _about(self) -> List[str]:
         linkage = self.linkage
@@ -125,16 +128,17 @@ class _Header:
         parents = {link.name: link.parent for link in self.linkage.links}
         lines = [f'    {self.number} {point}_x, {point}_y;'.ljust(34) + '/* [m] */'
                  for point in self.points]
-        lines += [f'    {self.number} {field(self.linkage, name)};'.ljust(34) + (
+        lines += [f'    {self.number} {field_};'.ljust(34) + (
             f'/* to {parents[name]} [rad] */' if self.linkage.is_angle(name) else '/* [m] */')
-            for name in self.linkage.joints]
+            for field_, name in self.fields.items() if name in parents]
         return '\n'.join(['/* Where the joints are, and each link to its parent. */',
                           'typedef struct {', *lines, f'}} {self.name}_pose;', ''])
 
     def _function(self, head: str, pose: Pose, ending: Callable[[List[str]], List[str]]) -> str:
         """Return a C function of the inputs with the operations of a Pose."""
         return self.code.function(head, pose, [
-            self._times(name, 1.0 / self.machine.scale_of(name)) for name in self.inputs], ending)
+            self._times(given, 1.0 / self.machine.scale_of(name))
+            for given, name in zip(self.given, self.inputs)], ending)
 
     def _filled(self, pose: str, codes: Iterable[str], unit: float = 1.0) -> List[str]:
         """Return the assignments of a pose, whose fields are divided by a unit."""
@@ -142,7 +146,7 @@ class _Header:
                 for (name, output), code in zip(self.fields.items(), codes)]
 
     def _solve(self) -> str:
-        arguments = ', '.join(f'{self.number} {name}' for name in self.inputs)
+        arguments = ', '.join(f'{self.number} {name}' for name in self.given)
         tests = '\n        && '.join(f'isfinite(p->{name})' for name in self.fields)
         return self._function(
             '/* Place the joints. Return 0 if not all can be assembled: NaN is what cannot. */\n'
@@ -151,7 +155,7 @@ class _Header:
             lambda codes: [*self._filled('p', codes), f'    return {tests};'])
 
     def _rates(self) -> str:
-        arguments = ', '.join([*(f'{self.number} {name}' for name in self.inputs),
+        arguments = ', '.join([*(f'{self.number} {name}' for name in self.given),
                                *(f'{self.name}_pose *by_{name}' for name in self.inputs)])
 
         def ending(codes: List[str]) -> List[str]:
@@ -169,7 +173,7 @@ class _Header:
             return ''
         first, arcs, literal = self.linkage.inputs[0], self.machine.first.reach, self.code.literal
         said = ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in arcs)
-        turn, f, name = literal(first.turn), self.code.suffix, first.name
+        turn, f, name = literal(first.turn), self.code.suffix, self.given[0]
         tests = [f'isfinite({name})'] if first.is_whole(arcs) else [
             f'({name} - {low}) - {turn} * floor{f}(({name} - {low}) / {turn}) <= {width}'
             if first.turns else f'({name} >= {low} && {name} <= {high})'
@@ -179,27 +183,27 @@ class _Header:
                           f'static inline int {self.name}_reaches({self.number} {name})', '{',
                           f'    return {" || ".join(tests)};', '}', ''])
 
-    def _inverse(self, outputs: Tuple[str, ...]) -> str:
+    def _inverse(self, tag: str, outputs: Sequence[str]) -> str:
         """Return the users' inverse: from outputs and near inputs, in scene units, to inputs."""
         linkage, number, n = self.linkage, self.number, len(outputs)
-        tag = '_'.join(field(linkage, output) for output in outputs)
         said = ', '.join(f'{output} [{"rad" if linkage.is_angle(output) else "m"}]'
                          for output in outputs)
         units = [size * self.machine.scale_of(name)
                  for name, size in zip(self.inputs, self.sides.sizes)]
         if n == 1:
-            what, near, values = self.inputs[0], ['near'], ['value']
-            head, given, made = (f'{number} value, {number} near, {number} *{what}', '&value',
-                                 [f'*{what}'])
+            what, out, near, values = self.inputs[0], self.given[0], ['near'], ['value']
+            head, given, made = (f'{number} value, {number} near, {number} *{out}', '&value',
+                                 [f'*{out}'])
         else:
             what, given = 'inputs', 'value'
             near, values, made = ([f'{name}[{i}]' for i in range(n)]
                                   for name in ('near', 'value', 'inputs'))
             head = f'const {number} value[{n}], const {number} near[{n}], {number} inputs[{n}]'
         known = ' && '.join(f'isfinite({value})' for value in values)
+        lack = 'is none' if n == 1 or linkage.inverse(outputs).closed else 'are none near'
         return '\n'.join([
             f'/* The {what} for {said}, nearest to `near`, whole turns included. Returns 0, and',
-            f'   leaves {what} alone, where there is none. */',
+            f'   leaves {what} alone, where there {lack}. */',
             f'static inline int {self.name}_{what}_for_{tag}({head})', '{',
             f'    {number} q[{n}];', f'    {self.name}_point p;',
             *(f'    q[{i}] = {self._times(code, 1.0 / units[i])};'

@@ -12,7 +12,7 @@
 
 from itertools import product
 import math
-from typing import Dict, List, Mapping, Sequence, Tuple
+from typing import Dict, Iterator, List, Mapping, Sequence, Tuple
 
 import numpy as np
 
@@ -44,11 +44,14 @@ class Inverses:
         Writes its C, for these or for changeable dimensions.
     values : mapping
         Values of the templates.
+    sides : sequence of (sequence of Axis)
+        The actuators and the joints.
 
     """
 
-    def __init__(self, linkage: Mechanism, code: Code, values: Mapping[str, object]):
-        self._linkage, self._code, self._values = linkage, code, values
+    def __init__(self, linkage: Mechanism, code: Code, values: Mapping[str, object],
+                 sides: Sequence[Sequence[Axis]]):
+        self._linkage, self._code, self._values, self._sides = linkage, code, values, sides
         self._sizes = [input_.size for input_ in linkage.inputs]
         self.poses = 0
         first, *others = linkage.inputs
@@ -80,25 +83,71 @@ class Inverses:
         values = [code.times(
             f'position[{i}]' + (f' - {code.literal(each.offset)}' if each.offset else ''),
             1.0 / each.factor) for i, each in enumerate(axes)]
-        given = {name: (i, value) for name, value in zip(outputs, values)
-                 for i, input_ in enumerate(inputs) if input_.name == name}
+        given, counted = {}, []
+        turns = [(input_.turn, 1.0 / input_.turn) if input_.turns else (0.0, 0.0)
+                 for input_ in inputs]
+        for k, i, ratio, offset in self._gears(axes):
+            value = values[k] + (f' - {code.literal(offset)}' if offset else '')
+            value = code.times(value, 1.0 / (ratio * sizes[i]))
+            given[i] = f'near[{i}] - whole[{i}]'
+            counted += [f'    near[{i}] = {value};']
+            if inputs[i].turns:
+                turn, over = map(code.literal, turns[i])
+                counted += [
+                    f'    whole[{i}] = {turn} * floor{code.suffix}(near[{i}] * {over} + '
+                    f'{code.literal(0.5)});',
+                    f'    to[{k}] -= {code.times(f"whole[{i}]", axes[k].factor * ratio)};']
+                turns[i] = 0.0, 0.0
         modes, way = '', {'count': 1, 'steps': CLOSED, 'poses': CLOSED, 'how': 'By its gear',
-                          'starts': '', 'strict': '0', 'moved': '', 'stop': 'break;'}
+                          'starts': '', 'strict': '0'}
+        kind = 'inverse.h.in'
         if len(given) < len(outputs):
-            closed = self._linkage.inverse(outputs).closed
-            modes, changed = self._closed(tag, outputs, closed, values) if closed else (
-                '', self._searched(outputs))
+            if closed := self._linkage.inverse(outputs).closed:
+                modes, changed = self._closed(tag, outputs, closed, values)
+            elif pieces := self._pieces(axes):
+                kind, changed = 'search.h.in', pieces
+            else:
+                changed = self._searched(outputs)
             way.update(changed)
-            way['inside'] = '' if side else f' && {code.name}_inside(start[next])'
         self.poses = max(self.poses, int(str(way['poses'])))
-        return modes + filled(template('inverse.h.in'), {
-            'inside': '', **self._values, **way, 'tag': tag, 'side': side,
+        return modes + filled(template(kind), {
+            **self._values, **way, 'tag': tag, 'side': side, 'at_side': int(side > 0),
             'at': f'{code.name}_at' + (f'_{tag}' if side > 1 else ''),
-            'given_inputs': '\n'.join(
-                f'        start[k][{i}] = {code.times(value, 1.0 / sizes[i])};'
-                for i, value in given.values()),
-            'turns': code.rows((input_.turn, 1.0 / input_.turn) if input_.turns and
-                               input_.name not in given else (0.0, 0.0) for input_ in inputs)})
+            'counted': '\n'.join(counted), 'recounted': '' if side > 1 else self._recounted(
+                'x' if kind == 'search.h.in' else 'start[next]'),
+            'given_inputs': '\n'.join(f'        start[k][{i}] = {value};'
+                                      for i, value in given.items()), 'turns': code.rows(turns)})
+
+    def _gears(self, axes: Sequence[Axis]) -> Iterator[Tuple[int, int, float, float]]:
+        """Yield the axes that count an input, maybe geared: number, input, ratio and offset."""
+        linkage = self._linkage
+        for k, each in enumerate(axes):
+            for i, input_ in enumerate(linkage.inputs):
+                if each.output == input_.name:
+                    yield k, i, 1.0, 0.0
+                elif each.output in linkage.geared_to(i) and not each.wraps and (
+                        input_.turns or not self._code.is_open):
+                    yield k, i, *linkage.gear(each.output, i)
+
+    def _recounted(self, given: str) -> str:
+        """Return the code that gives positions the whole turns of q beyond given inputs."""
+        return '\n'.join(
+            f'            p->position[{side}][{k}] += '
+            f'{self._code.times(f"q[{i}] - {given}[{i}]", axes[k].factor * ratio)};'
+            for side, axes in enumerate(self._sides) for k, i, ratio, _ in self._gears(axes)
+            if self._linkage.inputs[i].turns)
+
+    def _pieces(self, axes: Sequence[Axis]) -> Dict[str, object]:
+        """Return the pieces of the reach for a search in them; nothing if they are not known."""
+        if not self._is_known or self._code.is_open:
+            return {}
+        # In a piece an angle changes by half a turn at most, so that its gaps are known.
+        axis, = axes
+        pieces, _ = self._linkage.monotone(axis.output, math.pi if axis.turn else math.inf)
+        rows = [(low / self._sizes[0], high / self._sizes[0], axis.factor * first + axis.offset,
+                 axis.factor * last + axis.offset) for low, high, first, last in pieces]
+        return {'count': len(rows), 'pieces': self._code.rows(rows), 'steps': SEARCHED,
+                'poses': len(rows) * SEARCHED} if rows else {}
 
     def _searched(self, outputs: Tuple[str, ...]) -> Dict[str, object]:
         """Return how a search goes: from the inputs, and for one of them from any piece."""
@@ -106,18 +155,24 @@ class Inverses:
         if len(outputs) == 1 and not code.is_open:
             pieces, _ = self._linkage.monotone(outputs[0], math.inf)
             middles = [0.5 * (low + high) / self._sizes[0] for low, high, *_ in pieces]
-        way = {'count': 1 + len(middles), 'steps': SEARCHED, 'how': 'By a search',
-               'poses': (1 + len(middles)) * (SEARCHED + 1)}
-        return {**way, 'stop': '', 'moved': f'far = {code.name}_away(start[next], near);',
-                'starts': '\n'.join(f'    start[{k}][0] = {code.literal(value)};'
-                                    for k, value in enumerate(middles, 1))} if middles else way
+        return {'count': 1 + len(middles), 'steps': SEARCHED, 'how': 'By a search from q',
+                'poses': (1 + len(middles)) * (SEARCHED + 1),
+                'starts': '\n'.join([f'    {self._begin()}', *(
+                    f'    start[{k}][0] = {code.literal(value)};'
+                    for k, value in enumerate(middles, 1))])}
+
+    def _begin(self) -> str:
+        """Return the code that starts from the inputs, without their turns, which cost digits."""
+        half = self._code.literal(0.5)
+        return (f'for (i = 0; i < {len(self._sizes)}; i++) start[0][i] = q[i] - turn[i][0] * '
+                f'floor{self._code.suffix}(q[i] * turn[i][1] + {half});')
 
     def _closed(self, tag: str, outputs: Tuple[str, ...], closed: InverseLinkage,
                 values: Sequence[str]) -> Tuple[str, Dict[str, object]]:
         """Return the function for the inputs in all assembly modes, and how it is used."""
         code = self._code
         modes, count = self._modes(tag, self._own_modes(outputs, closed), closed, values)
-        call = f'{code.name}_modes_{tag}(position, start);'
+        call = f'{code.name}_modes_{tag}(to, start);'
         strict = f'far < {self._values["last"]}'
         # Each start may be tried twice, at an end of the reach with one more pose.
         poses = count * (CLOSED + 2 + bool(self._arcs))
@@ -125,10 +180,11 @@ class Inverses:
             return modes, {'count': count, 'how': 'In closed form', 'starts': f'    {call}',
                            'strict': strict, 'poses': poses}
         return modes, {
-            'count': count, 'how': 'In closed form; with other dimensions by a search',
-            'starts': f'    if (c->is_own)\n        {call}\n    else\n        for (k = 1; k < '
-                      f'{count}; k++)\n            for (i = 0; i < {len(self._sizes)}; i++)\n'
-                      f'                start[k][i] = {code.literal(math.nan)};',
+            'count': count, 'how': 'In closed form; with other dimensions by a search from q',
+            'starts': f'    if (c->is_own) {{\n        {call}\n    }} else {{\n        '
+                      f'{self._begin()}\n        for (k = 1; k < {count}; k++)\n            '
+                      f'for (i = 0; i < {len(self._sizes)}; i++)\n'
+                      f'                start[k][i] = {code.literal(math.nan)};\n    }}',
             'strict': f'c->is_own && {strict}', 'poses': max(poses, SEARCHED + 1),
             'steps': f'c->is_own ? {CLOSED} : {SEARCHED}'}
 

@@ -17,6 +17,8 @@ from typing import Iterable, List, Mapping
 from ..linkage.mechanism import Mechanism
 
 _PLACE = re.compile(r'@(\w+)@')
+# Names of inputs that a user has not chosen.
+_GIVEN = re.compile(r'(crank|cylinder|carriage)\d*')
 
 
 def template(name: str) -> str:
@@ -34,14 +36,29 @@ def filled(template: str, values: Mapping[str, object]) -> str:
     return '\n'.join(lines) + '\n'
 
 
-def constants(names: Iterable[str]) -> List[str]:
-    """Return names as ends of upper-case C constants, each distinct."""
+def distinct(names: Iterable[str]) -> List[str]:
+    """Return names, with a number after those that are there already."""
     made: List[str] = []
     for name in names:
-        plain = re.sub(r'[^A-Z0-9]+', '_', name.upper()).strip('_') or 'UNNAMED'
-        made.append(next(text for text in (plain, *(f'{plain}_{i}' for i in range(2, 1000)))
+        made.append(next(text for text in (name, *(f'{name}_{i}' for i in range(2, 1000)))
                          if text not in made))
     return made
+
+
+def constants(names: Iterable[str]) -> List[str]:
+    """Return names as ends of upper-case C constants, each distinct."""
+    return distinct(re.sub(r'[^A-Z0-9]+', '_', name.upper()).strip('_') or 'UNNAMED'
+                    for name in names)
+
+
+def prefix(name: str) -> str:
+    """Return the prefix of a mechanism's constants: different for arm, Arm and ARM."""
+    return name.upper() if name.islower() else f'{name}_' if name.isupper() else name
+
+
+def parameter(name: str) -> str:
+    """Return the name of an input as a parameter in C, which no word of C and no macro has."""
+    return name if _GIVEN.fullmatch(name) else f'{name}_'
 
 
 def field(linkage: Mechanism, output: str) -> str:

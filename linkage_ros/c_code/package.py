@@ -17,7 +17,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 from . import header
 from .axes import actuators, Axis, joints
-from .names import comment, constants, filled, literal, template
+from .names import comment, distinct, filled, literal, template
 from ..scene import SceneMechanism
 
 # Names of packages.
@@ -44,8 +44,9 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
         If a joint does not exist, or joints do not determine all inputs.
 
     """
-    classes = [text.title().replace('_', '') for text in constants(
-        re.sub(r'(?<=[a-z])(?=[A-Z])', '_', machine.name) for machine, _ in machines)]
+    classes = distinct(
+        re.sub(r'(?<=[a-z])(?=[A-Z])', '_', machine.name).title().replace('_', '')
+        for machine, _ in machines)
     parts = [_values(name, class_, machine, joints(machine, chosen))
              for class_, (machine, chosen) in zip(classes, machines)]
     common = {
@@ -53,7 +54,7 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
         'mechanisms': ' '.join(part['name'] for part in parts),
         'table': '\n'.join(part['row'] for part in parts)}
     files = {Path(path): filled(template(Path(path).name), common) for path in (
-        'CMakeLists.txt', 'package.xml', 'README.md', 'src/linkage_transmission.hpp')}
+        'CMakeLists.txt', 'package.xml', 'README.md', 'src/transmission-of.hpp')}
     files[Path('plugins.xml')] = f'<library path="{name}">\n' + ''.join(
         filled(template('plugin.xml'), part) for part in parts) + '</library>\n'
     files[Path('urdf/transmissions.xml')] = '<!-- Written by linkage_ros. -->\n' + ''.join(

@@ -21,7 +21,7 @@ from typing import Dict, Iterator, List, Sequence, Tuple
 from .axes import actuators, Axis, axis, joints, start
 from .code import Code, open_linkage
 from .inverses import Inverses
-from .names import comment, constants, field, filled, literal, template
+from .names import comment, constants, distinct, field, filled, literal, prefix, template
 from ..formula.expression import arctangent, Real, real
 from ..formula.program import Program
 from ..linkage.builder import in_metres
@@ -29,15 +29,16 @@ from ..scene import SceneMechanism
 
 # Limits by precision. A Jacobian is `singular` below this part of its size, and below `least` for
 # Newton's method, which ends where `enough` is left of a position [rad, sizes], and may leave
-# `close`; an input may be beyond an end by `slack`.
+# `close`, times the rate or `steepest`; an input may be beyond an end by `slack`.
 LIMITS = {'double': {'singular': 1e-6, 'least': 1e-12, 'enough': 1e-14, 'close': 1e-13,
-                     'slack': 1e-9},
+                     'steepest': 4e6, 'slack': 1e-9},
           'float': {'singular': 1e-3, 'least': 1e-5, 'enough': 2e-6, 'close': 4e-6,
-                    'slack': 1e-5}}
+                    'steepest': 1e3, 'slack': 1e-5}}
 # The longest step of Newton's method [rad, sizes], and its finest part. The start of a closed form
 # that misses by more than `other` is of another assembly, and tried last: as if `last` further.
-COMMON = {'longest': 0.5, 'finest': 2.0 ** -12, 'other': 1e-2, 'last': 1e6, 'infinity': math.inf,
-          'half': 0.5}
+# The way outside a sweep of what is measured counts `outside` times more.
+COMMON = {'longest': 0.5, 'finest': 2.0 ** -12, 'other': 1e-2, 'last': 1e6, 'outside': 10.0,
+          'infinity': math.inf, 'half': 0.5}
 # Samples for the first pose of a search.
 SAMPLES = 4096
 
@@ -57,22 +58,23 @@ class Sides:
         self.sizes = [input_.size for input_ in machine.linkage.inputs]
         # Pairs of what stands in a point, and the tag of their function.
         self.pairs = {'': (actuators(machine), joints(machine, names))}
-        for group in outputs:
-            own = [axis(machine, output) for output in group]
-            self.pairs['_' + '_'.join(field(self.linkage, each) for each in group)] = [], own
+        tags = distinct('_'.join(['', *(field(self.linkage, each) for each in group)])
+                        for group in outputs)
+        self.pairs.update((tag, ([], [axis(machine, output) for output in group]))
+                          for tag, group in zip(tags, outputs))
         self.values: Dict[str, object] = {
-            'name': machine.name, 'N': machine.name.upper(), 'n': len(self.sizes),
+            'name': machine.name, 'N': prefix(machine.name), 'n': len(self.sizes),
             'number': self.code.number, 'f': self.code.suffix, 'sides': len(self.pairs) + 1,
             'given': f'const {machine.name}_linkage *c, ' if is_open else '',
             'types': f'const {machine.name}_linkage *, ' if is_open else '',
             'pass': 'c, ' if is_open else '', 'samples': SAMPLES,
             **{key: self.code.literal(value)
                for key, value in {**COMMON, **LIMITS[self.code.number]}.items()}}
-        self._inverses = Inverses(machine.linkage, self.code, self.values)
+        self._inverses = Inverses(machine.linkage, self.code, self.values, self.pairs[''])
 
     def text(self) -> str:
         """Return all types and functions."""
-        machine, (first, second) = self.machine, self.pairs['']
+        first, second = self.pairs['']
         tables = [first, *(own for _, own in self.pairs.values())]
         tags = ['actuators', 'joints', *(tag[1:] for tag in self.pairs if tag)]
         return filled(template('transmission.h.in'), {
@@ -85,8 +87,7 @@ class Sides:
             'scales': ', '.join('{ %s }' % self.code.rows(
                 (1.0 / each.size, 0.5 * each.turn) for each in own) for own in tables),
             'ranges': self.code.rows(self._ranges()),
-            'ends': self.code.rows(self._counted(i, drive.ends or (-math.inf, math.inf))
-                                   for i, drive in enumerate(machine.inputs.values()))})
+            'ends': self.code.rows(self._ends())})
 
     @property
     def poses(self) -> int:
@@ -105,8 +106,15 @@ class Sides:
                 drive.reach, key=lambda arc: arc[1] - arc[0]))
             yield first / self.sizes[i], low, high - low, math.sqrt((i + 1) ** 2 + 1.0) % 1.0
 
+    def _ends(self) -> Iterator[Tuple[float, ...]]:
+        """Yield the ends of each input's sweep, with what may be beyond them by rounding."""
+        slack = LIMITS[self.code.number]['slack']
+        for i, drive in enumerate(self.machine.inputs.values()):
+            low, high = self._counted(i, drive.ends or (-math.inf, math.inf))
+            yield low - slack, high + slack
+
     def _enum(self, side: str, axes: Sequence[Axis]) -> str:
-        upper = f'{self.name}_{side}'.upper()
+        upper = f'{prefix(self.name)}_{side.upper()}'
         return 'enum { ' + ', '.join(f'{upper}_{name} = {i}' for i, name in enumerate(
             constants(each.name for each in axes))) + ' };'
 

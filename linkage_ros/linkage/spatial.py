@@ -49,10 +49,11 @@ from ..formula.expression import (
 Scalar = Any
 # Steps of Newton's method from the middle of a window: six are enough for five robots' ankles.
 STEPS = 8
-# After a last step [rad] of this size or less, the error is its square, less than rounding.
-LAST_STEP = 1e-7
+# After a last step [rad] of this size or less, the error is its square, less than rounding. This
+# and EDGE are powers of two: C, which replaces them for float, knows them from a design's numbers.
+LAST_STEP = 2.0 ** -23
 # A pose beyond its window by no more than this [rad] is on its edge; the proof covers twice that.
-EDGE = 1e-9
+EDGE = 2.0 ** -30
 
 
 class Vector(NamedTuple):

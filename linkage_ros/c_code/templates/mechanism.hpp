@@ -14,12 +14,12 @@
 #include <memory>
 
 #include "@name@_linkage.h"
-#include "linkage_transmission.hpp"
+#include "transmission-of.hpp"
 #include "transmission_interface/transmission_loader.hpp"
 
 namespace @namespace@
 {
-/// The C of the mechanism @name@, for LinkageTransmission.
+/// The C of the mechanism @name@, for TransmissionOf.
 struct @class@Code
 {
   using Linkage = @name@_linkage;
@@ -41,7 +41,7 @@ struct @class@Code
   }
 };
 
-using @class@Transmission = LinkageTransmission<@class@Code>;
+using @class@Transmission = TransmissionOf<@class@Code>;
 
 class @class@Loader : public transmission_interface::TransmissionLoader
 {

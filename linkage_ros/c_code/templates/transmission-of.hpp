@@ -124,10 +124,10 @@ private:
 
 /// A linkage between actuators and joints; Code wraps its generated C.
 template <class Code>
-class LinkageTransmission : public transmission_interface::Transmission
+class TransmissionOf : public transmission_interface::Transmission
 {
 public:
-  explicit LinkageTransmission(const hardware_interface::TransmissionInfo & info) : info_(info) {}
+  explicit TransmissionOf(const hardware_interface::TransmissionInfo & info) : info_(info) {}
 
   /// Set parameters and find handles by role or name; throws an exception that says what is wrong.
   void configure(
