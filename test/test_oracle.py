@@ -96,6 +96,21 @@ def test_a_velocity_that_is_no_number_leaves_all_velocities_out(graph, by):
             message({'a_crank': 0.2 + 0.01 * i} if i % 2 else {'b_crank': 0.01 * i}, [1.0])))])
 
 
+MEASURED = {'mechanisms': ['a', 'b'], 'a.type': 'four_bar', 'a.crank.measures': 'QB',
+            'a.crank.ratio': 2.0, 'a.crank.offset': 0.1, 'a.crank.start': 0.5,
+            'b.type': 'slotted_lever'}
+
+
+@pytest.mark.parametrize('bad', [9.0, math.nan, math.inf])
+def test_what_a_sensor_cannot_say_is_no_pose(graph, bad):
+    bench = Bench(graph, MEASURED)
+    good, other = message({'a_QB': 0.43}, [0.5]), message({'b_crank': 0.3}, [1.0])
+    odd = message({'a_QB': bad}, [0.7], 2), message({'a_QB': bad}, [math.nan], 3)
+    bench.run([*everything(MEASURED), odd[0], good, *odd, good, other, odd[0], other,
+               ('compiled',), good, good, *odd, other, good, message({'a_QB': 0.44}, [0.5], 4)])
+    assert bench.model.states['a'].values == [pytest.approx(0.54, abs=0.1)]
+
+
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('seed', range(5))
 def test_what_leaves_its_reach_leaves_the_picture(graph, seed):
