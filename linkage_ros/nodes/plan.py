@@ -106,6 +106,10 @@ class Plan:
             if one.is_complete and (in_scene or one.has_subscribers)]
         self._in_scene = [one for one in planner.mechanisms if one.is_complete] if in_scene else []
         moved = {one for one, _ in self.solved}
+        for one in mechanisms:
+            if one not in moved:
+                # Its last solution will be that of earlier inputs.
+                one.validity = None
         for one in self._in_scene:
             if one not in moved:
                 one.refresh(one.solution(in_scene))
