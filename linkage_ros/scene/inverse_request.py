@@ -110,6 +110,11 @@ class InverseRequest:
                       for drive, scale in zip(self._drives, self._scales)]
         self._compilation: Optional[Future] = None
 
+    @property
+    def is_closed(self) -> bool:
+        """Whether the answers are closed forms, so that none is searched."""
+        return self._inverse.closed is not None
+
     def inputs_of(self, positions: Sequence[Any]) -> List[Any]:
         """Return the inputs [rad or m] at their actuators' positions."""
         return [ratio * position + offset
