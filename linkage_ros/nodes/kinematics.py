@@ -14,14 +14,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-import sys
 import time
 from typing import Any, Callable, Dict, Iterable, List, Tuple
 
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
 
-from . import joint_state_reader, scene_node
+from . import joint_state_reader, scene_node, shutdown
 from .driven_mechanism import DrivenMechanism
 from .log import Once
 from .mechanism_model import MechanismModel
@@ -178,4 +177,4 @@ def main(args: Any = None) -> int:
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    shutdown.run(main)

@@ -15,14 +15,13 @@ from __future__ import annotations
 from array import array
 from contextlib import suppress
 import math
-import sys
 import time
 from typing import Any, Callable, Dict, List, Mapping, Sequence, Tuple
 
 import numpy as np
 from sensor_msgs.msg import JointState
 
-from . import joint_state_reader, scene_node
+from . import joint_state_reader, scene_node, shutdown
 from .command_stream import CommandStream
 from .message_layout import Unreadable
 from .. import scene
@@ -259,4 +258,4 @@ def main(args: Any = None) -> int:
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    shutdown.run(main)
