@@ -141,6 +141,13 @@ def test_two_outputs_of_one_input_and_a_name_of_nobody_are_said(stream, capfd):
     assert 'no output is called boom' in said
 
 
+@pytest.mark.parametrize('name', ['x{}', '{}' + 70_000 * 'x'])
+def test_a_reason_is_throttled_whoever_sends(stream, capfd, name):
+    for number in range(5):
+        stream.want(['flap', 'lever_A.x', name.format(number)], [flap(0.2), 100.0, 1.0])
+    assert capfd.readouterr().err.count('are moved by one input') == 1
+
+
 def test_hostile_bytes_end_nothing(stream, graph):
     publisher = graph.node.create_publisher(JointState, 'wanted_states', 10)
     graph.until(publisher.get_subscription_count)
@@ -386,6 +393,9 @@ def test_a_trajectory_of_a_foot_and_a_bucket(graph, several_plan):
     (['flap'], [([0.0], [1.0, 2.0])], 'as many velocities or none, not 1 and 2'),
     (['flap', 'wing'], [([0.0, 0.0], [])], 'no output is called wing'),
     (['flap', 'flap'], [([0.0, 0.0], [])], 'flap and flap are moved by one input'),
+    ([], [([], [])], 'joint_names is empty: name at least one output'),
+    (['flap'], [([0.0], [math.nan])], 'point 0: a velocity must be finite'),
+    (['flap'], [([0.0], [1.0]), ([0.1], [math.inf])], 'point 1: a velocity must be finite'),
     (['bar_A.x'], [([1e3], [])], 'point 0: bar_A.x cannot be 1000'),
     (['flap'], [([math.nan], [])], 'point 0: flap cannot be nan: a value must be finite')])
 def test_a_trajectory_that_cannot_be_is_refused_as_a_whole(graph, plan, capfd, names, points,

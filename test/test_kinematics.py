@@ -265,6 +265,24 @@ def test_velocities_are_left_out_where_they_are_infinite(graph):
     assert len(bench.joints_at(0.9 * high, 1.0).velocity) == 3
 
 
+def test_the_reach_of_another_leg_is_said_by_the_crank_that_they_share(graph):
+    heard = graph.log()
+    parameters = {'leg.type': 'jansen', 'leg.mirrored': True, 'mechanisms': ['leg'],
+                  'leg.dimensions.a': 10.0, 'leg.dimensions.m': 22.0}
+    bench = Bench(graph, 'leg', parameters, markers=False)
+    graph.until(lambda: bench.node.count_subscribers('/rosout'))
+    bench.joints_at(0.1)
+    message, = (m.msg for m in graph.all_logged(bench.node, heard) if 'cannot be' in m.msg)
+    leg, reach = re.match(r'(\w+) cannot be assembled at crank angle 0.1 rad; the reach is (.*)',
+                          message).groups()
+    assert leg == 'leg_right0'
+    assembly = bench.node.scene.machines['leg'].assembly()
+    for low, high in re.findall(r'\[(.*?), (.*?)\]', reach):
+        inside = [assembly.within_reach(float(low) + part * (float(high) - float(low)))[1]
+                  for part in (-0.1, 0.1, 0.9, 1.1)]
+        assert inside == [False, True, True, False]
+
+
 def test_an_angle_out_of_reach_is_passed_over_with_a_warning(graph):
     logged = graph.log()
     bench = Bench(graph, 'cell', CELL)

@@ -187,7 +187,8 @@ class CommandStream:
         """Return the targets of a sender's messages, and whether these have velocities."""
         targets, unknown, reasons = self._targets(message.name[:len(message.position)])
         for reason in reasons:
-            self._logger.warning(f'wanted_states: {reason}')
+            # Throttled, because each message of some senders is interpreted.
+            self._throttle.warn(reason, partial('wanted_states: {}'.format, reason))
         if unknown := self._unknown.new(unknown):
             self._logger.warning(f'wanted_states: {_no_output(unknown)}{self._unknown.ending}')
         return targets, len(message.velocity) == len(message.name)
@@ -290,6 +291,8 @@ class CommandStream:
             targets, unknown, reasons = self._targets(message.joint_names)
             if unknown or reasons:
                 raise ValueError(_no_output(unknown) if unknown else reasons[0])
+            if message.points and not targets:
+                raise ValueError('joint_names is empty: name at least one output')
         except ValueError as error:
             self._refuse(error)
             return
@@ -325,6 +328,8 @@ def _solved_point(i: int, point: JointTrajectoryPoint, n: int, targets: Sequence
     if len(point.positions) != n or len(point.velocities) not in (0, n):
         raise ValueError(f'point {i} must have {n} positions, and as many velocities or '
                          f'none, not {len(point.positions)} and {len(point.velocities)}')
+    if not all(map(math.isfinite, point.velocities)):
+        raise ValueError(f'point {i}: a velocity must be finite')
     found = []
     for k, target in enumerate(targets):
         near[k], *actuator = target.command(

@@ -223,13 +223,25 @@ class DrivenMechanism:
 
     def _out_of_reach(self) -> str:
         assembled = [*self.validity.legs()] if self.validity else []
-        legs = ', '.join(f'{self.name}_{prefix}'.rstrip('_') for leg, prefix in enumerate(
-            self.model.assembly.legs) if leg not in assembled)
-        inputs = self.model.inputs
+        missing = {leg: f'{self.name}_{prefix}'.rstrip('_') for leg, prefix in enumerate(
+            self.model.assembly.legs) if leg not in assembled}
+        legs, inputs = ', '.join(missing.values()), self.model.inputs
         if inputs[0].measures and math.isnan(self.inputs[0, 0]):
             return (f'{legs} cannot be assembled: {inputs[0].source} is at {self._measured:.6g}, '
                     f'out of reach of {inputs[0].measures}')
         at = ', '.join(f'{one.input.quantity} {value:.6g} {one.input.unit}'
                        for one, value in zip(inputs, self.inputs[0]))
-        reach = ', '.join(f'{scene.in_words(one.reach)} {one.input.unit}' for one in inputs)
-        return f'{legs} cannot be assembled at {at}; the reach is {reach}'
+        first, *others = missing
+        reach = ', '.join(f'{scene.in_words(self._reach(one, first))} {one.input.unit}'
+                          for one in inputs)
+        of = f' of {missing[first]}' if others else ''
+        return f'{legs} cannot be assembled at {at}; the reach{of} is {reach}'
+
+    def _reach(self, drive: scene.InputSettings, leg: int) -> Sequence[Tuple[float, float]]:
+        """Return the reach of a leg, by the crank that all legs have in common."""
+        if len(self.model.assembly.legs) == 1:
+            return drive.reach
+        side, plus = self.model.assembly.own_inputs()[leg]
+        arcs = [sorted(side * (end - plus) for end in arc) for arc in drive.reach]
+        turns = [drive.input.turn * math.floor(low / drive.input.turn + 0.5) for low, _ in arcs]
+        return sorted((low - turn, high - turn) for (low, high), turn in zip(arcs, turns))
