@@ -751,6 +751,17 @@ def test_a_gear_alone_has_its_ratio_sign_zero_and_speed(graph):
             ['thigh'], [-0.5], [-2.0])
 
 
+@pytest.mark.parametrize('source, shared, count', [
+    ('left_QB', SHARED, 1), ('left_QB', [], 0), ('left_crank', SHARED, 0)])
+def test_a_joint_and_a_source_of_one_name_on_one_topic_are_said_once(
+        graph, capfd, source, shared, count):
+    node = graph.start(Kinematics, {
+        'mechanisms': ['left', 'right'], 'left.type': 'four_bar', 'right.type': 'four_bar',
+        'right.crank.source': source}, cli_args=shared)
+    assert graph.set(node, left__dimensions__a=1.1).successful
+    assert capfd.readouterr().err.count('joint_states: left_QB is the name of a joint') == count
+
+
 def test_motors_and_passive_joints_share_a_topic_and_nobody_hears_himself(graph):
     heard = graph.log()
     graph.start(Kinematics, KNEE, cli_args=SHARED)
