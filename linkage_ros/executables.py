@@ -12,23 +12,12 @@
 
 from collections.abc import Callable
 from importlib import import_module
-import os
-import signal
-import sys
+
+from .nodes import shutdown
 
 
 def _executable(module: str) -> Callable[[], None]:
-    def start() -> None:
-        # Importing ROS is too slow for a signal to wait; `ShutdownHandler` replaces this later.
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: os._exit(0))
-        code = import_module(f'{__package__}.{module}').main()
-        # A compiling thread would delay the end, and a second signal would change the exit code.
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(code)
-
-    return start
+    return lambda: shutdown.run(lambda: import_module(f'{__package__}.{module}').main())
 
 
 crank_driver = _executable('nodes.crank_driver')

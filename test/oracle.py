@@ -15,8 +15,8 @@ What the kinematics node has to publish after any history, worked out by the lib
 
 - A message sets the inputs whose source it names, of a name that comes twice the last; a name
   without a position is not said. Bytes that are no joint states are dropped.
-- A source says `ratio * position + offset`, of the input or of what it measures. A measured value
-  that cannot be leaves the input as it was.
+- A source says `ratio * position + offset`, of the input or of what it measures. At a measured
+  value that cannot be no leg is assembled; the next one continues from the last that could be.
 - A speed is known while the last message of its input had a velocity for every name.
 - After a message each mechanism that it names is published, once all its inputs are known; then
   the joints of the scene, if any input was named. Nobody gets what he did not subscribe to before.
@@ -210,6 +210,8 @@ class State:
     values: list
     speeds: list
     stamp: tuple = (0, 0)
+    # The last input that a measured value gave.
+    near: float = None
 
 
 class Model:
@@ -260,9 +262,10 @@ class Model:
         return set(moved)
 
     def _source(self, state, machine, i, drive, position, speed):
-        value, speed = machine.from_source(drive, position, speed, state.values[i])
-        if math.isfinite(value) or not drive.measures:
-            state.values[i], state.speeds[i] = value, speed
+        value, speed = machine.from_source(drive, position, speed, state.near)
+        state.values[i], state.speeds[i] = value, speed
+        if math.isfinite(value):
+            state.near = value
 
     def change(self, values):
         """Return the reason to refuse a change, '' if it is accepted, and what it changes."""

@@ -202,17 +202,18 @@ def _stamp(message):
 
 def module(name):
     """Return the module of an executable."""
-    rooms = {'render': 'render', 'urdf': 'nodes.urdf_command', 'viewer': 'web.viewer'}
+    rooms = {'render': 'render', 'urdf': 'nodes.urdf_command', 'viewer': 'web.viewer',
+             'scene': 'nodes.scene_process'}
     return f'linkage_ros.{rooms.get(name, f"nodes.{name}")}'
 
 
 class Process:
     """An executable of this package as users start it, with a parameter file."""
 
-    def __init__(self, name, parameter_file, *arguments, domain=None, env=None):
+    def __init__(self, name, parameter_file, *arguments, domain=None, env=None, as_module=False):
         self._domain = None if domain else Domain()
         self.domain = domain or self._domain.id
-        start = ('-m', module(name)) if name == 'urdf' else (
+        start = ('-m', module(name)) if as_module or name == 'urdf' else (
             '-c', f'from linkage_ros import executables; executables.{name}()')
         self._process = subprocess.Popen(
             [sys.executable, *start, *arguments, '--ros-args',

@@ -13,6 +13,7 @@
 import itertools
 import math
 import random
+import threading
 
 from builtin_interfaces.msg import Duration
 from linkage_ros import mechanisms, scene
@@ -138,6 +139,13 @@ def test_two_outputs_of_one_input_and_a_name_of_nobody_are_said(stream, capfd):
     said = capfd.readouterr().err
     assert 'flap and lever_A.x are moved by one input: name one of them' in said
     assert 'no output is called boom' in said
+
+
+@pytest.mark.parametrize('name', ['x{}', '{}' + 70_000 * 'x'])
+def test_a_reason_is_throttled_whoever_sends(stream, capfd, name):
+    for number in range(5):
+        stream.want(['flap', 'lever_A.x', name.format(number)], [flap(0.2), 100.0, 1.0])
+    assert capfd.readouterr().err.count('are moved by one input') == 1
 
 
 def test_hostile_bytes_end_nothing(stream, graph):
@@ -268,6 +276,57 @@ def test_of_several_inputs_what_cannot_be_had_is_held_and_said(graph, capfd):
 
 # --- trajectories ---
 
+SEARCHED = ['digger_H.x', 'digger_J.y', 'digger_distance(P,J)']
+
+
+@pytest.fixture
+def searches(monkeypatch):
+    """Gather whether each search for a first command or a reason holds up the node's messages."""
+    gathered, command, reason = [], InverseRequest.command, InverseRequest.reason
+
+    def here():
+        gathered.append(threading.current_thread() is threading.main_thread())
+
+    def commanded(request, values, speeds, near, jumps):
+        if jumps and request.outputs[0] == 'H.x':
+            here()
+        return command(request, values, speeds, near, jumps)
+
+    def explained(request, *values):
+        here()
+        return reason(request, *values)
+
+    monkeypatch.setattr(InverseRequest, 'command', commanded)
+    monkeypatch.setattr(InverseRequest, 'reason', explained)
+    return gathered
+
+
+def test_a_first_command_is_searched_beside_the_messages(graph, searches):
+    stream = Stream(graph, SEVERAL)
+    arrays = graph.listen(Float64MultiArray, 'digger/commands')
+    far = [56.8, 137.9, 133.8]
+    linkage = stream.node.scene.machines['digger'].linkage
+    wanted = linkage.function((), tuple(name.split('_')[1] for name in SEARCHED))(*far)
+    found = stream.want(SEARCHED, list(wanted))
+    assert [position for position, in found.values()] == pytest.approx(
+        [far[0] - 80.0, *far[1:]], rel=1e-9)
+    graph.until(lambda: arrays and arrays[-1].data.tolist() == [x for x, in found.values()])
+    assert searches == [False]
+
+
+def test_why_there_is_no_first_command_is_searched_seldom_and_beside_the_messages(
+        graph, searches, capfd, monkeypatch):
+    monkeypatch.setattr('linkage_ros.nodes.command_stream.PAUSES', 1e9)
+    stream = Stream(graph, SEVERAL)
+    for _ in range(3):
+        assert stream.want(FOOT + SEARCHED, [*LINE[:2], 1e4, -150.0, 100.0]).keys() == {
+            'leg_crank', 'motor'}
+    graph.until(lambda: len(searches) > 1)
+    stream.want(FOOT, LINE[:2].tolist())
+    assert searches == [False, False]
+    assert 'outside the reach' in capfd.readouterr().err
+
+
 @pytest.fixture
 def plan(graph, stream):
     """Return a function that sends a trajectory and returns the actuators'."""
@@ -334,6 +393,9 @@ def test_a_trajectory_of_a_foot_and_a_bucket(graph, several_plan):
     (['flap'], [([0.0], [1.0, 2.0])], 'as many velocities or none, not 1 and 2'),
     (['flap', 'wing'], [([0.0, 0.0], [])], 'no output is called wing'),
     (['flap', 'flap'], [([0.0, 0.0], [])], 'flap and flap are moved by one input'),
+    ([], [([], [])], 'joint_names is empty: name at least one output'),
+    (['flap'], [([0.0], [math.nan])], 'point 0: a velocity must be finite'),
+    (['flap'], [([0.0], [1.0]), ([0.1], [math.inf])], 'point 1: a velocity must be finite'),
     (['bar_A.x'], [([1e3], [])], 'point 0: bar_A.x cannot be 1000'),
     (['flap'], [([math.nan], [])], 'point 0: flap cannot be nan: a value must be finite')])
 def test_a_trajectory_that_cannot_be_is_refused_as_a_whole(graph, plan, capfd, names, points,

@@ -65,6 +65,23 @@ def test_more_signals_than_one_end_a_node_as_quietly(harness, name, stop):
     assert (code, 'Traceback' in printed, 'rror' in printed) == (0, False, False), printed
 
 
+@pytest.mark.sample(1)
+@pytest.mark.parametrize('name', EXECUTABLES)
+def test_what_python_does_at_its_end_holds_up_no_node(harness, tmp_path, name):
+    """However it is started: much garbage takes seconds, and a second signal may come then."""
+    (tmp_path / 'sitecustomize.py').write_text(
+        'import atexit, time\natexit.register(time.sleep, 100.0)\n')
+    path = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', '')])
+    process = harness.Process(name, ROOT / 'config' / 'all.yaml', env={'PYTHONPATH': path},
+                              as_module=True)
+    for _ in range(3 if name == 'scene' else 1):
+        process.line()
+    while not process.has_ended:
+        process.interrupt(signal.SIGINT)
+        time.sleep(0.02)
+    assert process.end() == (0, '')
+
+
 IMPORTS_FOR_EVER = """
 import sys
 import time

@@ -265,6 +265,24 @@ def test_velocities_are_left_out_where_they_are_infinite(graph):
     assert len(bench.joints_at(0.9 * high, 1.0).velocity) == 3
 
 
+def test_the_reach_of_another_leg_is_said_by_the_crank_that_they_share(graph):
+    heard = graph.log()
+    parameters = {'leg.type': 'jansen', 'leg.mirrored': True, 'mechanisms': ['leg'],
+                  'leg.dimensions.a': 10.0, 'leg.dimensions.m': 22.0}
+    bench = Bench(graph, 'leg', parameters, markers=False)
+    graph.until(lambda: bench.node.count_subscribers('/rosout'))
+    bench.joints_at(0.1)
+    message, = (m.msg for m in graph.all_logged(bench.node, heard) if 'cannot be' in m.msg)
+    leg, reach = re.match(r'(\w+) cannot be assembled at crank angle 0.1 rad; the reach is (.*)',
+                          message).groups()
+    assert leg == 'leg_right0'
+    assembly = bench.node.scene.machines['leg'].assembly()
+    for low, high in re.findall(r'\[(.*?), (.*?)\]', reach):
+        inside = [assembly.within_reach(float(low) + part * (float(high) - float(low)))[1]
+                  for part in (-0.1, 0.1, 0.9, 1.1)]
+        assert inside == [False, True, True, False]
+
+
 def test_an_angle_out_of_reach_is_passed_over_with_a_warning(graph):
     logged = graph.log()
     bench = Bench(graph, 'cell', CELL)
@@ -592,7 +610,7 @@ def test_an_encoder_on_the_rocker_drives_as_the_crank_does(graph):
         assert dict(zip(state.name, state.velocity))['bars_QB'] == pytest.approx(0.5)
 
 
-def test_a_draw_wire_that_says_what_cannot_be_is_passed_over(graph):
+def test_a_draw_wire_that_says_what_cannot_be_moves_nothing_and_is_said(graph):
     heard = graph.log()
     node = graph.start(Kinematics, {
         'mechanisms': ['wired'], 'wired.type': 'four_bar',
@@ -602,12 +620,13 @@ def test_a_draw_wire_that_says_what_cannot_be_is_passed_over(graph):
     measure = graph.crank(['wired_distance(O,B)'])
     length = float(linkage.joint_angles(0.9, ['distance(O,B)'])['distance(O,B)'])
     assert measure([length], states).position[0] == pytest.approx(0.9)
+    before = len(states)
     for bad in (1e3, math.nan, math.inf):
         measure.send([bad])
     assert measure([length], states).position[0] == pytest.approx(0.9)
-    said, = (m.msg for m in graph.all_logged(node, heard) if 'is ignored' in m.msg)
+    said, = (m.msg for m in graph.all_logged(node, heard) if 'wired cannot be' in m.msg)
     assert 'wired_distance(O,B) is at 1000, out of reach of distance(O,B)' in said
-    assert all(np.isfinite(state.position).all() for state in states)
+    assert len({state.header.stamp.sec for state in states[before:]}) == 1
 
 
 MOTORS = {'mechanisms': ['left', 'right'], 'left.type': 'four_bar', 'right.type': 'four_bar',
@@ -730,6 +749,17 @@ def test_a_gear_alone_has_its_ratio_sign_zero_and_speed(graph):
         state = graph.crank(['hip_crank'])([8.0], states, [16.0])
         assert (state.name, list(state.position), list(state.velocity)) == (
             ['thigh'], [-0.5], [-2.0])
+
+
+@pytest.mark.parametrize('source, shared, count', [
+    ('left_QB', SHARED, 1), ('left_QB', [], 0), ('left_crank', SHARED, 0)])
+def test_a_joint_and_a_source_of_one_name_on_one_topic_are_said_once(
+        graph, capfd, source, shared, count):
+    node = graph.start(Kinematics, {
+        'mechanisms': ['left', 'right'], 'left.type': 'four_bar', 'right.type': 'four_bar',
+        'right.crank.source': source}, cli_args=shared)
+    assert graph.set(node, left__dimensions__a=1.1).successful
+    assert capfd.readouterr().err.count('joint_states: left_QB is the name of a joint') == count
 
 
 def test_motors_and_passive_joints_share_a_topic_and_nobody_hears_himself(graph):

@@ -46,12 +46,17 @@ def test_whatever_happens_the_node_publishes_what_the_library_says(name, seeds):
 
 FIVE_BAR = {'mechanisms': ['m'], 'm.type': 'five_bar'}
 LEG = {'mechanisms': ['m'], 'm.type': 'jansen'}
+BOTH = {'mechanisms': ['a', 'b'], 'a.type': 'jansen', 'b.type': 'slotted_lever'}
 UNHEARD = {
     'a scene that nobody listens to': (LEG, [message({'m_crank': 0.5})] * 3),
     'a listener that leaves': (LEG, [
         ('listen', 'm/joint_states', True), message({'m_crank': 0.5}),
         ('listen', 'm/joint_states', False), message({'m_crank': 0.6}),
         ('listen', 'm/joint_states', True), message({'m_crank': 0.7})]),
+    'a mechanism of two that moves unheard': (BOTH, [
+        ('listen', 'joint_states', True), message({'a_crank': 0.2, 'b_crank': 0.1}),
+        ('listen', 'joint_states', False), message({'b_crank': 0.5}),
+        ('listen', 'joint_states', True), message({'a_crank': 0.3})]),
     'an input of two': (FIVE_BAR, [
         *everything(FIVE_BAR), message({'m_crank': 0.5}), message({'m_crank': 0.6}),
         message({'m_crank2': 0.1})])}
@@ -94,6 +99,21 @@ def test_a_velocity_that_is_no_number_leaves_all_velocities_out(graph, by):
         *(step for i in range(5) for step in (
             by, message({'a_crank': 0.2, 'b_crank': 0.1}, [1.0, 1.0]), by,
             message({'a_crank': 0.2 + 0.01 * i} if i % 2 else {'b_crank': 0.01 * i}, [1.0])))])
+
+
+MEASURED = {'mechanisms': ['a', 'b'], 'a.type': 'four_bar', 'a.crank.measures': 'QB',
+            'a.crank.ratio': 2.0, 'a.crank.offset': 0.1, 'a.crank.start': 0.5,
+            'b.type': 'slotted_lever'}
+
+
+@pytest.mark.parametrize('bad', [9.0, math.nan, math.inf])
+def test_what_a_sensor_cannot_say_is_no_pose(graph, bad):
+    bench = Bench(graph, MEASURED)
+    good, other = message({'a_QB': 0.43}, [0.5]), message({'b_crank': 0.3}, [1.0])
+    odd = message({'a_QB': bad}, [0.7], 2), message({'a_QB': bad}, [math.nan], 3)
+    bench.run([*everything(MEASURED), odd[0], good, *odd, good, other, odd[0], other,
+               ('compiled',), good, good, *odd, other, good, message({'a_QB': 0.44}, [0.5], 4)])
+    assert bench.model.states['a'].values == [pytest.approx(0.54, abs=0.1)]
 
 
 @pytest.mark.sample(2)

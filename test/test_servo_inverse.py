@@ -27,6 +27,7 @@ pytest.importorskip('linkage_interfaces')
 from linkage_interfaces.srv import InputsFor, ServoInverse as Service  # noqa: E402
 from linkage_ros import mechanisms, scene  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
+from linkage_ros.scene.inverse_request import InverseRequest  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 
 TWO = {'mechanisms': ['left', 'right', 'drop'], 'left.type': 'slotted_lever',
@@ -338,6 +339,35 @@ def test_a_million_angles_are_answered(graph):
     response = ask(node, wanted)
     assert sum(response.reachable) == pytest.approx(10 ** 6 * LIMIT, abs=2)
     assert 'and 437459 more' in response.message or len(response.message) < 300
+
+
+SEARCHED = {'mechanism': 'jansen', 'output': 'G.x'}
+
+
+@pytest.mark.parametrize('count, longest, request_, text', [
+    (10_001, 9.0, SEARCHED, '10001 values; give up to 10000 at once, since G.x is searched'),
+    (1_000_001, 9.0, {}, '1000001 values; give up to 1000000 at once'),
+    (20_001, 0.0, {}, 'after 0 s only 10000 of the 20001 values in lever_angle are solved; give '
+                      'up to 10000 at once')])
+def test_an_answer_that_others_would_wait_for_is_refused(
+        graph, monkeypatch, count, longest, request_, text):
+    monkeypatch.setattr('linkage_ros.nodes.servo_inverse.LONGEST', longest)
+    response = ask(graph.start(ServoInverse), [0.1] * count, **request_)
+    assert not response.success and text in response.message
+
+
+@pytest.mark.parametrize('near', [[], [2.9], 'each'])
+def test_a_long_way_is_answered_as_in_one_piece(graph, near):
+    node = graph.start(ServoInverse, {'mechanisms': ['slotted_lever']})
+    # In and out of the reach, at the ends of the blocks too; it comes near its ends.
+    values = 0.57 * np.sin(np.linspace(-1.6, 9.0, 35_000))
+    near = np.linspace(-3.0, 20.0, len(values)) if near == 'each' else np.array(near)
+    response = ask(node, values.tolist(), near.tolist())
+    inverse = InverseRequest(node.scene.machines['slotted_lever'], [''])
+    (servos,), (rates,) = inverse.positions([values], [near] if len(near) else None)
+    np.testing.assert_allclose(response.servo_angle, servos, rtol=1e-12)
+    np.testing.assert_allclose(response.reduction, rates, rtol=1e-9)
+    assert np.isnan(servos).any() and np.isfinite(servos).any()
 
 
 def random_scene(rng):

@@ -12,6 +12,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import chain
 import math
 import time
@@ -34,8 +35,8 @@ from ..scene.joint_names import JointName
 from ..scene.scene_mechanism import SceneMechanism
 from ..words import elided, listed
 
-# Shortest time between two searches for a first command [s].
-SECONDS_BETWEEN_SEARCHES = 0.5
+# Pause after a search for a first command [s]; and at least as many times the search's duration.
+SECONDS_BETWEEN_SEARCHES, PAUSES = 0.5, 9.0
 # Maximum numbers of cached publishers, of logged unknown names, and of points of a trajectory,
 # which take the worker some seconds.
 PUBLISHERS, UNKNOWN_NAMES, MOST_POINTS = 100, 1000, 10_000
@@ -85,6 +86,11 @@ class Command(NamedTuple):
     speeds: Optional[Sequence[float]]
 
     @property
+    def is_valid(self) -> bool:
+        """Whether there is an answer."""
+        return all(map(math.isfinite, self.inputs))
+
+    @property
     def efforts(self) -> list[float]:
         """Return the static efforts of the actuators that balance the loads [N m or N]."""
         machine = self.target.machine
@@ -99,9 +105,10 @@ class CommandStream:
     Publishes `servo_commands`, `<mechanism>/commands` and `servo_trajectory`.
 
     Requests arrive on `wanted_states` and `wanted_trajectory`. Each solution continues the last
-    one; if an output is out of reach, its actuator holds the last valid command. A trajectory is
-    solved in a worker thread; a newer one replaces it. `present(mechanism)` returns the present
-    inputs of a SceneMechanism [rad or m], inf where they are unknown.
+    one; if an output is out of reach, its actuator holds the last valid command. Worker threads
+    solve a trajectory, which a newer one replaces, and what has to be searched for several inputs:
+    their first command, or why there is none. `present(mechanism)` returns the present inputs of a
+    SceneMechanism [rad or m], inf where they are unknown.
     """
 
     def __init__(self, node: Any, mechanisms: Iterable[str],
@@ -112,10 +119,12 @@ class CommandStream:
                         for name in mechanisms}
         self._trajectories = TrackedPublisher(node, JointTrajectory, 'servo_trajectory', 10)
         self._throttle, self._unknown = Throttle(self._logger), Once(UNKNOWN_NAMES)
+        self._searched = Throttle(self._logger)
         self._machines: Mapping[str, SceneMechanism] = {}
         self._last: dict[str, Command] = {}
+        # From when on the next search for a mechanism may begin.
         self._searches: dict[str, float] = {}
-        self._worker = Worker(node, node.report)
+        self._worker, self._searcher = Worker(node, node.report), Worker(node, node.report)
         joint_state_reader.subscribe(node, 'wanted_states', self._receive)
         node.create_subscription(JointTrajectory, 'wanted_trajectory', node.guarded(
             'wanted_trajectory', self._receive_trajectory), 10)
@@ -129,8 +138,9 @@ class CommandStream:
         self._reader = joint_state_reader.Reader(self._interpret)
 
     def end(self) -> None:
-        """Cancel the trajectory in progress."""
+        """Cancel the trajectory and the search in progress."""
         self._worker.end()
+        self._searcher.end()
 
     def _output(self, named: str) -> Optional[tuple[SceneMechanism, str, JointName]]:
         """Return the mechanism, output and published name for a name in messages, or None."""
@@ -177,7 +187,8 @@ class CommandStream:
         """Return the targets of a sender's messages, and whether these have velocities."""
         targets, unknown, reasons = self._targets(message.name[:len(message.position)])
         for reason in reasons:
-            self._logger.warning(f'wanted_states: {reason}')
+            # Throttled, because each message of some senders is interpreted.
+            self._throttle.warn(reason, partial('wanted_states: {}'.format, reason))
         if unknown := self._unknown.new(unknown):
             self._logger.warning(f'wanted_states: {_no_output(unknown)}{self._unknown.ending}')
         return targets, len(message.velocity) == len(message.name)
@@ -188,11 +199,12 @@ class CommandStream:
             return
         sender = self._reader.sender(data)
         (targets, known), (stamp, positions, speeds) = sender.meaning, sender.read(data)
-        commands = [self._command(target, positions, speeds if known else None)
+        if stamp == NEVER:
+            stamp = pack_time(self._clock.now().nanoseconds)
+        commands = [self._command(target, stamp, positions, speeds if known else None)
                     for target in targets]
         if found := [command for command in commands if command]:
-            now = stamp == NEVER and pack_time(self._clock.now().nanoseconds)
-            self._send(now or stamp, found)
+            self._send(stamp, found)
 
     def _near(self, target: Target) -> Sequence[float]:
         """Return the inputs to continue from: of the last command, else present, else starts."""
@@ -201,21 +213,48 @@ class CommandStream:
         return [position if math.isfinite(position) else drive.start for position, drive in zip(
             self._present(target.machine), target.machine.inputs.values())]
 
-    def _command(self, target: Target, positions: Sequence[float],
+    def _command(self, target: Target, stamp: bytes, positions: Sequence[float],
                  speeds: Optional[Sequence[float]]) -> Optional[Command]:
         """Return the command for a target or, out of reach, the last valid one, if any."""
-        name, now = target.machine.name, time.monotonic()
-        last = self._last.get(name)
-        # Only the first command, which continues no other, may jump; its search is rate-limited.
-        jumps = not last and now > self._searches.get(name, -math.inf)
-        command = Command(target, *target.command(positions, speeds, self._near(target), jumps))
-        if jumps:
-            self._searches[name] = now + SECONDS_BETWEEN_SEARCHES
-        if all(map(math.isfinite, command.inputs)):
+        name, near = target.machine.name, self._near(target)
+        last, is_slow = self._last.get(name), len(near) > 1 and not target.request.is_closed
+        # Only the first command, which continues no other, may jump.
+        command = Command(target, *target.command(
+            positions, speeds, near, jumps=not last and not is_slow))
+        if command.is_valid:
             self._last[name] = command
             return command
-        self._throttle.warn(target.named, lambda: f'wanted_states: {target.reason(positions)}')
+        if not is_slow:
+            self._throttle.warn(target.named, lambda: f'wanted_states: {target.reason(positions)}')
+        elif time.monotonic() > self._searches.get(name, -math.inf):
+            self._searches[name] = math.inf
+            self._searcher.replace(f'the search for {name}', lambda: self._search(
+                target, stamp, positions, speeds, None if last else near))
         return last and last._replace(speeds=[0.0] * len(last.inputs))
+
+    def _search(self, target: Target, stamp: bytes, positions: Sequence[float],
+                speeds: Optional[Sequence[float]], near: Optional[Sequence[float]]
+                ) -> Optional[Callable[[], None]]:
+        """Search the first command next to inputs `near`, if given; if there is none, say why."""
+        start = time.monotonic()
+        try:
+            if near:
+                command = Command(target, *target.command(positions, speeds, near, jumps=True))
+                if command.is_valid:
+                    return partial(self._begin, command, stamp)
+            self._searched.warn(target.named, lambda: f'wanted_states: {target.reason(positions)}')
+            return None
+        finally:
+            end = time.monotonic()
+            self._searches[target.machine.name] = end + max(
+                SECONDS_BETWEEN_SEARCHES, PAUSES * (end - start))
+
+    def _begin(self, command: Command, stamp: bytes) -> None:
+        """Publish a first command that has been searched, unless it is out of date."""
+        machine = command.target.machine
+        if machine is self._machines.get(machine.name) and machine.name not in self._last:
+            self._last[machine.name] = command
+            self._send(stamp, [command])
 
     def _send(self, stamp: bytes, commands: Sequence[Command]) -> None:
         names = tuple(name for command in commands for name in command.target.actuators)
@@ -252,6 +291,8 @@ class CommandStream:
             targets, unknown, reasons = self._targets(message.joint_names)
             if unknown or reasons:
                 raise ValueError(_no_output(unknown) if unknown else reasons[0])
+            if message.points and not targets:
+                raise ValueError('joint_names is empty: name at least one output')
         except ValueError as error:
             self._refuse(error)
             return
@@ -287,6 +328,8 @@ def _solved_point(i: int, point: JointTrajectoryPoint, n: int, targets: Sequence
     if len(point.positions) != n or len(point.velocities) not in (0, n):
         raise ValueError(f'point {i} must have {n} positions, and as many velocities or '
                          f'none, not {len(point.positions)} and {len(point.velocities)}')
+    if not all(map(math.isfinite, point.velocities)):
+        raise ValueError(f'point {i}: a velocity must be finite')
     found = []
     for k, target in enumerate(targets):
         near[k], *actuator = target.command(

@@ -12,7 +12,6 @@
 
 from __future__ import annotations
 
-import sys
 from time import monotonic_ns, time_ns
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
@@ -20,7 +19,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
-from . import scene_node
+from . import scene_node, shutdown
 from .message_layout import pack_time
 from .messages import joint_states
 from .publishers import PatchedPublisher, TrackedPublisher
@@ -181,4 +180,4 @@ def main(args: Any = None) -> int:
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    shutdown.run(main)

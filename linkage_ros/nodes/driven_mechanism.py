@@ -63,6 +63,9 @@ class DrivenMechanism:
         self.known = np.zeros((2, len(machine.inputs)), bool)
         self.stamp = np.zeros(1, np.int64)
         self.validity: Optional[Validity] = None
+        # A sensor's last reading, and the last input that one has given.
+        self._measured = math.nan
+        self._near: Optional[float] = None
         # Ids of the displayed markers, whether the locus is displayed, and the last robot model.
         self._displayed: AbstractSet[int] = frozenset()
         self._has_locus, self._described = False, ''
@@ -106,18 +109,14 @@ class DrivenMechanism:
         """Set input `i` [rad or m] and its speed [rad/s or m/s]; None sets a speed of 0."""
         self.inputs[:, i] = value, 0.0 if speed is None else speed
 
-    def measure(self, i: int, position: float, speed: Optional[float]) -> bool:
-        """Set input `i` by a sensor's position and speed; return False if that is out of reach."""
-        drive = self.model.inputs[i]
-        near = float(self.inputs[0, i]) if self.known[0, i] else None
-        value, speed = self.model.machine.from_source(drive, position, speed, near)
-        if not math.isfinite(value):
-            self._throttle.warn(drive.source, lambda: (
-                f'{drive.source} is at {position:.6g}, out of reach of {drive.measures}: it is '
-                'ignored'))
-            return False
+    def measure(self, i: int, position: float, speed: Optional[float]) -> None:
+        """Set input `i` by a sensor's position and speed; NaN if these are out of reach."""
+        value, speed = self.model.machine.from_source(
+            self.model.inputs[i], position, speed, self._near)
+        if math.isfinite(value):
+            self._near = value
+        self._measured = position
         self.receive(i, value, speed)
-        return True
 
     def solve(self, solution: Solution) -> None:
         """Solve at the present inputs."""
@@ -224,10 +223,25 @@ class DrivenMechanism:
 
     def _out_of_reach(self) -> str:
         assembled = [*self.validity.legs()] if self.validity else []
-        legs = ', '.join(f'{self.name}_{prefix}'.rstrip('_') for leg, prefix in enumerate(
-            self.model.assembly.legs) if leg not in assembled)
-        inputs = self.model.inputs
+        missing = {leg: f'{self.name}_{prefix}'.rstrip('_') for leg, prefix in enumerate(
+            self.model.assembly.legs) if leg not in assembled}
+        legs, inputs = ', '.join(missing.values()), self.model.inputs
+        if inputs[0].measures and math.isnan(self.inputs[0, 0]):
+            return (f'{legs} cannot be assembled: {inputs[0].source} is at {self._measured:.6g}, '
+                    f'out of reach of {inputs[0].measures}')
         at = ', '.join(f'{one.input.quantity} {value:.6g} {one.input.unit}'
                        for one, value in zip(inputs, self.inputs[0]))
-        reach = ', '.join(f'{scene.in_words(one.reach)} {one.input.unit}' for one in inputs)
-        return f'{legs} cannot be assembled at {at}; the reach is {reach}'
+        first, *others = missing
+        reach = ', '.join(f'{scene.in_words(self._reach(one, first))} {one.input.unit}'
+                          for one in inputs)
+        of = f' of {missing[first]}' if others else ''
+        return f'{legs} cannot be assembled at {at}; the reach{of} is {reach}'
+
+    def _reach(self, drive: scene.InputSettings, leg: int) -> Sequence[Tuple[float, float]]:
+        """Return the reach of a leg, by the crank that all legs have in common."""
+        if len(self.model.assembly.legs) == 1:
+            return drive.reach
+        side, plus = self.model.assembly.own_inputs()[leg]
+        arcs = [sorted(side * (end - plus) for end in arc) for arc in drive.reach]
+        turns = [drive.input.turn * math.floor(low / drive.input.turn + 0.5) for low, _ in arcs]
+        return sorted((low - turn, high - turn) for (low, high), turn in zip(arcs, turns))

@@ -14,14 +14,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-import sys
 import time
 from typing import Any, Callable, Dict, Iterable, List, Tuple
 
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
 
-from . import joint_state_reader, scene_node
+from . import joint_state_reader, scene_node, shutdown
 from .driven_mechanism import DrivenMechanism
 from .log import Once
 from .mechanism_model import MechanismModel
@@ -46,6 +45,7 @@ class Kinematics(scene_node.SceneNode):
         self._mechanisms: Dict[str, DrivenMechanism] = {}
         self._models: Dict[str, MechanismModel] = {}
         super().__init__(scene.KINEMATICS, **kwargs)
+        self._clashing = Once(UNKNOWN_NAMES)
         # Mechanism and index of the inputs, by their source joint.
         self._inputs: Dict[str, List[Tuple[str, int]]] = {}
         for name, machine in self.scene.machines.items():
@@ -102,6 +102,7 @@ class Kinematics(scene_node.SceneNode):
         is_first, self._models = not self._models, models
         self._own = frozenset(joint.name for model in models.values()
                               for joint in model.machine.joints.values())
+        self._check_clashes()
         for one in changed:
             one.adopt(models[one.name])
         self._invalidate()
@@ -160,6 +161,20 @@ class Kinematics(scene_node.SceneNode):
                 f'crank_states: no input is called {listed(unknown, 150)}; the inputs are '
                 f'{listed(self._inputs, 150)}{self._unknown.ending}')
 
+    def _check_clashes(self) -> None:
+        """Warn once of each joint that has the name of another mechanism's source on its topic."""
+        clashes = self._clashing.new(
+            joint.name for name, model in self._models.items()
+            for key, joint in model.machine.joints.items()
+            if joint.published and joint.name in self._scene_joint_states.omitted
+            and key not in model.machine.inputs
+            and name not in dict(self._inputs[joint.name]))
+        if clashes:
+            self.get_logger().warning(
+                f'joint_states: {listed(clashes, 150)} is the name of a joint and of a source of '
+                'another mechanism on the same topic, so that the joint is not published; rename '
+                f'one of them{self._clashing.ending}')
+
     def _warn_of_missing(self) -> None:
         """Warn of source joints that have not been received."""
         self._missing_timer.cancel()
@@ -178,4 +193,4 @@ def main(args: Any = None) -> int:
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    shutdown.run(main)

@@ -106,6 +106,10 @@ class Plan:
             if one.is_complete and (in_scene or one.has_subscribers)]
         self._in_scene = [one for one in planner.mechanisms if one.is_complete] if in_scene else []
         moved = {one for one, _ in self.solved}
+        for one in mechanisms:
+            if one not in moved:
+                # Its last solution will be that of earlier inputs.
+                one.validity = None
         for one in self._in_scene:
             if one not in moved:
                 one.refresh(one.solution(in_scene))
@@ -204,26 +208,26 @@ class Planner:
         """Return the plan for a message, None if it moves nothing; mark its inputs as known."""
         routes, moving = sender.meaning
         measured = [route for route in routes if route.is_measured]
-        failed = self._measure(sender, measured, moving, data) if measured else frozenset()
-        received = [route for route in routes if route not in failed]
+        if measured:
+            self._measure(sender, measured, moving, data)
         before = [one.known.tobytes() for one in self.mechanisms]
-        for route in received:
+        for route in routes:
             route.mechanism.known[:, route.input] = True, moving
         after = [one.known.tobytes() for one in self.mechanisms]
         moved = tuple(dict.fromkeys(route.mechanism for route in routes))
         plan = None
         if moved and sender.size:
             plan = self._plans.get_or_make(
-                (sender, tuple(after), failed), lambda: Plan(sender, routes, moved, self))
+                (sender, tuple(after)), lambda: Plan(sender, routes, moved, self))
         elif moved:
             plan = Plan(sender, routes, moved, self)
         self._last = plan if plan and not measured and before == after and sender.size else None
         return plan
 
     def _measure(self, sender: Sender, routes: Sequence[Route], moving: bool,
-                 data: bytes) -> frozenset:
-        """Set the inputs that sensors measure; return the routes of values out of reach."""
+                 data: bytes) -> None:
+        """Set the inputs that sensors measure."""
         _, positions, velocities = sender.read(data)
-        return frozenset(route for route in routes if not route.mechanism.measure(
-            route.input, positions[route.source_index],
-            velocities[route.source_index] if moving else None))
+        for route in routes:
+            route.mechanism.measure(route.input, positions[route.source_index],
+                                    velocities[route.source_index] if moving else None)

@@ -34,6 +34,12 @@ class SceneJointStates:
     If `crank_states` is remapped to `joint_states`, the source joints `sources` are on that topic
     already, and are not published again. `changed` is called when the first subscriber comes and
     when the last leaves.
+
+    Attributes
+    ----------
+    omitted : frozenset of str
+        The names that are not published, since they are on the topic already.
+
     """
 
     def __init__(self, node: Any, sources: Iterable[str], changed: Callable[[], None]):
@@ -42,7 +48,7 @@ class SceneJointStates:
         self._joint_states = TrackedPublisher(
             node, JointState, 'joint_states', 10, changed, int(same))
         self._descriptions = node.create_publisher(String, 'robot_description', LATCHED)
-        self._omitted = frozenset(sources if same else ())
+        self.omitted = frozenset(sources if same else ())
         self._logger = node.get_logger()
         self._publishers = Cache(self._publisher, PUBLISHERS)
         self._description = ''
@@ -79,7 +85,7 @@ class SceneJointStates:
         names, positions, velocities, efforts = map(np.concatenate, zip(
             *(model.joints(one, own)
               for (model, one), own in zip(parts, np.split(values, ends)))))
-        chosen = [name not in self._omitted for name in names]
+        chosen = [name not in self.omitted for name in names]
         moving = all(one.has_velocities for _, one in parts)
         loaded = {one.has_efforts for _, one in parts if one.solution.layout.efforts} == {True}
         return joint_states(

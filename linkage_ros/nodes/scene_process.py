@@ -10,10 +10,9 @@
 
 """The three nodes of a scene in one process: the same names, topics, parameters and services."""
 
-import sys
 from typing import Any, Iterator
 
-from . import scene_node
+from . import scene_node, shutdown
 from .crank_driver import CrankDriver
 from .kinematics import Kinematics
 from .scene_node import SceneNode
@@ -37,4 +36,4 @@ def main(args: Any = None) -> int:
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    shutdown.run(main)

@@ -15,13 +15,13 @@ from __future__ import annotations
 from array import array
 from contextlib import suppress
 import math
-import sys
+import time
 from typing import Any, Callable, Dict, List, Mapping, Sequence, Tuple
 
 import numpy as np
 from sensor_msgs.msg import JointState
 
-from . import joint_state_reader, scene_node
+from . import joint_state_reader, scene_node, shutdown
 from .command_stream import CommandStream
 from .message_layout import Unreadable
 from .. import scene
@@ -41,8 +41,9 @@ except ImportError as error:
         'build in the workspace, which builds linkage_interfaces too, and source '
         'install/setup.bash') from error
 
-# More values than this at once would delay other callers.
-MOST_VALUES = 1_000_000
+# Other callers and messages wait for an answer: most values at once, most of an output that is
+# searched, and the CPU time after which an answer is given up [s], seen after a block of them.
+MOST_VALUES, MOST_SEARCHED, LONGEST, BLOCK = 1_000_000, 10_000, 1.0, 10_000
 # Maximum number of values, and of letters of allowed names, in a message.
 MOST_NAMED, MOST = 5, 150
 
@@ -137,8 +138,10 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
     n = len(values)
     if not n:
         raise ValueError('lever_angle is empty; give at least one value')
-    if n > MOST_VALUES:
-        raise ValueError(f'lever_angle has {n} values; give up to {MOST_VALUES} at once')
+    most = MOST_VALUES if inverse.is_closed else MOST_SEARCHED
+    if n > most:
+        searched = '' if inverse.is_closed else f', since {listed(inverse.outputs)} is searched'
+        raise ValueError(f'lever_angle has {n} values; give up to {most} at once{searched}')
     if len(near) not in (0, 1, n):
         raise ValueError(f'servo_near must be empty, have one angle, or one for each of the '
                          f'{n} in lever_angle, not {len(near)}')
@@ -147,14 +150,15 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
     if start and not np.all(np.abs(start[0]) <= scene.FARTHEST):
         raise ValueError(f'servo_near must be finite and within {scene.FARTHEST:g} '
                          f'{inverse.units[0]} of zero')
-    (positions,), (rates,) = inverse.positions([np.array(values) if n > 1 else values[0]], start)
     if n > 1:
+        positions, rates = _many(inverse, np.array(values), start and start[0])
         finite = np.isfinite(positions)
         success = bool(finite.all())
         response.servo_angle = array('d', positions.tobytes())
         response.reduction = array('d', rates.tobytes())
         reachable = [True] * n if success else finite.tolist()
     else:
+        (positions,), (rates,) = inverse.positions([values[0]], start)
         success = math.isfinite(positions)
         response.servo_angle, response.reduction = [positions], [rates]
         reachable = [success]
@@ -162,6 +166,25 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
     if not success:
         response.message = elided(_unreachable(inverse, [
             value for value, reached in zip(values, reachable) if not reached]), MESSAGE)
+
+
+def _many(inverse: InverseRequest, values: np.ndarray, near: Any
+          ) -> Tuple[np.ndarray, np.ndarray]:
+    """Return positions and rates for many values; raise ValueError if that takes too long."""
+    each, start = np.size(near) == len(values), time.thread_time()
+    positions, rates = np.empty((2, len(values)))
+    for at in range(0, len(values), BLOCK):
+        if at and time.thread_time() > start + LONGEST:
+            raise ValueError(f'after {LONGEST:g} s only {at} of the {len(values)} values in '
+                             f'lever_angle are solved; give up to {at} at once')
+        some = slice(at, at + BLOCK)
+        beside = near[some] if each else near
+        (positions[some],), (rates[some],) = inverse.positions(
+            [values[some]], None if beside is None else [beside])
+        found = np.flatnonzero(np.isfinite(positions[some]))
+        if len(found) and not each:
+            near = positions[at + found[-1]]
+    return positions, rates
 
 
 def solve_inputs_for(machine: scene.SceneMechanism, request: Any, response: Any) -> None:
@@ -235,4 +258,4 @@ def main(args: Any = None) -> int:
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    shutdown.run(main)

@@ -23,6 +23,19 @@ from typing import Any, Callable
 TIMEOUT = 0.6
 
 
+def run(main: Callable[[], int]) -> None:
+    """Run the main function of a node, and end the process with the exit code that it returns."""
+    # Importing ROS is too slow for a signal to wait; ShutdownHandler replaces this meanwhile.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: os._exit(0))
+    code = main()
+    # A compiling thread or much garbage would delay the end, and a second signal would change the
+    # exit code.
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+
+
 class ShutdownHandler:
     """
     A context that handles SIGINT and SIGTERM in a thread, so that no callback is interrupted.

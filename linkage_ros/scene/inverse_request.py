@@ -24,6 +24,7 @@ from .scene_mechanism import SceneMechanism
 from ..formula.program import compile_in_background
 from ..linkage.choice import CLOSE
 from ..linkage.inputs import Arc, Input
+from ..linkage.inverse import Answer
 from ..words import listed
 
 LEVER = 'lever'
@@ -109,6 +110,11 @@ class InverseRequest:
         self._ends = [drive.ends and (drive.ends[0] / scale, drive.ends[1] / scale)
                       for drive, scale in zip(self._drives, self._scales)]
         self._compilation: Optional[Future] = None
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether the answers are closed forms, so that none is searched."""
+        return self._inverse.closed is not None
 
     def inputs_of(self, positions: Sequence[Any]) -> List[Any]:
         """Return the inputs [rad or m] at their actuators' positions."""
@@ -213,17 +219,22 @@ class InverseRequest:
         They are sorted by their distance from the inputs `near` [rad or m], by default the start.
         """
         near = [drive.start for drive in self._drives] if near is None else near
+        found = self._inside(self._inverse.all(np.divide(values, self._units),
+                                               np.divide(near, self._scales)))
+        sizes = [drive.input.size for drive in self._drives]
+        return sorted(found, key=lambda answer: math.dist(
+            np.divide(answer.inputs, sizes), np.divide(near, sizes)))
+
+    def _inside(self, answers: Sequence[Answer]) -> List[SceneAnswer]:
+        """Return those of the linkage's answers that lie inside the sweeps."""
         found = []
-        for answer in self._inverse.all(np.divide(values, self._units),
-                                        np.divide(near, self._scales)):
+        for answer in answers:
             inputs = [_between_ends(drive, input_, value * scale)
                       for drive, input_, value, scale in zip(
                           self._drives, self._inverse.inputs, answer.inputs, self._scales)]
             if not any(map(math.isnan, inputs)):
                 found.append(SceneAnswer(tuple(inputs), answer.mode, answer.is_singular))
-        sizes = [drive.input.size for drive in self._drives]
-        return sorted(found, key=lambda answer: math.dist(
-            np.divide(answer.inputs, sizes), np.divide(near, sizes)))
+        return found
 
     def reason(self, *values: float) -> str:
         """Return in words why values are unreachable."""
@@ -235,7 +246,7 @@ class InverseRequest:
             return self._reason(values[0], [answer.inputs[0] * self._scales[0]
                                             for answer in answers])
         what = f'{listed(self.outputs)} at {listed(f"{value:.6g}" for value in values)}'
-        if self.answers(values):
+        if self._inside(answers):
             return f'the way to {what} leads through a singular pose, out of the reach or a sweep'
         if not answers or not any(drive.ends for drive in self._drives):
             return f'{what} is outside the reach'

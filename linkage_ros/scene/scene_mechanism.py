@@ -13,6 +13,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field as some
+import math
 import re
 from typing import Any, Dict, Mapping, Optional, Sequence, Tuple
 
@@ -143,14 +144,15 @@ class SceneMechanism:
         Return an input and its speed, from those of its source joint [rad or m, per second].
 
         If the source joint measures an output, the input continues from `near`, by default its
-        start, and is NaN if there is none. The speed is None if it is unknown.
+        start, and is NaN if there is none. The speed is None if it is unknown, and NaN at an
+        extreme of the output.
         """
         value = drive.ratio * position + drive.offset
         speed = None if speed is None else drive.ratio * speed
         if not drive.measures:
             return value, speed
         found, rate = self.measured(drive.measures, value, drive.start if near is None else near)
-        return found, speed / rate if speed is not None and rate else None
+        return found, None if speed is None else speed / rate if rate else math.nan
 
     def to_source(self, drive: InputSettings, value: float, speed: float) -> Tuple[float, float]:
         """Return position and speed of an input's source joint, from those of the input."""

@@ -11,7 +11,6 @@
 """Node that serves a page with the running scene and sliders to change it."""
 
 from errno import EADDRINUSE
-import sys
 from typing import Any, Optional
 
 from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
@@ -19,7 +18,7 @@ from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 
 from .. import scene
-from ..nodes import scene_node
+from ..nodes import scene_node, shutdown
 
 try:
     from .server import Server
@@ -88,4 +87,4 @@ def main(args: Optional[list[str]] = None) -> int:
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    shutdown.run(main)
