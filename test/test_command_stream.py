@@ -14,6 +14,7 @@ import itertools
 import math
 import random
 import threading
+import time
 
 from builtin_interfaces.msg import Duration
 from linkage_ros import mechanisms, scene
@@ -54,6 +55,9 @@ BUCKET = [f'digger_{output}' for output in ('H.x', 'H.y', 'angle(H,J)')]
 class Stream:
     """What is wanted goes to a node, and its commands are gathered."""
 
+    # Without a pause the messages would leave a thread that searches no time.
+    PAUSE = 0.01
+
     def __init__(self, graph, parameters):
         self.node = graph.start(ServoInverse, parameters)
         self._graph, self._stamps = graph, itertools.count(1)
@@ -65,8 +69,13 @@ class Stream:
         message = JointState(name=names, position=positions, velocity=velocities)
         message.header.stamp.sec = stamp = next(self._stamps)
 
+        sent = -math.inf
+
         def answered():
-            self._wanted.publish(message)
+            nonlocal sent
+            if time.monotonic() > sent + self.PAUSE:
+                self._wanted.publish(message)
+                sent = time.monotonic()
             return [c for c in self.commands if c.header.stamp.sec == stamp]
 
         command = self._graph.until(answered)[0]
@@ -303,12 +312,14 @@ def searches(monkeypatch):
 
 def test_a_first_command_is_searched_beside_the_messages(graph, searches):
     stream = Stream(graph, SEVERAL)
+    arrays = graph.listen(Float64MultiArray, 'digger/commands')
     far = [56.8, 137.9, 133.8]
     linkage = stream.node.scene.machines['digger'].linkage
     wanted = linkage.function((), tuple(name.split('_')[1] for name in SEARCHED))(*far)
     found = stream.want(SEARCHED, list(wanted))
     assert [position for position, in found.values()] == pytest.approx(
         [far[0] - 80.0, *far[1:]], rel=1e-9)
+    graph.until(lambda: arrays and arrays[-1].data.tolist() == [x for x, in found.values()])
     assert searches == [False]
 
 
