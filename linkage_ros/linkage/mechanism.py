@@ -522,8 +522,9 @@ class Mechanism:
         values of the other inputs. Without `near`, the result has all solutions, crank angles in
         [-pi, pi) or within their period, ascending, on a last axis of length one or more, padded
         with NaN. With `near` it has the nearest, including whole turns, in the broadcast shape of
-        value and near. It is NaN where the output is unreachable or constant; a value beyond an
-        extreme by rounding counts as the extreme.
+        value and near. It is NaN where the output is unreachable or constant up to rounding; a
+        value beyond an extreme by rounding counts as the extreme. Raises ValueError if the
+        output's formula does not depend on the input.
         """
         value, (inverse, fixed) = numbers('value', value), self._with_others(output, others)
         if near is None:
