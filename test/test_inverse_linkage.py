@@ -16,6 +16,8 @@ import math
 import pickle
 
 from linkage_ros import mechanisms
+from linkage_ros.linkage.inverse_problem import InverseProblem
+from linkage_ros.linkage.search import BranchSearch
 import numpy as np
 import pytest
 from sweeps import EXHAUSTIVE
@@ -426,3 +428,45 @@ def test_newton_s_method_does_not_lead_to_answers_far_away():
         value = float(rhombus.solve(at)['B'][0])
         for answer in rhombus.inverse('B.x').all(value):
             assert rhombus.solve(answer.inputs[0])['B'][0] == pytest.approx(value, abs=1e-12)
+
+
+@pytest.mark.parametrize('near', [3.0, -3.0, 3.0 + math.tau])
+def test_a_jump_at_the_end_of_a_turn_is_not_passed(near):
+    # By the inscribed angle it is half the crank's, and jumps by half a turn where A meets Q.
+    linkage = custom('O ground 0 0', 'Q ground -1 0', 'R ground 3 0.4', 'A crank O 1',
+                     'B dyad A R 4 2.6 left')
+    search = BranchSearch(linkage, 'angle(Q,A)', linkage.inputs[0])
+    half = 0.5 * math.remainder(near, math.tau)
+    for away in (-0.05, 0.05):
+        (found,), _ = search.follow((half + away,), (near,))
+        assert found == pytest.approx(near + 2.0 * away, abs=1e-12)
+    (found,), _ = search.follow((math.copysign(0.5 * math.pi + 0.05, half),), (near,))
+    assert math.isnan(found)
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_what_is_followed_has_the_value(seed):
+    rng, count = np.random.default_rng(seed), 0
+    while count < 40:
+        try:
+            design = random_linkages.design(rng)
+            linkage = custom(*design.joints, branches=design.branches, **design.dimensions)
+        except ValueError:
+            continue
+        if len(linkage.inputs) > 1 or not linkage.reach():
+            continue
+        output = str(rng.choice(outputs_of(linkage)))
+        if output == linkage.inputs[0].name:
+            continue
+        first = InverseProblem(linkage, (output,)).inputs[0]
+        search, scale = BranchSearch(linkage, output, first), (
+            1.0 if linkage.is_angle(output) else linkage.longest)
+        for near in rng.uniform(1.2 * first.low, 1.2 * first.high, 20).tolist():
+            value = float(linkage.joint_angles(near, [output])[output])
+            value += rng.uniform(-0.2, 0.2) * scale
+            (found,), _ = search.follow((value,), (near,))
+            if math.isfinite(found):
+                gap = float(linkage.joint_angles(found, [output])[output]) - value
+                gap = math.remainder(gap, math.tau) if linkage.is_angle(output) else gap
+                assert abs(gap) < 1e-6 * scale, (str(design), output, near, value)
+                count += 1

@@ -175,12 +175,16 @@ class MonotoneBranches:
                  ) -> Optional[Tuple[float, float]]:
         """Return input and rate at a value of a branch or of those that continue it."""
         passed, slack = 0.0, self._rounding
+        broken = BROKEN * (math.pi if self._angular else self._range)
         while not branch.value[0] - slack <= target <= branch.value[-1] + slack:
             end, start, step = (-1, 0, turn) if target > branch.value[-1] else (0, -1, -turn)
-            following = [each for each in self._branches if each.sign == branch.sign
-                         and abs(each.theta[start] + step - branch.theta[end]) <= CLOSE]
+            following = [
+                each for each in self._branches if each.sign == branch.sign
+                and abs(each.theta[start] + step - branch.theta[end]) <= CLOSE
+                and abs(self._difference(each.value[start] - branch.value[end])) <= broken]
             if not following or abs(passed) > turn:
                 return None
+            # The same value, or whole turns from it.
             target += float(following[0].value[start] - branch.value[end])
             branch, passed = following[0], passed + step
         i = min(max(int(branch.value.searchsorted(target)), 1), len(branch.theta) - 1)
