@@ -260,11 +260,14 @@ def test_the_first_input_is_searched_between_extremes_though_others_are_held():
 def test_an_output_that_stands_still_in_most_poses_is_answered_where_it_moves():
     # Nearly equal bars: the block stays at the crank's centre in one half of the turn.
     linkage = mechanisms.create('custom', joints=[
-        'A ground 0 0', 'B ground 0.43 0', 'C ground 2.2 0', 'D crank C 0.9',
-        'E cylinder B A 2.2 left', 'F slider D 0.900000000000009 A along B out',
-        'G dyad A F 1.3 1.4 left'])
-    for crank, drive in ((1.4, 2.3), (2.0, 2.3)):
-        value = float(linkage.solve((crank, drive))['F'][0])
-        found = linkage.input_for('F.x', value, others=(drive,))
-        moves = abs(float(linkage.velocity((crank, drive))['F'][0])) > 1e-9
-        assert (np.nanmin(abs(found - crank), initial=9.0) < 1e-9) == moves
+        'A ground 0 0', 'B ground 0.432105123617702 0', 'C ground d1 0', 'D crank C d2',
+        'E cylinder B A 2.189315412 left called drive', 'F slider D d3 A along B out',
+        'G dyad A F d4 d4 right', 'H line F G d6', 'J K L inversor A F d7 2.0073'],
+        d1=2.2362640741019026, d2=0.8931826658923526, d3=0.8931826658923615, d4=2.6947387147872717,
+        d6=5.557896960568358, d7=0.8324685908048884)
+    drive = 2.403985938284456
+    for crank in (1.45, 2.5):
+        value = float(linkage.solve((crank, drive))['J'][1])
+        moves = abs(float(linkage.velocity((crank, drive))['J'][1])) > 1e-9
+        found = linkage.input_for('J.y', value, others=(drive,))
+        assert moves == (crank == 1.45) == (np.nanmin(abs(found - crank), initial=9.0) < 1e-9)
