@@ -172,22 +172,22 @@ class _Header:
         if len(self.inputs) > 1:
             return ''
         first, arcs, literal = self.linkage.inputs[0], self.machine.first.reach, self.code.literal
-        said = ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in arcs)
+        ranges = ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in arcs)
         turn, f, name = literal(first.turn), self.code.suffix, self.given[0]
         tests = [f'isfinite({name})'] if first.is_whole(arcs) else [
             f'({name} - {low}) - {turn} * floor{f}(({name} - {low}) / {turn}) <= {width}'
             if first.turns else f'({name} >= {low} && {name} <= {high})'
             for low, high, width in ((literal(low), literal(high), literal(high - low))
                                      for low, high in arcs)]
-        return '\n'.join([f'/* Whether it can be assembled: {said} {first.unit}. */',
+        return '\n'.join([f'/* Whether it can be assembled: {ranges} {first.unit}. */',
                           f'static inline int {self.name}_reaches({self.number} {name})', '{',
                           f'    return {" || ".join(tests)};', '}', ''])
 
     def _inverse(self, tag: str, outputs: Sequence[str]) -> str:
         """Return the users' inverse: from outputs and near inputs, in scene units, to inputs."""
         linkage, number, n = self.linkage, self.number, len(outputs)
-        said = ', '.join(f'{output} [{"rad" if linkage.is_angle(output) else "m"}]'
-                         for output in outputs)
+        names = ', '.join(f'{output} [{"rad" if linkage.is_angle(output) else "m"}]'
+                          for output in outputs)
         units = [size * self.machine.scale_of(name)
                  for name, size in zip(self.inputs, self.sides.sizes)]
         if n == 1:
@@ -202,7 +202,7 @@ class _Header:
         known = ' && '.join(f'isfinite({value})' for value in values)
         lack = 'is none' if n == 1 or linkage.inverse(outputs).closed else 'are none near'
         return '\n'.join([
-            f'/* The {what} for {said}, nearest to `near`, whole turns included. Returns 0, and',
+            f'/* The {what} for {names}, nearest to `near`, whole turns included. Returns 0, and',
             f'   leaves {what} alone, where there {lack}. */',
             f'static inline int {self.name}_{what}_for_{tag}({head})', '{',
             f'    {number} q[{n}];', f'    {self.name}_point p;',

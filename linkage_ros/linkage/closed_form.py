@@ -370,7 +370,7 @@ class ClosedForm:
             gaps.append(gap)
             away, allowed, own = abs(gap), ROUNDING * scale, 0.0
             if not away <= allowed:
-                for rate, x, size in zip(row[n + i::n], inputs, self._problem.sizes):
+                for rate, x, size in zip(row[n + i::n], inputs, problem.sizes):
                     allowed += slack * abs(rate) * max(size, abs(x))
                     # Next to a dead point an ulp of an input may move the output by more.
                     own += 2.0 ** -52 * abs(rate) * abs(x)

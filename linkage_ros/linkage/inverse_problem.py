@@ -9,7 +9,7 @@
 # limitations under the License.
 
 """
-What is asked of an inverse: outputs as many as a linkage has inputs, their periods and sizes.
+The problem that an inverse solves: outputs as many as inputs, their periods and sizes.
 
 Both ways to solve it use this: the closed forms (`closed_form`) and the searches (`search`).
 """

@@ -93,7 +93,7 @@ class Search:
 
     def __init__(self, problem: InverseProblem):
         self._problem, linkage, outputs = problem, problem.linkage, problem.outputs
-        self._way = StepSearch(linkage, outputs, problem.periods) if len(outputs) > 1 else (
+        self._search = StepSearch(linkage, outputs, problem.periods) if len(outputs) > 1 else (
             BranchSearch(linkage, outputs[0], problem.inputs[0]))
 
     def solutions(self, values: Tuple[float, ...]) -> Iterator[Found]:
@@ -105,13 +105,13 @@ class Search:
 
     def over(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return the solutions for values (outputs, n), NaN where there are fewer."""
-        inputs = self._way.answers(values)
+        inputs = self._search.answers(values)
         rates = self._problem.rated.over(*inputs.swapaxes(0, 1))[len(values):].swapaxes(0, 1)
         return inputs, rates
 
     def follow(self, values: Tuple[float, ...], near: Tuple[float, ...]) -> Found:
         """Return what `Inverse.follow` does."""
-        return self._way.follow(values, near)
+        return self._search.follow(values, near)
 
 
 class BranchSearch:

@@ -55,36 +55,36 @@ def show(args: Optional[List[str]]) -> None:
         robot.check_names(asked.driven or ())
         robot = spatial.posed(robot, _values(asked.pose))
         robot = closing.held(robot, {**robot.held, **_values(asked.hold)})
-        given, said = described(robot)
+        given, reports = described(robot)
     # Unprintable characters in names of the file could end a comment.
     head = [elided(line, 10 ** 6) for line in (
         f'From {asked.file}. All its joints on /joint_states, and its model:', _launch(asked),
-        *said)]
+        *reports)]
     print(*(f'# {line}' for line in head), in_yaml(given), sep='\n', end='')
     print(*(f'{NAME}: {line}' for line in head[2:]), sep='\n', file=sys.stderr)
-    if wrong := [line for line in said if WRONG in line]:
+    if wrong := [line for line in reports if WRONG in line]:
         raise command.RequestError(f'{len(wrong)} mechanisms are left out, as they differ from '
                                    'the robot or could not be compared with it')
 
 
 def _launch(asked: Any) -> str:
     """Return the command that launches the robot with its scene."""
-    said = {'robot': asked.file, 'scene': 'SCENE.yaml', 'loops': asked.loops or '',
-            'hold': ' '.join(asked.hold)}
+    arguments = {'robot': asked.file, 'scene': 'SCENE.yaml', 'loops': asked.loops or '',
+                 'hold': ' '.join(asked.hold)}
     return 'ros2 launch linkage_ros robot.launch.py ' + ' '.join(
-        f'{name}:={shlex.quote(text)}' for name, text in said.items() if text)
+        f'{name}:={shlex.quote(text)}' for name, text in arguments.items() if text)
 
 
 def described(robot: Robot) -> Tuple[Dict[str, Any], List[str]]:
     """Return the parameters of a robot's scene, and the report on omissions and checks."""
     given: Dict[str, Any] = {'mechanisms': []}
     closed = closing.closed(robot)
-    robot, said = closed.robot, closed.report
+    robot, reports = closed.robot, closed.report
 
     def add(name: str, parameters: Mapping[str, Any], more: Sequence[str]) -> None:
         given['mechanisms'].append(name)
         given.update(parameters)
-        said.extend(more)
+        reports.extend(more)
 
     for group in loops.groups(robot, closed.immobile):
         open_one, fault = (_first(reasons, group.joints) for reasons in (
@@ -99,7 +99,7 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str]]:
                 reason = f'{WRONG}: {error}' if isinstance(error, check.Difference) else (
                     fault or error)
                 bodies = error.bodies if isinstance(error, planar.NotPlaced) else _bodies(left)
-                said.append(f'Left out: {", ".join(bodies)}: {reason}.')
+                reports.append(f'Left out: {", ".join(bodies)}: {reason}.')
             done = {joint.name for joint in part.joints}
             left = [joint for joint in left if joint.name not in done]
         if not left:
@@ -110,17 +110,17 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str]]:
             add(*rods.described(robot, group._replace(joints=left), given['mechanisms']))
         except (ArithmeticError, ValueError) as error:
             why = fault or (f'as rods in space: {error}' if group.why else error)
-            said.append(f'Left out: {", ".join(_bodies(left))}: '
-                        + f'{group.why}; ' * bool(group.why) + f'{why}.')
+            reports.append(f'Left out: {", ".join(_bodies(left))}: '
+                           + f'{group.why}; ' * bool(group.why) + f'{why}.')
     if not given['mechanisms']:
-        raise command.RequestError(' '.join(said) or 'no joint of this robot closes a loop')
-    return given, said
+        raise command.RequestError(' '.join(reports) or 'no joint of this robot closes a loop')
+    return given, reports
 
 
-def _values(said: Sequence[str]) -> Dict[str, float]:
+def _values(texts: Sequence[str]) -> Dict[str, float]:
     """Parse texts such as JOINT=VALUE; raise RequestError for an invalid one."""
     found = {}
-    for each in said:
+    for each in texts:
         name, _, value = each.rpartition('=')
         try:
             found[name] = float(value)

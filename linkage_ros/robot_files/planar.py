@@ -224,29 +224,29 @@ def described(robot: Robot, group: loops.Group, others: Sequence[str]
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if not any(called.published for called in machine.joints.values()):
         raise NotPlaced(drawing)
-    said = [f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.'] if drawing.left else []
+    reports = [f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.'] if drawing.left else []
     drawing.limits, more = robot.limits(drawing.moved_by)
-    said += more
+    reports += more
     if drawing.measured:
-        said += [f'Left out: the limits of {limits.text(source)}: its motor is between two moving '
-                 'links.' for source, limits in drawing.limits.items()]
+        reports += [f'Left out: the limits of {limits.text(source)}: its motor is between two '
+                    'moving links.' for source, limits in drawing.limits.items()]
     else:
-        said += sweeps.added(given, name, drawing.drives, drawing.limits, machine.inputs)
+        reports += sweeps.added(given, name, drawing.drives, drawing.limits, machine.inputs)
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if drawing.apart(machine.linkage) > drawing.allowed:
         raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
     report = check.compared(robot, machine, [joint.name for joint in drawing.moved_by],
                             drawing.ends, loop.lean + loop.gap / loop.size)
-    said.append(report)
-    said += [f'{joint} has its ends {gap:.2g} m apart along its axis, on which no angle depends.'
-             for joint, gap in loop.across.items()]
+    reports.append(report)
+    reports += [f'{joint} has its ends {gap:.2g} m apart along its axis, on which no angle '
+                'depends.' for joint, gap in loop.across.items()]
     published = {called.name for called in machine.joints.values() if called.published}
     published |= {joint.name for joint in drawing.moved_by}
     own = {one.name for joint in loop.joints if drawing.parts.keys() >= {*joint.bodies}
            for one in joint.hinges}
     if lost := [joint for joint in robot.positions if joint in own - published]:
-        said.append(f'Not published: {", ".join(lost)}, which no angle in the plane tells.')
-    return name, given, said
+        reports.append(f'Not published: {", ".join(lost)}, which no angle in the plane tells.')
+    return name, given, reports
 
 
 def _drawn(robot: Robot, group: loops.Group) -> Drawing:

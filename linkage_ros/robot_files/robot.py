@@ -229,7 +229,7 @@ class Robot:
         They are those of joints and of all that these depend on.
         """
         found: Dict[str, Limits] = {}
-        said: Dict[str, str] = {}
+        reports: Dict[str, str] = {}
         named = {joint.name: joint for joint in self.joints if joint.position is not None}
         for joint in joints:
             own = self.sources(joint.name)
@@ -245,8 +245,8 @@ class Robot:
                     found[source] = Limits(max(low, ends[0]), min(high, ends[1]), (
                         *names, *[name] * (name not in names)))
                 if each.no_limits:
-                    said[name] = f'Left out: the limits of {name}, {each.no_limits}.'
-        return found, [*said.values()]
+                    reports[name] = f'Left out: the limits of {name}, {each.no_limits}.'
+        return found, [*reports.values()]
 
 
 def _limits(limits: Sequence[Any], is_continuous: bool
@@ -256,7 +256,7 @@ def _limits(limits: Sequence[Any], is_continuous: bool
                  for end in map(float, limits))
     if -low == high == math.inf:
         return None, ''
-    said = f'from {low:.4g} to {high:.4g}'
+    text = f'from {low:.4g} to {high:.4g}'
     if is_continuous:
-        return None, f'{said}: it is continuous' if low < high else ''
-    return ((low, high), '') if low < high else (None, f'{said}: they are no range')
+        return None, f'{text}: it is continuous' if low < high else ''
+    return ((low, high), '') if low < high else (None, f'{text}: they are no range')

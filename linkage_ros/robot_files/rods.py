@@ -192,23 +192,23 @@ def described(robot: Robot, group: Group, others: Sequence[str]
     found = Rods(robot, group)
     if not found.inputs:
         raise ValueError('not driven: its motors must be named by --driven')
-    lines, said = _lines(found)
+    lines, reports = _lines(found)
     name = f'{next(iter(found.inputs))}_rods'
     name = f'{name}_{len(others)}' if name in others else name
     given = {f'{name}.{key}': value for key, value in found.parameters(lines)}
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     limits, more = robot.limits(found.inputs.values())
-    said += more + [
+    reports += more + [
         f'Left out: the limits of {joint.name}, {why}.' for link, joint in found.links.items()
         if link not in found.inputs and (why := joint.no_limits or found.one_sided(joint))]
-    said += sweeps.added(given, name, [
+    reports += sweeps.added(given, name, [
         sweeps.Source(link, joint.name, 1.0, found.zeros[link] - joint.start, found.zeros[link])
         for link, joint in found.inputs.items()], limits, machine.inputs)
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     ends = _ranges(machine, found)
     report = check.compared(robot, machine, [joint.name for joint in found.inputs.values()],
                             ends, 0.0)
-    return name, given, [*said, report, *_corners(machine, found)]
+    return name, given, [*reports, report, *_corners(machine, found)]
 
 
 def _lines(found: Rods) -> Tuple[List[str], List[str]]:
@@ -220,12 +220,12 @@ def _lines(found: Rods) -> Tuple[List[str], List[str]]:
     except WindowError as error:
         if not error.limits:
             raise
-        said = ', '.join(f'{name} from {low + zero:.4g} to {high + zero:.4g}'
-                         for name, (low, high) in error.limits.items()
-                         for zero in [found.links[name].start])
+        ranges = ', '.join(f'{name} from {low + zero:.4g} to {high + zero:.4g}'
+                           for name, (low, high) in error.limits.items()
+                           for zero in [found.links[name].start])
         return found.lines(limits=error.limits), [
             f'Limits: inside those of the file, or without any, there may be a second pose; these '
-            f'are the largest shown to have one at most: {said}.']
+            f'are the largest shown to have one at most: {ranges}.']
 
 
 def _ranges(machine: scene.SceneMechanism, found: Rods) -> Dict[str, Tuple[float, float]]:

@@ -187,11 +187,11 @@ class _Model:
 
 
 def _pose(part: Optional[Element]) -> np.ndarray:
-    said = (part.text or '').strip() if part is not None else ''
-    if part is None or not said:
+    text = (part.text or '').strip() if part is not None else ''
+    if part is None or not text:
         return np.eye(4)
     if part.get('rotation_format') == 'quat_xyzw':
-        x, y, z, *turn = numbers(said, 7)
+        x, y, z, *turn = numbers(text, 7)
         return at((x, y, z), turned_by((turn[3], *turn[:3])))
     unit = math.pi / 180.0 if part.get('degrees') in ('1', 'true') else 1.0
-    return pose(*numbers(said, 6) * [1.0, 1.0, 1.0, unit, unit, unit])
+    return pose(*numbers(text, 6) * [1.0, 1.0, 1.0, unit, unit, unit])

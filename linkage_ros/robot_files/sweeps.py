@@ -41,7 +41,7 @@ def added(given: Dict[str, Any], name: str, drives: Sequence[Source], limits: Di
 
     Limits within which nothing moves are removed.
     """
-    said = []
+    reports = []
     for drive in drives:
         if drive.source in limits:
             sweep, why = _sweep(drive, limits[drive.source], inputs[drive.name])
@@ -50,11 +50,11 @@ def added(given: Dict[str, Any], name: str, drives: Sequence[Source], limits: Di
                 given[f'{name}.{drive.name}.sweep'] = [*sweep]
                 given[start] = min(max(given[start], sweep[0]), sweep[1])
             else:
-                said.append(f'Left out: the limits of {limits[drive.source].text(drive.source)}: '
-                            f'{why}.')
+                reports.append('Left out: the limits of '
+                               f'{limits[drive.source].text(drive.source)}: {why}.')
             if why in (UNREACHED, EMPTY):
                 del limits[drive.source]
-    return said
+    return reports
 
 
 def _sweep(drive: Source, limits: Limits, read: scene.InputSettings
