@@ -16,7 +16,7 @@ import math
 import pickle
 
 from linkage_ros import mechanisms
-from linkage_ros.linkage.inverse_problem import InverseProblem
+from linkage_ros.linkage.inverse.problem import InverseProblem
 from linkage_ros.linkage.search import BranchSearch
 import numpy as np
 import pytest

@@ -21,7 +21,7 @@ from .code import Code
 from .names import filled, template
 from ..formula.program import Program
 from ..linkage.inputs import MOST_COUNTED
-from ..linkage.inverse_linkage import InverseLinkage, Mode
+from ..linkage.inverse import InverseLinkage, Mode
 from ..linkage.mechanism import Mechanism
 
 # Newton steps, the first pose included, from a closed form and of a search.

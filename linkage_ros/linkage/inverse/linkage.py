@@ -27,13 +27,13 @@ from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, TYPE_
 
 import numpy as np
 
-from . import joint_lines
-from .builder import GROUND, Link, UNIT
-from .design import Design
-from .dyads import Dyads, Hinge, Motor, Slide
-from .inputs import Input, spread
-from .quantities import Names, PAIR, Structure
-from ..formula.expression import (
+from .. import joint_lines
+from ..builder import GROUND, Link, UNIT
+from ..design import Design
+from ..dyads import Dyads, Hinge, Motor, Slide
+from ..inputs import Input, spread
+from ..quantities import Names, PAIR, Structure
+from ...formula.expression import (
     arctangent,
     argument,
     Complex,
@@ -46,7 +46,7 @@ from ..formula.expression import (
 )
 
 if TYPE_CHECKING:
-    from .mechanism import Mechanism
+    from ..mechanism import Mechanism
 
 # Two to the power of this many assembly modes at most.
 MOST_SIDES = 5

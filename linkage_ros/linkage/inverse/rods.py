@@ -20,13 +20,13 @@ from __future__ import annotations
 from itertools import product
 from typing import Dict, List, Optional, Sequence, Tuple, TYPE_CHECKING
 
-from .inverse_linkage import InverseLinkage, Mode, MOST_SIDES
-from .quantities import Names, Structure
-from .rod_lines import turning_rods
-from ..formula.expression import argument, derivative, Real, real, substituted
+from .linkage import InverseLinkage, Mode, MOST_SIDES
+from ..quantities import Names, Structure
+from ..rod_lines import turning_rods
+from ...formula.expression import argument, derivative, Real, real, substituted
 
 if TYPE_CHECKING:
-    from .mechanism import Mechanism
+    from ..mechanism import Mechanism
 
 
 def taken_apart(linkage: Mechanism, outputs: Names) -> Optional[InverseLinkage]:

@@ -1,0 +1,447 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The inverse: values of the inputs at which as many outputs have given values.
+
+One algorithm: candidates are refined to solutions by the forward formula, those that are one are
+merged, and one is chosen. Only the candidates differ: brackets on `segments` for one input, the
+assembly `modes` of the inverse linkage for several, or a `grid` if it has no closed form.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+import math
+from typing import (
+    Any,
+    cast,
+    Dict,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Tuple,
+    TYPE_CHECKING,
+    Union,
+)
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import rods
+from .choice import choose, choose_arrays
+from .follow import follow
+from .grid import blocks, Grid
+from .linkage import InverseLinkage, taken_apart
+from .modes import Modes
+from .problem import Found, InverseProblem
+from .refine import distinct, distinct_arrays, refine, refine_arrays
+from .segments import Segments, segments_of
+from ..arguments import numbers
+from ..inputs import MOST_COUNTED
+from ...words import listed, quoted
+
+if TYPE_CHECKING:
+    from ..mechanism import Mechanism
+
+# Below this margin a pose is singular, and signs are 0.
+SINGULAR = 1e-6
+
+Ends = Optional[Sequence[Optional[Tuple[float, float]]]]
+
+
+class Solution(NamedTuple):
+    """
+    Values of all inputs at which the outputs have the given values.
+
+    Attributes
+    ----------
+    inputs : tuple of float
+        In the order of `Mechanism.inputs` [rad or m].
+    inverse : Inverse
+        The inverse that it solves.
+
+    """
+
+    inputs: Tuple[float, ...]
+    inverse: Inverse
+
+    def __repr__(self) -> str:
+        return f'Solution(inputs={self.inputs}, mode={self.mode!r}, margin={self.margin:.3g})'
+
+    @property
+    def signs(self) -> Mapping[str, int]:
+        """
+        Return the working mode.
+
+        For each link at the tip of an input crank, by its name, the side to which it turns off
+        from the line between the crank's joints, +1 left; and 'det', the sign of the determinant
+        of d outputs / d inputs. 0 where rounding hides the sign.
+        """
+        return self.inverse.signs(self.inputs)
+
+    @property
+    def margin(self) -> float:
+        """
+        Return the least singular value of d outputs / d inputs, divided by the greatest or 1.
+
+        It is 0 where the inputs cannot move the outputs in some direction, or cannot resist a load
+        in some direction. Units are rad, the longest bar for outputs, about the stroke for inputs.
+        """
+        return self.inverse.margin(self.inputs)
+
+    @property
+    def jacobian(self) -> np.ndarray:
+        """Return d outputs / d inputs [rad or m, per rad or m], shape (outputs, inputs)."""
+        return self.inverse.jacobian(self.inputs)
+
+    @property
+    def is_singular(self) -> bool:
+        """Whether the pose is singular, so that at most half of the digits are right."""
+        return self.margin < SINGULAR
+
+    @property
+    def mode(self) -> str:
+        """Return the signs as text: 'AP+ CP- det-'."""
+        return ' '.join(f'{name}{"0+-"[sign]}' for name, sign in self.signs.items())
+
+
+class Inverse:
+    """
+    The inverse of as many outputs as a linkage has inputs; make one with `Mechanism.inverse`.
+
+    `print` shows the joint lines of the inverse linkage.
+
+    Attributes
+    ----------
+    outputs : tuple of str
+        Names of the outputs; see `Mechanism.has_output`.
+    inputs : tuple of Input
+        The inputs of the linkage; see `InverseProblem`. Those of an infinite period have the
+        solutions of one turn.
+
+    """
+
+    def __init__(self, linkage: Mechanism, outputs: Tuple[str, ...]):
+        self.linkage, self.outputs, self._n = linkage, outputs, len(outputs)
+        blocks(linkage, outputs)
+        self._problem = InverseProblem(linkage, outputs)
+        self.inputs = self._problem.inputs
+        # With more turns than are searched, only the inverse linkage has them all.
+        self._is_single = self._n == 1 and (
+            linkage.period() <= MOST_COUNTED or not linkage.inputs[0].turns or not self.closed)
+        if not self._is_single and not self.closed:
+            self._source  # raises ValueError for dependent outputs
+
+    @cached_property
+    def closed(self) -> Optional[InverseLinkage]:
+        """Joint lines and assembly modes of the inverse linkage; None if there is none."""
+        return (taken_apart if self.linkage.axes == 'xy' else rods.taken_apart)(
+            self.linkage, self.outputs)
+
+    @property
+    def is_quick(self) -> bool:
+        """Whether arrays of values cost little more than poses: no grid is searched."""
+        return self._is_single or self.closed is not None
+
+    @cached_property
+    def _segments(self) -> Optional[Segments]:
+        return segments_of(self.linkage, self.outputs[0]) if self._is_single else None
+
+    @cached_property
+    def _source(self) -> Union[Modes, Grid]:
+        """Return what yields candidates of several inputs."""
+        return Modes(self._problem, self.closed) if self.closed else Grid(self._problem)
+
+    def __reduce__(self) -> Tuple[Any, ...]:
+        """Pickle the linkage and the outputs only."""
+        return self.linkage.inverse, (self.outputs,)
+
+    def __str__(self) -> str:
+        what = listed(self.outputs)
+        if not self.closed:
+            return f'the inverse of {self.linkage.type} for {what} is searched'
+        return f'# {self.linkage.type} driven by {what}\n{self.closed}'
+
+    # --- all solutions ---
+
+    def all(self, values: ArrayLike, near: Optional[ArrayLike] = None) -> List[Solution]:
+        """
+        Return all solutions for one value of each output.
+
+        Parameters
+        ----------
+        values : array-like (outputs,)
+            Values of the outputs [rad or m]; angles are equal up to whole turns, and an output
+            that is an input up to whole periods of it.
+        near : array-like (inputs,), optional
+            Values of the inputs [rad or m]. Whole turns are added to the solutions to bring them
+            nearest to it, and the nearest comes first; the unit of a length is about its stroke.
+
+        Returns
+        -------
+        list of Solution
+            The solutions of the linkage's own assembly, its `branches`, inside its reach; [] if
+            there are none. Without `near` crank angles are in [-pi, pi), and the first input
+            ascends. Solutions that differ by rounding only are one.
+
+        Raises
+        ------
+        ValueError
+            If there is not one value for each output, and one finite `near` for each input.
+
+        """
+        found = [inputs for inputs, _ in self._all(self._one_each(values))]
+        if near is not None:
+            beside = self._finite(near)
+            found = sorted((self._problem.beside(inputs, beside) for inputs in found),
+                           key=lambda x: sum(((a - b) / size) ** 2 for a, b, size in zip(
+                               x, beside, self._problem.sizes)))
+        return [Solution(inputs, self) for inputs in found]
+
+    def over(self, *values: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
+        """
+        Return all solutions for arrays of values [rad or m], one array for each output.
+
+        Returns
+        -------
+        (array (inputs, *shape, answers), array (outputs * inputs, *shape, answers))
+            The inputs [rad or m], the first ascending, padded with NaN; and the rate of each
+            output by the first input, by the second and so on.
+
+        """
+        rows = self._arrays(values)
+        inputs, rates = (np.moveaxis(part, 0, -1) for part in self._all_arrays(rows))
+        shape = rows[0].shape
+        return inputs.reshape(self._n, *shape, -1), rates.reshape(self._n ** 2, *shape, -1)
+
+    def _all(self, values: Sequence[float]) -> List[Found]:
+        """Return all solutions in order, none for values that are not finite."""
+        if not all(map(math.isfinite, values)):
+            return []
+        problem = self._problem
+        values = problem.reduced(values)
+        candidates: Any = [((), bracket) for bracket in self._segments.brackets(
+            values[0])] if self._segments else self._source.candidates(values)
+        found = [solution for inputs, bracket in candidates
+                 if (solution := refine(problem, values, inputs, bracket))]
+        return distinct(problem, found) if len(found) > 1 else found
+
+    def _all_arrays(self, rows: Sequence[np.ndarray]) -> Tuple[np.ndarray, np.ndarray]:
+        """Return all solutions (solutions, inputs, m) in order, and rates, padded with NaN."""
+        problem, n = self._problem, self._n
+        values = np.stack([row.ravel() for row in rows])
+        values = np.stack(problem.reduced(np.where(np.isfinite(values), values, math.nan)))
+        count, found = values.shape[1], []
+        if self._segments:
+            for place, bracket in self._segments.bracket_arrays(values[0]):
+                part = np.full((2, 1, count), math.nan)
+                part[:, :, place] = refine_arrays(
+                    problem, values[:, place], np.empty((1, 0)), bracket)
+                found.append(part)
+            inputs, rates = (np.stack([part[k] for part in found]) if found else np.full(
+                (1, 1, count), math.nan) for k in (0, 1))
+        elif isinstance(self._source, Modes):
+            modes = self._source.candidate_arrays(values)
+            inputs, rates = (np.moveaxis(part.reshape(-1, len(modes), count), 1, 0)
+                             for part in refine_arrays(
+                                 problem, np.tile(values, len(modes)),
+                                 np.moveaxis(modes, 0, 1).reshape(n, -1)))
+        else:
+            each = [self._all(column) for column in values.T.tolist()]
+            most = max(map(len, each), default=0) or 1
+            inputs, rates = (np.full((most, size, count), math.nan) for size in (n, n * n))
+            for k, solutions in enumerate(each):
+                for i, solution in enumerate(solutions):
+                    inputs[i, :, k], rates[i, :, k] = solution
+        return distinct_arrays(problem, inputs, rates)
+
+    # --- arguments ---
+
+    def _one_each(self, values: Any, name: str = 'values') -> Tuple[float, ...]:
+        """Return one number for each output; raise ValueError if there are not as many."""
+        if type(values) is list and len(values) == self._n and set(map(type, values)) == {float}:
+            return tuple(values)
+        found = numbers(name, values)
+        if found.shape != (self._n,) and not (self._n == 1 and found.shape == ()):
+            raise ValueError(f'{self.linkage.type} has {self._n} inputs: {name} must be as many '
+                             f'numbers, got {quoted(found.tolist())}')
+        return tuple(found.ravel().tolist())
+
+    def _finite(self, near: Any) -> Tuple[float, ...]:
+        found = self._one_each(near, 'near')
+        if not all(map(math.isfinite, found)):
+            raise ValueError(f'near must be finite, got {quoted(list(found))}')
+        return found
+
+    def _arrays(self, values: Any, name: str = 'values') -> Sequence[np.ndarray]:
+        """Return one array for each output; raise ValueError if there are not as many."""
+        if isinstance(values, (str, bytes)) or not hasattr(values, '__len__') or len(
+                values) != self._n:
+            what = f'values of {self._n} outputs' if name == 'values' else f'{self._n} {name}'
+            raise ValueError(f'{self.linkage.type} has {self._n} inputs: {what} are needed, got '
+                             f'{len(values) if hasattr(values, "__len__") else quoted(values)}')
+        return np.broadcast_arrays(*(numbers(name, each) for each in values))
+
+    def _limits(self, ends: Ends) -> Tuple[Tuple[float, ...], ...]:
+        """Return the ends of each input as floats, () if it has none."""
+        try:
+            limits = ((),) * self._n if ends is None else tuple(
+                () if pair is None else tuple(map(float, pair)) for pair in ends)
+            if len(limits) == self._n and all(
+                    len(pair) == 2 and -math.inf < pair[0] <= pair[1] < math.inf
+                    for pair in limits if pair):
+                return limits
+        except (TypeError, ValueError):
+            pass
+        raise ValueError('ends must be two finite numbers in order, or None, for each input, got '
+                         + quoted(ends))
+
+    # --- one of the solutions ---
+
+    def nearest(self, values: Sequence[Any], near: Optional[Sequence[Any]] = None,
+                ends: Ends = None) -> Tuple[Any, Any]:
+        """
+        Return one solution.
+
+        Parameters
+        ----------
+        values : sequence of float or array
+            The value of each output [rad or m].
+        near : sequence of float or array, optional
+            Values of the inputs [rad or m]: the solution is the nearest to them, whole turns
+            included; the unit of a length is about its stroke. Default: with one input, the least
+            at which the output increases, else the least (on this working branch of a lever, lever
+            and crank turn the same way); with several, the one with the least first input; where
+            that is equal up to 1e-9 [rad, strokes], the least next one.
+        ends : sequence of (float, float) or None, optional
+            For each input the range [rad or m] that the solution has to lie in, or None.
+
+        Returns
+        -------
+        (tuple of float or array, tuple of float or array)
+            The inputs [rad or m], and the rate of each output by the first input, by the second
+            and so on; NaN where there is no solution.
+
+        Raises
+        ------
+        ValueError
+            If there is not one value for each output, or ends are not finite and in order.
+
+        """
+        limits = self._limits(ends)
+        given = (*values, *(() if near is None else near)) if type(values) in (
+            tuple, list) and type(near) in (tuple, list, type(None)) else ()
+        if set(map(type, given)) == {float} and len(given) in (self._n, 2 * self._n) and len(
+                values) == self._n:
+            return choose(self._problem, self._all(values), near, limits)
+        rows = self._arrays(values)
+        beside = [] if near is None else [*self._arrays(near, 'near')]
+        rows = np.broadcast_arrays(*rows, *beside)
+        shape, rows = rows[0].shape, [row.ravel() for row in rows]
+        inputs, rates = self._all_arrays(rows[:self._n])
+        found = choose_arrays(self._problem, inputs, rates, rows[self._n:] or None, limits)
+        places, rates = (tuple(row.reshape(shape) for row in part) for part in found)
+        return places, rates
+
+    def path(self, values: Sequence[ArrayLike], near: Optional[ArrayLike] = None,
+             ends: Ends = None) -> Tuple[Any, Any]:
+        """
+        Return solutions for successive values: each is the nearest to the one before.
+
+        Parameters
+        ----------
+        values : sequence of array (n,)
+            The successive values of each output [rad or m].
+        near, ends
+            As for `nearest`, for the first value. Values without a solution are left out, and the
+            next one continues from the solution before them.
+
+        Returns
+        -------
+        (tuple of array (n,), tuple of array (n,))
+            As `nearest` does.
+
+        """
+        problem, limits = self._problem, self._limits(ends)
+        beside = None if near is None else self._one_each(near, 'near')
+        inputs, rates = self._all_arrays(self._arrays(values))
+        found = []
+        for x, r in zip(inputs.transpose(2, 0, 1).tolist(), rates.transpose(2, 0, 1).tolist()):
+            solution = choose(problem, [(i, j) for i, j in zip(x, r) if i[0] == i[0]], beside,
+                              limits)
+            found.append([*solution[0], *solution[1]])
+            if solution[0][0] == solution[0][0]:
+                beside = solution[0]
+        rows = np.array(found).reshape(-1, self._n + self._n ** 2).T
+        return tuple(rows[:self._n]), tuple(rows[self._n:])
+
+    def follow(self, values: ArrayLike, near: ArrayLike) -> Found:
+        """
+        Return the solution that is continuous from given inputs.
+
+        Parameters
+        ----------
+        values : array-like (outputs,)
+            The values of the outputs [rad or m].
+        near : array-like (inputs,)
+            The present inputs [rad or m]; whole turns of a crank are preserved.
+
+        Returns
+        -------
+        (tuple of float, tuple of float)
+            The inputs [rad or m] at the end of a motion in which the outputs go straight from
+            their present values to `values`, angles the shorter way; and the rate of each output
+            by the first input, by the second and so on. NaN if the motion passes a dead point or
+            leaves the reach.
+
+        """
+        values, near = self._one_each(values), self._one_each(near, 'near')
+        known = all(map(math.isfinite, (*values, *near)))
+        return known and follow(self._problem, self._problem.reduced(values), near,
+                                self._segments) or (
+            (math.nan,) * self._n, (math.nan,) * self._n ** 2)
+
+    # --- the working mode ---
+
+    def jacobian(self, inputs: ArrayLike) -> np.ndarray:
+        """Return d outputs / d inputs at a pose (inputs,), shape (outputs, inputs)."""
+        rates = self._problem.rated.at(*self._one_each(inputs, 'inputs'))[self._n:]
+        return np.reshape(rates, (self._n, self._n)).T
+
+    def margin(self, inputs: ArrayLike) -> float:
+        """Return the distance of a pose from a singular one; see `Solution.margin`."""
+        jacobian = self._problem.scaled(self.jacobian(inputs))
+        if not np.isfinite(jacobian).all():
+            return 0.0
+        values = np.linalg.svd(jacobian, compute_uv=False)
+        return float(values[-1] / max(1.0, values[0]))
+
+    def signs(self, inputs: Sequence[float]) -> Mapping[str, int]:
+        """Return the working mode of a pose; see `Solution.signs`."""
+        linkage = self.linkage
+        cranks = {link.name: link for link in linkage.links
+                  if any(input_.turns and link.name == input_.name for input_ in linkage.inputs)}
+        places, signs = linkage.solve(inputs if self._n > 1 else inputs[0]), {}
+        for link in linkage.links if linkage.axes == 'xy' else ():
+            crank = cranks.get(link.parent)
+            if crank and link.kind == 'revolute' and link.joint != crank.joint:
+                (a, b), (c, d) = (places[end] - places[start] for start, end in (
+                    (crank.joint, link.joint), (link.joint, link.tip)))
+                signs[link.name] = _sign(a * d - b * c, math.hypot(a, b) * math.hypot(c, d))
+        signs['det'] = 0 if self.margin(inputs) < SINGULAR else _sign(float(np.linalg.det(
+            self._problem.scaled(self.jacobian(inputs)))), 0.0)
+        return signs
+
+
+def _sign(value: float, size: float) -> int:
+    return int(np.sign(value)) if abs(value) > SINGULAR * size else 0

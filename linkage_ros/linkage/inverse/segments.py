@@ -1,0 +1,388 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The segments of the reach on which an output is monotone: candidates of one unknown input.
+
+Special inputs cut the reach: ends, dead points, extremes of the output and its jumps. Between two
+of them the output has each value of its range once; docs/accuracy.md has the rule for its ends.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+import math
+from typing import Any, Callable, Iterator, List, NamedTuple, Optional, Sequence, Tuple, TYPE_CHECKING
+
+import numpy as np
+
+from ..analysis import Analysis, distinct
+from ..curves import ascending, extremes, refined, sampled, turns
+from ..dead_points import NEAR, NearZero
+from ..inputs import Arc, Input
+
+if TYPE_CHECKING:
+    from ..mechanism import Mechanism
+
+# A value this near to a special input's is that input's; and this near, if no other input has it
+# [parts of the output's size].
+SPECIAL, BEYOND = 1e-13, 1e-9
+# The output's error between samples [part of its range]; cells narrower than the second [rad] are
+# only divided where it jumps, by more than the third [part of its range].
+EXPLAINED, NARROW, JUMP = 1e-4, 1e-6, 0.05
+# Parts of a divided cell, and rounds: a turn is divided down to neighbouring floats.
+PARTS, ROUNDS = 8, 20
+# The output has rounding of this part of its size; changes up to STILL times that are none.
+ROUNDING, STILL = 2.0 ** -50, 64.0
+# Samples at an end with more noise than this multiple of rounding are left out.
+NOISY = 1e9
+# More samples than these are those of a linkage that is singular nearly everywhere.
+MAX_SAMPLES = 40000
+
+
+class Bracket(NamedTuple):
+    """
+    Two inputs between which an output has a value once, and a first estimate.
+
+    All are floats, or arrays; inputs are in their size, `sign` is that of the rate.
+    """
+
+    low: Any
+    high: Any
+    seed: Any
+    sign: Any
+
+
+class Segment(NamedTuple):
+    """
+    Samples of a part of the reach on which an output is monotone.
+
+    Attributes
+    ----------
+    theta, value : float array (samples,)
+        The input in its size, and the output times the sign of its rate; both ascend.
+    cells : float array (samples - 1, 8)
+        For an estimate between two samples: see `_estimate`.
+    sign : float
+        1.0 where the output rises, -1.0 where it falls.
+
+    """
+
+    theta: np.ndarray
+    value: np.ndarray
+    cells: np.ndarray
+    sign: float
+
+
+class Segments:
+    """
+    An output over the reach, in segments on which it is monotone.
+
+    Parameters
+    ----------
+    curve : callable
+        From values of the input, shape (n,), to the output and its rate, shape (2, n).
+    arcs : sequence of (float, float)
+        The reach; no arc extends to both sides of -pi or pi.
+    near_zeros : sequence of NearZero
+        Where a dyad is or nearly is at a dead point.
+    input_ : Input
+        The input, in its size.
+    period : float
+        After how much the output is the same, or inf.
+    size : float
+        The unit of the output.
+
+    """
+
+    def __init__(self, curve: Callable, arcs: Sequence[Arc], near_zeros: Sequence[NearZero],
+                 input_: Input, period: float, size: float):
+        self._curve, self._period, self._size = curve, period, size
+        self._rounding = ROUNDING * size
+        special = distinct((near.value for near in near_zeros if near.gap <= near.rounding),
+                           input_)
+        marks = distinct((near.value for near in near_zeros if near.gap <= NEAR * near.size),
+                         input_)
+        self.jumps: List[float] = []
+        runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
+        self.all = [segment for run in runs for segment in self._monotone(*run)] \
+            if self._moves(runs) else []
+        self.all.sort(key=lambda segment: float(segment.theta[0]))
+        turn = input_.turn if input_.turns else math.inf
+        self._following = [self._continued(segment, turn) for segment in self.all]
+        self._preceding: List[Optional[int]] = [None] * len(self.all)
+        for number, other in enumerate(self._following):
+            if other is not None:
+                self._preceding[other] = number
+        # What one value needs: the range in which a segment has answers, then its samples.
+        self._rows = [(
+            segment.value[0] - size * (BEYOND if before is None else SPECIAL),
+            segment.value[-1] + size * (BEYOND if after is None else SPECIAL),
+            segment.sign, *(part.tolist() for part in segment[:3]))
+            for segment, before, after in zip(self.all, self._preceding, self._following)]
+
+    # --- candidates ---
+
+    def brackets(self, value: float) -> Iterator[Bracket]:
+        """Yield a bracket for each input that has a value; a special input has no width."""
+        special, period = SPECIAL * self._size, self._period
+        for low, high, sign, *samples in self._rows:
+            target = sign * value
+            if period < math.inf:
+                target += period * math.ceil((low - target) / period)
+            while low <= target <= high:
+                yield _bracket(target, special, sign, *samples)
+                target += period
+
+    def bracket_arrays(self, values: np.ndarray) -> List[Tuple[np.ndarray, Bracket]]:
+        """Return for each segment the places of values (n,) that it has, and their brackets."""
+        found, special, period = [], SPECIAL * self._size, self._period
+        for (low, high, sign, *_), (theta, value, cells, _) in zip(self._rows, self.all):
+            target = sign * values
+            if period < math.inf:
+                target = target + period * np.ceil((low - target) / period)
+            while len(place := np.flatnonzero((low <= target) & (target <= high))):
+                goal = target[place]
+                i = np.clip(value.searchsorted(goal, 'right') - 1, 0, len(cells) - 1)
+                start, end = goal <= value[0] + special, goal >= value[-1] - special
+                lo, hi, seed = theta[i], theta[i + 1], _estimate(goal, *cells[i].T)
+                lo, hi, seed = (np.where(start, theta[0], np.where(end, theta[-1], x))
+                                for x in (lo, hi, seed))
+                found.append((place, Bracket(lo, hi, seed, np.full(len(place), sign))))
+                target = target + period
+        return found
+
+    def follow(self, value: float, now: float, near: float, turn: float
+               ) -> Optional[Tuple[Bracket, float]]:
+        """
+        Return the bracket of a value on the segment of `near` or those that continue it.
+
+        The output goes straight there from its present value `now`, an angle the shorter way;
+        also returned are the whole turns that the input passes.
+        """
+        gap, passed = math.remainder(value - now, self._period), 0.0
+        for number, segment in enumerate(self.all):
+            if segment.theta[0] <= near <= segment.theta[-1]:
+                start = float(np.interp(near, segment.theta, segment.value))
+                start += math.remainder(segment.sign * now - start, self._period)
+                target, first = start + segment.sign * gap, number
+                break
+        else:
+            return None
+        while True:
+            low, high, sign, theta, samples, cells = self._rows[number]
+            if low <= target <= high:
+                return _bracket(target, SPECIAL * self._size, sign, theta, samples, cells), passed
+            other = (self._following if target > high else self._preceding)[number]
+            if other is None or abs(passed) > turn:
+                return None
+            ends = (-1, 0) if target > high else (0, -1)
+            # The same value, or whole periods from it.
+            target += self._rows[other][4][ends[1]] - samples[ends[0]]
+            passed += turn * round((theta[ends[0]] - self._rows[other][3][ends[1]]) / turn) \
+                if turn < math.inf else 0.0
+            number = other
+
+    # --- for other uses ---
+
+    @property
+    def arcs(self) -> List[Arc]:
+        """Return the reach without jumps, cut at them."""
+        joined: List[Arc] = []
+        for theta, *_ in self.all:
+            low, high = float(theta[0]), float(theta[-1])
+            joined.append((joined.pop()[0], high) if joined and low == joined[-1][1] else (
+                low, high))
+        return joined
+
+    def pieces(self, most: float) -> List[Tuple[float, float, float, float]]:
+        """Return pieces of the segments, each two inputs and outputs at most `most` apart."""
+        cut = []
+        for theta, value, _, sign in self.all:
+            places = [0]
+            for i in range(1, len(theta)):
+                if i + 1 == len(theta) or value[i + 1] - value[places[-1]] > most:
+                    places.append(i)
+            cut += [(float(theta[i]), float(theta[k]), float(sign * value[i]),
+                     float(sign * value[k])) for i, k in zip(places, places[1:])]
+        return cut
+
+    # --- how they are found ---
+
+    def _difference(self, gap: Any) -> Any:
+        return gap if self._period == math.inf else gap - self._period * np.round(
+            gap / self._period)
+
+    def _runs(self, lo: float, hi: float, marks: Sequence[float]) -> Iterator[Tuple]:
+        """Yield samples as inputs, values, rates and noise, cut where the output jumps."""
+        theta = np.concatenate([sampled(*arc) for arc in _cut([(lo, hi)], marks)])
+        theta = ascending(theta)
+        known = np.isfinite(self._curve(theta[[0, -1]])[0])
+        if not known.all():
+            # The last input inside: an end may be rounded, or an arm without length at it.
+            inside, _ = refined(lambda x: np.isfinite(self._curve(x.ravel())[0]).reshape(
+                x.shape), theta[[1, -2]], theta[[0, -1]])
+            theta[[0, -1]] = np.where(known, theta[[0, -1]], inside)
+        theta, jumped = self._divided(theta)
+        if len(theta) > MAX_SAMPLES:
+            return
+        self.jumps += theta[jumped].tolist()
+        digit = 4.0 * np.spacing(np.abs(theta).clip(1e-3))
+        around = (theta + digit * np.array([[0.0], [1.0], [-1.0]])).clip(lo, hi)
+        value, rate = self._curve(around.ravel()).reshape(2, *around.shape)
+        with np.errstate(all='ignore'):
+            # The change over an ulp of the input that the rate does not explain is rounding.
+            noise = np.abs(self._difference(value[1:] - value[0])
+                           - rate[0] * (around[1:] - theta)).max(axis=0)
+        noise[~np.isfinite(noise)] = 0.0
+        known = np.isfinite(value[0])
+        cuts = np.unique(np.concatenate([np.flatnonzero(~known), jumped + 1]))
+        for run in np.split(np.arange(len(theta)), cuts):
+            clear = np.flatnonzero((known & (noise <= NOISY * self._rounding))[run])
+            if len(clear) > 1:
+                run = run[clear[0]:clear[-1] + 1]
+                steps = self._difference(np.diff(value[0, run]))
+                yield (theta[run], value[0, run[0]] + np.append(0.0, np.cumsum(steps))
+                       if self._period < math.inf else value[0, run], rate[0, run], noise[run])
+
+    def _divided(self, theta: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Return samples that explain the output, and after which of them it jumps."""
+        inner, jumped = np.arange(1, PARTS) / PARTS, np.empty(0, int)
+        value, rate = self._curve(theta)
+        for _ in range(ROUNDS):
+            width, change = np.diff(theta), self._difference(np.diff(value))
+            with np.errstate(all='ignore'):
+                size = 0.5 * self._period if self._period < math.inf else float(
+                    np.nanmax(value) - np.nanmin(value))
+                mean = 0.5 * width * (rate[1:] + rate[:-1])
+                missed = np.abs(change - mean)
+                wide = (width > NARROW) & (missed > STILL * self._rounding)
+                # Two extremes may hide where the change is less than half of what rates say.
+                hidden = (rate[1:] * rate[:-1] > 0.0) & (missed > 0.5 * np.abs(mean))
+                place = np.flatnonzero((missed > JUMP * size) | wide & (
+                    hidden | (missed > EXPLAINED * size)))
+            neighbours = np.nextafter(theta[place], theta[place + 1]) == theta[place + 1]
+            jumped, place = place[neighbours & (missed[place] > JUMP * size)], place[~neighbours]
+            if not len(place) or len(theta) > MAX_SAMPLES:
+                break
+            new = (theta[place, None] + width[place, None] * inner).ravel()
+            found = self._curve(new)
+            order = np.argsort(np.concatenate([theta, new]))
+            theta, value, rate = (np.concatenate(parts)[order] for parts in (
+                (theta, new), (value, found[0]), (rate, found[1])))
+        return theta, jumped
+
+    def _moves(self, runs: Sequence[Tuple]) -> bool:
+        """Return whether the output changes by more than rounding."""
+        if not runs:
+            return False
+        _, values, _, noise = (np.concatenate(part) for part in zip(*runs))
+        noise = STILL * (noise + np.median(noise)) + self._rounding
+        return bool(np.any(np.abs(self._difference(values - np.median(values))) > noise))
+
+    def _monotone(self, theta: np.ndarray, value: np.ndarray, rate: np.ndarray,
+                  noise: np.ndarray) -> Iterator[Segment]:
+        """Yield the segments of a run, cut at its extremes."""
+        with np.errstate(invalid='ignore'):
+            places = turns(value, rate, 4.0 * (noise + self._rounding))
+            rising = rate[places] >= 0.0
+            at, _ = refined(lambda x: (self._curve(x.ravel())[1] >= 0.0).reshape(
+                x.shape) == rising[:, None], theta[places], theta[places + 1])
+        found = self._curve(at)[0] if len(at) else at
+        # An extreme may be the one input at which an arm has no length and no direction.
+        at = np.where(np.isfinite(found), at, theta[places])
+        found = value[places] + self._difference(
+            np.where(np.isfinite(found), found, value[places]) - value[places])
+        theta, value = np.insert(theta, places + 1, at), np.insert(value, places + 1, found)
+        rate = np.insert(rate, places + 1, 0.0)
+        cuts = [0, *(places + 1 + np.arange(len(places))).tolist(), len(theta) - 1]
+        for first, last in zip(cuts, cuts[1:]):
+            part = slice(first, last + 1)
+            sign = 1.0 if value[last] >= value[first] else -1.0
+            values = np.maximum.accumulate(sign * value[part])
+            yield Segment(theta[part], values, _cells(theta[part], values, sign * rate[part]),
+                          sign)
+
+    def _continued(self, segment: Segment, turn: float) -> Optional[int]:
+        """Return the number of the segment on which the output goes on after the last input."""
+        for number, other in enumerate(self.all):
+            apart = other.theta[0] - segment.theta[-1]
+            if turn < math.inf:
+                apart -= turn * round(apart / turn)
+            if other.sign == segment.sign and abs(apart) <= SPECIAL and abs(self._difference(
+                    other.value[0] - segment.value[-1])) <= BEYOND * self._size:
+                return number
+        return None
+
+
+def segments_of(linkage: Mechanism, output: str, others: Sequence[float] = ()) -> Segments:
+    """Return the segments of an output over the first input; the others are fixed."""
+    def make() -> Segments:
+        analysis, first = Analysis(linkage, others), linkage.inputs[0]
+        period = math.inf if not linkage.is_angle(output) else (
+            first.turn if output == first.name else math.tau)
+        return Segments(analysis.curve('output', output), analysis.reach(), analysis.near_zeros(),
+                        first.counted(), period, linkage.longest if math.isinf(period) else 1.0)
+
+    return linkage.cache.get_or_make(('segments', output, *others), make)
+
+
+def extremes_of(linkage: Mechanism, output: str, arcs: Optional[Sequence[Arc]]) -> list:
+    """Implement `Mechanism.extremes`."""
+    linkage.check_output(output)
+    pose, angular = linkage.bound('output', output), np.array([linkage.is_angle(output)])
+    size = linkage.inputs[0].size
+    parts = linkage.reach() if arcs is None else arcs
+    if arcs is None and (segments := segments_of(linkage, output)).jumps:
+        parts = [(low * size, high * size) for low, high in segments.arcs]
+    found = [extremes(lambda value: pose.searched(value)[:1], low, high, angular)[0].tolist()
+             for low, high in parts]
+    return [(tuple(least), tuple(greatest)) for least, greatest in found]
+
+
+def _cut(arcs: Sequence[Arc], marks: Any) -> Iterator[Arc]:
+    """Yield arcs, cut at marks."""
+    for start, end in arcs:
+        inside = sorted(mark for mark in marks if start < mark < end)
+        yield from zip([start, *inside], [*inside, end])
+
+
+def _cells(theta: np.ndarray, value: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    """Return what `_estimate` needs between samples: a cubic from the end with the lower rate."""
+    width, change = np.diff(theta), np.diff(value)
+    slow, fast = rate[:-1], rate[1:]
+    start = ~(slow > fast)
+    slow, fast = np.where(start, slow, fast) * width, np.where(start, fast, slow) * width
+    slow = np.where(slow < change, slow.clip(1e-300), change.clip(1e-300))
+    known = np.isfinite(fast)
+    bend = np.where(known, 3.0 * change - 2.0 * slow - np.where(known, fast, 0.0), change - slow)
+    return np.column_stack([
+        np.where(start, theta[:-1], theta[1:]), np.where(start, width, -width),
+        np.where(start, value[:-1], value[1:]), np.where(start, 1.0, -1.0), slow, change - slow,
+        bend, change - slow - bend])
+
+
+def _estimate(target: Any, start: Any, width: Any, value: Any, side: Any, slow: Any, curve: Any,
+              square: Any, cube: Any) -> Any:
+    """Return the input at a value: a parabola's, after one step of Newton's on the cubic."""
+    rest = side * (target - value)
+    part = 2.0 * rest / (slow + (slow * slow + 4.0 * curve * rest) ** 0.5)
+    error = part * (slow + part * (square + part * cube)) - rest
+    return start + width * (part - error / (slow + part * (2.0 * square + 3.0 * part * cube)))
+
+
+def _bracket(target: float, special: float, sign: float, theta: Sequence[float],
+             value: Sequence[float], cells: Sequence[Sequence[float]]) -> Bracket:
+    if target <= value[0] + special:
+        return Bracket(theta[0], theta[0], theta[0], sign)
+    if target >= value[-1] - special:
+        return Bracket(theta[-1], theta[-1], theta[-1], sign)
+    i = bisect_right(value, target) - 1
+    return Bracket(theta[i], theta[i + 1], _estimate(target, *cells[i]), sign)
