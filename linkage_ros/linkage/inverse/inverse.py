@@ -220,9 +220,9 @@ class Inverse:
 
         """
         rows = self._arrays(values)
-        inputs, rates = (np.moveaxis(part, 0, -1) for part in self._all_arrays(rows))
-        shape = rows[0].shape
-        return inputs.reshape(self._n, *shape, -1), rates.reshape(self._n ** 2, *shape, -1)
+        inputs, rates = (np.moveaxis(part, 0, -1).reshape(
+            part.shape[1], *rows[0].shape, len(part)) for part in self._all_arrays(rows))
+        return inputs, rates
 
     def _all(self, values: Sequence[float]) -> List[Found]:
         """Return all solutions in order, none for values that are not finite."""
@@ -252,10 +252,10 @@ class Inverse:
                 (1, 1, count), math.nan) for k in (0, 1))
         elif isinstance(self._source, Modes):
             modes = self._source.candidate_arrays(values)
-            inputs, rates = (np.moveaxis(part.reshape(-1, len(modes), count), 1, 0)
+            inputs, rates = (np.moveaxis(part.reshape(len(part), len(modes), count), 1, 0)
                              for part in refine_arrays(
                                  problem, np.tile(values, len(modes)),
-                                 np.moveaxis(modes, 0, 1).reshape(n, -1)))
+                                 np.moveaxis(modes, 0, 1).reshape(n, len(modes) * count)))
         else:
             each = [self._all(column) for column in values.T.tolist()]
             most = max(map(len, each), default=0) or 1

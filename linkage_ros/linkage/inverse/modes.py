@@ -27,14 +27,15 @@ class Modes:
     """The inputs in each assembly mode of an inverse linkage, and in each of its turns."""
 
     def __init__(self, problem: InverseProblem, closed: InverseLinkage):
-        self._problem, self._count = problem, problem.n
-        self._pose = problem.linkage.bind(Program(
-            [value + turn for mode in closed.modes for turns in product(*closed.turns)
-             for value, turn in zip(mode.inputs, turns)], problem.n, closed.arguments))
+        self._problem = problem
+        rows = [value + turn for mode in closed.modes for turns in product(*closed.turns)
+                for value, turn in zip(mode.inputs, turns)]
+        self._pose = problem.linkage.bind(Program(rows, problem.n, closed.arguments))
+        self._shape = len(rows) // problem.n, problem.n
 
     def candidates(self, values: Sequence[float]) -> Iterator[Tuple[Tuple[float, ...], None]]:
         """Yield the inputs of each mode that can be assembled."""
-        flat, n = self._pose.at(*values), self._count
+        flat, n = self._pose.at(*values), self._problem.n
         for start in range(0, len(flat), n):
             inputs = flat[start:start + n]
             if math.isfinite(sum(inputs)):
@@ -44,4 +45,4 @@ class Modes:
         """Return the inputs of each mode for values (outputs, m), shape (modes, inputs, m)."""
         pose = self._pose
         over = pose.over if self._problem.linkage.is_accelerated else pose.searched
-        return over(*values).reshape(-1, *values.shape)
+        return over(*values).reshape(*self._shape, values.shape[1])

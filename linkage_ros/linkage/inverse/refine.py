@@ -24,7 +24,7 @@ from typing import Any, List, Optional, Sequence, Tuple
 import numpy as np
 
 from .problem import Found, InverseProblem
-from .segments import BEYOND, Bracket
+from .segments import Bracket, STEEPEST
 
 # Errors in units of 2^-53 of an output's size: rounding, where refinement stops; and the largest
 # of a solution, which rounding of all joints on the way may explain.
@@ -81,7 +81,7 @@ def refine(problem: InverseProblem, values: Sequence[float], inputs: Tuple[float
         return None
     inputs, row = found
     if least > ACCEPTED and not (bracket and abs(math.remainder(
-            row[0] - values[0], problem.periods[0])) <= BEYOND * problem.scales[0]):
+            row[0] - values[0], problem.periods[0])) <= STEEPEST * problem.scales[0]):
         return None
     if n == 1 and not -math.inf < row[1] < math.inf:
         row = _beside(problem, inputs[0]) or row
@@ -173,7 +173,7 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, inputs: np.ndarra
     if bracket:
         with np.errstate(invalid='ignore'):
             accepted |= np.abs(_gaps(problem, found[1:], values)[0]) <= (
-                BEYOND * problem.scales[0])
+                STEEPEST * problem.scales[0])
         for place in np.flatnonzero(accepted & ~np.isfinite(found[2])):
             found[2, place] = (_beside(problem, float(found[0, place])) or found[1:, place])[1]
     found[:, ~accepted] = np.nan
@@ -208,7 +208,7 @@ def _step_arrays(problem: InverseProblem, gaps: np.ndarray, rows: np.ndarray) ->
     if n == 2:
         a, b, c, d = rows[2:]
         return np.stack([gaps[0] * d - gaps[1] * c, gaps[1] * a - gaps[0] * b]) / (a * d - b * c)
-    jacobian = rows[n:].reshape(n, n, -1).T
+    jacobian = rows[n:].reshape(n, n, rows.shape[1]).T
     jacobian[~np.isfinite(jacobian).all(axis=(1, 2))] = np.eye(n)
     singular = np.linalg.det(jacobian) == 0.0
     jacobian[singular] = np.inf * np.eye(n)

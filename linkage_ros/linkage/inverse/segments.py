@@ -34,17 +34,22 @@ if TYPE_CHECKING:
 # A value this near to a special input's is that input's; and this near, if no other input has it
 # [parts of the output's size].
 SPECIAL, BEYOND = 1e-13, 1e-9
+# Next to an end at which its rate is infinite, a value may be this far beyond it.
+STEEPEST = 1e-6
 # The output's error between samples [part of its range]; cells narrower than the second [rad] are
 # only divided where it jumps, by more than the third [part of its range].
 EXPLAINED, NARROW, JUMP = 1e-4, 1e-6, 0.05
+# Jumps that are no farther apart than this [rad] are noise, of an arm that nearly vanishes.
+NARROWEST = 1e-12
 # Parts of a divided cell, and rounds: a turn is divided down to neighbouring floats.
 PARTS, ROUNDS = 8, 20
 # The output has rounding of this part of its size; changes up to STILL times that are none.
 ROUNDING, STILL = 2.0 ** -50, 64.0
 # Samples at an end with more noise than this multiple of rounding are left out.
 NOISY = 1e9
-# More samples than these are those of a linkage that is singular nearly everywhere.
-MAX_SAMPLES = 40000
+# More samples of an arc, and more jumps and dead points, are those of a linkage that is singular
+# nearly everywhere.
+MAX_SAMPLES, MAX_RUNS = 10000, 100
 
 
 class Bracket(NamedTuple):
@@ -112,8 +117,9 @@ class Segments:
                          input_)
         self.jumps: List[float] = []
         runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
-        self.all = [segment for run in runs for segment in self._monotone(*run)] \
-            if self._moves(runs) else []
+        if not self._moves(runs):
+            runs, self.jumps = [], []
+        self.all = [segment for run in runs for segment in self._monotone(*run)]
         self.all.sort(key=lambda segment: float(segment.theta[0]))
         turn = input_.turn if input_.turns else math.inf
         self._following = [self._continued(segment, turn) for segment in self.all]
@@ -123,8 +129,8 @@ class Segments:
                 self._preceding[other] = number
         # What one value needs: the range in which a segment has answers, then its samples.
         self._rows = [(
-            segment.value[0] - size * (BEYOND if before is None else SPECIAL),
-            segment.value[-1] + size * (BEYOND if after is None else SPECIAL),
+            segment.value[0] - self._slack(segment, 0, before),
+            segment.value[-1] + self._slack(segment, -1, after),
             segment.sign, *(part.tolist() for part in segment[:3]))
             for segment, before, after in zip(self.all, self._preceding, self._following)]
 
@@ -176,19 +182,20 @@ class Segments:
                 break
         else:
             return None
-        while True:
+        for _ in range(2 * len(self.all)):
             low, high, sign, theta, samples, cells = self._rows[number]
             if low <= target <= high:
                 return _bracket(target, SPECIAL * self._size, sign, theta, samples, cells), passed
             other = (self._following if target > high else self._preceding)[number]
-            if other is None or abs(passed) > turn:
-                return None
+            if other is None:
+                break
             ends = (-1, 0) if target > high else (0, -1)
             # The same value, or whole periods from it.
             target += self._rows[other][4][ends[1]] - samples[ends[0]]
             passed += turn * round((theta[ends[0]] - self._rows[other][3][ends[1]]) / turn) \
                 if turn < math.inf else 0.0
             number = other
+        return None
 
     # --- for other uses ---
 
@@ -246,7 +253,7 @@ class Segments:
         cuts = np.unique(np.concatenate([np.flatnonzero(~known), jumped + 1]))
         for run in np.split(np.arange(len(theta)), cuts):
             clear = np.flatnonzero((known & (noise <= NOISY * self._rounding))[run])
-            if len(clear) > 1:
+            if len(clear) > 1 and theta[run[-1]] - theta[run[0]] > NARROWEST:
                 run = run[clear[0]:clear[-1] + 1]
                 steps = self._difference(np.diff(value[0, run]))
                 yield (theta[run], value[0, run[0]] + np.append(0.0, np.cumsum(steps))
@@ -259,17 +266,21 @@ class Segments:
         for _ in range(ROUNDS):
             width, change = np.diff(theta), self._difference(np.diff(value))
             with np.errstate(all='ignore'):
-                size = 0.5 * self._period if self._period < math.inf else float(
-                    np.nanmax(value) - np.nanmin(value))
-                mean = 0.5 * width * (rate[1:] + rate[:-1])
-                missed = np.abs(change - mean)
+                size = 0.5 * self._period if self._period < math.inf else max(
+                    float(np.nanmax(value) - np.nanmin(value)), BEYOND * self._size)
+                slopes = np.stack([rate[1:], rate[:-1]])
+                # At an end a rate may be infinite.
+                slopes = np.where(np.isfinite(slopes), slopes, slopes[::-1])
+                mean = 0.5 * width * slopes.sum(axis=0)
+                missed = np.abs(change - np.where(np.isfinite(mean), mean, 0.0))
                 wide = (width > NARROW) & (missed > STILL * self._rounding)
                 # Two extremes may hide where the change is less than half of what rates say.
-                hidden = (rate[1:] * rate[:-1] > 0.0) & (missed > 0.5 * np.abs(mean))
+                hidden = (slopes[0] * slopes[1] > 0.0) & (missed > 0.5 * np.abs(mean))
                 place = np.flatnonzero((missed > JUMP * size) | wide & (
                     hidden | (missed > EXPLAINED * size)))
             neighbours = np.nextafter(theta[place], theta[place + 1]) == theta[place + 1]
-            jumped, place = place[neighbours & (missed[place] > JUMP * size)], place[~neighbours]
+            jumped = place[neighbours & (np.abs(change[place]) > JUMP * size)]
+            place = place[~neighbours]
             if not len(place) or len(theta) > MAX_SAMPLES:
                 break
             new = (theta[place, None] + width[place, None] * inner).ravel()
@@ -280,8 +291,8 @@ class Segments:
         return theta, jumped
 
     def _moves(self, runs: Sequence[Tuple]) -> bool:
-        """Return whether the output changes by more than rounding."""
-        if not runs:
+        """Return whether the output changes by more than rounding, and not nearly everywhere."""
+        if not 0 < len(runs) <= MAX_RUNS:
             return False
         _, values, _, noise = (np.concatenate(part) for part in zip(*runs))
         noise = STILL * (noise + np.median(noise)) + self._rounding
@@ -309,6 +320,18 @@ class Segments:
             values = np.maximum.accumulate(sign * value[part])
             yield Segment(theta[part], values, _cells(theta[part], values, sign * rate[part]),
                           sign)
+
+    def _slack(self, segment: Segment, end: int, other: Optional[int]) -> float:
+        """Return how far beyond an end of a segment values are that end's."""
+        if other is not None:
+            there = self.all[other]
+            return SPECIAL * self._size + abs(float(self._difference(
+                there.value[-1 - end] - segment.value[end])))
+        # The end of a reach is a float, too: next to it the output may change quickly.
+        inside = np.nextafter(segment.theta[end], segment.theta[-1 - end])
+        step = abs(self._difference(float(self._curve(np.array([inside]))[0, 0])
+                                    - segment.sign * segment.value[end]))
+        return float(np.fmin(max(BEYOND * self._size, 2.0 * step), STEEPEST * self._size))
 
     def _continued(self, segment: Segment, turn: float) -> Optional[int]:
         """Return the number of the segment on which the output goes on after the last input."""
@@ -359,7 +382,8 @@ def _cells(theta: np.ndarray, value: np.ndarray, rate: np.ndarray) -> np.ndarray
     width, change = np.diff(theta), np.diff(value)
     slow, fast = rate[:-1], rate[1:]
     start = ~(slow > fast)
-    slow, fast = np.where(start, slow, fast) * width, np.where(start, fast, slow) * width
+    with np.errstate(invalid='ignore'):
+        slow, fast = np.where(start, slow, fast) * width, np.where(start, fast, slow) * width
     slow = np.where(slow < change, slow.clip(1e-300), change.clip(1e-300))
     known = np.isfinite(fast)
     bend = np.where(known, 3.0 * change - 2.0 * slow - np.where(known, fast, 0.0), change - slow)
