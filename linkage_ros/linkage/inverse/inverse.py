@@ -239,8 +239,7 @@ class Inverse:
     def _all_arrays(self, rows: Sequence[np.ndarray]) -> Tuple[np.ndarray, np.ndarray]:
         """Return all solutions (solutions, inputs, m) in order, and rates, padded with NaN."""
         problem, n = self._problem, self._n
-        values = np.stack([row.ravel() for row in rows])
-        values = np.stack(problem.reduced(np.where(np.isfinite(values), values, math.nan)))
+        values = problem.reduced_arrays(np.stack([row.ravel() for row in rows]))
         count, found = values.shape[1], []
         if self._segments:
             for place, bracket in self._segments.bracket_arrays(values[0]):
@@ -373,7 +372,7 @@ class Inverse:
 
         """
         problem, limits = self._problem, self._limits(ends)
-        beside = None if near is None else self._one_each(near, 'near')
+        beside = None if near is None else self._one_each(numbers('near', near).ravel(), 'near')
         inputs, rates = self._all_arrays(self._arrays(values))
         found = []
         for x, r in zip(inputs.transpose(2, 0, 1).tolist(), rates.transpose(2, 0, 1).tolist()):

@@ -100,11 +100,18 @@ class InverseProblem:
         """Return the function from arrays of inputs to outputs and rates, as arrays."""
         return self.forward.over if self.linkage.is_accelerated else self.forward.searched
 
-    def reduced(self, values: Sequence[Any]) -> Any:
-        """Return values, floats or arrays, with large angles reduced to one period, exactly."""
-        return [x if turn == math.inf or np.all(np.abs(x) <= turn) else np.where(
-            np.abs(x) > turn, _within_period(x, turn), x)[()]
-            for x, turn in zip(values, self.periods)]
+    def reduced(self, values: Sequence[float]) -> Sequence[float]:
+        """Return values with large angles reduced to one period, exactly."""
+        return [x if -turn <= x <= turn else float(_within_period(x, turn))
+                for x, turn in zip(values, self.periods)]
+
+    def reduced_arrays(self, values: np.ndarray) -> np.ndarray:
+        """Return what `reduced` does for values (outputs, m); NaN for those not finite."""
+        values = np.where(np.isfinite(values), values, math.nan)
+        for row, turn in zip(values, self.periods):
+            far = np.abs(row) > turn
+            row[far] = _within_period(row[far], turn)
+        return values
 
     def wrapped(self, inputs: Sequence[float]) -> Tuple[float, ...]:
         """Return inputs, angles within one period around zero, zero without sign."""

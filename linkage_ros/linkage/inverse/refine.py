@@ -56,22 +56,23 @@ def refine(problem: InverseProblem, values: Sequence[float], inputs: Tuple[float
         row = at(*inputs)
         gaps = [math.remainder(y - x, turn) if -math.inf < y < math.inf else math.nan
                 for y, x, turn in zip(row, values, problem.periods)]
-        error = _error(problem, gaps, row, inputs)
-        if error < least:
-            least, found = error, (inputs, row)
-            if error <= ROUNDED:
+        missed = max([abs(gap) / scale for gap, scale in zip(gaps, problem.scales)])
+        if missed < least:
+            least, found = missed, (inputs, row, gaps)
+            if missed <= ROUNDED * _UNIT:
                 break
-        elif not bracket or least <= ACCEPTED:
+        elif not bracket or least <= ACCEPTED * _UNIT:
             break
         if not bracket:
             step = _step(problem, gaps, row)
-            if not error <= OTHER / _UNIT or not all([
+            if not missed <= OTHER or not all([
                     abs(x) <= LONGEST * size for x, size in zip(step, problem.sizes)]):
                 break
             inputs = tuple([x - by for x, by in zip(inputs, step)])
             continue
-        low, high = (inputs[0], high) if gaps[0] * sign < 0.0 else (low, inputs[0])
-        guess = inputs[0] - gaps[0] / row[n] if row[n] else math.nan
+        x, gap, rate = inputs[0], gaps[0], row[n]
+        low, high = (x, high) if gap * sign < 0.0 else (low, x)
+        guess = x - gap / rate if rate else math.nan
         if not low < guess < high:
             guess = 0.5 * (low + high)
             if guess in (low, high):
@@ -79,9 +80,9 @@ def refine(problem: InverseProblem, values: Sequence[float], inputs: Tuple[float
         inputs = (guess, *inputs[1:])
     if not found:
         return None
-    inputs, row = found
-    if least > ACCEPTED and not (bracket and abs(math.remainder(
-            row[0] - values[0], problem.periods[0])) <= STEEPEST * problem.scales[0]):
+    inputs, row, gaps = found
+    if least > ROUNDED * _UNIT and _error(problem, gaps, row, inputs) > ACCEPTED and not (
+            bracket and least <= STEEPEST):
         return None
     if n == 1 and not -math.inf < row[1] < math.inf:
         row = _beside(problem, inputs[0]) or row
@@ -217,6 +218,9 @@ def _step_arrays(problem: InverseProblem, gaps: np.ndarray, rows: np.ndarray) ->
 
 def same(problem: InverseProblem, one: Found, other: Found) -> bool:
     """Return whether two solutions are one."""
+    for x, y, turn, size in zip(one[0], other[0], problem.turns, problem.sizes):
+        if NEIGHBOURS * size < abs(x - y) < turn - NEIGHBOURS * size:
+            return False
     steps = [math.remainder(x - y, turn) for x, y, turn in zip(one[0], other[0], problem.turns)]
     apart = max([abs(step) / size for step, size in zip(steps, problem.sizes)])
     if not SAME < apart <= NEIGHBOURS:
