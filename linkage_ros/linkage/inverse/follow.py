@@ -51,7 +51,7 @@ def follow(problem: InverseProblem, values: Sequence[float], near: Sequence[floa
         if not way:
             return None
         bracket, passed = way
-        found, near = refine(problem, values, (), bracket), (turns + passed + bracket.seed * size,)
+        found, near = refine(problem, values, (), bracket), (turns + passed + bracket[2],)
     else:
         end = _followed(problem, values, near, start)
         found = end and refine(problem, values, end)

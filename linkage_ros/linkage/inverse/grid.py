@@ -85,7 +85,7 @@ class Grid:
                       for by, input_ in enumerate(self._inputs) if input_.name in problem.outputs}
         self._blocks = blocks(problem.linkage, problem.outputs)
         # With all others known, the first input is searched as if it were the only one.
-        self.is_held = {*self._held.values()} == {*range(1, problem.n)}
+        self.is_held = {*self._held} == {*self._held.values()} == {*range(1, problem.n)}
         if not self.is_held:
             self._check_independent()
 
@@ -113,7 +113,7 @@ class Grid:
         problem = self._problem
         for bracket in segments_of(problem.linkage, problem.outputs[row], others).brackets(
                 values[row]):
-            yield (bracket.seed * problem.sizes[0], *others), bracket
+            yield (bracket[2], *others), bracket
 
     def _missed(self, q: np.ndarray, target: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return the errors of the outputs from their target, and the Jacobian, per row of q."""

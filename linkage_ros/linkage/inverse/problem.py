@@ -115,8 +115,8 @@ class InverseProblem:
 
     def wrapped(self, inputs: Sequence[float]) -> Tuple[float, ...]:
         """Return inputs, angles within one period around zero, zero without sign."""
-        return tuple([0.0 if abs(x) < LEAST * size else x if 2.0 * abs(x) < turn else
-                      x - turn * math.floor(x / turn + 0.5)
+        return tuple([(x if 2.0 * abs(x) < turn else x - turn * math.floor(x / turn + 0.5))
+                      if abs(x) > LEAST * size else 0.0
                       for x, turn, size in zip(inputs, self.turns, self.sizes)])
 
     def wrapped_arrays(self, inputs: np.ndarray) -> np.ndarray:

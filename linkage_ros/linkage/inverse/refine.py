@@ -47,52 +47,70 @@ _UNIT = 2.0 ** -53
 def refine(problem: InverseProblem, values: Sequence[float], inputs: Tuple[float, ...],
            bracket: Optional[Bracket] = None) -> Optional[Found]:
     """Return the solution at a candidate, with its rates; None if there is none."""
-    at, n, least, found = problem.forward.at, problem.n, math.inf, None
     if bracket:
-        (low, high, seed, sign), size = bracket, problem.sizes[0]
-        low, high, seed = low * size, high * size, seed * size
-        inputs = (seed if low <= seed <= high else 0.5 * (low + high), *inputs[1:])
+        return _refine_inside(problem, values, inputs[1:], bracket)
+    at, n, least, found = problem.forward.at, problem.n, math.inf, None
     for _ in range(MAX_STEPS):
         row = at(*inputs)
         gaps = [math.remainder(y - x, turn) if -math.inf < y < math.inf else math.nan
                 for y, x, turn in zip(row, values, problem.periods)]
         missed = max([abs(gap) / scale for gap, scale in zip(gaps, problem.scales)])
-        if missed < least:
-            least, found = missed, (inputs, row, gaps)
-            if missed <= ROUNDED * _UNIT:
-                break
-        elif not bracket or least <= ACCEPTED * _UNIT:
+        if not missed < least:
             break
-        if not bracket:
-            step = _step(problem, gaps, row)
-            if not missed <= OTHER or not all([
-                    abs(x) <= LONGEST * size for x, size in zip(step, problem.sizes)]):
-                break
-            inputs = tuple([x - by for x, by in zip(inputs, step)])
-            continue
-        x, gap, rate = inputs[0], gaps[0], row[n]
-        low, high = (x, high) if gap * sign < 0.0 else (low, x)
-        guess = x - gap / rate if rate else math.nan
-        if not low < guess < high:
-            guess = 0.5 * (low + high)
-            if guess in (low, high):
-                break
-        inputs = (guess, *inputs[1:])
-    if not found:
+        least, found = missed, (inputs, row, gaps)
+        if not ROUNDED * _UNIT < missed <= OTHER:
+            break
+        step = _step(problem, gaps, row)
+        if not all([abs(x) <= LONGEST * size for x, size in zip(step, problem.sizes)]):
+            break
+        inputs = tuple([x - by for x, by in zip(inputs, step)])
+    if not found or least > OTHER:
         return None
     inputs, row, gaps = found
-    if least > ROUNDED * _UNIT and _error(problem, gaps, row, inputs) > ACCEPTED and not (
-            bracket and least <= STEEPEST):
+    if least > ROUNDED * _UNIT and _error(problem, gaps, row, inputs) > ACCEPTED:
         return None
-    if n == 1 and not -math.inf < row[1] < math.inf:
-        row = _beside(problem, inputs[0]) or row
     return problem.wrapped(inputs), row[n:]
 
 
-def _beside(problem: InverseProblem, x: float) -> Optional[Sequence[float]]:
+def _refine_inside(problem: InverseProblem, values: Sequence[float], others: Sequence[float],
+                   bracket: Bracket) -> Optional[Found]:
+    """Return the solution in a bracket of the first input; the others are fixed."""
+    low, high, x, sign = bracket
+    at, n, value, period = problem.forward.at, problem.n, values[0], problem.periods[0]
+    enough, least, best = ROUNDED * _UNIT * problem.scales[0], math.inf, math.nan
+    x = x if low <= x <= high else 0.5 * (low + high)
+    found: Sequence[float] = ()
+    for _ in range(MAX_STEPS):
+        row = at(x, *others)
+        gap, rate = row[0] - value, row[n]
+        if not -period <= 2.0 * gap <= period:
+            gap = math.remainder(gap, period) if -math.inf < gap < math.inf else math.nan
+        if abs(gap) < least:
+            least, best, found = abs(gap), x, row
+            if least <= enough:
+                break
+        elif least <= enough * (ACCEPTED / ROUNDED):
+            break
+        low, high = (x, high) if gap * sign < 0.0 else (low, x)
+        x = x - gap / rate if rate else math.nan
+        if not low < x < high:
+            x = 0.5 * (low + high)
+            if x in (low, high):
+                break
+    # At a jump or in noise both sides enclose values that the output never has.
+    if not least <= STEEPEST * problem.scales[0]:
+        return None
+    if not -math.inf < found[n] < math.inf:
+        found = _beside(problem, best, others) or found
+    return problem.wrapped((best, *others)), found[n:]
+
+
+def _beside(problem: InverseProblem, x: float, others: Sequence[float] = ()
+            ) -> Optional[Sequence[float]]:
     """Return outputs and rates at the nearest float that has rates, for an end of a segment."""
     near = (x + side * 2.0 ** k * math.ulp(x) for k in range(MAX_STEPS // 2) for side in (1, -1))
-    return next((row for row in map(problem.forward.at, near) if math.isfinite(row[1])), None)
+    rows = (problem.forward.at(y, *others) for y in near)
+    return next((row for row in rows if math.isfinite(row[problem.n])), None)
 
 
 def _error(problem: InverseProblem, gaps: Sequence[float], row: Sequence[float],
@@ -138,9 +156,7 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, inputs: np.ndarra
     found, least = np.full((2 * n + n * n, count), np.nan), np.full(count, np.inf)
     going = np.flatnonzero(np.isfinite(inputs).all(axis=0)) if not bracket else np.arange(count)
     if bracket:
-        size = problem.sizes[0]
-        low, high, seed, sign = bracket.low * size, bracket.high * size, bracket.seed * size, (
-            bracket.sign)
+        low, high, seed, sign = bracket
         inputs = np.where((low <= seed) & (seed <= high), seed, 0.5 * (low + high))[None]
     else:
         inputs = inputs[:, going]

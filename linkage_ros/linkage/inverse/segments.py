@@ -52,17 +52,9 @@ NOISY = 1e9
 MAX_SAMPLES, MAX_RUNS = 10000, 100
 
 
-class Bracket(NamedTuple):
-    """
-    Two inputs between which an output has a value once, and a first estimate.
-
-    All are floats, or arrays; inputs are in their size, `sign` is that of the rate.
-    """
-
-    low: Any
-    high: Any
-    seed: Any
-    sign: Any
+# Two inputs between which an output has a value once, a first estimate, and the sign of the rate:
+# floats or arrays, inputs in rad or m. A special input has no width.
+Bracket = Tuple[Any, Any, Any, Any]
 
 
 class Segment(NamedTuple):
@@ -99,7 +91,7 @@ class Segments:
     near_zeros : sequence of NearZero
         Where a dyad is or nearly is at a dead point.
     input_ : Input
-        The input, in its size.
+        The input; in all samples it is in its size.
     period : float
         After how much the output is the same, or inf.
     size : float
@@ -109,7 +101,7 @@ class Segments:
 
     def __init__(self, curve: Callable, arcs: Sequence[Arc], near_zeros: Sequence[NearZero],
                  input_: Input, period: float, size: float):
-        self._curve, self._period, self._size = curve, period, size
+        self._curve, self._period, self._size, self._unit = curve, period, size, input_.size
         self._rounding = ROUNDING * size
         special = distinct((near.value for near in near_zeros if near.gap <= near.rounding),
                            input_)
@@ -127,41 +119,47 @@ class Segments:
         for number, other in enumerate(self._following):
             if other is not None:
                 self._preceding[other] = number
-        # What one value needs: the range in which a segment has answers, then its samples.
+        # What one value needs: the range in which a segment has answers, its sign, the range
+        # without its ends, and its samples.
+        special, scale = SPECIAL * size, [self._unit, self._unit, *[1.0] * 6]
         self._rows = [(
-            segment.value[0] - self._slack(segment, 0, before),
-            segment.value[-1] + self._slack(segment, -1, after),
-            segment.sign, *(part.tolist() for part in segment[:3]))
+            float(segment.value[0] - self._slack(segment, 0, before)),
+            float(segment.value[-1] + self._slack(segment, -1, after)),
+            segment.sign, float(segment.value[0] + special), float(segment.value[-1] - special),
+            (segment.theta * self._unit).tolist(), segment.value.tolist(),
+            [*map(tuple, (segment.cells * scale).tolist())])
             for segment, before, after in zip(self.all, self._preceding, self._following)]
 
     # --- candidates ---
 
-    def brackets(self, value: float) -> Iterator[Bracket]:
-        """Yield a bracket for each input that has a value; a special input has no width."""
-        special, period = SPECIAL * self._size, self._period
-        for low, high, sign, *samples in self._rows:
+    def brackets(self, value: float) -> List[Bracket]:
+        """Return a bracket for each input that has a value."""
+        found, period = [], self._period
+        for row in self._rows:
+            low, high, sign = row[:3]
             target = sign * value
-            if period < math.inf:
+            if period < math.inf and not low <= target < low + period:
                 target += period * math.ceil((low - target) / period)
             while low <= target <= high:
-                yield _bracket(target, special, sign, *samples)
+                found.append(_bracket(target, row))
                 target += period
+        return found
 
     def bracket_arrays(self, values: np.ndarray) -> List[Tuple[np.ndarray, Bracket]]:
         """Return for each segment the places of values (n,) that it has, and their brackets."""
-        found, special, period = [], SPECIAL * self._size, self._period
-        for (low, high, sign, *_), (theta, value, cells, _) in zip(self._rows, self.all):
+        found, period, unit = [], self._period, self._unit
+        for (low, high, sign, start, end, *_), (theta, value, cells, _) in zip(
+                self._rows, self.all):
             target = sign * values
             if period < math.inf:
                 target = target + period * np.ceil((low - target) / period)
             while len(place := np.flatnonzero((low <= target) & (target <= high))):
                 goal = target[place]
                 i = np.clip(value.searchsorted(goal, 'right') - 1, 0, len(cells) - 1)
-                start, end = goal <= value[0] + special, goal >= value[-1] - special
-                lo, hi, seed = theta[i], theta[i + 1], _estimate(goal, *cells[i].T)
-                lo, hi, seed = (np.where(start, theta[0], np.where(end, theta[-1], x))
-                                for x in (lo, hi, seed))
-                found.append((place, Bracket(lo, hi, seed, np.full(len(place), sign))))
+                ends = [goal <= start, goal >= end], [theta[0], theta[-1]]
+                lo, hi, seed = (unit * np.select(*ends, x) for x in (
+                    theta[i], theta[i + 1], _estimate(goal, *cells[i].T)))
+                found.append((place, (lo, hi, seed, np.full(len(place), sign))))
                 target = target + period
         return found
 
@@ -183,16 +181,16 @@ class Segments:
         else:
             return None
         for _ in range(2 * len(self.all)):
-            low, high, sign, theta, samples, cells = self._rows[number]
+            low, high, *_, theta, samples, _ = self._rows[number]
             if low <= target <= high:
-                return _bracket(target, SPECIAL * self._size, sign, theta, samples, cells), passed
+                return _bracket(target, self._rows[number]), passed
             other = (self._following if target > high else self._preceding)[number]
             if other is None:
                 break
             ends = (-1, 0) if target > high else (0, -1)
             # The same value, or whole periods from it.
-            target += self._rows[other][4][ends[1]] - samples[ends[0]]
-            passed += turn * round((theta[ends[0]] - self._rows[other][3][ends[1]]) / turn) \
+            target += self._rows[other][6][ends[1]] - samples[ends[0]]
+            passed += turn * round((theta[ends[0]] - self._rows[other][5][ends[1]]) / turn) \
                 if turn < math.inf else 0.0
             number = other
         return None
@@ -352,7 +350,7 @@ def segments_of(linkage: Mechanism, output: str, others: Sequence[float] = ()) -
         period = math.inf if not linkage.is_angle(output) else (
             first.turn if output == first.name else math.tau)
         return Segments(analysis.curve('output', output), analysis.reach(), analysis.near_zeros(),
-                        first.counted(), period, linkage.longest if math.isinf(period) else 1.0)
+                        first, period, linkage.longest if math.isinf(period) else 1.0)
 
     return linkage.cache.get_or_make(('segments', output, *others), make)
 
@@ -402,11 +400,11 @@ def _estimate(target: Any, start: Any, width: Any, value: Any, side: Any, slow: 
     return start + width * (part - error / (slow + part * (2.0 * square + 3.0 * part * cube)))
 
 
-def _bracket(target: float, special: float, sign: float, theta: Sequence[float],
-             value: Sequence[float], cells: Sequence[Sequence[float]]) -> Bracket:
-    if target <= value[0] + special:
-        return Bracket(theta[0], theta[0], theta[0], sign)
-    if target >= value[-1] - special:
-        return Bracket(theta[-1], theta[-1], theta[-1], sign)
+def _bracket(target: float, row: Tuple) -> Bracket:
+    _, _, sign, start, end, theta, value, cells = row
+    if target <= start:
+        return theta[0], theta[0], theta[0], sign
+    if target >= end:
+        return theta[-1], theta[-1], theta[-1], sign
     i = bisect_right(value, target) - 1
-    return Bracket(theta[i], theta[i + 1], _estimate(target, *cells[i]), sign)
+    return theta[i], theta[i + 1], _estimate(target, *cells[i]), sign
