@@ -242,7 +242,10 @@ class Inverse:
             apart = max(apart, min(gap, abs(turn - gap)) / size)
         if apart <= SAME:
             return True
-        values = np.linalg.svd(problem.jacobian(answer[1]), compute_uv=False)
+        jacobian = problem.jacobian(answer[1])
+        if not np.isfinite(jacobian).all():  # at an end of the reach an output tells all digits
+            return False
+        values = np.linalg.svd(jacobian, compute_uv=False)
         rounding = 8 * 2.0 ** -53 if self.closed or self._n == 1 else SAME
         return bool(apart <= rounding * (1.0 + values[0]) / max(values[-1], SAME))
 

@@ -462,8 +462,8 @@ class Mechanism:
 
     def check_output(self, output: str) -> None:
         """Raise ValueError if an output does not exist or does not move."""
-        self.check_there(output)
-        if not self.moves(output):
+        if not isinstance(output, str) or not self.moves(output):
+            self.check_there(output)
             raise ValueError(f'{plain_text(output)} of {self.type} does not move with the '
                              f'{self.inputs[0].name}')
 

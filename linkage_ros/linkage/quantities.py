@@ -82,7 +82,7 @@ class Structure:
         design.words.draw(self.built, design.lines, joint_lines.symbols_of(
             design.dimensions, design.signed), branches, **given)
         self.branches = dict(branches)
-        self._programs, self._known = Cache(), Cache()
+        self._programs, self._moving = Cache(), Cache()
         self._outputs: Mapping[str, Callable] = {
             'points': self._points, 'velocities': self._velocities, 'angles': self._angles,
             'rates': self._rates, 'parts': self._parts, 'margins': self._margins,
@@ -254,9 +254,6 @@ class Structure:
 
     def has(self, output: str) -> bool:
         """Return whether there is an output of this name."""
-        return self._known.get_or_make(output, lambda: self._has(output))
-
-    def _has(self, output: str) -> bool:
         joint, _, axis = output.rpartition('.')
         pair = PAIR.fullmatch(output) if self.built.axes == 'xy' else None
         ends = pair.groups() if pair else (joint,) if axis in [*self.built.axes] else ()
@@ -270,9 +267,9 @@ class Structure:
         return output.startswith('angle(')
 
     def moves(self, output: str, by: int = 0) -> bool:
-        """Return whether an output depends on one of the inputs."""
-        return self._known.get_or_make(
-            (output, by), lambda: not _vanishes(self._rates((output,), by)[0]))
+        """Return whether there is an output of this name and it depends on one of the inputs."""
+        return self._moving.get_or_make((output, by), lambda: self.has(output) and not _vanishes(
+            self._rates((output,), by)[0]))
 
 
 def _vanishes(rate: Real) -> bool:
