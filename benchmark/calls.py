@@ -19,6 +19,7 @@ of a pose, or the inverse. With --document the table goes into docs/performance.
 
 import argparse
 import ast
+from functools import partial
 import os
 from pathlib import Path
 import re
@@ -73,13 +74,13 @@ def below(call, known):
         names = [*given[1:], *named.values(), None][0]
         pose, inputs = linkage._ready(KINDS[method], names)[1], linkage.each_input(given[0])
         if not any(map(np.ndim, inputs)) and not pose.shape:
-            return 'code of a pose', lambda x=list(map(float, inputs)): pose.at(*x)
-        return 'code of an array', lambda: pose.over(*inputs)
+            return 'code of a pose', partial(pose.at, *map(float, inputs))
+        return 'code of an array', partial(pose.over, *inputs)
     if method in ('servo_angle', 'servo_for'):
         output, value = ['lever', *given][-2:]
-        return 'inverse.nearest', lambda inverse=linkage.inverse(output): inverse.nearest([value])
+        return 'inverse.nearest', partial(linkage.inverse(output).nearest, [value])
     if method in ('input_for', 'inputs_for'):
-        return 'inverse.all', lambda inverse=linkage.inverse(given[0]): inverse.all(given[1])
+        return 'inverse.all', partial(linkage.inverse(given[0]).all, given[1])
     return '', None
 
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from truth.drawing import DIGITS, draw, precisely
 from truth.linkage_checks import Subject
-from truth.random_linkages import design, Design
+from truth.random_linkages import Design, design
 
 # A small motion: its square is below the last of 96 digits.
 SMALL = mpfr(2) ** -160
@@ -48,8 +48,8 @@ LINKAGES = {
     'inversor': ('O ground 0 0', 'P ground -3 0', 'A crank O 3', 'B C D inversor P A 9 4'),
     'gears': ('O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'C crank Q 1 geared crank -0.5 0.3',
               'B dyad A C 2 2 left', 'D crank B 0.4 zero A geared crank 2 0.1',
-              'R ground 1 5', 'E cylinder R B 2 left', 'S ground 8 3', 'T ground 9 5',
-             'F carriage S along T 0 4 geared cylinder 0.5 0.2'),
+               'R ground 1 5', 'E cylinder R B 2 left', 'S ground 8 3', 'T ground 9 5',
+              'F carriage S along T 0 4 geared cylinder 0.5 0.2'),
 }
 # Two hinges in a row, one rod on a crank, one on a cylinder.
 ANKLE = (
@@ -62,7 +62,7 @@ ANKLE = (
 
 @precisely
 def balance(subject, values, loads):
-    """Return the efforts that balance loads in small motions, and the sizes of what they add up."""
+    """Return the efforts that balance loads, by small motions, and the sizes of what they add."""
     linkage, way = subject.linkage, subject.ways[0]
     rows, turns = linkage.prepared(linkage.numbers), linkage.turns(linkage.numbers, way)
     bars = {pose.name: pose.parts[0] for pose in subject.poses if pose.what != 'point'}

@@ -279,7 +279,7 @@ class Inverse:
         return found
 
     def _each(self, values: Any, name: str = 'values') -> Tuple[Any, ...]:
-        """Return a float or an array for each output; raise ValueError if there are not as many."""
+        """Return a float or an array for each output; raise ValueError if they are not that."""
         if not isinstance(values, (list, tuple)):
             values = np.atleast_1d(numbers(name, values))
         if len(values) != self._n:
