@@ -35,8 +35,9 @@ from .nodes.report import table
 
 ROOT = document.DOCS.parent
 ROUNDS, SAMPLE = 100, 1e-3
-KINDS = {'solve': 'points', 'velocity': 'velocities', 'joint_angles': 'angles',
-         'transmission_angles': 'transmissions'}
+KINDS = {'solve': ('points', lambda x: x.points), 'velocity': ('velocities', lambda x: x.points),
+         'joint_angles': ('angles', lambda x: x.joints),
+         'transmission_angles': ('transmissions', lambda x: x.structure.built.transmissions)}
 # These and the methods of linkages are timed.
 MODULES = 'mechanisms.create', 'scene.load'
 
@@ -71,8 +72,9 @@ def below(call, known):
     given = [eval(ast.unparse(x), known) for x in call.args]
     named = {x.arg: eval(ast.unparse(x.value), known) for x in call.keywords}
     if method in KINDS:
-        names = [*given[1:], *named.values(), None][0]
-        pose, inputs = linkage._ready(KINDS[method], names)[1], linkage.each_input(given[0])
+        kind, all_names = KINDS[method]
+        names = [*given[1:], *named.values(), all_names(linkage)][0]
+        pose, inputs = linkage.bound(kind, tuple(names)), linkage.each_input(given[0])
         if not any(map(np.ndim, inputs)) and not pose.shape:
             return 'code of a pose', partial(pose.at, *map(float, inputs))
         return 'code of an array', partial(pose.over, *inputs)

@@ -48,7 +48,7 @@ LINKAGES = {
     'inversor': ('O ground 0 0', 'P ground -3 0', 'A crank O 3', 'B C D inversor P A 9 4'),
     'gears': ('O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'C crank Q 1 geared crank -0.5 0.3',
               'B dyad A C 2 2 left', 'D crank B 0.4 zero A geared crank 2 0.1',
-               'R ground 1 5', 'E cylinder R B 2 left', 'S ground 8 3', 'T ground 9 5',
+              'R ground 1 5', 'E cylinder R B 2 left', 'S ground 8 3', 'T ground 9 5',
               'F carriage S along T 0 4 geared cylinder 0.5 0.2'),
 }
 # Two hinges in a row, one rod on a crank, one on a cylinder.

@@ -267,9 +267,9 @@ class Inverse:
     def _one_each(self, values: Any, name: str = 'values') -> Tuple[float, ...]:
         """Return one number for each output; raise ValueError if there are not as many."""
         found = self._each(values, name)
-        if set(map(type, found)) != {float}:
+        if any(np.size(each) != 1 for each in found):
             raise self._miscounted(values, name)
-        return found
+        return tuple(each if type(each) is float else each.item() for each in found)
 
     def _finite(self, values: Any, name: str) -> Tuple[float, ...]:
         """Return what `_one_each` does; raise ValueError also if one is not finite."""
