@@ -189,6 +189,20 @@ def test_what_is_not_loaded_needs_no_effort_even_at_a_dead_point():
     assert stretched.effort(0.0, {}) == 0.0
 
 
+def test_without_loads_the_efforts_have_the_shape_of_the_inputs():
+    assert mechanisms.create('four_bar').effort(np.zeros((3, 2)), {}).shape == (3, 2, 1)
+    assert mechanisms.create('five_bar').effort([np.full(3, 1.9), 0.4], {}).shape == (3, 2)
+
+
+def test_the_effort_of_an_output_asks_for_one_input_and_an_output_that_moves():
+    with pytest.raises(ValueError, match='five_bar has several inputs'):
+        mechanisms.create('five_bar').output_effort('P.x', (1.9, 0.4), 1.0)
+    for output, problem in (('Q.x', 'does not move'), ('Z.x', 'has no output'),
+                            (7, 'has no output')):
+        with pytest.raises(ValueError, match=problem):
+            mechanisms.create('four_bar').output_effort(output, 0.4, 1.0)
+
+
 def test_the_names_of_loads_are_texts_of_any_class():
     bars = mechanisms.create('four_bar')
     assert bars.effort(0.4, {np.str_('B'): (0.0, 1.0), np.str_('QB'): 2.0}) == bars.effort(
