@@ -224,3 +224,35 @@ def test_the_margin_of_a_pose_without_rates_is_zero():
         assert any(abs(answer.inputs[0]) < 1e-9 for answer in found)
         assert inverse.margin(0.0) == 0.0
         assert all(0.0 <= answer.margin <= 1.0 and repr(answer) for answer in found)
+
+
+# --- what a linkage is created with ---
+
+@pytest.mark.parametrize('given, problem', [
+    ({'c': math.nan}, 'dimension c must be finite, got nan'),
+    ({'c': -math.inf}, 'dimension c must be finite, got -inf'),
+    ({'a': [1.0, math.nan]}, 'dimension a must be finite'),
+    ({'c': 1e-301}, 'dimension c must lie between 1e-300 and 1e\\+300'),
+    ({'b': 1e301}, 'dimension b must lie between'),
+    ({'a': [1.0, 2.0], 'b': [1.0, 2.0, 3.0]}, r'shapes that broadcast, got a \(2,\), b \(3,\)'),
+    ({'branches': {'B': True}}, 'branch B must be \\+1 or -1, got True'),
+    ({'branches': {'B': 1.5}}, 'branch B must be \\+1 or -1, got 1.5'),
+    ({'branches': ['B']}, 'branches must be a mapping'),
+    ({'tracer': 'A'}, 'joints and tracer are for type custom or rods, not for slider_crank')])
+def test_wrong_dimensions_branches_and_tracers_are_named(given, problem):
+    with pytest.raises(ValueError, match=problem):
+        mechanisms.create('slider_crank', **given)
+
+
+def test_the_reach_of_an_offset_lever_ends_where_the_pin_is_square_to_it():
+    for e in (0.0, 10.0, -30.0):
+        lever = mechanisms.create('slotted_lever', e=e)
+        swept = lever.joint_angles(np.linspace(-math.pi, math.pi, 200001), ('lever',))['lever']
+        (low, high), = lever.lever_reach()
+        assert (low, high) == pytest.approx((np.nanmin(swept), np.nanmax(swept)), abs=1e-8)
+
+
+def test_sums_of_bars_that_differ_by_rounding_are_a_change_point():
+    assert mechanisms.create('four_bar', a=0.1, b=0.3, c=0.2, d=0.4).grashof() == 'change point'
+    assert mechanisms.create('four_bar', a=0.1, b=0.3, c=0.2, d=0.4 + 1e-15).grashof() != (
+        'change point')
