@@ -36,8 +36,9 @@ if TYPE_CHECKING:
 
 # Grid points at first and at most, and the least number of them that can be assembled.
 STARTS, MAX_STARTS, ASSEMBLED = 1024, 1 << 16, 250
-# Steps from a start, the longest one [sizes], and their damping: initial, and of giving up.
-STEPS, LONGEST_STEP, DAMPING, HOPELESS = 40, 0.7, 1e-3, 1e4
+# Steps from a start (few need many), the longest one [sizes], and their damping: initial, and of
+# giving up.
+STEPS, LONGEST_STEP, DAMPING, HOPELESS = 100, 0.7, 1e-3, 1e4
 # Errors of a solution of the search [sizes]; `refine` removes them.
 NEAR = 1e-12
 # Outputs are dependent if in nine of ten poses the Jacobian is singular by less than this.

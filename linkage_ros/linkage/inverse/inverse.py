@@ -166,6 +166,9 @@ class Inverse:
         """Pickle the linkage and the outputs only."""
         return self.linkage.inverse, (self.outputs,)
 
+    def __repr__(self) -> str:
+        return f'<inverse of {self.linkage.type} for {listed(self.outputs)}>'
+
     def __str__(self) -> str:
         what = listed(self.outputs)
         if not self.closed:
@@ -202,7 +205,7 @@ class Inverse:
         """
         found = [inputs for inputs, _ in self._all(self._one_each(values))]
         if near is not None:
-            beside = self._finite(near)
+            beside = self._finite(near, 'near')
             found = sorted((self._problem.beside(inputs, beside) for inputs in found),
                            key=lambda x: sum(((a - b) / size) ** 2 for a, b, size in zip(
                                x, beside, self._problem.sizes)))
@@ -219,7 +222,7 @@ class Inverse:
             output by the first input, by the second and so on.
 
         """
-        rows = self._arrays(values)
+        rows = _broadcast(self._each(values))
         inputs, rates = (np.moveaxis(part, 0, -1).reshape(
             part.shape[1], *rows[0].shape, len(part)) for part in self._all_arrays(rows))
         return inputs, rates
@@ -268,33 +271,39 @@ class Inverse:
 
     def _one_each(self, values: Any, name: str = 'values') -> Tuple[float, ...]:
         """Return one number for each output; raise ValueError if there are not as many."""
-        if type(values) is list and len(values) == self._n and set(map(type, values)) == {float}:
-            return tuple(values)
-        found = numbers(name, values)
-        if found.shape != (self._n,) and not (self._n == 1 and found.shape == ()):
-            raise ValueError(f'{self.linkage.type} has {self._n} inputs: {name} must be as many '
-                             f'numbers, got {quoted(found.tolist())}')
-        return tuple(found.ravel().tolist())
+        found = self._each(values, name)
+        if any(type(each) is not float and each.size != 1 for each in found):
+            raise self._miscounted(values, name)
+        return tuple([each if type(each) is float else each.item() for each in found])
 
-    def _finite(self, near: Any) -> Tuple[float, ...]:
-        found = self._one_each(near, 'near')
+    def _finite(self, values: Any, name: str) -> Tuple[float, ...]:
+        """Return what `_one_each` does; raise ValueError also if one is not finite."""
+        found = self._one_each(values, name)
         if not all(map(math.isfinite, found)):
-            raise ValueError(f'near must be finite, got {quoted(list(found))}')
+            raise ValueError(f'{name} must be finite, got {quoted(list(found))}')
         return found
 
-    def _arrays(self, values: Any, name: str = 'values') -> Sequence[np.ndarray]:
-        """Return one array for each output; raise ValueError if there are not as many."""
-        if isinstance(values, (str, bytes)) or not hasattr(values, '__len__') or len(
-                values) != self._n:
-            what = f'values of {self._n} outputs' if name == 'values' else f'{self._n} {name}'
-            raise ValueError(f'{self.linkage.type} has {self._n} inputs: {what} are needed, got '
-                             f'{len(values) if hasattr(values, "__len__") else quoted(values)}')
-        return np.broadcast_arrays(*(numbers(name, each) for each in values))
+    def _each(self, values: Any, name: str = 'values') -> Tuple[Any, ...]:
+        """Return a float or an array for each output; raise ValueError if they are not that."""
+        if not isinstance(values, (list, tuple)):
+            values = np.atleast_1d(numbers(name, values))
+        if len(values) != self._n:
+            raise self._miscounted(values, name)
+        if set(map(type, values)) == {float}:
+            return tuple(values)
+        found = [numbers(name, each) for each in values]
+        return tuple(each if each.ndim else float(each) for each in found)
+
+    def _miscounted(self, values: Any, name: str) -> ValueError:
+        return ValueError(f'{self.linkage.type} has {self._n} inputs: {name} must be as many '
+                          f'numbers, got {quoted(values)}')
 
     def _limits(self, ends: Ends) -> Tuple[Tuple[float, ...], ...]:
         """Return the ends of each input as floats, () if it has none."""
+        if ends is None:
+            return ((),) * self._n
         try:
-            limits = ((),) * self._n if ends is None else tuple(
+            limits = tuple(
                 () if pair is None else tuple(map(float, pair)) for pair in ends)
             if len(limits) == self._n and all(
                     len(pair) == 2 and -math.inf < pair[0] <= pair[1] < math.inf
@@ -337,15 +346,12 @@ class Inverse:
             If there is not one value for each output, or ends are not finite and in order.
 
         """
-        limits = self._limits(ends)
-        given = (*values, *(() if near is None else near)) if type(values) in (
-            tuple, list) and type(near) in (tuple, list, type(None)) else ()
-        if set(map(type, given)) == {float} and len(given) in (self._n, 2 * self._n) and len(
-                values) == self._n:
+        limits, values = self._limits(ends), self._each(values)
+        near = None if near is None else self._each(near, 'near')
+        given = (*values, *(near or ()))
+        if set(map(type, given)) == {float}:
             return choose(self._problem, self._all(values), near, limits)
-        rows = self._arrays(values)
-        beside = [] if near is None else [*self._arrays(near, 'near')]
-        rows = np.broadcast_arrays(*rows, *beside)
+        rows = _broadcast(given)
         shape, rows = rows[0].shape, [row.ravel() for row in rows]
         inputs, rates = self._all_arrays(rows[:self._n])
         found = choose_arrays(self._problem, inputs, rates, rows[self._n:] or None, limits)
@@ -372,8 +378,11 @@ class Inverse:
 
         """
         problem, limits = self._problem, self._limits(ends)
-        beside = None if near is None else self._one_each(numbers('near', near).ravel(), 'near')
-        inputs, rates = self._all_arrays(self._arrays(values))
+        beside = None if near is None else self._finite(near, 'near')
+        rows = [np.atleast_1d(row) for row in _broadcast(self._each(values))]
+        if rows[0].ndim > 1:
+            raise self._miscounted(values, 'values')
+        inputs, rates = self._all_arrays(rows)
         found = []
         for x, r in zip(inputs.transpose(2, 0, 1).tolist(), rates.transpose(2, 0, 1).tolist()):
             solution = choose(problem, [(i, j) for i, j in zip(x, r) if i[0] == i[0]], beside,
@@ -381,8 +390,8 @@ class Inverse:
             found.append([*solution[0], *solution[1]])
             if solution[0][0] == solution[0][0]:
                 beside = solution[0]
-        rows = np.array(found).reshape(-1, self._n + self._n ** 2).T
-        return tuple(rows[:self._n]), tuple(rows[self._n:])
+        columns = np.array(found).reshape(-1, self._n + self._n ** 2).T
+        return tuple(columns[:self._n]), tuple(columns[self._n:])
 
     def follow(self, values: ArrayLike, near: ArrayLike) -> Found:
         """
@@ -427,7 +436,7 @@ class Inverse:
 
     def signs(self, inputs: Sequence[float]) -> Mapping[str, int]:
         """Return the working mode of a pose; see `Solution.signs`."""
-        linkage = self.linkage
+        linkage, inputs = self.linkage, self._one_each(inputs, 'inputs')
         cranks = {link.name: link for link in linkage.links
                   if any(input_.turns and link.name == input_.name for input_ in linkage.inputs)}
         places, signs = linkage.solve(inputs if self._n > 1 else inputs[0]), {}
@@ -440,6 +449,15 @@ class Inverse:
         signs['det'] = 0 if self.margin(inputs) < SINGULAR else _sign(float(np.linalg.det(
             self._problem.scaled(self.jacobian(inputs)))), 0.0)
         return signs
+
+
+def _broadcast(values: Sequence[Any]) -> Sequence[np.ndarray]:
+    """Return arrays of one shape; raise ValueError with their shapes if they have none."""
+    try:
+        return np.broadcast_arrays(*values)
+    except ValueError:
+        shapes = ', '.join(str(np.shape(each)) for each in values)
+        raise ValueError(f'arrays must have shapes that broadcast, got {shapes}') from None
 
 
 def _sign(value: float, size: float) -> int:

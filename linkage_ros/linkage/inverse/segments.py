@@ -355,16 +355,17 @@ def segments_of(linkage: Mechanism, output: str, others: Sequence[float] = ()) -
     return linkage.cache.get_or_make(('segments', output, *others), make)
 
 
-def extremes_of(linkage: Mechanism, output: str, arcs: Optional[Sequence[Arc]]) -> list:
+def extremes_of(linkage: Mechanism, output: str, arcs: Optional[Sequence[Arc]],
+                others: Sequence[float]) -> list:
     """Implement `Mechanism.extremes`."""
     linkage.check_output(output)
     pose, angular = linkage.bound('output', output), np.array([linkage.is_angle(output)])
     size = linkage.inputs[0].size
-    parts = linkage.reach() if arcs is None else arcs
-    if arcs is None and (segments := segments_of(linkage, output)).jumps:
+    parts = linkage.reach(*others) if arcs is None else arcs
+    if arcs is None and (segments := segments_of(linkage, output, others)).jumps:
         parts = [(low * size, high * size) for low, high in segments.arcs]
-    found = [extremes(lambda value: pose.searched(value)[:1], low, high, angular)[0].tolist()
-             for low, high in parts]
+    found = [extremes(lambda value: pose.searched(value, *others)[:1], low, high,
+                      angular)[0].tolist() for low, high in parts]
     return [(tuple(least), tuple(greatest)) for least, greatest in found]
 
 
