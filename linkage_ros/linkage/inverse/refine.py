@@ -76,7 +76,7 @@ def _refine_inside(problem: InverseProblem, values: Sequence[float], others: Seq
                    bracket: Bracket) -> Optional[Found]:
     """Return the solution in a bracket of the first input; the others are fixed."""
     low, high, x, sign = bracket
-    at, n, value, period = problem.forward.at, problem.n, values[0], problem.periods[0]
+    at, n, value, period = problem.rated.at, problem.n, values[0], problem.periods[0]
     enough, least, best = ROUNDED * _UNIT * problem.scales[0], math.inf, math.nan
     x = x if low <= x <= high else 0.5 * (low + high)
     found: Sequence[float] = ()
@@ -109,7 +109,7 @@ def _beside(problem: InverseProblem, x: float, others: Sequence[float] = ()
             ) -> Optional[Sequence[float]]:
     """Return outputs and rates at the nearest float that has rates, for an end of a segment."""
     near = (x + side * 2.0 ** k * math.ulp(x) for k in range(MAX_STEPS // 2) for side in (1, -1))
-    rows = (problem.forward.at(y, *others) for y in near)
+    rows = (problem.rated.at(y, *others) for y in near)
     return next((row for row in rows if math.isfinite(row[problem.n])), None)
 
 

@@ -34,8 +34,9 @@ if TYPE_CHECKING:
 # A value this near to a special input's is that input's; and this near, if no other input has it
 # [parts of the output's size].
 SPECIAL, BEYOND = 1e-13, 1e-9
-# Next to an end at which its rate is infinite, a value may be this far beyond it.
-STEEPEST = 1e-6
+# Next to an end at which its rate is infinite, a value is the end's if so many ulps of the input
+# change the output as much, up to the second [part of the output's size].
+ULPS, STEEPEST = 64.0, 1e-6
 # The output's error between samples [part of its range]; cells narrower than the second [rad] are
 # only divided where it jumps, by more than the third [part of its range].
 EXPLAINED, NARROW, JUMP = 1e-4, 1e-6, 0.05
@@ -325,11 +326,12 @@ class Segments:
             there = self.all[other]
             return SPECIAL * self._size + abs(float(self._difference(
                 there.value[-1 - end] - segment.value[end])))
-        # The end of a reach is a float, too: next to it the output may change quickly.
-        inside = np.nextafter(segment.theta[end], segment.theta[-1 - end])
-        step = abs(self._difference(float(self._curve(np.array([inside]))[0, 0])
+        # An end is a float, too: next to it the output may change quickly.
+        x, inside = segment.theta[end], segment.theta[-1 - end] - segment.theta[end]
+        beside = x + np.copysign(ULPS * np.spacing(max(abs(x), 1.0)), inside)
+        step = abs(self._difference(float(self._curve(np.array([beside]))[0, 0])
                                     - segment.sign * segment.value[end]))
-        return float(np.fmin(max(BEYOND * self._size, 2.0 * step), STEEPEST * self._size))
+        return float(np.fmin(max(BEYOND * self._size, step), STEEPEST * self._size))
 
     def _continued(self, segment: Segment, turn: float) -> Optional[int]:
         """Return the number of the segment on which the output goes on after the last input."""
