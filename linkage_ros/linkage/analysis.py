@@ -17,7 +17,7 @@ from typing import Callable, Iterable, List, Sequence, TYPE_CHECKING
 import numpy as np
 
 from .curves import LEAST
-from .dead_points import NEAR, near_zeros, NearZero
+from .dead_points import near_zeros, NearZero
 from .inputs import Arc, Input
 
 if TYPE_CHECKING:

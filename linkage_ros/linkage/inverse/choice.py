@@ -75,7 +75,7 @@ def _inside(problem: InverseProblem, by: int, place: float, rates: Sequence[floa
 def _slack(problem: InverseProblem, by: int, speeds: Sequence[Any], low: Any, high: Any) -> Any:
     """Return how far rounding of the outputs moves an input; rates may be NaN."""
     n, size = problem.n, problem.sizes[by]
-    far = CLOSE * size
+    far: Any = CLOSE * size
     for speed, scale in zip(speeds[n * by:n * by + n], problem.scales):
         # The distance from which on the output changes by more than its rounding.
         moved = TOLERANCE * math.pi * scale / (speed + 1e-300)
@@ -84,7 +84,7 @@ def _slack(problem: InverseProblem, by: int, speeds: Sequence[Any], low: Any, hi
 
 
 def choose_arrays(problem: InverseProblem, inputs: np.ndarray, rates: np.ndarray,
-                  near: Optional[Sequence[np.ndarray]], limits: Sequence[Sequence[np.ndarray]]
+                  near: Optional[Sequence[np.ndarray]], limits: Limits
                   ) -> Tuple[np.ndarray, np.ndarray]:
     """Return what `choose` does for columns of solutions (solutions, inputs, m)."""
     n, places = problem.n, inputs.copy()
@@ -97,7 +97,7 @@ def choose_arrays(problem: InverseProblem, inputs: np.ndarray, rates: np.ndarray
             if turn < math.inf:
                 up, down = np.ceil((low - x) / turn), np.floor((high - x) / turn)
                 x += turn * np.where((x < low) | (near is None), up, np.where(x > high, down, 0.0))
-            x[:] = np.where((low <= x) & (x <= high), np.clip(x, *ends), math.nan)
+            x[:] = np.where((low <= x) & (x <= high), np.clip(x, ends[0], ends[1]), math.nan)
     sizes = np.reshape(problem.sizes, (n, 1))
     if near is None:
         orders: List[np.ndarray] = [*inputs.swapaxes(0, 1) / sizes[..., None]]

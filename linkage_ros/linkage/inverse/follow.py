@@ -30,20 +30,18 @@ from .problem import Found, InverseProblem
 from .refine import refine
 from .segments import Segments
 
-# Steps of a motion at most, the shortest of them, and the longest of an input [rad, sizes].
-STEPS, SHORTEST, LONGEST = 40, 1e-10, 0.7
-# Newton steps to the end of each; each has to be shorter than this part of the one before.
-NEWTON_STEPS, SHORTER = 30, 0.6
-# After a step that is no longer than this [rad, sizes], the next one is rounding.
-CLOSE = 1e-9
+# Steps of a motion at most, the shortest of them [part of the motion], and the longest of an input
+# [rad, sizes].
+STEPS, SHORTEST, LONGEST = 200, 1e-10, 0.7
 
 
 def follow(problem: InverseProblem, values: Sequence[float], near: Sequence[float],
            segments: Optional[Segments]) -> Optional[Found]:
-    """Return the solution, with the whole turns of `near`, and its rates; None if there is none."""
+    """Return the solution, with the whole turns of `near`, and its rates; None if none."""
     start = problem.forward.at(*near)[:problem.n]
     if not all(map(math.isfinite, start)):
         return None
+    found: Optional[Found]
     if segments:
         input_, size = problem.inputs[0], problem.sizes[0]
         turns = input_.turns_of(near[0])
@@ -51,51 +49,36 @@ def follow(problem: InverseProblem, values: Sequence[float], near: Sequence[floa
         if not way:
             return None
         bracket, passed = way
-        found, near = refine(problem, values, (), bracket), (turns + passed + bracket[2],)
+        found = refine(problem, values, (), bracket)
+        near = (turns + passed + bracket[2],)
     else:
-        end = _followed(problem, values, near, start)
-        found = end and refine(problem, values, end)
-        near = end or near
+        found, near = _followed(problem, values, near, start)
     return found and (problem.beside(found[0], near), found[1])
 
 
 def _followed(problem: InverseProblem, values: Sequence[float], near: Sequence[float],
-              start: Sequence[float]) -> Optional[Tuple[float, ...]]:
-    """Return the end of the motion; None if it passes a dead point or leaves the reach."""
-    sizes, left, part = np.array(problem.sizes), 1.0, 1.0
-    gaps = np.array([math.remainder(now - value, turn) for now, value, turn in zip(
-        start, values, problem.periods)])
-    q, side = np.divide(near, sizes), np.linalg.det(problem.jacobian(
-        problem.forward.at(*near)[problem.n:]))
-    for _ in range(STEPS if math.isfinite(side) and side else 0):
+              start: Sequence[float]) -> Tuple[Optional[Found], Sequence[float]]:
+    """Return the end of the motion, None if there is none, and inputs in its turn."""
+    gaps = [math.remainder(now - value, turn) for now, value, turn in zip(
+        start, values, problem.periods)]
+    side, left, part = _side(problem, problem.forward.at(*near)[problem.n:]), 1.0, 1.0
+    for _ in range(STEPS if side else 0):
         rest = max(left - part, 0.0)
-        found = _corrected(problem, q, np.add(values, rest * gaps), side)
-        if found is not None:
-            q, left = found, rest
+        found = refine(problem, [x + rest * gap for x, gap in zip(values, gaps)], tuple(near))
+        # A fold is not passed, nor is the motion left for another one.
+        if found and _side(problem, found[1]) == side and all(
+                abs(x - y) <= LONGEST * size for x, y, size in zip(
+                    problem.beside(found[0], near), near, problem.sizes)):
+            near, left = problem.beside(found[0], near), rest
             if not left:
-                return tuple((q * sizes).tolist())
+                return found, near
             part = min(4.0 * part, left)
         elif (part := 0.25 * part) < SHORTEST:
             break
-    return None
+    return None, near
 
 
-def _corrected(problem: InverseProblem, start: np.ndarray, aim: np.ndarray,
-               side: float) -> Optional[np.ndarray]:
-    """Return the pose near a start at which outputs have values, without passing a fold."""
-    q, last, n = start, LONGEST, problem.n
-    for _ in range(NEWTON_STEPS):
-        row = problem.forward.at(*(q * problem.sizes).tolist())
-        jacobian = problem.jacobian(row[n:])
-        gap = [math.remainder(y - x, turn) / scale if math.isfinite(y) else math.nan
-               for y, x, turn, scale in zip(row, aim, problem.periods, problem.scales)]
-        if not (np.isfinite(jacobian).all() and np.linalg.det(jacobian) * side > 0.0):
-            return None
-        step = np.linalg.solve(jacobian, gap)
-        longest = float(np.abs(step).max())
-        if not longest <= last or np.abs(q - step - start).max() > LONGEST:
-            return None
-        q, last = q - step, SHORTER * longest
-        if longest <= CLOSE:
-            return q
-    return None
+def _side(problem: InverseProblem, rates: Sequence[float]) -> float:
+    """Return the sign of the determinant, 0 where there is none."""
+    jacobian = problem.jacobian(rates)
+    return float(np.sign(np.linalg.det(jacobian))) if np.isfinite(jacobian).all() else 0.0

@@ -23,7 +23,6 @@ import math
 from typing import (
     Any,
     cast,
-    Dict,
     List,
     Mapping,
     NamedTuple,
@@ -140,7 +139,7 @@ class Inverse:
         self._is_single = self._n == 1 and (
             linkage.period() <= MOST_COUNTED or not linkage.inputs[0].turns or not self.closed)
         if not self._is_single and not self.closed:
-            self._source  # raises ValueError for dependent outputs
+            self._source = Grid(self._problem)  # raises ValueError for dependent outputs
 
     @cached_property
     def closed(self) -> Optional[InverseLinkage]:
@@ -355,8 +354,8 @@ class Inverse:
         shape, rows = rows[0].shape, [row.ravel() for row in rows]
         inputs, rates = self._all_arrays(rows[:self._n])
         found = choose_arrays(self._problem, inputs, rates, rows[self._n:] or None, limits)
-        places, rates = (tuple(row.reshape(shape) for row in part) for part in found)
-        return places, rates
+        return cast(Tuple[Any, Any], tuple(
+            tuple(row.reshape(shape) for row in part) for part in found))
 
     def path(self, values: Sequence[ArrayLike], near: Optional[ArrayLike] = None,
              ends: Ends = None) -> Tuple[Any, Any]:

@@ -19,7 +19,7 @@ the same on arrays. Where a bracket is known, Newton's method stays inside it.
 from __future__ import annotations
 
 import math
-from typing import Any, List, Optional, Sequence, Tuple
+from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -29,10 +29,8 @@ from .segments import Bracket, STEEPEST
 # Errors in units of 2^-53 of an output's size: rounding, where refinement stops; and the largest
 # of a solution, which rounding of all joints on the way may explain.
 ROUNDED, ACCEPTED = 2.0, 64.0
-# Where rates are unbounded, the largest error of a solution is this part of the output's size.
-STEEP = 1e-7
 # A larger error than this part of the output's size belongs to another assembly.
-OTHER = 1e-2
+OTHER = 0.1
 # A longer step leads to another solution [rad, sizes].
 LONGEST = 0.1
 # Steps at most: bisection alone needs one per bit of a float.
@@ -67,7 +65,8 @@ def refine(problem: InverseProblem, values: Sequence[float], inputs: Tuple[float
     if not found or least > OTHER:
         return None
     inputs, row, gaps = found
-    if least > ROUNDED * _UNIT and _error(problem, gaps, row, inputs) > ACCEPTED:
+    if least > ROUNDED * _UNIT and not _errors(
+            problem, *(np.reshape(part, (-1, 1)) for part in (gaps, row, inputs)))[0] <= ACCEPTED:
         return None
     return problem.wrapped(inputs), row[n:]
 
@@ -102,7 +101,7 @@ def _refine_inside(problem: InverseProblem, values: Sequence[float], others: Seq
         return None
     if not -math.inf < found[n] < math.inf:
         found = _beside(problem, best, others) or found
-    return problem.wrapped((best, *others)), found[n:]
+    return problem.wrapped((best, *others)), tuple(found[n:])
 
 
 def _beside(problem: InverseProblem, x: float, others: Sequence[float] = ()
@@ -113,23 +112,6 @@ def _beside(problem: InverseProblem, x: float, others: Sequence[float] = ()
     return next((row for row in rows if math.isfinite(row[problem.n])), None)
 
 
-def _error(problem: InverseProblem, gaps: Sequence[float], row: Sequence[float],
-           inputs: Sequence[float]) -> float:
-    """Return the largest of some outputs' errors in units of their rounding; NaN if unknown."""
-    n, worst = problem.n, 0.0
-    for i, (gap, scale) in enumerate(zip(gaps, problem.scales)):
-        rounding = scale
-        for rate, x, size in zip(row[n + i::n], inputs, problem.sizes):
-            rounding += abs(rate * x) if abs(x) > size else abs(rate) * size
-        most = scale * (STEEP / (ACCEPTED * _UNIT))
-        # Where a pose has no rates, they explain nothing.
-        error = abs(gap) / (_UNIT * (
-            rounding if rounding < most else most if rounding >= most else scale))
-        if not error <= worst:
-            worst = error
-    return worst
-
-
 def _step(problem: InverseProblem, gaps: Sequence[float], row: Sequence[float]) -> Sequence[float]:
     """Return the step of Newton's method; NaN where the Jacobian is singular."""
     n = problem.n
@@ -138,10 +120,7 @@ def _step(problem: InverseProblem, gaps: Sequence[float], row: Sequence[float]) 
         det = a * d - b * c
         return ((gaps[0] * d - gaps[1] * c) / det, (gaps[1] * a - gaps[0] * b) / det) if det else (
             math.nan,)
-    try:
-        return np.linalg.solve(np.reshape(row[n:], (n, n)).T, gaps).tolist()
-    except np.linalg.LinAlgError:
-        return (math.nan,)
+    return _step_arrays(problem, np.reshape(gaps, (n, 1)), np.reshape(row, (-1, 1)))[:, 0].tolist()
 
 
 def refine_arrays(problem: InverseProblem, values: np.ndarray, inputs: np.ndarray,
@@ -164,12 +143,13 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, inputs: np.ndarra
         with np.errstate(all='ignore'):
             rows = problem.over(*inputs)
             gaps = _gaps(problem, rows, values[:, going])
-            error = _error_arrays(problem, gaps, rows, inputs)
+            error = _errors(problem, gaps, rows, inputs)
             better = error < least[going]
             at = going[better]
             least[at] = error[better]
             found[:n, at], found[n:, at] = inputs[:, better], rows[:, better]
-            more = ~(error <= ROUNDED) & (better | (least[going] > ACCEPTED) if bracket else better)
+            more = ~(error <= ROUNDED) & (
+                better | (least[going] > ACCEPTED) if bracket else better)
             if bracket:
                 x, behind = inputs[0], gaps[0] * sign < 0.0
                 low, high = np.where(behind, x, low), np.where(behind, high, x)
@@ -205,15 +185,16 @@ def _gaps(problem: InverseProblem, rows: np.ndarray, values: np.ndarray) -> np.n
     return gaps
 
 
-def _error_arrays(problem: InverseProblem, gaps: np.ndarray, rows: np.ndarray,
-                  inputs: np.ndarray) -> np.ndarray:
-    """Return what `_error` does for columns."""
+def _errors(problem: InverseProblem, gaps: np.ndarray, rows: np.ndarray,
+            inputs: np.ndarray) -> np.ndarray:
+    """Return the largest of the outputs' errors in units of their rounding, for columns."""
     n, errors = problem.n, []
     weights = [np.maximum(np.abs(x), size) for x, size in zip(inputs, problem.sizes)]
     for i, (gap, scale) in enumerate(zip(gaps, problem.scales)):
         rounding = scale + sum(np.abs(rate) * weight for rate, weight in zip(
             rows[n + i::n], weights))
-        most = scale * (STEEP / (ACCEPTED * _UNIT))
+        # Where a pose has no rates, they explain nothing.
+        most = scale * (STEEPEST / (ACCEPTED * _UNIT))
         errors.append(np.abs(gap) / (_UNIT * np.where(np.isnan(rounding), scale, np.minimum(
             rounding, most))))
     return np.max(errors, axis=0) if n > 1 else errors[0]

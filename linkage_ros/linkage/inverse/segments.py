@@ -19,7 +19,17 @@ from __future__ import annotations
 
 from bisect import bisect_right
 import math
-from typing import Any, Callable, Iterator, List, NamedTuple, Optional, Sequence, Tuple, TYPE_CHECKING
+from typing import (
+    Any,
+    Callable,
+    Iterator,
+    List,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Tuple,
+    TYPE_CHECKING,
+)
 
 import numpy as np
 
@@ -122,13 +132,13 @@ class Segments:
                 self._preceding[other] = number
         # What one value needs: the range in which a segment has answers, its sign, the range
         # without its ends, and its samples.
-        special, scale = SPECIAL * size, [self._unit, self._unit, *[1.0] * 6]
+        special, units = SPECIAL * size, [self._unit, self._unit, *[1.0] * 6]
         self._rows = [(
             float(segment.value[0] - self._slack(segment, 0, before)),
             float(segment.value[-1] + self._slack(segment, -1, after)),
             segment.sign, float(segment.value[0] + special), float(segment.value[-1] - special),
             (segment.theta * self._unit).tolist(), segment.value.tolist(),
-            [*map(tuple, (segment.cells * scale).tolist())])
+            [*map(tuple, (segment.cells * units).tolist())])
             for segment, before, after in zip(self.all, self._preceding, self._following)]
 
     # --- candidates ---
@@ -177,7 +187,7 @@ class Segments:
             if segment.theta[0] <= near <= segment.theta[-1]:
                 start = float(np.interp(near, segment.theta, segment.value))
                 start += math.remainder(segment.sign * now - start, self._period)
-                target, first = start + segment.sign * gap, number
+                target = start + segment.sign * gap
                 break
         else:
             return None
