@@ -111,12 +111,12 @@ class Limits(NamedTuple):
 
 
 @precisely
-def limits(linkage: Linkage, poses, way, value: float) -> Limits:
-    """Return the limits of outputs at a value from both sides."""
+def limits(linkage: Linkage, poses, way, value: float, others=()) -> Limits:
+    """Return the limits of outputs at a value of the first input from both sides."""
     rows, turns = linkage.prepared(linkage.numbers), linkage.turns(linkage.numbers, way)
     unit = 1 if linkage.inputs[0].turns else linkage.longest
-    drawn = [draw(DIGITS, linkage, rows, [mpfr(value) + side * SIDE * unit], way, turns)
-             for side in (-1, 0, 1)]
+    drawn = [draw(DIGITS, linkage, rows, [mpfr(value) + side * SIDE * unit, *map(mpfr, others)],
+                  way, turns) for side in (-1, 0, 1)]
     sides = [None if any(gap < 0 for gap in each.gaps.values())
              else [_pose(out, each) for out in poses] for each in drawn[::2]]
     return Limits(*sides, frozenset(
