@@ -204,9 +204,9 @@ def test_generated_c_has_the_limits_too(tmp_path, single):
     *found, whole = solved(compiled(tmp_path, [machine], single), machine, theta[:, None], kind).T
     at = 2 * machine.linkage.points.index('C')
     assert whole.all()
-    np.testing.assert_allclose(found[at], 0.25 * (1.0 + np.cos(theta)), rtol=1e-6 if single else 1e-15)
-    np.testing.assert_allclose(found[at + 1], 0.25 * np.sin(theta), atol=1e-7 if single
-                               else 1e-16, rtol=1e-6)
+    close = 1e-7 if single else 1e-16
+    np.testing.assert_allclose(found[at], 0.25 * (1.0 + np.cos(theta)), atol=close)
+    np.testing.assert_allclose(found[at + 1], 0.25 * np.sin(theta), atol=close)
 
 
 @pytest.mark.parametrize('start', [0.0, 1e-200])

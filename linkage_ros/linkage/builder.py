@@ -292,7 +292,7 @@ class Builder:
     def dyad(self, name: str, first: str, second: str, to_first: Real, to_second: Real,
              side: float) -> None:
         """Join bars of to_first and to_second [m] from two joints, left of first -> second."""
-        found = planar.dyad(self.arm(first, second, True), to_first, to_second, side)
+        found = planar.dyad(self.arm(first, second, smooth=True), to_first, to_second, side)
         self.limits += found.limits
         start, pivot = self.points[first], self.points[second]
         place = start.place + found.first
@@ -334,7 +334,7 @@ class Builder:
         """Mirror a joint in the line of two others: the far corner of a kite."""
         pin = self.points[first].crank
         ends = [self._side(end, point).vector for end in (second, first)]
-        place, arm = self.points[point].place, self.arm(second, first, True)
+        place, arm = self.points[point].place, self.arm(second, first, smooth=True)
         self._reflect(name, first, second, arm, place, arm.offset(place, ends[0]), ends,
                       self.distance(first, point), self.distance(second, point), point)
         if isinstance(arm, planar.CrankArm) and pin and pin.centre is self.points[point].place:
@@ -354,7 +354,7 @@ class Builder:
     def antiparallelogram(self, name: str, corner: str, first: str, second: str) -> None:
         """Join two bars as long as those from a corner, but crossed."""
         to_first, to_second = (self._side(corner, end) for end in (first, second))
-        arm = self.arm(second, first, True)
+        arm = self.arm(second, first, smooth=True)
         opposite = self.points[first].place + to_second.vector
         start = self.points[corner].place
         offset = -arm.offset(start, -to_second.vector)
@@ -500,7 +500,7 @@ class Builder:
         self.frames[name] = {tip: Complex(0.0, 0.0)}
         self._axes[name] = _Vector(along, real(1.0), name)
 
-    def arm(self, first: str, second: str, smooth: bool = False) -> planar.Arm:
+    def arm(self, first: str, second: str, *, smooth: bool = False) -> planar.Arm:
         """Return the arm from one joint to another; see `planar.CrankArm` for `smooth`."""
         ends = self.points[first], self.points[second]
         for (foot, pin), reverse in ((ends, False), (ends[::-1], True)):

@@ -127,8 +127,9 @@ class Input(NamedTuple):
         return abs(self.wrapped(value - other))
 
     def is_whole(self, arcs: Sequence[Arc]) -> bool:
-        """Return whether some arcs are a full rotation."""
-        return self.wraps and len(arcs) == 1 and arcs[0][1] - arcs[0][0] >= self.turn
+        """Return whether some arcs are a full rotation, or all that is computed of one."""
+        return self.turns and len(arcs) == 1 and arcs[0][1] - arcs[0][0] >= min(
+            self.turn, self.high - self.low)
 
     def is_cut(self, value: float) -> bool:
         """Return whether the input is cut off at a value: a turn at pi, a stroke at its end."""

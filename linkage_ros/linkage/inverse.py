@@ -17,12 +17,14 @@ If the inverse linkage decomposes into dyads, each of its assembly modes is a cl
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import chain, combinations, takewhile
 import math
 from typing import (
     Any,
     cast,
     Dict,
+    Iterable,
     List,
     Mapping,
     NamedTuple,
@@ -175,9 +177,9 @@ class Inverse:
         """
         if near is not None and (there := self._elsewhere(self._one_each(near, 'near'))):
             inverse, start, own = there
-            found = inverse.all(np.subtract(self._one_each(values), own),
-                                np.subtract(self._one_each(near), start))
-            return [Answer(tuple(np.add(each.inputs, start).tolist()), self) for each in found]
+            return [Answer(tuple(np.add(each, start).tolist()), self) for each, _ in inverse.all(
+                np.subtract(self._one_each(values), own), np.subtract(
+                    self._one_each(near), start))]
         found = [inputs for inputs, _ in self._all(self._one_each(values))]
         if near is not None:
             beside = self._one_each(near, 'near')
@@ -249,9 +251,10 @@ class Inverse:
         distinct: List[Found] = []
         near, turn = NEIGHBOURS * self._problem.sizes[0], self._problem.turned[0][1]
         for answer in sorted(found):
-            first = answer[0][0]
-            beside = (*takewhile(lambda other: first - other[0][0] <= near, reversed(distinct)),
-                      *takewhile(lambda other: turn - (first - other[0][0]) <= near, distinct))
+            below, turned = answer[0][0] - near, answer[0][0] - (turn - near)
+            # Those just below, and those that are nearly a turn below.
+            beside = (*takewhile(partial(_is_above, below), reversed(distinct)),
+                      *takewhile(partial(_is_below, turned), distinct))
             if not any(self._are_one(answer, other) for other in beside):
                 distinct.append(answer)
         return distinct
@@ -272,12 +275,12 @@ class Inverse:
     def _single(self, inputs: np.ndarray, rates: np.ndarray) -> None:
         """Make NaN all but one of the solutions that differ by rounding."""
         doubtful = np.zeros(inputs.shape[2], bool)
-        pairs = combinations(inputs, 2)
+        pairs: Iterable[Tuple[np.ndarray, np.ndarray]] = combinations(inputs, 2)
         if self._n == 1:
             ordered = np.sort(inputs, axis=0)
             last = np.isfinite(ordered).sum(axis=0, keepdims=True).clip(1) - 1
             ends = ordered[0], np.take_along_axis(ordered, last, 0)[0]
-            pairs = iter([*zip(ordered[:-1], ordered[1:]), *[ends] * (len(ordered) > 2)])
+            pairs = [*zip(ordered[:-1], ordered[1:]), *[ends] * (len(ordered) > 2)]
         for one, two in pairs:
             away = self._problem.away(one, two)
             with np.errstate(invalid='ignore'):
@@ -386,7 +389,7 @@ class Inverse:
                 inverse._solutions(tuple(np.subtract(one[:self._n], own).tolist())),
                 np.subtract(one[self._n:], start).tolist(),
                 [tuple(np.subtract(pair, turn).tolist()) for pair, turn in zip(limits, start)])[1:]
-            found[:, *place] = *np.add(inputs, start), *rates
+            found[(slice(None), *place)] = [*np.add(inputs, start), *rates]
         return tuple(found[:self._n][()]), tuple(found[self._n:])
 
     def path(self, values: Sequence[np.ndarray], near: Optional[Sequence[float]] = None,
@@ -414,8 +417,9 @@ class Inverse:
             inverse, start, own = there
             inputs, rates = inverse.path(
                 [np.subtract(row, turn) for row, turn in zip(values, own)],
-                np.subtract(beside, start).tolist(), [pair and tuple(np.subtract(
-                    pair, turn).tolist()) for pair, turn in zip(limits, start)])
+                np.subtract(beside, start).tolist(), [
+                    (pair[0] - turn, pair[1] - turn) if pair else None
+                    for pair, turn in zip(limits, start)])
             return tuple(row + turn for row, turn in zip(inputs, start)), rates
         found = np.full((self._n + self._n ** 2, inputs.shape[2]), np.nan)
         breaks: Dict[int, np.ndarray] = {}
@@ -562,3 +566,11 @@ class Inverse:
 
 def _sign(value: float, size: float) -> int:
     return int(np.sign(value)) if abs(value) > SINGULAR * size else 0
+
+
+def _is_above(least: float, answer: Found) -> bool:
+    return answer[0][0] >= least
+
+
+def _is_below(most: float, answer: Found) -> bool:
+    return answer[0][0] <= most

@@ -86,7 +86,8 @@ class InverseProblem:
         rates = [self.linkage.gear(name, by)[0] for name in self.linkage.geared_to(by)]
         periods = (1.0, *(1.0 / abs(rate) for rate in rates if rate), math.inf)
         return next(each for each in (input_._replace(period=period) for period in periods)
-                    if not each.period < math.inf or each.wraps and is_periodic(partial(self._outputs_over, by), each))
+                    if each.period == math.inf or each.wraps and is_periodic(
+                        partial(self._outputs_over, by), each))
 
     def _outputs_over(self, by: int, values: np.ndarray) -> np.ndarray:
         """Return the outputs, angles as directions, over one input; the others are spread."""

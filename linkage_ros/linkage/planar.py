@@ -58,8 +58,8 @@ LEFT, RIGHT = 1.0, -1.0
 
 # A margin counts as zero within rounding: eight half ulps of the scale.
 TOLERANCE = 8 * 2.0 ** -53
-# Added to a cosine that may vanish where the quotient of two zeros has a limit: its square is a normal
-# number, and it is far below the rounding of a direction.
+# Added to a cosine that may vanish where the quotient of two zeros has a limit: its square is a
+# normal number, and it is far below the rounding of a direction.
 TINY = 2.0 ** -330
 # An arm whose square is smaller has no direction: squares below lose digits, or are zero.
 LEAST_SQUARE = 2.0 ** -1000

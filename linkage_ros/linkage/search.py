@@ -133,8 +133,9 @@ class BranchSearch:
         """Return the solution that is continuous from given inputs, and the rates."""
         input_ = self._input
         turns = input_.turns_of(near[0])
-        found, rate = self._branches.follow(self._pose.at, input_.step, values[0], near[0] - turns,
-                                            input_.turn / input_.step if input_.wraps else math.inf)
+        turn = input_.turn / input_.step if input_.wraps else math.inf
+        found, rate = self._branches.follow(self._pose.at, input_.step, values[0],
+                                            near[0] - turns, turn)
         return (found + turns,), (rate,)
 
 

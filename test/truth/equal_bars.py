@@ -23,7 +23,7 @@ import numpy as np
 
 from .drawing import DIGITS, draw, FLOATS, Linkage, precisely
 from .drawing_accuracy import turned_bar
-from .random_linkages import Design
+from .random_linkages import Design, INPUTS
 
 # How far from a value its sides are; limits that differ by less are equal; arms below it vanish.
 SIDE, EQUAL, NONE = mpfr(2) ** -150, mpfr(2) ** -50, mpfr(2) ** -280
@@ -37,7 +37,8 @@ LINES = {
     'yoke {0} {1} along {2}': 1, 'block {0} {l} 0': 1, 'inversor {0} {1} {l} {m}': 1,
     'crank {0} {l} geared crank {ratio} 0': 1, 'crank {0} {l} zero {1} geared crank {ratio} 0': 1}
 STARTS = {'crank O {l}': 6, 'crank O {l} up': 1, 'crank O {l} zero Q': 1,
-          'cylinder O Q {l} {side}': 1, 'carriage O along Q -{l} {l}': 1, 'carriage O along Q 0 {l}': 1}
+          'cylinder O Q {l} {side}': 1, 'carriage O along Q -{l} {l}': 1,
+          'carriage O along Q 0 {l}': 1}
 CHOICES = {'side': ('left', 'right'), 'half': ('out', 'in'), 'angle': ('0', '90deg', '45deg'),
            'ratio': ('1', '-1', '2', '0.5')}
 
@@ -77,8 +78,8 @@ def _is_allowed(joints, dimensions):
         held = np.all([gap > -1e-6 + 0.0 * values for gap in (1.0, *drawn.gaps.values())], axis=0)
         apart = np.all([arm > 1e-6 + 0.0 * values for arm in (1.0, *drawn.arms.values())], axis=0)
     last, = linkage.lines[-1:]
-    moving = not linkage.fixed >= set(linkage.lines[-1].joints)
-    return np.sum(held & apart) > 0.9 * np.sum(held) and (moving or last.word in ('crank', 'cylinder', 'carriage'))
+    moves = last.word in INPUTS or not linkage.fixed.issuperset(last.joints)
+    return bool(moves and np.sum(held & apart) > 0.9 * np.sum(held))
 
 
 def _chosen(rng, weights):
