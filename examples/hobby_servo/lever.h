@@ -44,33 +44,33 @@ static inline int lever_solve(float crank, lever_pose *p)
     const float k30 = 0.025f;
     const float k31 = 0.000625f;
     const float k34 = 0.0036f;
-    const float k54 = 0.081f;
-    const float k73 = 0.000625f;
-    const float k80 = 0.0f;
+    const float k40 = 1.0f;
+    const float k58 = 0.081f;
+    const float k77 = 0.000625f;
+    const float k84 = 0.0f;
     const float x0 = crank;
     const float v14 = (0.5f * x0);
     const float v15 = sinf(v14);
     const float v17 = cosf(v14);
     const float v35 = (v17 * v17);
     const float v36 = (k34 * v35);
-    const float v37 = (k31 + v36);
-    const float v40 = lever_gated(v37, (v37 - 7.888609e-31f), 0.0f);
-    const float v41 = lever_gated((-((k26 * v15) * v17)), v40, 0.0f);
-    const float v45 = lever_gated((k30 + (k26 * v35)), v40, 0.0f);
-    const float v48 = sqrtf(((v41 * v41) + (v45 * v45)));
-    const float v49 = (v41 / v48);
-    const float v56 = (v45 / v48);
+    const float v44 = lever_gated((k31 + v36), ((v35 + k40) - 7.888609e-31f), 0.0f);
+    const float v45 = lever_gated((-((k26 * v15) * v17)), v44, 0.0f);
+    const float v49 = lever_gated((k30 + (k26 * v35)), v44, 0.0f);
+    const float v52 = sqrtf(((v45 * v45) + (v49 * v49)));
+    const float v53 = (v45 / v52);
+    const float v60 = (v49 / v52);
     p->O_x = 0.0f;
     p->O_y = 0.0f;
     p->Q_x = 0.0f;
     p->Q_y = k10;
     p->A_x = (-(((2.0f * v15) * v17) * k19));
     p->A_y = ((1.0f - (2.0f * (v15 * v15))) * k19);
-    p->L_x = (v49 * k54);
-    p->L_y = (k7 + (v56 * k54));
+    p->L_x = (v53 * k58);
+    p->L_y = (k7 + (v60 * k58));
     p->angle_crank = x0;
-    p->angle_lever = atan2f((-v49), v56);
-    p->slide_slide = lever_root((k73 + v36), k80);
+    p->angle_lever = atan2f((-v53), v60);
+    p->slide_slide = lever_root((k77 + v36), k84);
     return isfinite(p->O_x)
         && isfinite(p->O_y)
         && isfinite(p->Q_x)
@@ -94,9 +94,10 @@ static inline void lever_rates(float crank, lever_pose *by_crank)
     const float k26 = 0.000625f;
     const float k29 = 0.0036f;
     const float k34 = 0.04f;
-    const float k55 = 0.081f;
-    const float k79 = 0.000625f;
-    const float k86 = 0.0f;
+    const float k39 = 1.0f;
+    const float k59 = 0.081f;
+    const float k83 = 0.000625f;
+    const float k90 = 0.0f;
     const float x0 = crank;
     const float v5 = (0.5f * x0);
     const float v6 = sinf(v5);
@@ -105,21 +106,21 @@ static inline void lever_rates(float crank, lever_pose *by_crank)
     const float v30 = (k29 * v21);
     const float v31 = (k26 + v30);
     const float v33 = (((k10 * (k19 + (k20 * v21))) / v31) + 0.0f);
-    const float v39 = lever_gated(v31, (v31 - 7.888609e-31f), 0.0f);
-    const float v40 = lever_gated((k25 + (k34 * v21)), v39, 0.0f);
-    const float v44 = lever_gated((-((k34 * v6) * v14)), v39, 0.0f);
-    const float v48 = sqrtf(((v44 * v44) + (v40 * v40)));
+    const float v43 = lever_gated(v31, ((v21 + k39) - 7.888609e-31f), 0.0f);
+    const float v44 = lever_gated((k25 + (k34 * v21)), v43, 0.0f);
+    const float v48 = lever_gated((-((k34 * v6) * v14)), v43, 0.0f);
+    const float v52 = sqrtf(((v48 * v48) + (v44 * v44)));
     by_crank->O_x = 0.0f;
     by_crank->O_y = 0.0f;
     by_crank->Q_x = 0.0f;
     by_crank->Q_y = 0.0f;
     by_crank->A_x = (-((1.0f - (2.0f * (v6 * v6))) * k10));
     by_crank->A_y = (-(((2.0f * v6) * v14) * k10));
-    by_crank->L_x = (-((v33 * (v40 / v48)) * k55));
-    by_crank->L_y = ((v33 * (v44 / v48)) * k55);
+    by_crank->L_x = (-((v33 * (v44 / v52)) * k59));
+    by_crank->L_y = ((v33 * (v48 / v52)) * k59);
     by_crank->angle_crank = lever_gated(1.0f, fabsf(x0), 0.0f);
     by_crank->angle_lever = v33;
-    by_crank->slide_slide = (-(((((v6 * 0.5f) * v14) * 2.0f) * k29) / (2.0f * lever_root((k79 + v30), k86))));
+    by_crank->slide_slide = (-(((((v6 * 0.5f) * v14) * 2.0f) * k29) / (2.0f * lever_root((k83 + v30), k90))));
 }
 
 /* Whether it can be assembled: [-3.14159, 3.14159] rad. */
@@ -167,22 +168,23 @@ static inline int lever_at(const float *q, int is_rated, lever_point *p)
     const float k12 = 0.025f;
     const float k13 = 0.000625f;
     const float k16 = 0.0036f;
-    const float k33 = (-0.025f);
-    const float k34 = 0.09f;
+    const float k24 = 1.0f;
+    const float k37 = (-0.025f);
+    const float k38 = 0.09f;
     const float x0 = q[0];
     const float v5 = (0.5f * x0);
     const float v8 = cosf(v5);
     const float v17 = (v8 * v8);
     const float v19 = (k13 + (k16 * v17));
-    const float v23 = lever_gated(v19, (v19 - 7.888609e-31f), 0.0f);
+    const float v28 = lever_gated(v19, ((v17 + k24) - 7.888609e-31f), 0.0f);
     p->position[0][0] = x0;
-    p->position[1][0] = atan2f((-lever_gated((-((k3 * sinf(v5)) * v8)), v23, 0.0f)), lever_gated((k12 + (k3 * v17)), v23, 0.0f));
+    p->position[1][0] = atan2f((-lever_gated((-((k3 * sinf(v5)) * v8)), v28, 0.0f)), lever_gated((k12 + (k3 * v17)), v28, 0.0f));
     if (!isfinite(p->position[0][0] + p->position[1][0]))
         return 0;
     if (!is_rated)
         return 1;
     p->rate[0][0][0] = lever_gated(1.0f, fabsf(x0), 0.0f);
-    p->rate[1][0][0] = (((k2 * (k33 + (k34 * v17))) / v19) + 0.0f);
+    p->rate[1][0][0] = (((k2 * (k37 + (k38 * v17))) / v19) + 0.0f);
     p->load[0] = 0.0f;
     return 1;
 }
@@ -195,20 +197,21 @@ static inline int lever_at_angle_lever(const float *q, int is_rated, lever_point
     const float k12 = 0.025f;
     const float k13 = 0.000625f;
     const float k16 = 0.0036f;
-    const float k30 = (-0.025f);
-    const float k31 = 0.09f;
+    const float k24 = 1.0f;
+    const float k35 = (-0.025f);
+    const float k36 = 0.09f;
     const float x0 = q[0];
     const float v5 = (0.5f * x0);
     const float v8 = cosf(v5);
     const float v17 = (v8 * v8);
     const float v19 = (k13 + (k16 * v17));
-    const float v23 = lever_gated(v19, (v19 - 7.888609e-31f), 0.0f);
-    p->position[1][0] = atan2f((-lever_gated((-((k2 * sinf(v5)) * v8)), v23, 0.0f)), lever_gated((k12 + (k2 * v17)), v23, 0.0f));
+    const float v28 = lever_gated(v19, ((v17 + k24) - 7.888609e-31f), 0.0f);
+    p->position[1][0] = atan2f((-lever_gated((-((k2 * sinf(v5)) * v8)), v28, 0.0f)), lever_gated((k12 + (k2 * v17)), v28, 0.0f));
     if (!isfinite(p->position[1][0]))
         return 0;
     if (!is_rated)
         return 1;
-    p->rate[1][0][0] = (((k1 * (k30 + (k31 * v17))) / v19) + 0.0f);
+    p->rate[1][0][0] = (((k1 * (k35 + (k36 * v17))) / v19) + 0.0f);
     p->load[0] = 0.0f;
     return 1;
 }

@@ -151,7 +151,12 @@ class Arm:
     def divisor(self) -> Real:
         """Its square, NaN where it has no direction."""
         return self.square if self._length or self._is_smooth else gated(
-            self.square, self.square - LEAST_SQUARE, real(0.0))
+            self.square, self._clear - LEAST_SQUARE, real(0.0))
+
+    @property
+    def _clear(self) -> Real:
+        """A square that is no smaller than rounding where the arm has a direction."""
+        return self.square
 
     @property
     def length(self) -> Optional[Real]:
@@ -233,6 +238,10 @@ class CrankArm(Arm):
                         m * ((m - g) + 2.0 * g * square(h)) / self.square)
         vector.spin = Rate((crank.angle,), lambda rate: rate * turning)
         self.vector = -vector if reverse else vector
+
+    @property
+    def _clear(self) -> Real:
+        return square(self._h) + where(self._is_isosceles, 0.0, 1.0)
 
     @property
     def _is_isosceles(self) -> Real:
