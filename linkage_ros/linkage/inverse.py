@@ -120,8 +120,8 @@ class Inverse:
     closed : InverseLinkage or None
         Joint lines and assembly modes of the inverse linkage; None if the inverse is searched.
     inputs : tuple of Input
-        The inputs of the linkage; see `InverseProblem`. Those of an infinite period have the
-        solutions of one turn.
+        The inputs of the linkage; see `InverseProblem`. One that `is_part` has the solutions of
+        the turns around zero, or around given inputs.
 
     """
 
@@ -390,7 +390,8 @@ class Inverse:
                 np.subtract(one[self._n:], start).tolist(),
                 [tuple(np.subtract(pair, turn).tolist()) for pair, turn in zip(limits, start)])[1:]
             found[(slice(None), *place)] = [*np.add(inputs, start), *rates]
-        return tuple(found[:self._n][()]), tuple(found[self._n:])
+        rows = found.tolist() if {*map(type, (*values, *near))} == {float} else found
+        return tuple(rows[:self._n]), tuple(rows[self._n:])
 
     def path(self, values: Sequence[np.ndarray], near: Optional[Sequence[float]] = None,
              ends: Ends = None) -> Tuple[Any, Any]:

@@ -49,7 +49,7 @@ class InverseProblem:
     ----------
     inputs : tuple of Input
         Those of the linkage. If one repeats only after very many turns, its period is that of the
-        outputs, or infinite if they have none.
+        outputs, if they repeat earlier.
     angular : list of bool
         For each output, whether it is an angle.
     scales, sizes : list of float
@@ -84,10 +84,9 @@ class InverseProblem:
         if not input_.is_part:
             return input_
         rates = [self.linkage.gear(name, by)[0] for name in self.linkage.geared_to(by)]
-        periods = (1.0, *(1.0 / abs(rate) for rate in rates if rate), math.inf)
-        return next(each for each in (input_._replace(period=period) for period in periods)
-                    if each.period == math.inf or each.wraps and is_periodic(
-                        partial(self._outputs_over, by), each))
+        periods = (1.0, *(1.0 / abs(rate) for rate in rates if rate))
+        return next((each for each in (input_._replace(period=period) for period in periods)
+                     if each.wraps and is_periodic(partial(self._outputs_over, by), each)), input_)
 
     def _outputs_over(self, by: int, values: np.ndarray) -> np.ndarray:
         """Return the outputs, angles as directions, over one input; the others are spread."""
