@@ -155,7 +155,7 @@ class Arm:
 
     @property
     def _clear(self) -> Real:
-        """A square that is no smaller than rounding where the arm has a direction."""
+        """Return a square that is not tiny where the arm has a direction."""
         return self.square
 
     @property
