@@ -41,32 +41,36 @@ static inline int lever_solve(float crank, lever_pose *p)
     const float k10 = (-0.045f);
     const float k19 = 0.02f;
     const float k26 = 0.04f;
-    const float k31 = 0.025f;
-    const float k43 = 0.081f;
-    const float k62 = 0.000625f;
-    const float k65 = 0.0036f;
-    const float k73 = 0.0f;
+    const float k30 = 0.025f;
+    const float k31 = 0.000625f;
+    const float k34 = 0.0036f;
+    const float k40 = 1.0f;
+    const float k58 = 0.081f;
+    const float k77 = 0.000625f;
+    const float k84 = 0.0f;
     const float x0 = crank;
     const float v14 = (0.5f * x0);
     const float v15 = sinf(v14);
     const float v17 = cosf(v14);
-    const float v29 = (-((k26 * v15) * v17));
-    const float v32 = (v17 * v17);
-    const float v34 = (k31 + (k26 * v32));
-    const float v37 = sqrtf(((v29 * v29) + (v34 * v34)));
-    const float v38 = (v29 / v37);
-    const float v45 = (v34 / v37);
+    const float v35 = (v17 * v17);
+    const float v36 = (k34 * v35);
+    const float v44 = lever_gated((k31 + v36), ((v35 + k40) - 7.888609e-31f), 0.0f);
+    const float v45 = lever_gated((-((k26 * v15) * v17)), v44, 0.0f);
+    const float v49 = lever_gated((k30 + (k26 * v35)), v44, 0.0f);
+    const float v52 = sqrtf(((v45 * v45) + (v49 * v49)));
+    const float v53 = (v45 / v52);
+    const float v60 = (v49 / v52);
     p->O_x = 0.0f;
     p->O_y = 0.0f;
     p->Q_x = 0.0f;
     p->Q_y = k10;
     p->A_x = (-(((2.0f * v15) * v17) * k19));
     p->A_y = ((1.0f - (2.0f * (v15 * v15))) * k19);
-    p->L_x = (v38 * k43);
-    p->L_y = (k7 + (v45 * k43));
+    p->L_x = (v53 * k58);
+    p->L_y = (k7 + (v60 * k58));
     p->angle_crank = x0;
-    p->angle_lever = atan2f((-v38), v45);
-    p->slide_slide = lever_root((k62 + (k65 * v32)), k73);
+    p->angle_lever = atan2f((-v53), v60);
+    p->slide_slide = lever_root((k77 + v36), k84);
     return isfinite(p->O_x)
         && isfinite(p->O_y)
         && isfinite(p->Q_x)
@@ -90,30 +94,33 @@ static inline void lever_rates(float crank, lever_pose *by_crank)
     const float k26 = 0.000625f;
     const float k29 = 0.0036f;
     const float k34 = 0.04f;
-    const float k50 = 0.081f;
-    const float k74 = 0.000625f;
-    const float k81 = 0.0f;
+    const float k39 = 1.0f;
+    const float k59 = 0.081f;
+    const float k83 = 0.000625f;
+    const float k90 = 0.0f;
     const float x0 = crank;
     const float v5 = (0.5f * x0);
     const float v6 = sinf(v5);
     const float v14 = cosf(v5);
     const float v21 = (v14 * v14);
     const float v30 = (k29 * v21);
-    const float v33 = (((k10 * (k19 + (k20 * v21))) / (k26 + v30)) + 0.0f);
-    const float v36 = (k25 + (k34 * v21));
-    const float v39 = (-((k34 * v6) * v14));
-    const float v43 = sqrtf(((v39 * v39) + (v36 * v36)));
+    const float v31 = (k26 + v30);
+    const float v33 = (((k10 * (k19 + (k20 * v21))) / v31) + 0.0f);
+    const float v43 = lever_gated(v31, ((v21 + k39) - 7.888609e-31f), 0.0f);
+    const float v44 = lever_gated((k25 + (k34 * v21)), v43, 0.0f);
+    const float v48 = lever_gated((-((k34 * v6) * v14)), v43, 0.0f);
+    const float v52 = sqrtf(((v48 * v48) + (v44 * v44)));
     by_crank->O_x = 0.0f;
     by_crank->O_y = 0.0f;
     by_crank->Q_x = 0.0f;
     by_crank->Q_y = 0.0f;
     by_crank->A_x = (-((1.0f - (2.0f * (v6 * v6))) * k10));
     by_crank->A_y = (-(((2.0f * v6) * v14) * k10));
-    by_crank->L_x = (-((v33 * (v36 / v43)) * k50));
-    by_crank->L_y = ((v33 * (v39 / v43)) * k50);
+    by_crank->L_x = (-((v33 * (v44 / v52)) * k59));
+    by_crank->L_y = ((v33 * (v48 / v52)) * k59);
     by_crank->angle_crank = lever_gated(1.0f, fabsf(x0), 0.0f);
     by_crank->angle_lever = v33;
-    by_crank->slide_slide = (-(((((v6 * 0.5f) * v14) * 2.0f) * k29) / (2.0f * lever_root((k74 + v30), k81))));
+    by_crank->slide_slide = (-(((((v6 * 0.5f) * v14) * 2.0f) * k29) / (2.0f * lever_root((k83 + v30), k90))));
 }
 
 /* Whether it can be assembled: [-3.14159, 3.14159] rad. */
@@ -158,23 +165,26 @@ static inline int lever_at(const float *q, int is_rated, lever_point *p)
 {
     const float k2 = 0.02f;
     const float k3 = 0.04f;
-    const float k13 = 0.025f;
-    const float k22 = (-0.025f);
-    const float k23 = 0.09f;
-    const float k27 = 0.000625f;
-    const float k30 = 0.0036f;
+    const float k12 = 0.025f;
+    const float k13 = 0.000625f;
+    const float k16 = 0.0036f;
+    const float k24 = 1.0f;
+    const float k37 = (-0.025f);
+    const float k38 = 0.09f;
     const float x0 = q[0];
     const float v5 = (0.5f * x0);
     const float v8 = cosf(v5);
-    const float v14 = (v8 * v8);
+    const float v17 = (v8 * v8);
+    const float v19 = (k13 + (k16 * v17));
+    const float v28 = lever_gated(v19, ((v17 + k24) - 7.888609e-31f), 0.0f);
     p->position[0][0] = x0;
-    p->position[1][0] = atan2f((-(-((k3 * sinf(v5)) * v8))), (k13 + (k3 * v14)));
+    p->position[1][0] = atan2f((-lever_gated((-((k3 * sinf(v5)) * v8)), v28, 0.0f)), lever_gated((k12 + (k3 * v17)), v28, 0.0f));
     if (!isfinite(p->position[0][0] + p->position[1][0]))
         return 0;
     if (!is_rated)
         return 1;
     p->rate[0][0][0] = lever_gated(1.0f, fabsf(x0), 0.0f);
-    p->rate[1][0][0] = (((k2 * (k22 + (k23 * v14))) / (k27 + (k30 * v14))) + 0.0f);
+    p->rate[1][0][0] = (((k2 * (k37 + (k38 * v17))) / v19) + 0.0f);
     p->load[0] = 0.0f;
     return 1;
 }
@@ -184,21 +194,24 @@ static inline int lever_at_angle_lever(const float *q, int is_rated, lever_point
 {
     const float k1 = 0.02f;
     const float k2 = 0.04f;
-    const float k13 = 0.025f;
-    const float k18 = (-0.025f);
-    const float k19 = 0.09f;
-    const float k23 = 0.000625f;
-    const float k26 = 0.0036f;
+    const float k12 = 0.025f;
+    const float k13 = 0.000625f;
+    const float k16 = 0.0036f;
+    const float k24 = 1.0f;
+    const float k35 = (-0.025f);
+    const float k36 = 0.09f;
     const float x0 = q[0];
     const float v5 = (0.5f * x0);
     const float v8 = cosf(v5);
-    const float v14 = (v8 * v8);
-    p->position[1][0] = atan2f((-(-((k2 * sinf(v5)) * v8))), (k13 + (k2 * v14)));
+    const float v17 = (v8 * v8);
+    const float v19 = (k13 + (k16 * v17));
+    const float v28 = lever_gated(v19, ((v17 + k24) - 7.888609e-31f), 0.0f);
+    p->position[1][0] = atan2f((-lever_gated((-((k2 * sinf(v5)) * v8)), v28, 0.0f)), lever_gated((k12 + (k2 * v17)), v28, 0.0f));
     if (!isfinite(p->position[1][0]))
         return 0;
     if (!is_rated)
         return 1;
-    p->rate[1][0][0] = (((k1 * (k18 + (k19 * v14))) / (k23 + (k26 * v14))) + 0.0f);
+    p->rate[1][0][0] = (((k1 * (k35 + (k36 * v17))) / v19) + 0.0f);
     p->load[0] = 0.0f;
     return 1;
 }

@@ -23,14 +23,14 @@ from ..formula.expression import Real, real, unknown
 from ..formula.operations import OPERATIONS
 from ..formula.program import Dialect, evaluate, Pose
 from ..linkage.mechanism import Mechanism
-from ..linkage.planar import TOLERANCE
+from ..linkage.planar import LEAST_SQUARE, TINY, TOLERANCE
 from ..linkage.spatial import EDGE, LAST_STEP
 
 # Expressions that are true or false.
 _CONDITIONS = ('less', 'less_equal')
 # What formulas count as rounding, and what that is in float.
 _IN_FLOAT = {TOLERANCE: 8 * 2.0 ** -24, -TOLERANCE: -8 * 2.0 ** -24, LAST_STEP: 2.0 ** -11,
-             EDGE: 2.0 ** -17}
+             EDGE: 2.0 ** -17, TINY: 2.0 ** -26, LEAST_SQUARE: 2.0 ** -100}
 
 
 class Code:

@@ -20,7 +20,6 @@ from .axes import Axis
 from .code import Code
 from .names import filled, template
 from ..formula.program import Program
-from ..linkage.inputs import MOST_COUNTED
 from ..linkage.inverse_linkage import InverseLinkage, Mode
 from ..linkage.mechanism import Mechanism
 
@@ -55,8 +54,8 @@ class Inverses:
         self._sizes = [input_.size for input_ in linkage.inputs]
         self.poses = 0
         first, *others = linkage.inputs
-        # Whether the reach is known: of longer periods only one turn is computed.
-        self._is_known = not others and first.period <= MOST_COUNTED
+        # Whether the reach is known: of very long periods only a part is computed.
+        self._is_known = not others and not first.is_part
         self._arcs = linkage.reach() if self._is_known else []
         if first.is_whole(self._arcs):
             self._arcs = []
@@ -64,7 +63,7 @@ class Inverses:
     def within(self) -> Dict[str, object]:
         """Return the function that keeps the input in its reach, and its call, if it has ends."""
         first, code = self._linkage.inputs[0], self._code
-        turn, inside = first.turn if first.turns else 0.0, INSIDE[code.number]
+        turn, inside = first.turn if first.wraps else 0.0, INSIDE[code.number]
         if not self._arcs:
             return {'within': '', 'clamped': ''}
         arcs = ((0.5 * (low + high) / first.size, 0.5 * (high - low) / first.size - inside)
@@ -83,15 +82,17 @@ class Inverses:
         values = [code.times(
             f'position[{i}]' + (f' - {code.literal(each.offset)}' if each.offset else ''),
             1.0 / each.factor) for i, each in enumerate(axes)]
-        given, counted = {}, []
-        turns = [(input_.turn, 1.0 / input_.turn) if input_.turns else (0.0, 0.0)
-                 for input_ in inputs]
-        for k, i, ratio, offset in self._gears(axes):
+        given, counted, gears = {}, [], [*self._gears(axes)]
+        # Outputs may repeat earlier than the linkage.
+        turns = [(each.turn, 1.0 / each.turn) if each.wraps else (0.0, 0.0)
+                 for each in (inputs if len(gears) == len(outputs) else
+                              self._linkage.inverse(outputs).inputs)]
+        for k, i, ratio, offset in gears:
             value = values[k] + (f' - {code.literal(offset)}' if offset else '')
             value = code.times(value, 1.0 / (ratio * sizes[i]))
             given[i] = f'near[{i}] - whole[{i}]'
             counted += [f'    near[{i}] = {value};']
-            if inputs[i].turns:
+            if inputs[i].wraps:
                 turn, over = map(code.literal, turns[i])
                 counted += [
                     f'    whole[{i}] = {turn} * floor{code.suffix}(near[{i}] * {over} + '
@@ -135,7 +136,7 @@ class Inverses:
             f'            p->position[{side}][{k}] += '
             f'{self._code.times(f"q[{i}] - {given}[{i}]", axes[k].factor * ratio)};'
             for side, axes in enumerate(self._sides) for k, i, ratio, _ in self._gears(axes)
-            if self._linkage.inputs[i].turns)
+            if self._linkage.inputs[i].wraps)
 
     def _pieces(self, axes: Sequence[Axis]) -> Dict[str, object]:
         """Return the pieces of the reach for a search in them; nothing if they are not known."""

@@ -50,7 +50,10 @@ two). There it continues smoothly and changes sides: a parallelogram stays a par
 line then has the side at a crank angle of a quarter turn. The block of a slider on a crank pin
 continues smoothly, too, where the rod is square to the line; `out` and `in` are then as they are
 where the pin is farthest along the line. A linkage with one change point in a turn repeats only
-after two turns: its crank angle counts beyond a turn.
+after two turns: its crank angle counts beyond a turn. Where an arm has no length, what stands on
+it has the limit from both sides if they agree, as at a change point, and else no place.
+
+A gear's ratio is a number up to 1000. Poses repeat after as many turns as its denominator says.
 """
 
 from __future__ import annotations
