@@ -1,0 +1,53 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What was just measured can be commanded, in C and through the transmission; see `commanded`."""
+
+import shutil
+
+from c_libraries import COMPILER, ROS
+import commanded
+import pytest
+from sweeps import EXHAUSTIVE
+
+pytestmark = pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
+NEEDS = pytest.mark.skipif(not shutil.which('g++') or not ROS,
+                           reason='g++ or rcutils is not installed')
+KINDS = ['double', 'float', pytest.param('transmission', marks=[NEEDS, pytest.mark.long])]
+MISSES = [1, 2, 4, 5]
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_linkages_that_refused_what_they_measured(tmp_path, kind):
+    cases = [*commanded.found()]
+    counts = commanded.asked(tmp_path, cases, kind, 300)
+    assert (counts[:, [0, 3]] > 280).all() and not counts[:, MISSES].any()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('kind', KINDS)
+def test_the_catalogue(tmp_path, kind):
+    cases = [*commanded.catalogue()]
+    counts = commanded.asked(tmp_path, cases, kind, 300)
+    assert (counts[:, 0] > 100).all() and not counts[:, MISSES].any()
+
+
+# Of single precision 1 in 10 000 may miss, next to a pose that two inputs share.
+@pytest.mark.parametrize('seeds', [
+    pytest.param(range(12), marks=pytest.mark.long), pytest.param(range(200), marks=EXHAUSTIVE)],
+    ids=['few', 'many'])
+@pytest.mark.parametrize('kind, most', [('double', 0.0), ('float', 1e-4), pytest.param(
+    'transmission', 0.0, marks=NEEDS)])
+def test_random_linkages(tmp_path, kind, most, seeds):
+    cases = [*commanded.drawn(seeds)]
+    counts = sum(commanded.asked(tmp_path / f'{i}', cases[i:i + 25], kind, 300).sum(axis=0)
+                 for i in range(0, len(cases), 25))
+    assert counts[0] > 20 * len(seeds) and counts[MISSES].sum() <= most * counts[[0, 3]].sum()
