@@ -81,12 +81,14 @@ try {
     } else if (words[0] == "actuator_handle") {
       actuators.emplace_back(words[1], words[2], place);
     } else {
-      auto & infos = words[0] == "joint" ? info.joints : info.actuators;
-      infos.emplace_back();
-      infos.back().name = words[1];
-      infos.back().role = words[2];
-      infos.back().mechanical_reduction = std::atof(words[3].c_str());
-      infos.back().offset = std::atof(words[4].c_str());
+      const auto add = [&words](auto & infos) {
+        infos.emplace_back();
+        infos.back().name = words[1];
+        infos.back().role = words[2];
+        infos.back().mechanical_reduction = std::atof(words[3].c_str());
+        infos.back().offset = std::atof(words[4].c_str());
+      };
+      words[0] == "joint" ? add(info.joints) : add(info.actuators);
     }
   }
   auto made = std::make_unique<Component>();
