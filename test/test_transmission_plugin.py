@@ -332,7 +332,7 @@ def test_the_nearest_input_is_that_to_the_newest_position(plugins):
 
 def test_an_effort_is_that_at_the_measured_pose(plugins):
     machine, component = plugins.machines['lever'], plugins.component('lever')
-    there, here = (poses(machine, crank) for crank in (-0.3, 0.3))
+    there, here = (poses(machine, crank) for crank in (-0.1, 0.3))
     rate = float(machine.linkage.joint_rates(0.3, ['lever'])['lever'])
     component.write(there[1])
     component.read(here[0])
