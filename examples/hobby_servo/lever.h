@@ -4,7 +4,7 @@
  * Input: crank [rad]. Angles [rad] count counterclockwise.
  * float: joints are off by up to 1e-07 of the longest bar at 2001 poses over the reach, without its outermost hundredth.
  * C99 and C++17 without heap, lock or recursion; compile without -ffast-math, which drops the checks.
- * A call of the transmission takes at most 12 poses.
+ * A call of the transmission takes at most 18 poses.
  */
 #ifndef LEVER_LINKAGE_H
 #define LEVER_LINKAGE_H
@@ -131,7 +131,7 @@ static inline int lever_reaches(float crank)
 
 /* Status of a call: 0, or a sum of these. OUT_OF_REACH: outside the reach or the sweep, or not found
    by a search. SINGULAR: a velocity or an effort would be infinite. NOT_KNOWN: a value is NaN or
-   infinite. */
+   infinite, which of a command means that there is none. */
 enum { LEVER_OK = 0, LEVER_OUT_OF_REACH = 1, LEVER_SINGULAR = 2, LEVER_NOT_KNOWN = 4 };
 enum { LEVER_ACTUATOR_LEVER_CRANK = 0 };
 enum { LEVER_JOINT_LEVER_LEVER = 0 };
@@ -145,11 +145,13 @@ typedef lever_side lever_joints;
 typedef struct { float position[2][1], rate[2][1][1], load[1]; } lever_point;
 
 /* The state between calls, which lever_begin initializes: the last poses and inputs by measured
-   actuators [0] and by commanded joints [1], and the last valid values of both. */
+   actuators [0] and by commanded joints [1], which of them is newer, and whether there is one; what
+   is held: the actuators [0] where they were last commanded or measured, whichever is newer, and the
+   joints [1] where they were last measured. NaN was never there. */
 typedef struct {
     lever_point point[2];
     float input[2][1];
-    int is_known[2], is_held[2];
+    int newer, is_known;
     lever_side held[2];
 } lever_memory;
 
@@ -427,14 +429,14 @@ static inline void lever_modes_joints(const float position[1],
     start[0][0] = atan2f((-((-v49) - v54)), (v58 + v59));
     start[1][0] = atan2f((-(v49 - v54)), (v58 - v59));
 }
-/* From positions to the inputs nearest to q. In closed form, 12 poses at most. */
+/* From positions to the inputs nearest to q. In closed form, 18 poses at most. */
 static inline int lever_from_joints(const float position[1], float q[1], lever_point *p)
 {
     /* The inputs' turns, and one over them; 0 where there is none. */
     static const float turn[1][2] = { { 6.2831855f, 0.15915494f } };
     /* Whole turns that a position counts are taken away, so that they cost no digits. */
     float whole[1] = { 0 }, to[1], near[1];
-    float start[2][1], away[2], far;
+    float start[3][1], away[3], far;
     lever_point found;
     int i, k, next, ended;
     for (i = 0; i < 1; i++) {
@@ -442,11 +444,13 @@ static inline int lever_from_joints(const float position[1], float q[1], lever_p
         near[i] = q[i];
     }
     lever_modes_joints(to, start);
-    for (k = 0; k < 2; k++) {
+    for (i = 0; i < 1; i++) start[2][i] = q[i] - turn[i][0] * floorf(q[i] * turn[i][1] + 0.5f);
+    for (k = 0; k < 3; k++) {
         away[k] = lever_turned(1, turn, whole, start[k], near, q);
     }
+    away[2] = 1000000.0f;
     for (;;) {
-        for (next = 0, k = 1; k < 2; k++)
+        for (next = 0, k = 1; k < 3; k++)
             next = away[k] < away[next] || !isfinite(away[next]) ? k : next;
         if (!isfinite(away[next]))
             return 0;
@@ -487,14 +491,14 @@ static inline void lever_modes_angle_lever(const float position[1],
     start[0][0] = atan2f((-((-v49) - v54)), (v58 + v59));
     start[1][0] = atan2f((-(v49 - v54)), (v58 - v59));
 }
-/* From positions to the inputs nearest to q. In closed form, 12 poses at most. */
+/* From positions to the inputs nearest to q. In closed form, 18 poses at most. */
 static inline int lever_from_angle_lever(const float position[1], float q[1], lever_point *p)
 {
     /* The inputs' turns, and one over them; 0 where there is none. */
     static const float turn[1][2] = { { 6.2831855f, 0.15915494f } };
     /* Whole turns that a position counts are taken away, so that they cost no digits. */
     float whole[1] = { 0 }, to[1], near[1];
-    float start[2][1], away[2], far;
+    float start[3][1], away[3], far;
     lever_point found;
     int i, k, next, ended;
     for (i = 0; i < 1; i++) {
@@ -502,11 +506,13 @@ static inline int lever_from_angle_lever(const float position[1], float q[1], le
         near[i] = q[i];
     }
     lever_modes_angle_lever(to, start);
-    for (k = 0; k < 2; k++) {
+    for (i = 0; i < 1; i++) start[2][i] = q[i] - turn[i][0] * floorf(q[i] * turn[i][1] + 0.5f);
+    for (k = 0; k < 3; k++) {
         away[k] = lever_turned(2, turn, whole, start[k], near, q);
     }
+    away[2] = 1000000.0f;
     for (;;) {
-        for (next = 0, k = 1; k < 2; k++)
+        for (next = 0, k = 1; k < 3; k++)
             next = away[k] < away[next] || !isfinite(away[next]) ? k : next;
         if (!isfinite(away[next]))
             return 0;
@@ -536,8 +542,11 @@ static inline int lever_begin(lever_memory *m)
 {
     static const lever_side none = { { 0 }, { 0 }, { 0 } };
     int i;
-    m->is_known[0] = m->is_known[1] = m->is_held[0] = m->is_held[1] = 0;
+    m->newer = 1;
+    m->is_known = 0;
     m->held[0] = m->held[1] = none;
+    for (i = 0; i < 1; i++)
+        m->held[0].position[i] = m->held[1].position[i] = (float)NAN;
     for (i = 0; i < 4096; i++) {
         lever_sample(i, m->input[1]);
         if (lever_at(m->input[1], 1, &m->point[1]))
@@ -548,36 +557,46 @@ static inline int lever_begin(lever_memory *m)
 
 static inline int lever_transmit(lever_memory *m, int side, const lever_side *from, lever_side *to)
 {
-    const int other = 1 - side;
+    const int other = 1 - side, before = m->newer, was_known = m->is_known;
+    static const float none[1][2] = { { 0 } };
     lever_side *held = &m->held[other];
-    lever_point found;
+    lever_point found = m->point[before];
     const lever_point *at;
     float q[1], x[1], y[1] = { 0 };
     int i, j, status = LEVER_OK, all;
     for (i = 0; i < 1; i++) {
-        q[i] = m->input[!m->is_known[0]][i];
+        q[i] = m->input[before][i];
         status = isfinite(from->position[i]) ? status : LEVER_NOT_KNOWN;
+        /* Where an actuator is measured is newer than its command, within the reach or not. */
+        if (!side && isfinite(from->position[i]))
+            m->held[0].position[i] = from->position[i];
     }
-    if (status == LEVER_OK && !(side ? lever_from_joints(from->position, q, &found)
+    /* Where it is already needs no search; but a command has to be in the sweep. */
+    if (status == LEVER_OK && !(was_known && lever_gap(from->position, &found, side, x) <= 2e-06f
+            && isfinite(lever_turned(side, none, y, q, q, x)))
+            && !(side ? lever_from_joints(from->position, q, &found)
             : lever_from_actuators(from->position, q, &found)))
         status = LEVER_OUT_OF_REACH;
     for (i = 0; status == LEVER_OK && i < 1; i++)
         status = isfinite(found.position[other][i]) ? LEVER_OK : LEVER_OUT_OF_REACH;
     if (status == LEVER_OK) {
+        m->newer = side;
+        m->is_known = 1;
         m->point[side] = found;
         for (i = 0; i < 1; i++) {
             m->input[side][i] = q[i];
             held->position[i] = found.position[other][i];
-            m->held[side].position[i] = m->is_held[side] ? m->held[side].position[i] : from->position[i];
         }
-        m->is_known[side] = m->is_held[0] = m->is_held[1] = 1;
-    } else if (side && status == LEVER_NOT_KNOWN)
-        m->is_known[1] = 0;
+    }
+    /* A position that is not commanded is not written. */
+    for (i = 0; i < 1; i++)
+        if (!(side && status == LEVER_NOT_KNOWN) && isfinite(held->position[i]))
+            to->position[i] = held->position[i];
     all = status;
 
-    /* Velocities at the requested pose, else at the last one; a held position has velocity 0. */
-    at = &m->point[m->is_known[side] ? side : other];
-    if (status == LEVER_NOT_KNOWN && (m->is_known[0] || m->is_known[1]))
+    /* Velocities at the newest pose; a held position has velocity 0. */
+    at = &m->point[m->newer];
+    if (status == LEVER_NOT_KNOWN && m->is_known)
         status = LEVER_OK;
     for (i = 0; i < 1; i++)
         status |= isfinite(from->velocity[i]) ? LEVER_OK : LEVER_NOT_KNOWN;
@@ -589,37 +608,40 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
     for (i = 0; i < 1; i++)
         status |= isfinite(y[i]) ? LEVER_OK : LEVER_SINGULAR;
     for (i = 0; i < 1; i++)
-        held->velocity[i] = status == LEVER_OK ? y[i] : 0;
+        if (!(side && status & LEVER_NOT_KNOWN))
+            to->velocity[i] = status == LEVER_OK ? y[i] : 0;
     all |= status;
 
-    /* Efforts at the actuators' pose: their power is that of the joints, less that of the loads. */
-    at = &m->point[m->is_known[0] ? 0 : 1];
-    status = m->is_known[0] || m->is_known[1] ? LEVER_OK : LEVER_NOT_KNOWN;
-    for (i = 0; status == LEVER_OK && i < 1; i++) {
-        status = isfinite(from->effort[i]) ? LEVER_OK : LEVER_NOT_KNOWN;
-        x[i] = side ? at->load[i] : -at->load[i];
-        for (j = 0; j < 1; j++)
+    /* Efforts where the actuators are: their power is that of the joints, less that of the loads. */
+    at = &m->point[side && was_known ? before : m->newer];
+    status = m->is_known ? LEVER_OK : LEVER_NOT_KNOWN;
+    for (i = 0; i < 1; i++)
+        status = isfinite(from->effort[i]) ? status : LEVER_NOT_KNOWN;
+    for (i = 0; status == LEVER_OK && i < 1; i++)
+        for (x[i] = side ? at->load[i] : -at->load[i], j = 0; j < 1; j++)
             x[i] += at->rate[side][j][i] * from->effort[j];
-    }
     if (status == LEVER_OK && !lever_solved(at, other, 1, 0.001f, x, y))
         status = LEVER_SINGULAR;
     for (i = 0; i < 1; i++) {
-        held->effort[i] = status == LEVER_OK ? y[i] : held->effort[i];
-        to->position[i] = m->is_held[other] ? held->position[i] : to->position[i];
-        to->velocity[i] = held->velocity[i];
-        to->effort[i] = held->effort[i];
+        /* What was commanded before a pause is not held after it. */
+        if (status != LEVER_SINGULAR && (side || status == LEVER_OK))
+            held->effort[i] = status == LEVER_OK ? y[i] : 0;
+        if (!(side && status == LEVER_NOT_KNOWN))
+            to->effort[i] = held->effort[i];
     }
     return all | status;
 }
 
 /* From the actuators' positions, velocities and efforts to the joints'. Returns a status: where it
-   is not OK, positions and efforts are the last valid ones, and velocities 0. */
+   is not OK, positions and efforts are the last measured ones, and velocities 0. */
 static inline int lever_actuators_to_joints(lever_memory *m, const lever_actuators *from, lever_joints *to)
 {
     return lever_transmit(m, 0, from, to);
 }
 
-/* The same from the joints to the actuators, to the inputs nearest to the last ones. */
+/* The same from the joints to the actuators, to the inputs nearest to the last ones. Out of reach
+   the actuators are commanded to where they are: what was last commanded or measured, whichever is
+   newer. What is not commanded, NaN, is not written. */
 static inline int lever_joints_to_actuators(lever_memory *m, const lever_joints *from, lever_actuators *to)
 {
     return lever_transmit(m, 1, from, to);
