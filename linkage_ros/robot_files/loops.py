@@ -36,7 +36,8 @@ class Loop(NamedTuple):
     Places of joints are complex [m], and so are the axes of slides; the axis of a hinge is 1 or
     -1. `size` is the largest distance of two joints [m], `gap` the distance that cannot be closed
     [m], `lean` the inclination of axes [rad], and `across` has the distances of joints' ends
-    normal to the plane [m].
+    normal to the plane [m]. `pins` are the hinges and slides with a position, those of balls in
+    the plane included, and `still` the other hinges of these balls.
     """
 
     ground: str
@@ -47,6 +48,8 @@ class Loop(NamedTuple):
     gap: float
     lean: float
     across: Dict[str, float]
+    pins: List[Joint]
+    still: List[str]
 
     @property
     def near(self) -> float:
@@ -223,8 +226,19 @@ def flat(robot: Robot, group: Group, drives: Sequence[str]) -> Loop:
               for apart, joint in gaps)
     if gap > OPEN * size:
         raise ValueError(f'its loops cannot be closed: they stay open by {gap:.3g} m')
+    pins = [joint for joint in found if joint.position is not None]
+    still: List[str] = []
+    up = hinges[0].axis * np.sign((seen[:3, :3] @ hinges[0].axis)[2])
+    for joint in found:
+        # A rod turns in the plane about one hinge of the ball at its end; the others stay.
+        for hinge, sign in joint.chain:
+            if _lean(hinge, up) < ASKEW:
+                pins.append(replace(joint, name=hinge.name, kind=HINGE, position=hinge.position,
+                                    axes=[sign * float(np.sign(hinge.axis @ up))] * 2))
+                still += [one.name for one, _ in joint.chain if one is not hinge]
+                break
     return Loop(ground, frame_id, frame, found, size, gap, lean if lean > 1e-12 else 0.0,
-                across)
+                across, pins, still)
 
 
 def _check_rods(ground: str, joints: Sequence[Joint]) -> None:

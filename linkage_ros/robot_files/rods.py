@@ -182,10 +182,9 @@ def _on_bodies(joints: Sequence[Joint]) -> Dict[str, List[Joint]]:
             for joint in joints for body in joint.bodies}
 
 
-def described(robot: Robot, group: Group, others: Sequence[str]
-              ) -> Tuple[str, Dict[str, Any], List[str]]:
+def described(robot: Robot, group: Group, others: Sequence[str]) -> check.Imported:
     """
-    Return a mechanism's name, its parameters, and its report.
+    Return a mechanism.
 
     Raises ValueError for loops that rods cannot be, or whose poses are others than the robot's.
     """
@@ -206,9 +205,9 @@ def described(robot: Robot, group: Group, others: Sequence[str]
         for link, joint in found.inputs.items()], limits, machine.inputs)
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     ends = _ranges(machine, found)
-    report = check.compared(robot, machine, [joint.name for joint in found.inputs.values()],
-                            ends, 0.0)
-    return name, given, [*reports, report, *_corners(machine, found)]
+    report, ranges = check.compared(
+        robot, machine, [joint.name for joint in found.inputs.values()], ends, 0.0)
+    return check.Imported(name, given, [*reports, report, *_corners(machine, found)], ranges)
 
 
 def _lines(found: Rods) -> Tuple[List[str], List[str]]:

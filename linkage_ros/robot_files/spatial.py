@@ -260,6 +260,16 @@ class Component:
         return {joint.name: joint.position for joint in self.joints
                 if joint.position is not None}
 
+    @property
+    def cut_names(self) -> Set[str]:
+        """Names of the hinges that close its loops, whose angles `read` returns."""
+        return {cut.name for cut in self._cuts if cut.position is not None and cut.kind == HINGE}
+
+    @property
+    def names(self) -> Set[str]:
+        """Names of the joints whose positions `read` returns."""
+        return self.cut_names | {self._names[i] for i in np.flatnonzero(self._named)}
+
     def at_start(self, count: int = 1) -> Poses:
         """Return the pose of the file, `count` times."""
         return Poses(np.zeros((count, len(self._elements))),
@@ -298,13 +308,6 @@ class Component:
     def step_between(self, one: Poses, other: Poses) -> np.ndarray:
         """Return the difference of two poses in each column; balls have none."""
         return (other.positions - one.positions)[:, self._column]
-
-    def stiffness(self, poses: Poses, fixed: np.ndarray, nullity: int
-                  ) -> Tuple[np.ndarray, np.ndarray]:
-        """Return the least and the product of singular values of each pose: 0 at a dead point."""
-        slope = self.errors(poses, True)[1][:, :, ~fixed] / self.size
-        values = np.linalg.svd(slope, compute_uv=False)[:, :np.sum(~fixed) - nullity]
-        return np.min(values, axis=1, initial=1.0), np.prod(values, axis=1)
 
     def nullity(self, fixed: np.ndarray) -> int:
         """Return the degrees of freedom that the loops leave, in a random open pose."""
