@@ -27,7 +27,7 @@ import pytest
 from test_robot_files import check_comes_back, random_robot, words
 from test_sdf_readers import frame, quaternion
 
-pytest.importorskip('mujoco', reason='MJCF is read by MuJoCo: pip install mujoco')
+mujoco = pytest.importorskip('mujoco', reason='MJCF is read by MuJoCo: pip install mujoco')
 
 
 def motion(joint, change):
@@ -198,6 +198,35 @@ def check_is_read(folder, seeds):
         except command.command.RequestError as error:
             assert re.search('closes a loop|not of dyads|it cannot move', str(error)), seed
     assert moved > 0.9 * len(robots)
+
+
+TIED = """<mujoco><compiler angle="radian"/><worldbody>
+  <body><joint name="a" type="{}" axis="0 0 1" ref="{}"/><geom size="1"/></body>
+  <body><joint name="b" type="{}" axis="0 0 1" ref="{}"/><geom size="1"/></body></worldbody>
+  <equality><joint joint1="a" {} polycoef="{} {} 0 0 0"/></equality></mujoco>"""
+
+
+@pytest.mark.parametrize('seed', range(6))
+@pytest.mark.parametrize('other', ['joint2="b"', ''])
+def test_joints_with_zeros_of_their_own_are_where_mujoco_ties_them(tmp_path, seed, other):
+    # By MuJoCo's residual: what is tied counts from `ref`, in both joints.
+    rng, file = np.random.default_rng(seed), tmp_path / 'tied.xml'
+    kinds = rng.choice(['hinge', 'slide'], 2)
+    ref, ref_b, start, ratio, b = rng.normal(size=5)
+    file.write_text(TIED.format(kinds[0], ref, kinds[1], ref_b, other, start, ratio))
+    robot = readers.read(str(file))
+    if other:
+        (leader, factor, offset), = robot.follows.values()
+        positions = {'b': b, 'a': factor * b + offset}
+        assert leader == 'b' and not robot.held
+    else:
+        positions = {'b': b, **robot.held}
+    model = mujoco.MjModel.from_xml_path(str(file))
+    data = mujoco.MjData(model)
+    for name, value in positions.items():
+        data.joint(name).qpos = value
+    mujoco.mj_forward(model, data)
+    assert data.ne == 1 and abs(data.efc_pos[0]) < 1e-15
 
 
 # The second has a hinge on a block of which no word can tell the angle.

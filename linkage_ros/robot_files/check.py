@@ -24,13 +24,11 @@ from typing import Any, Dict, List, Mapping, NamedTuple, Sequence, Set, Tuple
 import numpy as np
 
 from .robot import Robot, SLIDE
-from .spatial import Component, components, Poses
+from .spatial import Component, components, EXACT, Poses
 from .. import scene
 
 # Number of paths of several motors, of poses on all paths, and of poses that a check needs.
 PATHS, POSES, FEWEST = 12, 240, 200
-# Loops with exact axes stand open by less, of their size.
-EXACT = 1e-9
 # A misfit of the file opens its loops by less than this factor times it.
 MISFIT = 10.0
 # A mechanism whose joints are farther off in the file's pose [rad, or of the size] is another.
@@ -83,9 +81,11 @@ class Track(NamedTuple):
 
 
 def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str], ends: Ranges,
-             slack: float) -> Tuple[str, Ranges]:
+             slack: float) -> Tuple[str, Ranges, Tuple[float, float]]:
     """
-    Put what a mechanism publishes into the loops of its robot; report on it, and on its range.
+    Put what a mechanism publishes into the loops of its robot; report on it.
+
+    Also return the ranges of its sources and of its first input in the poses that were checked.
 
     Parameters
     ----------
@@ -133,7 +133,9 @@ def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
             moved = ', '.join(f'{source} from {low:.4g} to {high:.4g}'
                               for source, (low, high) in ranges.items())
             return (f'Checked: {machine.name}: in {good.sum()} poses of the robot, {moved}, its '
-                    f'loops stand open by {track.gaps[good].max():.0e} m at most{beyond}.', ranges)
+                    f'loops stand open by {track.gaps[good].max():.0e} m at most{beyond}.', ranges,
+                    (float(min(track.inputs[good].min(), loops.near)),
+                     float(max(track.inputs[good].max(), loops.near))))
         targets = start + (targets - start) * good.mean(axis=1)[:, None]
     raise Difference(f'it could not be checked in more than {good.sum()} poses')
 
@@ -213,7 +215,8 @@ def whole(robot: Robot, machines: Mapping[str, scene.SceneMechanism], imported: 
     All motors move at once towards both ends of the ranges in which their mechanisms were checked,
     less far where a loop that is left out ends.
     """
-    worst, reports = 0.0, []
+    worst = 0.0
+    reports: List[str] = []
     movers = {*robot.driven, *(source for each in imported for source in each.ranges)}
     for component in components(robot):
         slack = max((each.slack for each in imported if each.ranges.keys() & component.names),
@@ -228,18 +231,18 @@ def whole(robot: Robot, machines: Mapping[str, scene.SceneMechanism], imported: 
             gaps, poses = opened(component, found, component.at_start())
             good = np.logical_and.accumulate(gaps <= allowed, axis=1)
             worst = max(worst, float(np.max(gaps, where=good, initial=0.0)))
-            for path, step in enumerate(good.sum(axis=1)):
-                last = poses[step - 1].some(np.array([path])) if step else component.at_start()
-                if not good[path].all() and gaps[path, step] > allowed and _closes(
-                        component, last, {name: found[name][path, step] for name in motors},
-                        allowed):
-                    reports = [*reports, f'{OPEN} the loops of {", ".join(sorted(found))}, by '
-                               f'{gaps[path, step]:.2g} m.']
-                    break
-            if good.mean() > 0.5:
+            wrong = [gaps[path, step] for path, step in enumerate(good.sum(axis=1))
+                     if not good[path].all() and gaps[path, step] > allowed and _closes(
+                         component, poses[step - 1].some(np.array([path])) if step else
+                         component.at_start(), {name: found[name][path, step] for name in motors},
+                         allowed)]
+            if wrong:
+                reports.append(f'{OPEN} the loops of {", ".join(sorted(found))}, by '
+                               f'{max(wrong):.2g} m.')
+            if wrong or good.mean() > 0.5:
                 break
     return [f'Checked: the whole robot: its loops stand open by {worst:.0e} m at most.',
-            *dict.fromkeys(reports)]
+            *reports]
 
 
 def _moved(robot: Robot, machines: Mapping[str, scene.SceneMechanism],
@@ -268,7 +271,8 @@ class _Loops:
         self._machine, self._sources = machine, sources
         # For each driven joint its source, ratio and offset.
         self._movers = {name: robot.source(name) for name in driven}
-        self._allowed = (EXACT + MISFIT * slack) * self._component.size
+        self._slack = MISFIT * slack
+        self._allowed = (EXACT + self._slack) * self._component.size
         # Where paths start: the pose of the file.
         self.poses, self.near = self._component.at_start(), machine.first.start
 
@@ -303,7 +307,7 @@ class _Loops:
                 off = float(found[joint.name][0, 0]) - joint.position
                 off = off / self._component.size if joint.kind == SLIDE else math.remainder(
                     off, math.tau)
-                if abs(off) > OTHER:
+                if abs(off) > OTHER + self._slack:
                     raise Difference(f'{self._at(start)} {joint.name} is off by {abs(off):.2g}')
 
     def end(self, track: Track, path: int, step: int) -> str:

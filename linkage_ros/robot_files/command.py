@@ -126,7 +126,8 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str], Dict[str, float]
     machines = scene.read(given).machines
     tree = {joint.name for _, joint in spatial.trees(robot)[0].values()}
     stay = {*closed.immobile, *(name for made in imported for name in made.still)}
-    still = {name: robot.positions[name] for name in tree & stay - check.published(machines)}
+    still = {name: value for name, value in robot.positions.items()
+             if name in tree & stay - check.published(machines)}
     rest, lost = model.others(robot, machines, still)
     if rest:
         machines = scene.read({**given, **rest, 'mechanisms': [*machines, model.OTHERS]}).machines

@@ -73,7 +73,8 @@ def others(robot: Robot, machines: Mapping[str, scene.SceneMechanism],
     Also return the joints that nothing determines: undriven ones in loops, and what follows them.
     `held` are positions of joints that stay.
     """
-    held = {**robot.held, **held}
+    held = {name: value for name, value in {**robot.held, **held}.items()
+            if name in robot.positions}
     known = published(machines)
     loops = components(closing.held(robot, held))
     passive = {joint.name for each in loops for joint in each.joints}.difference(

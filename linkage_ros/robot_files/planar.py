@@ -245,18 +245,19 @@ def described(robot: Robot, group: loops.Group, others: Sequence[str]) -> check.
     reports = [f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.'] if drawing.left else []
     drawing.limits, more = robot.limits(drawing.moved_by)
     reports += more
-    if drawing.measured:
-        reports += [f'Left out: the limits of {limits.text(source)}: its motor is between two '
-                    'moving links.' for source, limits in drawing.limits.items()]
-    else:
+    if not drawing.measured:
         reports += sweeps.added(given, name, drawing.drives, drawing.limits, machine.inputs)
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if drawing.apart(machine.linkage) > drawing.allowed:
         raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
     slack = loop.lean + loop.gap / loop.size
-    report, ranges = check.compared(robot, machine, [joint.name for joint in drawing.moved_by],
-                                    drawing.ends, slack)
-    reports.append(report)
+    report, ranges, (low, high) = check.compared(
+        robot, machine, [joint.name for joint in drawing.moved_by], drawing.ends, slack)
+    if drawing.measured and drawing.limits:
+        own = f'{name}.{drawing.drives[0].name}'
+        given[f'{own}.sweep'] = [low, high]
+        given[f'{own}.start'] = min(max(given[f'{own}.start'], low), high)
+    reports += [report] + [loop.misfit] * bool(loop.misfit)
     reports += [f'{joint} has its ends {gap:.2g} m apart along its axis, on which no angle '
                 'depends.' for joint, gap in loop.across.items()]
     return check.Imported(name, given, reports, ranges, slack, loop.still)

@@ -187,8 +187,9 @@ class Robot:
             # Two hinges with a cross between them.
             cross = f'{name}/cross'
             self.frames[cross] = frame
-            self.join(name, HINGE, (bodies[0], cross), frame, axis)
-            self.join(f'{name}/second', HINGE, (cross, bodies[1]), frame, ways[1], other)
+            self.join(name, HINGE, (bodies[0], cross), frame, axis, None, position)
+            self.join(f'{name}/second', HINGE, (cross, bodies[1]), frame, ways[1], other,
+                      position if other is None else None)
             return
         turns = tuple(each[:3, :3] for each in frames)
         self.joints.append(Joint(

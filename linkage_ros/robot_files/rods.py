@@ -205,7 +205,7 @@ def described(robot: Robot, group: Group, others: Sequence[str]) -> check.Import
         for link, joint in found.inputs.items()], limits, machine.inputs)
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     ends = _ranges(machine, found)
-    report, ranges = check.compared(
+    report, ranges, _ = check.compared(
         robot, machine, [joint.name for joint in found.inputs.values()], ends, 0.0)
     return check.Imported(name, given, [*reports, report, *_corners(machine, found)], ranges)
 

@@ -37,6 +37,8 @@ MOST = 100
 TOGETHER = 1e-6
 # Loops open by less, of their size, are closed.
 CLOSED = 1e-10
+# Loops open by more, of their size, are so in the file or by a mistake, not by rounding.
+EXACT = 1e-9
 # Loops that are less stiff, of their size, are at a dead point.
 DEAD = 1e-6
 # The order of joints in the tree, which leaves hinges and balls to close the loops.
