@@ -15,6 +15,7 @@ Bring up a robot with the scene that from_robot has made of it, all its joints o
 """
 
 from pathlib import Path
+import shlex
 import tempfile
 
 from launch import LaunchDescription
@@ -51,7 +52,7 @@ def _started(context):
     loops = chosen['loops'] or None
     shown, robot = scene.load(chosen['scene']), readers.read(chosen['robot'], loops)
     held = {name: float(value) for name, _, value in (
-        each.rpartition('=') for each in chosen['hold'].split())}
+        each.rpartition('=') for each in shlex.split(chosen['hold']))}
     files = [chosen['scene']]
     rest, lost = model.others(robot, shown.machines, held)
     if rest:

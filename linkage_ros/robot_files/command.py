@@ -22,6 +22,7 @@ import numpy as np
 from . import check, closing, loops, model, planar, readers, rods, spatial
 from .robot import FARTHEST, Joint, Robot
 from .. import command, scene
+from ..linkage.dyads import short
 from ..scene.writing import in_yaml
 from ..words import elided
 
@@ -72,8 +73,8 @@ def show(args: Optional[List[str]]) -> None:
 def _launch(asked: Any, still: Mapping[str, float]) -> str:
     """Return the command that launches the robot with its scene; some joints stay."""
     arguments = {'robot': asked.file, 'scene': 'SCENE.yaml', 'loops': asked.loops or '',
-                 'hold': ' '.join([*asked.hold, *(f'{name}={value:.9g}'
-                                                  for name, value in still.items())])}
+                 'hold': shlex.join([*asked.hold, *(
+                     f'{name}={short(value)}' for name, value in still.items())])}
     return 'ros2 launch linkage_ros robot.launch.py ' + ' '.join(
         f'{name}:={shlex.quote(text)}' for name, text in arguments.items() if text)
 
