@@ -283,9 +283,9 @@ def test_what_follows_a_joint_that_is_held_is_held(capsys, tmp_path):
 
 
 def checked(text):
-    """Return in how many poses each mechanism was checked, and the worst difference."""
+    """Return in how many poses each mechanism was checked, and how far loops are open [m]."""
     return [(int(count), float(worst)) for count, worst in re.findall(
-        'Checked: .*: in (.*) poses of the robot, .* its loops stand open by (.*) m at most', text)]
+        'Checked: .*: in (.*) poses of the robot, .* loops stand open by (.*) m at most', text)]
 
 
 @pytest.mark.parametrize('place', ['0 0 0.2', '0 0 0.20001', '0 0.01 0.2', '0 0 0.26'])

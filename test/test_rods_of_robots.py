@@ -147,7 +147,8 @@ def test_hinges_of_rods_are_published(tmp_path, capsys, seed, count):
         mujoco.mj_kinematics(model, data)
         closed += 1
         for i in (0, 1):
-            assert data.site(f'eye {i}').xpos == pytest.approx(data.site(f'pin {i}').xpos, abs=1e-14)
+            eye, pin = (data.site(f'{name} {i}').xpos for name in ('eye', 'pin'))
+            assert eye == pytest.approx(pin, abs=1e-14)
     assert closed > 8
 
 

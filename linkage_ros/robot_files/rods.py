@@ -238,7 +238,8 @@ def described(robot: Robot, group: Group, others: Sequence[str]) -> check.Import
     limits, more = robot.limits(found.inputs.values())
     reports += more + [
         f'Left out: the limits of {joint.name}, {why}.' for link, joint in found.links.items()
-        if link not in {*found.inputs, *found.universals} and (why := joint.no_limits or found.one_sided(joint))]
+        if link not in {*found.inputs, *found.universals}
+        and (why := joint.no_limits or found.one_sided(joint))]
     reports += sweeps.added(given, name, [
         sweeps.Source(link, joint.name, 1.0, found.zeros[link] - joint.start, found.zeros[link])
         for link, joint in found.inputs.items()], limits, machine.inputs)

@@ -62,7 +62,7 @@ class Poses(NamedTuple):
     positions: np.ndarray
     moved: np.ndarray
 
-    def some(self, which: np.ndarray) -> 'Poses':
+    def some(self, which: Any) -> 'Poses':
         """Return some of the poses."""
         return Poses(self.positions[which], self.moved[which])
 
@@ -310,6 +310,12 @@ class Component:
     def step_between(self, one: Poses, other: Poses) -> np.ndarray:
         """Return the difference of two poses in each column; balls have none."""
         return (other.positions - one.positions)[:, self._column]
+
+    def stiffness(self, poses: Poses, fixed: np.ndarray) -> np.ndarray:
+        """Return the product of singular values of the loops in each pose: 0 at a dead point."""
+        slope = self.errors(poses, True)[1][:, :, ~fixed] / self.size
+        count = np.sum(~fixed) - self.nullity(fixed)
+        return np.prod(np.linalg.svd(slope, compute_uv=False)[:, :count], axis=1)
 
     def nullity(self, fixed: np.ndarray) -> int:
         """Return the degrees of freedom that the loops leave, in a random open pose."""
