@@ -137,7 +137,8 @@ class Rods:
         for ball, other in held, held[::-1]:
             base, place = ball.other(body), ball.place(body)
             chain = [hinge for hinge, _ in ball.chain]
-            if not 2 <= len(chain) <= 3:
+            # A third hinge stays, unless the other end needs it.
+            if not 2 <= len(chain) <= 2 + (len(other.hinges) != 2):
                 continue
             (first, second), way = (chain if ball.bodies[1] == body else chain[::-1])[:2], (
                 other.place(body) - place)
