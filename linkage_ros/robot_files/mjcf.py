@@ -12,12 +12,20 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
 
 from .elements import at, turned_by
 from .robot import BALL, FIXED, HINGE, Robot, SLIDE
+from ..command import RequestError
+
+# What MuJoCo says of a file, and the sentence for it.
+_ERRORS = [
+    (r"Error opening file '(.*)'", 'it includes {!r}, which is not there'),
+    (r'plugin (\S+) not found', 'it uses the plugin {!r}, which this MuJoCo does not have: remove '
+     'that from <extension>, and what refers to it')]
 
 
 def read(path: str) -> Robot:
@@ -66,7 +74,13 @@ def _compiled(path: str) -> Any:
 
     # Warnings, which MuJoCo writes to a file, concern dynamics.
     mj.set_mju_user_warning(lambda text: None)
-    spec = mj.MjSpec.from_file(path)
+    try:
+        spec = mj.MjSpec.from_file(path)
+    except ValueError as error:
+        for pattern, why in _ERRORS:
+            if found := re.search(pattern, str(error)):
+                raise RequestError(why.format(found[1])) from None
+        raise
     for geom in spec.geoms:
         if geom.type in (mj.mjtGeom.mjGEOM_MESH, mj.mjtGeom.mjGEOM_HFIELD, mj.mjtGeom.mjGEOM_SDF):
             geom.type, geom.meshname, geom.hfieldname = mj.mjtGeom.mjGEOM_SPHERE, '', ''
