@@ -40,7 +40,7 @@ class Parser(argparse.ArgumentParser):
         return found
 
 
-def run(name: str, work: Callable, args: Optional[Sequence[str]], needs: str) -> int:
+def run(name: str, work: Callable, args: Optional[Sequence[str]]) -> int:
     """
     Run a command; return the exit code.
 
@@ -52,8 +52,6 @@ def run(name: str, work: Callable, args: Optional[Sequence[str]], needs: str) ->
         Takes the arguments; raises RequestError, SceneError, OSError or ImportError.
     args : list of str
         The arguments; None: those of this process.
-    needs : str
-        How to install packages that may be missing.
 
     """
     try:
@@ -64,10 +62,8 @@ def run(name: str, work: Callable, args: Optional[Sequence[str]], needs: str) ->
         # The reader has closed the pipe: Python discards the rest of the output at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except (RequestError, SceneError) as error:
+    except (RequestError, SceneError, ImportError) as error:
         why: object = error
-    except ImportError as error:
-        why = f'{(error.name or "").split(".")[0]} is not installed: {needs}'
     except OSError as error:
         why = f'{error.filename}: {error.strerror}{_beside(error)}' if error.filename else error
     except KeyboardInterrupt:

@@ -12,7 +12,6 @@
 
 import math
 import struct
-import sys
 import warnings
 
 import numpy as np
@@ -282,14 +281,6 @@ def test_nothing_is_missed_where_nothing_or_everything_was_heard(graph):
     patience.end()
     graph.all_logged(hand.node, hand.said)
     assert not hand.warnings('was received, without')
-
-
-def test_without_llvmlite_the_node_says_so(graph, monkeypatch):
-    monkeypatch.setitem(sys.modules, 'llvmlite', None)
-    said = graph.log()
-    graph.start(Kinematics, {'mechanisms': ['jansen']})
-    graph.until(lambda: [m for m in said
-                         if m.level == LoggingSeverity.INFO and 'llvmlite' in m.msg])
 
 
 def test_a_crank_alone_is_no_exception(graph):

@@ -66,7 +66,10 @@ class Kinematics(scene_node.SceneNode):
         try:
             next(iter(self.scene.machines.values())).linkage.accelerated()
         except ImportError as error:
-            self.get_logger().info(f'{error}; plain Python is used instead, with the same results')
+            # Whoever has not installed it knows; whoever has, does not know that it is broken.
+            is_missing = isinstance(error, ModuleNotFoundError)
+            log = self.get_logger().info if is_missing else self.get_logger().warning
+            log(f'plain Python is used instead of machine code, with the same results: {error}')
         joint_state_reader.subscribe(
             self, 'crank_states', self._planner.process, self._planner.discard)
 

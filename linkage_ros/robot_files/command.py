@@ -26,14 +26,13 @@ from ..scene.writing import in_yaml
 from ..words import elided
 
 NAME = 'from_robot'
-NEEDS = 'pip install pyyaml, and mujoco for MJCF'
 # The report on a mechanism that differs from its robot, or could not be compared.
 WRONG = 'compared with the robot'
 
 
 def main(args: Optional[List[str]] = None) -> int:
     """Print a scene file; return the exit code."""
-    return command.run(NAME, show, args, NEEDS)
+    return command.run(NAME, show, args)
 
 
 def show(args: Optional[List[str]]) -> None:
