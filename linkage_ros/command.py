@@ -14,14 +14,17 @@ import argparse
 import os
 import re
 import sys
-from typing import Callable, List, Mapping, NoReturn, Optional, Sequence
+from typing import Any, Callable, List, Mapping, NoReturn, Optional, Sequence
 
 from .scene import SceneError, SceneMechanism
-from .words import meant
+from .words import meant, sentence
 
 
 class RequestError(Exception):
     """An invalid request; the text is one sentence."""
+
+    def __init__(self, text: Any):
+        super().__init__(sentence(text))
 
 
 class Parser(argparse.ArgumentParser):
@@ -68,7 +71,7 @@ def run(name: str, work: Callable, args: Optional[Sequence[str]]) -> int:
         why = f'{error.filename}: {error.strerror}{_beside(error)}' if error.filename else error
     except KeyboardInterrupt:
         why = 'interrupted'
-    print(f'{name}: {" ".join(str(why).split())}', file=sys.stderr)
+    print(f'{name}: {sentence(why)}', file=sys.stderr)
     return 1
 
 

@@ -27,6 +27,7 @@ from truth.working_modes import excavator, five_bar
 pytest.importorskip('rclpy')
 pytest.importorskip('linkage_interfaces')
 
+from linkage_ros.nodes import log  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
@@ -155,6 +156,19 @@ def test_a_reason_is_throttled_whoever_sends(stream, capfd, name):
     for number in range(5):
         stream.want(['flap', 'lever_A.x', name.format(number)], [flap(0.2), 100.0, 1.0])
     assert capfd.readouterr().err.count('are moved by one input') == 1
+
+
+def test_of_a_name_twice_the_last_counts_as_in_crank_states(stream):
+    assert stream.want(['flap', 'bar_QB', 'flap'], [flap(0.2), 1.2, flap(0.7)])['servo'] == (
+        pytest.approx(0.7, abs=1e-13),)
+
+
+def test_names_that_somebody_makes_up_do_not_fill_the_log(stream, capfd):
+    for number in range(60):
+        stream.want(['flap', f'wing{number}'], [flap(0.2), 1.0])
+    said = [line for line in capfd.readouterr().err.splitlines() if 'no output is called' in line]
+    assert 'called wing0;' in said[0] and len(said) == log.NAMES
+    assert 'no more will be named' in said[-1]
 
 
 def test_hostile_bytes_end_nothing(stream, graph):
@@ -400,7 +414,7 @@ def test_a_trajectory_of_a_foot_and_a_bucket(graph, several_plan):
     (['flap'], [([0.0, 1.0], [])], 'point 0 must have 1 positions'),
     (['flap'], [([0.0], [1.0, 2.0])], 'as many velocities or none, not 1 and 2'),
     (['flap', 'wing'], [([0.0, 0.0], [])], 'no output is called wing'),
-    (['flap', 'flap'], [([0.0, 0.0], [])], 'flap and flap are moved by one input'),
+    (['flap', 'flap'], [([0.0, 0.0], [])], 'joint_names has a name twice'),
     ([], [([], [])], 'joint_names is empty: name at least one output'),
     (['flap'], [([0.0], [math.nan])], 'point 0: a velocity must be finite'),
     (['flap'], [([0.0], [1.0]), ([0.1], [math.inf])], 'point 1: a velocity must be finite'),
@@ -418,6 +432,26 @@ def test_a_trajectory_that_cannot_be_is_refused_as_a_whole(graph, plan, capfd, n
     assert reason in ''.join(logged)
     graph.until(plan(['flap'], ([flap(0.3)], [])))
     assert not refused()
+
+
+@pytest.mark.parametrize('times, reason', [
+    ([(0, 5), (0, 5), (1, 0)], ''), ([(0, 0)], ''), ([(0, 2 * 10 ** 9), (2, 1)], ''),
+    ([(1, 0), (0, 999_999_999)], 'point 1 is at 1 s, before 1 s'),
+    ([(-1, 0)], 'point 0 is at -1 s, before 0 s: time_from_start must not decrease'),
+    ([(0, 0), (3, 0), (2, 5 * 10 ** 8)], 'point 2 is at 2.5 s, before 3 s')])
+def test_a_trajectory_goes_forwards_in_time(graph, stream, capfd, times, reason):
+    planned, logged = graph.listen(JointTrajectory, 'servo_trajectory'), []
+    publisher = graph.node.create_publisher(JointTrajectory, 'wanted_trajectory', 10)
+    graph.until(publisher.get_subscription_count)
+    graph.until(lambda: stream.node.count_subscribers('servo_trajectory'))
+    points = [JointTrajectoryPoint(positions=[flap(0.3)], time_from_start=Duration(
+        sec=sec, nanosec=nanosec)) for sec, nanosec in times]
+    publisher.publish(JointTrajectory(joint_names=['flap'], points=points))
+    graph.until(lambda: logged.append(capfd.readouterr().err) or planned
+                or 'wanted_trajectory is refused: ' in ''.join(logged))
+    assert reason in ''.join(logged) and bool(planned) != bool(reason)
+    assert [point.time_from_start for one in planned for point in one.points] == (
+        [] if reason else [point.time_from_start for point in points])
 
 
 @pytest.mark.slow

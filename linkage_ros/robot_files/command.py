@@ -23,7 +23,7 @@ from . import check, closing, loops, planar, readers, rods, spatial
 from .robot import FARTHEST, Joint, Robot
 from .. import command
 from ..scene.writing import in_yaml
-from ..words import elided
+from ..words import elided, sentence
 
 NAME = 'from_robot'
 # The report on a mechanism that differs from its robot, or could not be compared.
@@ -56,9 +56,9 @@ def show(args: Optional[List[str]]) -> None:
         robot = closing.held(robot, {**robot.held, **_values(asked.hold)})
         given, reports = described(robot)
     # Unprintable characters in names of the file could end a comment.
-    head = [elided(line, 10 ** 6) for line in (
-        f'From {asked.file}. All its joints on /joint_states, and its model:', _launch(asked),
-        *reports)]
+    head = [*(elided(line, 10 ** 6) for line in (
+        f'From {asked.file}. All its joints on /joint_states, and its model:', _launch(asked))),
+        *map(sentence, reports)]
     print(*(f'# {line}' for line in head), in_yaml(given), sep='\n', end='')
     print(*(f'{NAME}: {line}' for line in head[2:]), sep='\n', file=sys.stderr)
     if wrong := [line for line in reports if WRONG in line]:
