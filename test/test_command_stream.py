@@ -30,6 +30,7 @@ pytest.importorskip('linkage_interfaces')
 from linkage_ros.nodes import log  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
+from linkage_ros.nodes.worker import Worker  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import Float64MultiArray  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
@@ -277,6 +278,19 @@ def test_a_foot_and_a_bucket_go_in_along_a_line_and_back_out(graph):
         [place for array in arrays for place in array[-1].data], actuators_at(0.0), rtol=1e-11))
 
 
+def test_of_several_inputs_no_command_outlives_a_change_of_the_geometry(graph):
+    stream = Stream(graph, {
+        'mechanisms': ['leg', 'other', 'bar'], 'leg.type': 'five_bar', 'leg.crank.start': 1.9,
+        'leg.crank2.start': 1.24, 'other.type': 'five_bar', 'other.crank.start': 1.9,
+        'other.crank2.start': 1.24, 'bar.type': 'four_bar'})
+    names, far = [*FOOT, 'other_P.x', 'other_P.y', 'bar_QB'], [9.0, 9.0]
+    good = stream.want(names, [*LINE[:2], *LINE[:2], 1.2])
+    assert stream.want(names, [*far, *far, 1.2]) == good
+    assert graph.set(stream.node, leg__dimensions__a=0.085).successful
+    held = stream.want(names, [*far, *far, 1.2])
+    assert held == {name: at for name, at in good.items() if not name.startswith('leg')}
+
+
 @pytest.mark.slow
 def test_of_several_inputs_what_cannot_be_had_is_held_and_said(graph, capfd):
     stream = Stream(graph, SEVERAL)
@@ -452,6 +466,32 @@ def test_a_trajectory_goes_forwards_in_time(graph, stream, capfd, times, reason)
     assert reason in ''.join(logged) and bool(planned) != bool(reason)
     assert [point.time_from_start for one in planned for point in one.points] == (
         [] if reason else [point.time_from_start for point in points])
+
+
+def test_a_newer_trajectory_ends_the_older_one(graph, plan, monkeypatch):
+    begun, queued, kinds, solved = threading.Event(), threading.Event(), [], []
+    replace, command = Worker.replace, InverseRequest.command
+
+    def replaced(worker, kind, job):
+        replace(worker, kind, job)
+        kinds.append(kind)
+        if kinds.count('wanted_trajectory') == 2:
+            queued.set()
+
+    def after_both_are_there(*args):
+        begun.set()
+        assert queued.wait(20.0)
+        solved.append(args)
+        return command(*args)
+
+    monkeypatch.setattr(Worker, 'replace', replaced)
+    monkeypatch.setattr(InverseRequest, 'command', after_both_are_there)
+    older = plan(['flap'], *(([flap(0.3)], []) for _ in range(50)))
+    graph.until(begun.is_set)
+    newer = plan(['flap'], ([flap(0.2)], []))
+    assert graph.until(newer) and not older()
+    # Of the older one no more than the point that was being solved.
+    assert len(solved) <= 2
 
 
 @pytest.mark.slow

@@ -1481,6 +1481,20 @@ def served():
             and not task.done() and task.get_loop() is not here]
 
 
+def test_what_a_page_looked_at_is_not_subscribed_to_when_it_is_gone(graph, show):
+    running = show(LEG)
+    at_rest = running.entities()
+
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/leg')
+            await browser.until(lambda: len(page.drawn('/leg', 'joints')))
+            assert running.entities()[0] >= at_rest[0] + 4
+        await browser.until(lambda: running.entities() == at_rest)
+
+    asyncio.run(use(running.viewer.url))
+
+
 @pytest.mark.long
 def test_pages_that_come_and_go_leave_nothing(show):
     running = show(LEG)
