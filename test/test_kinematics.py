@@ -279,6 +279,7 @@ def test_the_reach_of_another_leg_is_said_by_the_crank_that_they_share(graph):
     assert leg == 'leg_right0'
     assembly = bench.node.scene.machines['leg'].assembly()
     for low, high in re.findall(r'\[(.*?), (.*?)\]', reach):
+        assert -math.pi <= float(low) < math.pi
         inside = [assembly.within_reach(float(low) + part * (float(high) - float(low)))[1]
                   for part in (-0.1, 0.1, 0.9, 1.1)]
         assert inside == [False, True, True, False]
