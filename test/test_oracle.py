@@ -152,7 +152,9 @@ def test_the_reach_is_the_same_in_any_turn(graph, turn):
     bench = Bench(graph, parameters)
     still = message({'b_crank': 0.1})
     # A plan tries for machine code at its second message, and then now and then.
-    bench.run([*everything(parameters), *3 * [still], ('compiled',), *6 * [still], *(message({'b_crank': angle}) for angle in angles)])
+    bench.run([
+        *everything(parameters), *3 * [still], ('compiled',), *6 * [still],
+        *(message({'b_crank': angle}) for angle in angles)])
 
 
 @pytest.mark.usefixtures('machine_code')

@@ -594,6 +594,7 @@ def test_a_trace_is_the_way_of_its_joint_up_to_where_it_is(start, end):
         return machine.linkage.solve(inputs[0] + math.tau * turns, ('G',))['G']
 
     np.testing.assert_allclose(curve[-1], place(end), atol=1e-12)
+
     def steps(points):
         return np.linalg.norm(np.diff(points, axis=0), axis=1)
 
