@@ -267,9 +267,10 @@ def test_the_launch_file_starts_the_nodes_of_a_scene(arguments, besides, monkeyp
 def test_without_aiohttp_the_rest_is_started(monkeypatch):
     from launch.actions import LogInfo
 
-    monkeypatch.setattr('importlib.util.find_spec', lambda name: None)
+    monkeypatch.setitem(sys.modules, 'aiohttp', None)
     said, *nodes = started()
     assert isinstance(said, LogInfo)
+    assert said.msg[0].text.startswith('The viewer is left out: aiohttp is not installed: ')
     assert [node.node_executable for node in nodes] == ['scene']
 
 

@@ -12,7 +12,7 @@
 
 import cmath
 from collections import Counter, defaultdict
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from functools import lru_cache
 import io
 import json
@@ -20,7 +20,13 @@ import math
 from pathlib import Path
 import random
 import re
+import resource
+import subprocess
+import sys
+from tempfile import TemporaryDirectory
+from xml.etree import ElementTree
 
+from hypothesis import example, given, settings, strategies as st
 from linkage_ros import mechanisms, scene
 from linkage_ros.robot_files import check, closing, command, model, readers
 from linkage_ros.robot_files.spatial import posed, trees
@@ -523,6 +529,47 @@ def test_whatever_is_in_a_file_it_is_read_or_refused_in_one_sentence(
         code = command.main([str(file)])
         out, err = capsys.readouterr()
         assert code == 0 or not out and err.count('\n') == 1, file.read_text()
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize('long', ['<!--{}-->', '<?of {}?>', '<material name="{}"/>'])
+def test_a_long_comment_costs_no_more_than_its_letters(tmp_path, long):
+    # A parser that is fed piece by piece reads what is unfinished anew with each piece: 20 s.
+    text = (ROBOTS / 'four_bar.urdf').read_text()
+    file = tmp_path / 'long.urdf'
+    file.write_text(text.replace('</robot>', long.format(10 ** 7 * 'x') + '</robot>'))
+    done = subprocess.run(
+        [sys.executable, '-m', 'linkage_ros.robot_files', str(file)], cwd=ROBOTS.parents[1],
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (10, 10)), capture_output=True,
+        text=True)
+    assert done.returncode == 0, done.stderr[:1000]
+
+
+@given(st.text(max_size=40), st.sampled_from([1, 100]))
+@example('\x9b2J', 1)
+@example('\x1b]0;title\x07', 1)
+@example('x', 3000)
+@example('x y ', 3000)
+@settings(database=None, print_blob=True, deadline=None, max_examples=8)
+def test_a_name_of_the_file_is_never_more_than_text_in_the_terminal(name, times):
+    text = (ROBOTS / 'four_bar.urdf').read_text()
+    where = name * times
+    with TemporaryDirectory() as folder, redirect_stderr(io.StringIO()) as err, redirect_stdout(
+            io.StringIO()) as out:
+        file = Path(folder, 'named.urdf')
+        root = ElementTree.fromstring(text)
+        for part in root.iter():
+            for key in ('name', 'link', 'joint'):
+                if part.get(key) in ('coupler', 'rocker', 'elbow', 'motor'):
+                    part.set(key, part.get(key) + where)
+        with suppress(UnicodeEncodeError):
+            ElementTree.ElementTree(root).write(file, 'utf-8')
+        command.main([str(file), '--driven', 'nobody'])
+        command.main([str(file)])
+    for line in err.getvalue().splitlines():
+        assert line.isprintable() and len(line) < 5000
+        assert max(map(len, line.split()), default=0) <= 300
+    assert all(line.isprintable() for line in out.getvalue().splitlines())
 
 
 def test_what_is_missing_is_said_in_one_sentence(capsys, tmp_path):

@@ -15,7 +15,6 @@ from __future__ import annotations
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
-from importlib.util import find_spec
 import math
 from types import MappingProxyType
 from typing import Any, Callable, List, Mapping, Optional, Sequence, Tuple, TypeVar, Union
@@ -35,6 +34,7 @@ from .quantities import LinkPoint, Points, structure_of
 from ..cache import Cache
 from ..formula.expression import derivative, Real, real
 from ..formula.program import Batch, evaluate, Pose, Program
+from ..optional import needs
 from ..words import listed, meant, plain_text, quoted
 
 # Lengths beyond these have a unit of their own, a power of two. It changes no bit of a result and
@@ -267,10 +267,10 @@ class Mechanism:
         The first call for a set of points compiles for about 0.1 s. Sine, cosine and arctangent
         are its own and satisfy the rule for errors. A pose is the same in any array, on any number
         of cores, but its last digits may differ from those of a single pose. Raises ImportError
-        without llvmlite.
+        without an llvmlite that works.
         """
-        if not find_spec('llvmlite'):
-            raise ImportError('accelerated() needs llvmlite: pip install llvmlite')
+        with needs('llvmlite'):
+            from ..formula import llvm_arrays  # noqa: F401
         return self.cache.get_or_make('accelerated', lambda: type(self)(
             self.design, self.dimensions, self.branches, True))
 

@@ -24,17 +24,16 @@ from .robot import FARTHEST, Joint, Robot
 from .. import command, scene
 from ..linkage.dyads import short
 from ..scene.writing import in_yaml
-from ..words import elided
+from ..words import elided, sentence
 
 NAME = 'from_robot'
-NEEDS = 'pip install pyyaml, and mujoco for MJCF'
 # The report on a mechanism that differs from its robot, or could not be compared.
 WRONG = 'compared with the robot'
 
 
 def main(args: Optional[List[str]] = None) -> int:
     """Print a scene file; return the exit code."""
-    return command.run(NAME, show, args, NEEDS)
+    return command.run(NAME, show, args)
 
 
 def show(args: Optional[List[str]]) -> None:
@@ -58,9 +57,9 @@ def show(args: Optional[List[str]]) -> None:
         robot = closing.held(robot, {**robot.held, **_values(asked.hold)})
         given, reports, still = described(robot)
     # Unprintable characters in names of the file could end a comment.
-    head = [elided(line, 10 ** 6) for line in (
+    head = [*(elided(line, 10 ** 6) for line in (
         f'From {asked.file}. Its joints on /joint_states, and its model:',
-        _launch(asked, still), *reports)]
+        _launch(asked, still))), *map(sentence, reports)]
     print(*(f'# {line}' for line in head), in_yaml(given), sep='\n', end='')
     print(*(f'{NAME}: {line}' for line in head[2:]), sep='\n', file=sys.stderr)
     if wrong := [line for line in reports if WRONG in line]:
