@@ -487,7 +487,9 @@ class Bench:
         self._until_idle('linkage_ros compiler')
 
     def _until_idle(self, name):
-        if not self._until(lambda: name not in {t.name for t in threading.enumerate()}):
+        # The threads of a pool have a number behind its name.
+        if not self._until(lambda: not any(
+                t.name.startswith(name) for t in threading.enumerate())):
             raise Mismatch(f'the thread {name} does not end')
         self._drain()
 

@@ -12,7 +12,6 @@
 
 import importlib
 import math
-import sys
 import threading
 
 from linkage_ros import mechanisms
@@ -163,16 +162,6 @@ def test_an_llvmlite_that_is_too_old_is_named(monkeypatch):
     monkeypatch.setattr('llvmlite.__version__', '0.41.1')
     with pytest.raises(ImportError, match='llvmlite 0.44 or newer is needed, this is 0.41.1'):
         importlib.reload(native)
-
-
-def test_without_llvmlite_only_accelerated_is_missing(monkeypatch):
-    monkeypatch.setitem(sys.modules, 'llvmlite', None)
-    linkage = mechanisms.create('water_drop')
-    with pytest.raises(ImportError, match=r'needs llvmlite: pip install llvmlite'):
-        linkage.accelerated()
-    solution = Assembly(linkage).solution(('P',))
-    solution.solve([0.3])
-    assert solution.rows[0] == pytest.approx(linkage.solve(0.3)['P'])
 
 
 def test_it_is_compiled_once_for_all_mechanisms_of_a_type(code):

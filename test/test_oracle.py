@@ -21,6 +21,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from linkage_ros.nodes import plan  # noqa: E402
 from oracle import Bench, everything, history, message, Mismatch, SCENES  # noqa: E402
 from ros_harness import Graph  # noqa: E402
 from sweeps import EXHAUSTIVE
@@ -67,6 +68,18 @@ def test_a_message_that_sets_nothing_off_ends_nothing(graph, parameters, steps):
     Bench(graph, parameters).run(steps)
 
 
+@pytest.fixture
+def machine_code(monkeypatch):
+    """Hold that machine code runs some messages, where llvmlite works."""
+    ran = []
+    if plan.plan_llvm:
+        run = plan.plan_llvm.LlvmBackend.run
+        monkeypatch.setattr(plan.plan_llvm.LlvmBackend, 'run', lambda backend, *args: (
+            ran.append(args) or run(backend, *args)))
+    yield
+    assert bool(ran) == bool(plan.plan_llvm)
+
+
 LOADED = {
     'a lever': {'mechanisms': ['a', 'b'], 'a.type': 'slotted_lever', 'b.type': 'jansen',
                 'a.loads': ['L=0 -9.81']},
@@ -75,6 +88,7 @@ LOADED = {
         'a.cylinder.source': 'a_crank'}}
 
 
+@pytest.mark.usefixtures('machine_code')
 @pytest.mark.parametrize('parameters', LOADED.values(), ids=LOADED)
 def test_efforts_are_there_whoever_sets_the_message_off(graph, parameters):
     Bench(graph, parameters).run([
@@ -88,6 +102,7 @@ PAIR = {'mechanisms': ['a', 'b'], 'a.type': 'jansen', 'b.type': 'peaucellier'}
 END = 2.0 * math.acos(5.0 / 6.0)
 
 
+@pytest.mark.usefixtures('machine_code')
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('by', [
     message({'a_crank': 0.3}, [math.nan]), message({'a_crank': 0.3}, [math.inf]),
@@ -106,6 +121,7 @@ MEASURED = {'mechanisms': ['a', 'b'], 'a.type': 'four_bar', 'a.crank.measures': 
             'b.type': 'slotted_lever'}
 
 
+@pytest.mark.usefixtures('machine_code')
 @pytest.mark.parametrize('bad', [9.0, math.nan, math.inf])
 def test_what_a_sensor_cannot_say_is_no_pose(graph, bad):
     bench = Bench(graph, MEASURED)
@@ -116,6 +132,7 @@ def test_what_a_sensor_cannot_say_is_no_pose(graph, bad):
     assert bench.model.states['a'].values == [pytest.approx(0.54, abs=0.1)]
 
 
+@pytest.mark.usefixtures('machine_code')
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('seed', range(5))
 def test_what_leaves_its_reach_leaves_the_picture(graph, seed):
@@ -126,6 +143,21 @@ def test_what_leaves_its_reach_leaves_the_picture(graph, seed):
         *(message({'b_crank': angle}, [1.0]) for angle in [0.1, 0.1, *near, *5 * [END + 0.1]])])
 
 
+@pytest.mark.usefixtures('machine_code')
+@pytest.mark.parametrize('turn', [-3, 1, 1000])
+def test_the_reach_is_the_same_in_any_turn(graph, turn):
+    parameters = {'mechanisms': ['b'], 'b.type': 'peaucellier'}
+    angles = [sign * (END + gap) + turn * math.tau
+              for sign in (1.0, -1.0) for gap in (-1.0, -1e-6, 1e-6, 0.5)]
+    bench = Bench(graph, parameters)
+    still = message({'b_crank': 0.1})
+    # A plan tries for machine code at its second message, and then now and then.
+    bench.run([
+        *everything(parameters), *3 * [still], ('compiled',), *6 * [still],
+        *(message({'b_crank': angle}) for angle in angles)])
+
+
+@pytest.mark.usefixtures('machine_code')
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('name', ['an excavator', 'a reach that ends',
                                   'more legs than are solved one by one'])

@@ -35,7 +35,7 @@ def distinct(values: Iterable[float], input_: Input) -> List[float]:
     for x in sorted(float(input_.wrapped(0.0 if abs(x) < LEAST else x)) for x in values):
         if not found or x - found[-1] > SAME:
             found.append(x)
-    if input_.turns and len(found) > 1 and found[0] + input_.turn - found[-1] <= SAME:
+    if input_.wraps and len(found) > 1 and found[0] + input_.turn - found[-1] <= SAME:
         found.pop()
     return found
 
@@ -47,7 +47,7 @@ class Analysis:
         self._linkage, self._others = linkage, tuple(others)
         self._first = linkage.inputs[0]
 
-    # From here on the first input is in units of its size.
+    # From here on the first input is in units of its step.
 
     def dead_points(self) -> List[float]:
         """Return the values of the input at which a dyad stretches or folds."""
@@ -61,13 +61,13 @@ class Analysis:
 
     def reach(self) -> List[Arc]:
         """Return the reach in arcs, none of them on both sides of an end of a turn."""
-        size = self._first.size
+        size = self._first.step
         return [part for lo, hi in self._linkage.reach(*self._others)
-                for part in self._first.within(lo / size, hi / size)]
+                for part in self._first.counted().within(lo / size, hi / size)]
 
     def curve(self, kind: str, name: object) -> Callable:
         """Return the function from the first input to numbers, and each one's rate by it."""
-        pose, size, others = self._linkage.bound(kind, name), self._first.size, self._others
+        pose, size, others = self._linkage.bound(kind, name), self._first.step, self._others
 
         def curve(value: np.ndarray) -> np.ndarray:
             rows = pose.searched(value * size, *others)

@@ -232,10 +232,20 @@ class DrivenMechanism:
         at = ', '.join(f'{one.input.quantity} {value:.6g} {one.input.unit}'
                        for one, value in zip(inputs, self.inputs[0]))
         first, *others = missing
-        reach = ', '.join(f'{scene.in_words(self._reach(one, first))} {one.input.unit}'
-                          for one in inputs)
+        if len(inputs) > 1:
+            return f'{legs} cannot be assembled at {at}: no place for "{self._unplaced()}"'
         of = f' of {missing[first]}' if others else ''
-        return f'{legs} cannot be assembled at {at}; the reach{of} is {reach}'
+        return (f'{legs} cannot be assembled at {at}; the reach{of} is '
+                f'{scene.in_words(self._reach(inputs[0], first))} {inputs[0].input.unit}')
+
+    def _unplaced(self) -> str:
+        """Return the first joint line that has no place at the present inputs."""
+        machine = self.model.machine
+        own = [value / machine.scale_of(name)
+               for name, value in zip(machine.inputs, self.inputs[0])]
+        found = {**machine.linkage.solve(own), **machine.linkage.joint_angles(own)}
+        return next((line.text for line in machine.linkage.design.lines
+                     if any(np.isnan(found.get(name, 0.0)).any() for name in line.names)), '')
 
     def _reach(self, drive: scene.InputSettings, leg: int) -> Sequence[Tuple[float, float]]:
         """Return the reach of a leg, by the crank that all legs have in common."""

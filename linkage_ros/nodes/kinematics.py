@@ -22,7 +22,7 @@ from sensor_msgs.msg import JointState
 
 from . import joint_state_reader, scene_node, shutdown
 from .driven_mechanism import DrivenMechanism
-from .log import Once
+from .log import NAMES, Once
 from .mechanism_model import MechanismModel
 from .message_layout import pack_time
 from .plan import Planner, Route
@@ -31,9 +31,8 @@ from .. import scene
 from ..robot_model import bodies, urdf
 from ..words import listed
 
-# Time from the first input received to a warning about the others [s]; most unknown joint names
-# that are logged.
-MISSING_AFTER, UNKNOWN_NAMES = 5.0, 1000
+# Time from the start, and from the first input received, to a warning about missing ones [s].
+MISSING_AFTER = 5.0
 # Longest wait for subscribers to delete markers when the node ends [s].
 DELETION_TIMEOUT = 0.1
 
@@ -45,7 +44,7 @@ class Kinematics(scene_node.SceneNode):
         self._mechanisms: Dict[str, DrivenMechanism] = {}
         self._models: Dict[str, MechanismModel] = {}
         super().__init__(scene.KINEMATICS, **kwargs)
-        self._clashing = Once(UNKNOWN_NAMES)
+        self._clashing = Once(NAMES)
         # Mechanism and index of the inputs, by their source joint.
         self._inputs: Dict[str, List[Tuple[str, int]]] = {}
         for name, machine in self.scene.machines.items():
@@ -58,15 +57,18 @@ class Kinematics(scene_node.SceneNode):
                                 joint_state_reader.Reader(self._interpret),
                                 lambda: pack_time(self.get_clock().now().nanoseconds))
         self._own: frozenset = frozenset()
-        self._missing, self._unknown = set(self._inputs), Once(UNKNOWN_NAMES)
+        self._missing, self._unknown = set(self._inputs), Once(NAMES)
         self._missing_timer = self.create_timer(
             MISSING_AFTER, self.guarded('the check for missing inputs', self._warn_of_missing),
-            clock=Clock(clock_type=ClockType.STEADY_TIME), autostart=False)
+            clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.begin()
         try:
             next(iter(self.scene.machines.values())).linkage.accelerated()
         except ImportError as error:
-            self.get_logger().info(f'{error}; plain Python is used instead, with the same results')
+            # Whoever has not installed it knows; whoever has, does not know that it is broken.
+            is_missing = isinstance(error, ModuleNotFoundError)
+            log = self.get_logger().info if is_missing else self.get_logger().warning
+            log(f'plain Python is used instead of machine code, with the same results: {error}')
         joint_state_reader.subscribe(
             self, 'crank_states', self._planner.process, self._planner.discard)
 

@@ -30,11 +30,13 @@ from .publishers import PatchedPublisher
 from .scene_joint_states import SceneJointStates
 from ..cache import Cache
 from ..linkage.walker import Solution
+from ..optional import needs
 
 try:
-    from . import plan_llvm
+    with needs('llvmlite'):
+        from . import plan_llvm
 except ImportError:
-    # Without llvmlite there is no machine code.
+    # `kinematics` logs the reason.
     plan_llvm = None  # type: ignore[assignment]
 
 # Maximum number of cached plans, and of cached outputs of a plan.

@@ -124,7 +124,7 @@ def _limits(loop: int, mechanism: Any, solution: Solution) -> Iterator[tuple]:
     for at, (factor, plus) in zip(native.addresses(solution.batch.arguments)[0],
                                   assembly.own_inputs()):
         yield (loop, at, factor, plus, 0.5 * (low + high), 0.5 * (high - low),
-               math.tau if first.turns else 0.0)
+               first.turn if first.wraps else 0.0)
 
 
 def _conversion(mechanism: Any, solution: Solution) -> np.ndarray:

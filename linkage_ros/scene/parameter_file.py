@@ -24,6 +24,7 @@ import sys
 from typing import Any, Dict, Iterable, List, Optional, Tuple
 
 from .parameters import SceneError
+from ..optional import needs
 from ..words import quoted
 
 KEY = 'ros__parameters'
@@ -50,12 +51,14 @@ def overrides(path: str, node: str) -> Optional[Dict[str, Any]]:
     `node` is its full name, such as '/kinematics'. None means that no section matches it. Raises
     SceneError with the reason of rcl if rcl would refuse the file.
     """
-    import yaml
+    with needs('yaml'):
+        import yaml
 
+        loader = getattr(yaml, 'CLoader', yaml.Loader)
     reader = _Reader()
     try:
         with open(path, 'rb') as file:
-            reader.read(yaml.parse(file, Loader=getattr(yaml, 'CLoader', yaml.Loader)))
+            reader.read(yaml.parse(file, Loader=loader))
     except (yaml.YAMLError, UnicodeError, RecursionError):
         reason = f'Error parsing a event near line {reader.line}'
     except ValueError as error:

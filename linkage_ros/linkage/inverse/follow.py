@@ -43,9 +43,10 @@ def follow(problem: InverseProblem, values: Sequence[float], near: Sequence[floa
         return None
     found: Optional[Found]
     if segments:
-        input_, size = problem.inputs[0], problem.sizes[0]
+        input_ = problem.inputs[0]
         turns = input_.turns_of(near[0])
-        way = segments.follow(values[0], start[0], (near[0] - turns) / size, problem.turns[0])
+        way = segments.follow(values[0], start[0], (near[0] - turns) / input_.step,
+                              problem.turns[0])
         if not way:
             return None
         bracket, passed = way

@@ -79,7 +79,8 @@ class Grid:
     """Outputs as functions of several inputs, all of them counted in their sizes inside."""
 
     def __init__(self, problem: InverseProblem):
-        self._problem, self._sizes = problem, np.array(problem.sizes)
+        self._problem = problem
+        self._sizes = np.array([input_.step for input_ in problem.linkage.inputs])
         self._inputs = [input_.counted() for input_ in problem.linkage.inputs]
         # Outputs that are inputs, by their numbers in both.
         self._held = {problem.outputs.index(input_.name): by
@@ -95,7 +96,7 @@ class Grid:
         """Yield inputs next to which the outputs may have some values, and their bracket."""
         start = [0.5 * (input_.low + input_.high) for input_ in self._inputs]
         for place, by in self._held.items():
-            start[by] = values[place] / self._problem.sizes[by]
+            start[by] = values[place] / self._sizes[by]
         found, target = np.array([start]), np.array(values)
         for rows, columns in self._blocks:
             if self.is_held and columns == [0]:
@@ -143,7 +144,7 @@ class Grid:
             q = q.copy()
             for by, x in zip(columns, (q[:, columns] + step).T):
                 input_ = self._inputs[by]
-                q[:, by] = input_.wrapped(x) if input_.turns else x.clip(input_.low, input_.high)
+                q[:, by] = input_.wrapped(x) if input_.wraps else x.clip(input_.low, input_.high)
             return q
 
         def known(q: np.ndarray) -> np.ndarray:

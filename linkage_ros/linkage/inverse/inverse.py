@@ -46,7 +46,6 @@ from .problem import Found, InverseProblem
 from .refine import distinct, distinct_arrays, refine, refine_arrays
 from .segments import Segments, segments_of
 from ..arguments import numbers
-from ..inputs import MOST_COUNTED
 from ...words import listed, quoted
 
 if TYPE_CHECKING:
@@ -125,8 +124,8 @@ class Inverse:
     outputs : tuple of str
         Names of the outputs; see `Mechanism.has_output`.
     inputs : tuple of Input
-        The inputs of the linkage; see `InverseProblem`. Those of an infinite period have the
-        solutions of one turn.
+        The inputs of the linkage; see `InverseProblem`. One that `is_part` has the solutions of
+        the turns around zero, or around given inputs.
 
     """
 
@@ -135,26 +134,25 @@ class Inverse:
         blocks(linkage, outputs)
         self._problem = InverseProblem(linkage, outputs)
         self.inputs = self._problem.inputs
-        # With more turns than are searched, only the inverse linkage has them all.
-        self._is_single = self._n == 1 and (
-            linkage.period() <= MOST_COUNTED or not linkage.inputs[0].turns or not self.closed)
-        if not self._is_single and not self.closed:
+        self._is_part = any(each.is_part for each in self.inputs)
+        if self._n > 1 and not self.closed:
             self._source = Grid(self._problem)  # raises ValueError for dependent outputs
 
     @cached_property
     def closed(self) -> Optional[InverseLinkage]:
         """Joint lines and assembly modes of the inverse linkage; None if there is none."""
-        return (taken_apart if self.linkage.axes == 'xy' else rods.taken_apart)(
-            self.linkage, self.outputs)
+        # An inverse linkage has each input in one period, or else in one turn.
+        make = taken_apart if self.linkage.axes == 'xy' else rods.taken_apart
+        return None if self._is_part else make(self.linkage, self.outputs)
 
     @property
     def is_quick(self) -> bool:
         """Whether arrays of values cost little more than poses: no grid is searched."""
-        return self._is_single or self.closed is not None
+        return self._n == 1 or self.closed is not None
 
     @cached_property
     def _segments(self) -> Optional[Segments]:
-        return segments_of(self.linkage, self.outputs[0]) if self._is_single else None
+        return segments_of(self.linkage, self.outputs[0]) if self._n == 1 else None
 
     @cached_property
     def _source(self) -> Union[Modes, Grid]:
@@ -202,6 +200,11 @@ class Inverse:
             If there is not one value for each output, and one finite `near` for each input.
 
         """
+        if near is not None and (there := self._elsewhere(self._one_each(near, 'near'))):
+            inverse, start, own = there
+            return [Solution(tuple(np.add(each, start).tolist()), self) for each, _ in inverse.all(
+                np.subtract(self._one_each(values), own), np.subtract(
+                    self._one_each(near), start))]
         found = [inputs for inputs, _ in self._all(self._one_each(values))]
         if near is not None:
             beside = self._finite(near, 'near')
@@ -209,6 +212,35 @@ class Inverse:
                            key=lambda x: sum(((a - b) / size) ** 2 for a, b, size in zip(
                                x, beside, self._problem.sizes)))
         return [Solution(inputs, self) for inputs in found]
+
+    def _elsewhere(self, near: Sequence[float]
+                   ) -> Optional[Tuple[Inverse, Sequence[float], Sequence[float]]]:
+        """
+        Return the inverse in the turns of some inputs, if it is not this one, and these turns.
+
+        These are the angles [rad] of each input, and of each output that is an input.
+        """
+        turns = [float(input_.whole_turns(x)) if math.isfinite(x) else 0.0
+                 for input_, x in zip(self.inputs, near)]
+        if not any(turns):
+            return None
+        start = {input_.name: math.tau * count for input_, count in zip(self.inputs, turns)}
+        return (self.linkage.turned(*turns).inverse(self.outputs), list(start.values()),
+                [start.get(name, 0.0) for name in self.outputs])
+
+    def _in_turns(self, method: str, values: Sequence[Any], near: Sequence[float],
+                  *limits: Sequence[Sequence[float]]) -> Optional[Tuple[Any, Any]]:
+        """Return what a method does in the turns of some inputs; None if those are these."""
+        there = self._is_part and self._elsewhere(near)
+        if not there:
+            return None
+        inverse, start, own = there
+        ends = [[tuple(end - turn for end in pair) or None for pair, turn in zip(each, start)]
+                for each in limits]
+        inputs, rates = getattr(inverse, method)(
+            [x - turn for x, turn in zip(values, own)],
+            [x - turn for x, turn in zip(near, start)], *ends)
+        return tuple(x + turn for x, turn in zip(inputs, start)), rates
 
     def over(self, *values: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
         """
@@ -349,9 +381,16 @@ class Inverse:
         near = None if near is None else self._each(near, 'near')
         given = (*values, *(near or ()))
         if set(map(type, given)) == {float}:
-            return choose(self._problem, self._all(values), near, limits)
+            return near and self._in_turns('nearest', values, near, limits) or choose(
+                self._problem, self._all(values), near, limits)
         rows = _broadcast(given)
         shape, rows = rows[0].shape, [row.ravel() for row in rows]
+        if near and self._is_part:
+            alone = [self.nearest(column[:self._n], column[self._n:], ends)
+                     for column in np.stack(rows).T.tolist()]
+            return cast(Tuple[Any, Any], tuple(
+                tuple(np.reshape(part, (len(alone), -1)).T.reshape(-1, *shape))
+                for part in (zip(*alone) if alone else ([], []))))
         inputs, rates = self._all_arrays(rows[:self._n])
         found = choose_arrays(self._problem, inputs, rates, rows[self._n:] or None, limits)
         return cast(Tuple[Any, Any], tuple(
@@ -381,6 +420,8 @@ class Inverse:
         rows = [np.atleast_1d(row) for row in _broadcast(self._each(values))]
         if rows[0].ndim > 1:
             raise self._miscounted(values, 'values')
+        if beside and (there := self._in_turns('path', rows, beside, limits)):
+            return there
         inputs, rates = self._all_arrays(rows)
         found = []
         for x, r in zip(inputs.transpose(2, 0, 1).tolist(), rates.transpose(2, 0, 1).tolist()):
@@ -414,6 +455,8 @@ class Inverse:
         """
         values, near = self._one_each(values), self._one_each(near, 'near')
         known = all(map(math.isfinite, (*values, *near)))
+        if known and (there := self._in_turns('follow', values, near)):
+            return there
         return known and follow(self._problem, self._problem.reduced(values), near,
                                 self._segments) or (
             (math.nan,) * self._n, (math.nan,) * self._n ** 2)
@@ -461,3 +504,11 @@ def _broadcast(values: Sequence[Any]) -> Sequence[np.ndarray]:
 
 def _sign(value: float, size: float) -> int:
     return int(np.sign(value)) if abs(value) > SINGULAR * size else 0
+
+
+def _is_above(least: float, answer: Found) -> bool:
+    return answer[0][0] >= least
+
+
+def _is_below(most: float, answer: Found) -> bool:
+    return answer[0][0] <= most

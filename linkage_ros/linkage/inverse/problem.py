@@ -44,8 +44,8 @@ class InverseProblem:
     n : int
         The number of outputs, and of inputs.
     inputs : tuple of Input
-        Those of the linkage. If the gears of one repeat only after very many turns, its period is
-        that of the outputs, or infinite if they have none.
+        Those of the linkage. If one repeats only after very many turns, its period is that of the
+        outputs, if they repeat earlier.
     angular : list of bool
         For each output, whether it is an angle.
     scales, sizes : list of float
@@ -67,7 +67,7 @@ class InverseProblem:
         self.scales = [1.0 if angular else linkage.longest for angular in self.angular]
         self.sizes = [input_.size for input_ in linkage.inputs]
         self.inputs = tuple(map(self._with_period, range(self.n), linkage.inputs))
-        self.turns = [input_.turn if input_.turns else math.inf for input_ in self.inputs]
+        self.turns = [input_.turn if input_.wraps else math.inf for input_ in self.inputs]
         # An output that is an input has its period.
         own = {input_.name: turn for input_, turn in zip(self.inputs, self.turns)}
         self.periods = [own.get(name, math.tau) if angular else math.inf
@@ -75,12 +75,12 @@ class InverseProblem:
 
     def _with_period(self, by: int, input_: Input) -> Input:
         """Return an input with the period of the outputs if its own has too many turns."""
-        if not input_.turns or self.linkage.period(by) == input_.period:
+        if not input_.is_part:
             return input_
         rates = [self.linkage.gear(name, by)[0] for name in self.linkage.geared_to(by)]
-        periods = (1.0, *(1.0 / abs(rate) for rate in rates if abs(rate) > 1.0), math.inf)
-        return next(each for each in (input_._replace(period=period) for period in periods)
-                    if not each.turns or is_periodic(partial(self._outputs_over, by), each))
+        periods = (1.0, *(1.0 / abs(rate) for rate in rates if rate))
+        return next((each for each in (input_._replace(period=period) for period in periods)
+                     if each.wraps and is_periodic(partial(self._outputs_over, by), each)), input_)
 
     def _outputs_over(self, by: int, values: np.ndarray) -> np.ndarray:
         """Return the outputs, angles as directions, over one input; the others are spread."""

@@ -18,6 +18,7 @@ the same on arrays. Where a bracket is known, Newton's method stays inside it.
 
 from __future__ import annotations
 
+from itertools import combinations
 import math
 from typing import List, Optional, Sequence, Tuple
 
@@ -232,7 +233,9 @@ def distinct(problem: InverseProblem, solutions: Sequence[Found]) -> List[Found]
     """Return solutions in order, one of those that are one."""
     found: List[Found] = []
     for solution in sorted(solutions):
-        if not any([same(problem, solution, other) for other in found]):
+        # Of one input only neighbours can be one, a turn apart too.
+        beside = found if problem.n > 1 else found[-1:] + found[:1]
+        if not any([same(problem, solution, other) for other in beside]):
             found.append(solution)
     return found
 
@@ -240,17 +243,25 @@ def distinct(problem: InverseProblem, solutions: Sequence[Found]) -> List[Found]
 def distinct_arrays(problem: InverseProblem, inputs: np.ndarray, rates: np.ndarray
                     ) -> Tuple[np.ndarray, np.ndarray]:
     """Return solutions (solutions, inputs, m) in order, without those that are one of others."""
-    for i in range(1, len(inputs)):
-        for k in range(i):
-            apart = np.max([problem.apart(by, *inputs[[i, k], by])
-                            for by in range(problem.n)], axis=0)
-            for place in np.flatnonzero(apart <= NEIGHBOURS):
-                one, other = ((tuple(inputs[j, :, place].tolist()),
-                               tuple(rates[j, :, place].tolist())) for j in (i, k))
-                if same(problem, one, other):
-                    inputs[i, :, place] = math.nan
-    order = np.lexsort(np.nan_to_num(inputs, nan=np.inf).swapaxes(0, 1)[::-1], axis=0)
+    def ordered() -> None:
+        order = np.lexsort(np.nan_to_num(inputs, nan=np.inf).swapaxes(0, 1)[::-1], axis=0)
+        for part in (inputs, rates):
+            part[:] = np.take_along_axis(part, order[:, None], 0)
+
+    ordered()
+    count, places = len(inputs), np.arange(inputs.shape[2])
+    last = np.isfinite(inputs[:, 0]).sum(axis=0).clip(1) - 1
+    # Of one input only neighbours can be one, a turn apart too.
+    pairs = [(k, np.full_like(last, i)) for k, i in combinations(range(count), 2)
+             if problem.n > 1 or k + 1 == i] + [(0, last)] * (count > 1)
+    for k, i in pairs:
+        apart = np.max([problem.apart(by, inputs[k, by], inputs[i, by, places])
+                        for by in range(problem.n)], axis=0)
+        for place in np.flatnonzero((apart <= NEIGHBOURS) & (i > k)):
+            one, other = ((tuple(inputs[j, :, place].tolist()), tuple(rates[j, :, place].tolist()))
+                          for j in (k, i[place]))
+            if same(problem, one, other):
+                inputs[i[place], :, place] = rates[i[place], :, place] = math.nan
+    ordered()
     most = max(int(np.isfinite(inputs[:, 0]).sum(axis=0).max(initial=0)), 1)
-    inputs, rates = (np.take_along_axis(part, order[:, None], 0)[:most] for part in (
-        inputs, rates))
-    return inputs, np.where(np.isnan(inputs[:, :1]), math.nan, rates)
+    return inputs[:most], rates[:most]

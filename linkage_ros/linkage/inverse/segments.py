@@ -58,8 +58,8 @@ PARTS, ROUNDS = 8, 20
 ROUNDING, STILL = 2.0 ** -50, 64.0
 # Samples at an end with more noise than this multiple of rounding are left out.
 NOISY = 1e9
-# More samples of an arc, and more jumps and dead points, are those of a linkage that is singular
-# nearly everywhere.
+# More additional samples of an arc, and more jumps and dead points a turn, are those of a linkage
+# that is singular nearly everywhere.
 MAX_SAMPLES, MAX_RUNS = 10000, 100
 
 
@@ -112,19 +112,20 @@ class Segments:
 
     def __init__(self, curve: Callable, arcs: Sequence[Arc], near_zeros: Sequence[NearZero],
                  input_: Input, period: float, size: float):
-        self._curve, self._period, self._size, self._unit = curve, period, size, input_.size
-        self._rounding = ROUNDING * size
+        self._curve, self._period, self._size, self._unit = curve, period, size, input_.step
+        self._rounding, counted = ROUNDING * size, input_.counted()
         special = distinct((near.value for near in near_zeros if near.gap <= near.rounding),
-                           input_)
+                           counted)
         marks = distinct((near.value for near in near_zeros if near.gap <= NEAR * near.size),
-                         input_)
+                         counted)
         self.jumps: List[float] = []
         runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
-        if not self._moves(runs):
+        if not 0 < len(runs) <= MAX_RUNS * max(1.0, sum(hi - lo for lo, hi in arcs) / math.tau) \
+                or not self._moves(runs):
             runs, self.jumps = [], []
         self.all = [segment for run in runs for segment in self._monotone(*run)]
         self.all.sort(key=lambda segment: float(segment.theta[0]))
-        turn = input_.turn if input_.turns else math.inf
+        turn = counted.turn if counted.wraps else math.inf
         self._following = [self._continued(segment, turn) for segment in self.all]
         self._preceding: List[Optional[int]] = [None] * len(self.all)
         for number, other in enumerate(self._following):
@@ -132,7 +133,7 @@ class Segments:
                 self._preceding[other] = number
         # What one value needs: the range in which a segment has answers, its sign, the range
         # without its ends, and its samples.
-        special, units = SPECIAL * size, [self._unit, self._unit, *[1.0] * 6]
+        special, units = SPECIAL * size, np.array([self._unit, self._unit, *[1.0] * 6])
         self._rows = [(
             float(segment.value[0] - self._slack(segment, 0, before)),
             float(segment.value[-1] + self._slack(segment, -1, after)),
@@ -183,16 +184,15 @@ class Segments:
         also returned are the whole turns that the input passes.
         """
         gap, passed = math.remainder(value - now, self._period), 0.0
-        for number, segment in enumerate(self.all):
-            if segment.theta[0] <= near <= segment.theta[-1]:
-                start = float(np.interp(near, segment.theta, segment.value))
-                start += math.remainder(segment.sign * now - start, self._period)
-                target = start + segment.sign * gap
-                break
-        else:
+        number = next((i for i, (theta, *_) in enumerate(self.all)
+                       if theta[0] <= near <= theta[-1]), None)
+        if number is None:
             return None
+        theta, value, _, sign = self.all[number]
+        target = float(np.interp(near, theta, value))
+        target += math.remainder(sign * now - target, self._period) + sign * gap
         for _ in range(2 * len(self.all)):
-            low, high, *_, theta, samples, _ = self._rows[number]
+            low, high, *_, inputs, samples, _ = self._rows[number]
             if low <= target <= high:
                 return _bracket(target, self._rows[number]), passed
             other = (self._following if target > high else self._preceding)[number]
@@ -201,7 +201,7 @@ class Segments:
             ends = (-1, 0) if target > high else (0, -1)
             # The same value, or whole periods from it.
             target += self._rows[other][6][ends[1]] - samples[ends[0]]
-            passed += turn * round((theta[ends[0]] - self._rows[other][5][ends[1]]) / turn) \
+            passed += turn * round((inputs[ends[0]] - self._rows[other][5][ends[1]]) / turn) \
                 if turn < math.inf else 0.0
             number = other
         return None
@@ -246,8 +246,9 @@ class Segments:
             inside, _ = refined(lambda x: np.isfinite(self._curve(x.ravel())[0]).reshape(
                 x.shape), theta[[1, -2]], theta[[0, -1]])
             theta[[0, -1]] = np.where(known, theta[[0, -1]], inside)
-        theta, jumped = self._divided(theta)
-        if len(theta) > MAX_SAMPLES:
+        most = MAX_SAMPLES + 4 * len(theta)
+        theta, jumped = self._divided(theta, most)
+        if len(theta) > most:
             return
         self.jumps += theta[jumped].tolist()
         digit = 4.0 * np.spacing(np.abs(theta).clip(1e-3))
@@ -268,7 +269,7 @@ class Segments:
                 yield (theta[run], value[0, run[0]] + np.append(0.0, np.cumsum(steps))
                        if self._period < math.inf else value[0, run], rate[0, run], noise[run])
 
-    def _divided(self, theta: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    def _divided(self, theta: np.ndarray, most: int) -> Tuple[np.ndarray, np.ndarray]:
         """Return samples that explain the output, and after which of them it jumps."""
         inner, jumped = np.arange(1, PARTS) / PARTS, np.empty(0, int)
         value, rate = self._curve(theta)
@@ -290,7 +291,7 @@ class Segments:
             neighbours = np.nextafter(theta[place], theta[place + 1]) == theta[place + 1]
             jumped = place[neighbours & (np.abs(change[place]) > JUMP * size)]
             place = place[~neighbours]
-            if not len(place) or len(theta) > MAX_SAMPLES:
+            if not len(place) or len(theta) > most:
                 break
             new = (theta[place, None] + width[place, None] * inner).ravel()
             found = self._curve(new)
@@ -300,9 +301,7 @@ class Segments:
         return theta, jumped
 
     def _moves(self, runs: Sequence[Tuple]) -> bool:
-        """Return whether the output changes by more than rounding, and not nearly everywhere."""
-        if not 0 < len(runs) <= MAX_RUNS:
-            return False
+        """Return whether the output changes by more than rounding."""
         _, values, _, noise = (np.concatenate(part) for part in zip(*runs))
         noise = STILL * (noise + np.median(noise)) + self._rounding
         return bool(np.any(np.abs(self._difference(values - np.median(values))) > noise))
@@ -360,9 +359,9 @@ def segments_of(linkage: Mechanism, output: str, others: Sequence[float] = ()) -
     def make() -> Segments:
         analysis, first = Analysis(linkage, others), linkage.inputs[0]
         period = math.inf if not linkage.is_angle(output) else (
-            first.turn if output == first.name else math.tau)
+            math.tau if output != first.name else first.turn if first.wraps else math.inf)
         return Segments(analysis.curve('output', output), analysis.reach(), analysis.near_zeros(),
-                        first, period, linkage.longest if math.isinf(period) else 1.0)
+                        first, period, 1.0 if linkage.is_angle(output) else linkage.longest)
 
     return linkage.cache.get_or_make(('segments', output, *others), make)
 
@@ -372,7 +371,7 @@ def extremes_of(linkage: Mechanism, output: str, arcs: Optional[Sequence[Arc]],
     """Implement `Mechanism.extremes`."""
     linkage.check_output(output)
     pose, angular = linkage.bound('output', output), np.array([linkage.is_angle(output)])
-    size = linkage.inputs[0].size
+    size = linkage.inputs[0].step
     parts = linkage.reach(*others) if arcs is None else arcs
     if arcs is None and (segments := segments_of(linkage, output, others)).jumps:
         parts = [(low * size, high * size) for low, high in segments.arcs]
