@@ -26,7 +26,8 @@ AWAY = 1e-12, 1e-9, 1e-6, 1e-3
 # within 1e-13 of theirs is theirs.
 AT, NEXT = 1e-7, 3e-5
 # Error of an answer in units of the rule: half an ulp of the output's size, and of the input
-# times the rate; what is beyond MOST and, next to a special input, 1e-9 of the size is invented.
+# times the rate; what is beyond MOST is invented. Next to a special input 1e-9 of the size is
+# allowed, and what 64 ulps of the input change.
 MOST, ALLOWED = 64.0, 1e-9
 # Samples of the range of an input, and steps of a bisection.
 SAMPLES, STEPS = 721, 60
@@ -154,8 +155,8 @@ def judge(linkage, name, rng, count=6, others=()):
                 found[kind, 'lost at', linkage, name, at, others] += 1
                 break
         for k, x in enumerate(answers):
-            error, reached = _error(output, x, value)
-            beyond = 0.0 if kind == 'ordinary' else 2.0 * ALLOWED * output.size
+            error, reached, beside = _error(output, x, value)
+            beyond = 0.0 if kind == 'ordinary' else max(2.0 * ALLOWED * output.size, beside)
             if not error <= MOST and not output.away(reached, value) <= beyond:
                 found[kind, 'invented'] += 1
                 found[kind, 'invented at', linkage, name, at, others] += 1
@@ -171,10 +172,11 @@ def _error(output, x, value):
     first = output.first
     step = 2.0 * np.spacing(max(abs(x), 1e-3 * first.size))
     reached, *beside = output.at(np.array([x, x + step, x - step])).tolist()
-    # What an ulp of the input changes, on the side where there is a pose.
+    # What an ulp of the input changes, on the side where there is a pose; and what 64 do.
     change = np.nanmax([0.0, *output.away(beside, reached)]) / 4.0
-    return float(output.away(reached, value)) / (
-        2.0 ** -53 * output.size + change), reached
+    far = output.at(np.array([x + 32.0 * step, x - 32.0 * step]))
+    return float(output.away(reached, value)) / (2.0 ** -53 * output.size + change), reached, min(
+        1e-6 * output.size, 2.0 * np.nanmax([0.0, *output.away(far, reached)]))
 
 
 def judge_several(linkage, names, rng, count=6):
@@ -201,13 +203,13 @@ def judge_several(linkage, names, rng, count=6):
             gaps = [abs(math.remainder(gap, math.tau)) / scale if linkage.is_angle(name)
                     and name not in [input_.name for input_ in linkage.inputs]
                     else abs(gap) / scale for gap, name, scale in zip(there - row, names, scales)]
-            if not max(gaps) < 1e-9 and name_differs(linkage, names, there - row, scales):
+            if not max(gaps) < 1e-9 and _differ(linkage, names, there - row, scales):
                 found['ordinary', 'invented'] += 1
                 found['ordinary', 'invented at', linkage, names, tuple(pose), ()] += 1
     return found, worst
 
 
-def name_differs(linkage, names, gaps, scales):
+def _differ(linkage, names, gaps, scales):
     """Return whether outputs differ, those that are inputs not only by whole periods."""
     inputs = {input_.name: input_ for input_ in linkage.inputs}
     return not all(

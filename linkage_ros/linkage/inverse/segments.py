@@ -133,11 +133,11 @@ class Segments:
                 self._preceding[other] = number
         # What one value needs: the range in which a segment has answers, its sign, the range
         # without its ends, and its samples.
-        special, units = SPECIAL * size, np.array([self._unit, self._unit, *[1.0] * 6])
+        rounded, units = SPECIAL * size, np.array([self._unit, self._unit, *[1.0] * 6])
         self._rows = [(
             float(segment.value[0] - self._slack(segment, 0, before)),
             float(segment.value[-1] + self._slack(segment, -1, after)),
-            segment.sign, float(segment.value[0] + special), float(segment.value[-1] - special),
+            segment.sign, float(segment.value[0] + rounded), float(segment.value[-1] - rounded),
             (segment.theta * self._unit).tolist(), segment.value.tolist(),
             [*map(tuple, (segment.cells * units).tolist())])
             for segment, before, after in zip(self.all, self._preceding, self._following)]
@@ -188,8 +188,8 @@ class Segments:
                        if theta[0] <= near <= theta[-1]), None)
         if number is None:
             return None
-        theta, value, _, sign = self.all[number]
-        target = float(np.interp(near, theta, value))
+        theta, values, _, sign = self.all[number]
+        target = float(np.interp(near, theta, values))
         target += math.remainder(sign * now - target, self._period) + sign * gap
         for _ in range(2 * len(self.all)):
             low, high, *_, inputs, samples, _ = self._rows[number]
