@@ -31,9 +31,9 @@ from ..robot_model import bodies
 from ..scene.inverse_request import InverseRequest, LEVER, present_inputs
 from ..words import elided, listed, meant, MESSAGE, quoted
 
-# Other callers and messages wait for an answer: most values at once, most of an output that is
-# searched, and the CPU time after which an answer is given up [s], seen after a block of them.
-MOST_VALUES, MOST_SEARCHED, LONGEST, BLOCK = 1_000_000, 10_000, 1.0, 10_000
+# Other callers and messages wait for an answer: most values at once, and the CPU time after
+# which an answer is given up [s], seen after a block of them.
+MOST_VALUES, LONGEST, BLOCK = 1_000_000, 1.0, 10_000
 # Maximum number of values, and of letters of allowed names, in a message.
 MOST_NAMED, MOST = 5, 150
 
@@ -133,10 +133,8 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
     n = len(values)
     if not n:
         raise ValueError('lever_angle is empty; give at least one value')
-    most = MOST_VALUES if inverse.is_closed else MOST_SEARCHED
-    if n > most:
-        searched = '' if inverse.is_closed else f', since {listed(inverse.outputs)} is searched'
-        raise ValueError(f'lever_angle has {n} values; give up to {most} at once{searched}')
+    if n > MOST_VALUES:
+        raise ValueError(f'lever_angle has {n} values; give up to {MOST_VALUES} at once')
     if len(near) not in (0, 1, n):
         raise ValueError(f'servo_near must be empty, have one angle, or one for each of the '
                          f'{n} in lever_angle, not {len(near)}')

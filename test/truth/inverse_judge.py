@@ -43,11 +43,13 @@ class Output:
         self.size = 1.0 if linkage.is_angle(name) else linkage.longest
         own = name == self.first.name
         self.period = math.inf if not linkage.is_angle(name) else (
-            self.first.turn if own else math.tau)
-        reach = math.pi * (self.first.period if self.first.turns else 1)
-        low, high = (-reach, reach) if self.first.turns else (self.first.low, self.first.high)
-        self.theta = np.linspace(low, high, SAMPLES * int(max(1, round((high - low) / math.tau))
-                                                          if self.first.turns else 1))
+            math.tau if not own else self.first.turn if self.first.wraps else math.inf)
+        low, high = self.first.low, self.first.high
+        # Few of many turns: the judge is slow.
+        turns = min(round((high - low) / math.tau), 3) if self.first.turns else 1
+        if turns > 1:
+            low, high = -math.pi * turns, math.pi * turns
+        self.theta = np.linspace(low, high, SAMPLES * max(turns, 1))
         self.values = self.at(self.theta)
 
     def at(self, theta):
@@ -74,7 +76,7 @@ class Output:
                 middle = 0.5 * (inside + out)
                 inside, out = (middle, out) if np.isfinite(self.at(middle)) else (inside, middle)
             yield inside, -1.0 if known[i] else 1.0
-        if not self.first.turns:
+        if not self.first.turns:  # a whole turn, or a few of many, have no ends
             yield from ((end, side) for end, side, there in (
                 (self.theta[0], 1.0, known[0]), (self.theta[-1], -1.0, known[-1])) if there)
 
@@ -141,7 +143,7 @@ def judge(linkage, name, rng, count=6, others=()):
         value = float(output.at(at))
         if value != value:
             continue
-        answers = [answer.inputs[0] for answer in inverse.all([value, *others])]
+        answers = [answer.inputs[0] for answer in inverse.all([value, *others], [at, *others])]
         found[kind, 'questions'] += 1
         expected = [at] if kind != 'ordinary' else [at, *output.roots(value)]
         close = (AT if kind == 'ordinary' else NEXT) * first.size

@@ -25,7 +25,7 @@ from typing import List, Optional, Sequence, Tuple
 import numpy as np
 
 from .problem import Found, InverseProblem
-from .segments import Bracket, STEEPEST
+from .segments import Bracket, SPECIAL, STEEPEST
 
 # Errors in units of 2^-53 of an output's size: rounding, where refinement stops; and the largest
 # of a solution, which rounding of all joints on the way may explain.
@@ -36,9 +36,9 @@ OTHER = 0.1
 LONGEST = 0.1
 # Steps at most: bisection alone needs one per bit of a float.
 MAX_STEPS = 64
-# Two solutions are one if they are no farther apart than the first [rad, sizes], or than the
-# second and the rates say that the outputs differ by no more than the first [sizes].
-SAME, NEIGHBOURS = 1e-13, 1e-4
+# Two solutions are one if they are no farther apart than SPECIAL [rad, sizes], or than this and
+# the rates say that the outputs differ by no more than SPECIAL [sizes].
+NEIGHBOURS = 1e-4
 
 _UNIT = 2.0 ** -53
 
@@ -66,8 +66,9 @@ def refine(problem: InverseProblem, values: Sequence[float], inputs: Tuple[float
     if not found or least > OTHER:
         return None
     inputs, row, gaps = found
-    if least > ROUNDED * _UNIT and not _errors(
-            problem, *(np.reshape(part, (-1, 1)) for part in (gaps, row, inputs)))[0] <= ACCEPTED:
+    # Where rates are low, rounding is that of the outputs alone.
+    if least > ACCEPTED * _UNIT and not (least <= STEEPEST and _errors(
+            problem, *(np.reshape(part, (-1, 1)) for part in (gaps, row, inputs)))[0] <= ACCEPTED):
         return None
     return problem.wrapped(inputs), row[n:]
 
@@ -221,11 +222,11 @@ def same(problem: InverseProblem, one: Found, other: Found) -> bool:
             return False
     steps = [math.remainder(x - y, turn) for x, y, turn in zip(one[0], other[0], problem.turns)]
     apart = max([abs(step) / size for step, size in zip(steps, problem.sizes)])
-    if not SAME < apart <= NEIGHBOURS:
-        return apart <= SAME
+    if not SPECIAL < apart <= NEIGHBOURS:
+        return apart <= SPECIAL
     n = problem.n
     return any(all(abs(sum(rate * step for rate, step in zip(rates[i::n], steps)))
-                   <= SAME * scale for i, scale in enumerate(problem.scales))
+                   <= SPECIAL * scale for i, scale in enumerate(problem.scales))
                for _, rates in (one, other))
 
 
