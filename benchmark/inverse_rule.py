@@ -101,7 +101,7 @@ def main():
         (f'{kind}, {where}', *(total[kind, where, what] for what in COLUMNS))
         for kind, where in places])
     text += (f'\n\n{used} linkages. The largest error of a solution at an ordinary value is '
-             f'{worst:.2g} in units of the rule: half an ulp of the output\'s size, and half an '
+             f"{worst:.2g} in units of the rule: half an ulp of the output's size, and half an "
              'ulp of the input times the rate.')
     print(text)
     if options.document:

@@ -117,6 +117,6 @@ def test_the_jacobian_has_a_row_for_each_output():
     arm, pose, step = mechanisms.create('five_bar'), (1.9, 1.24), 1e-6
     answer, = [each for each in arm.inputs_for(('P.x', 'P.y'), arm.solve(pose)['P'])
                if math.dist(each.inputs, pose) < 1e-9]
-    slopes = [(arm.solve(np.add(pose, step * e))['P'] - arm.solve(np.subtract(pose, step * e))['P'])
+    slopes = [np.subtract(*(arm.solve(np.add(pose, side * step * e))['P'] for side in (1, -1)))
               / (2.0 * step) for e in np.eye(2)]
     np.testing.assert_allclose(answer.jacobian, np.transpose(slopes), rtol=1e-6)
