@@ -170,15 +170,9 @@ class Solver:
 
     def _placed(self, values):
         """Return where the spots are, by leg; no other public function places them."""
-        legs = list(self.assembly.legs.values())
-        rows = np.empty((len(legs), 2 * len(self._spots)))
-        if self._spots:
-            batch = self.machine.linkage.legs(self._spots, (), (), rows)
-            for given, value in zip(batch.arguments, values):
-                given.fill(value)
-            batch.arguments[2 * len(values):].T[:] = legs
-            batch.solve()
-        return [dict(zip(self._spots, row.reshape(-1, 2).tolist())) for row in rows]
+        place, at_rest = self.machine.linkage.legs(self._spots, (), ()), [0.0] * len(values)
+        rows = [place(*values, *at_rest, *leg) for leg in self.assembly.legs.values()]
+        return [dict(zip(self._spots, zip(row[::2], row[1::2]))) for row in rows]
 
 
 def _on_each_side(legs):
@@ -487,7 +481,8 @@ class Bench:
         self._until_idle('linkage_ros compiler')
 
     def _until_idle(self, name):
-        if not self._until(lambda: name not in {t.name for t in threading.enumerate()}):
+        if not self._until(lambda: not any(
+                thread.name.startswith(name) for thread in threading.enumerate())):
             raise Mismatch(f'the thread {name} does not end')
         self._drain()
 
