@@ -239,7 +239,7 @@ class Process:
         """Return the next line that is printed, '' after the last."""
         line = self._process.stdout.readline()
         # `kinematics` says so once where that is not installed.
-        return self.line() if 'needs llvmlite' in line else line
+        return self.line() if 'llvmlite' in line else line
 
     def end(self, seconds=DEADLINE):
         """Wait for the end; return exit code and all else that was printed."""

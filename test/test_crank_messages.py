@@ -284,12 +284,13 @@ def test_nothing_is_missed_where_nothing_or_everything_was_heard(graph):
     assert not hand.warnings('was received, without')
 
 
-def test_without_llvmlite_the_node_says_so(graph, monkeypatch):
+@pytest.mark.parametrize('pairs', [1, 2])
+def test_without_llvmlite_the_node_of_a_walker_says_so(graph, monkeypatch, pairs):
     monkeypatch.setitem(sys.modules, 'llvmlite', None)
     said = graph.log()
-    graph.start(Kinematics, {'mechanisms': ['jansen']})
-    graph.until(lambda: [m for m in said
-                         if m.level == LoggingSeverity.INFO and 'llvmlite' in m.msg])
+    node = graph.start(Kinematics, {'mechanisms': ['jansen'], 'jansen.leg_pairs': pairs})
+    graph.all_logged(node, said)
+    assert [m.level for m in said if 'llvmlite' in m.msg] == [LoggingSeverity.INFO] * (pairs > 1)
 
 
 def test_a_crank_alone_is_no_exception(graph):

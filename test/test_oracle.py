@@ -142,19 +142,23 @@ def test_numbers_are_the_same_at_the_ends_of_the_reach_and_in_many_legs(graph, n
 
 
 WITHOUT = 'LINKAGE_ROS_WITHOUT_LLVMLITE'
+# What replaces llvmlite: nothing, and a package whose library cannot be loaded.
+REPLACED = {'missing': ('sitecustomize.py', "import sys\nsys.modules['llvmlite'] = None\n"),
+            'broken': ('llvmlite.py', "raise OSError('libllvmlite.so cannot be loaded')\n")}
 
 
-# `make nodes PLAIN=1` runs them so, too.
 @pytest.mark.long
 @pytest.mark.skipif(WITHOUT in os.environ, reason='this is without')
+@pytest.mark.parametrize('replaced', REPLACED)
 @pytest.mark.parametrize('which', [
     'not exhaustive', pytest.param('exhaustive', marks=pytest.mark.exhaustive)])
-def test_all_this_holds_without_llvmlite(tmp_path, which):
-    (tmp_path / 'sitecustomize.py').write_text(
-        "import sys\nsys.modules['llvmlite'] = None\n")
+def test_all_this_holds_without_llvmlite(tmp_path, which, replaced):
+    name, text = REPLACED[replaced]
+    (tmp_path / name).write_text(text)
     paths = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', '')])
     done = subprocess.run(
-        [sys.executable, '-m', 'pytest', '-q', '-p', 'no:cacheprovider', '-m', which, __file__],
+        [sys.executable, '-m', 'pytest', '-q', '-p', 'no:cacheprovider', '-m', which,
+         '-W', 'ignore:no machine code', __file__],
         env={**os.environ, 'PYTHONPATH': paths, WITHOUT: '1'}, cwd=Path(__file__).parents[1],
         capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-5000:]

@@ -29,19 +29,6 @@ from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 TWO = {'mechanisms': ['a', 'b'], 'a.type': 'four_bar', 'b.type': 'jansen'}
 LOADED = {'mechanisms': ['a', 'b'], 'a.type': 'slotted_lever', 'a.loads': ['L=0 -9.81'],
           'b.type': 'jansen'}
-NOT_INSTALLED = "import sys; sys.modules['llvmlite'] = None\n"
-
-
-@pytest.fixture(params=['machine code', 'plain Python'])
-def backend(request, monkeypatch):
-    """Machine code where it is installed, and as if it were not."""
-    if request.param == 'plain Python':
-        for name in [name for name in sys.modules if name.startswith('linkage_ros.nodes')
-                     and name.rpartition('.')[2] in ('tick', 'plan_llvm')]:
-            monkeypatch.delitem(sys.modules, name)
-        monkeypatch.setitem(sys.modules, 'llvmlite', None)
-        monkeypatch.setitem(sys.modules, 'linkage_ros.formula.llvm_pipeline', None)
-    return request.param
 
 
 class Scene:
@@ -74,36 +61,7 @@ class Scene:
             self.received[topic][-1].header.stamp.sec == self._stamp))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize('name', ['kinematics', 'scene'])
-def test_without_llvmlite_and_without_subscribers_a_node_goes_on(tmp_path, name):
-    (tmp_path / 'sitecustomize.py').write_text(NOT_INSTALLED)
-    scene = Path(__file__).parents[1] / 'config' / 'jansen.yaml'
-    path = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', '')])
-    with Graph() as graph:
-        process = Process(name, scene, domain=graph.context.get_domain_id(),
-                          env={'PYTHONPATH': path})
-        publisher = graph.node.create_publisher(JointState, 'crank_states', 10)
-
-        def answered():
-            for _ in range(5):
-                publisher.publish(JointState(name=['jansen_crank'], position=[0.5]))
-            return answers
-
-        try:
-            graph.until(lambda: graph.node.count_publishers('jansen/joint_states'))
-            answers = [None]
-            for _ in range(10):
-                graph.until(answered)
-            answers = graph.listen(JointState, 'jansen/joint_states')
-            graph.until(answered)
-        finally:
-            process.interrupt(signal.SIGINT)
-            code, printed = process.end()
-    assert code == 0 and 'Traceback' not in printed
-
-
-def test_loads_beside_another_mechanism_come_with_every_message(graph, backend):
+def test_loads_beside_another_mechanism_come_with_every_message(graph):
     scene = Scene(graph, LOADED, ['joint_states'])
     for message in ({'name': ['a_crank'], 'position': [0.3]},
                     {'name': ['b_crank'], 'position': [0.4]}):
@@ -119,7 +77,7 @@ def test_loads_beside_another_mechanism_come_with_every_message(graph, backend):
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize('wrong', [math.nan, math.inf, 1e308])
-def test_a_speed_that_is_no_number_is_in_no_message(graph, backend, wrong):
+def test_a_speed_that_is_no_number_is_in_no_message(graph, wrong):
     scene = Scene(graph, TWO, ['joint_states'])
     for _ in range(3):
         for name in ('a_crank', 'b_crank'):
@@ -145,7 +103,7 @@ def displayed(messages):
 
 @pytest.mark.slow
 @pytest.mark.parametrize('times', [6, pytest.param(30, marks=pytest.mark.long)])
-def test_markers_are_gone_wherever_noise_about_the_end_of_the_reach_was(graph, backend, times):
+def test_markers_are_gone_wherever_noise_about_the_end_of_the_reach_was(graph, times):
     scene = Scene(graph, {'mechanisms': ['m', 'b'], 'm.type': 'peaucellier', 'b.type': 'jansen'},
                   ['m/markers', 'm/joint_states', 'b/joint_states'])
     end = scene.node.scene.machines['m'].reach[0][1]

@@ -26,7 +26,7 @@ import time
 
 from linkage_interfaces.srv import ServoInverse
 from linkage_ros import scene
-from linkage_ros.nodes import driven_mechanism, messages, scene_node
+from linkage_ros.nodes import mechanism_topics, messages, scene_node
 from linkage_ros.nodes.joint_state_reader import ANY
 from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.mechanism_model import MechanismModel
@@ -90,9 +90,9 @@ class Deaf(Node):
 class FreshModel(MechanismModel):
     """Builds ordinary messages, as one writes it: new ones each time."""
 
-    def publisher(self, *args):
+    def _publisher(self, key):
         """Return a publisher that never patches."""
-        publisher = super().publisher(*args)
+        publisher = super()._publisher(key)
         publisher.template = None
         return publisher
 
@@ -170,11 +170,11 @@ class Fresh(Kinematics):
 
     def __init__(self, **kwargs):
         # Other nodes in this process patch theirs.
-        driven_mechanism.MechanismModel = FreshModel
+        mechanism_topics.MechanismModel = FreshModel
         try:
             super().__init__(**kwargs)
         finally:
-            driven_mechanism.MechanismModel = MechanismModel
+            mechanism_topics.MechanismModel = MechanismModel
 
 
 KINDS = {'kinematics': Kinematics, 'fresh': Fresh, 'floor': Floor, 'relay': Relay,

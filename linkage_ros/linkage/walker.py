@@ -16,7 +16,6 @@ leg at pi - (theta - 2 pi j/N), on the same crank pin.
 """
 
 from importlib.util import find_spec
-from itertools import chain
 import math
 from struct import Struct
 from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Union
@@ -82,24 +81,35 @@ class Solution:
 
     def __init__(self, layout: Layout, legs: Sequence[Leg], function: Pose):
         self.layout, self.values = layout, np.zeros(layout.size)
-        self.rows, self._driven = layout.rows(self.values), layout.driven(self.values)
-        self._legs, self._function = legs, function.at
+        self.rows, self._function = layout.rows(self.values), function.at
         self._at_rest = layout.inputs * (0.0,)
-        self._pack: Callable = Struct(f'{layout.size - layout.efforts}d').pack_into
+        # Packing is faster than assignment to an array. Each leg with the place of its row [bytes].
+        self._pack_row, self._pack_driven = (Struct(f'{count}d').pack_into for count in (
+            self.rows.shape[1], layout.inputs + layout.speeds))
+        self._legs = [(i * self.rows.strides[0], leg) for i, leg in enumerate(legs)]
         self._batch: Optional[Batch] = None
         if len(legs) > 1 and find_spec('llvmlite'):
             self._batch = function.batch(self.rows)
             self._batch.arguments[2 * layout.inputs:].T[:] = legs
 
-    def solve(self, inputs: Sequence[float], speeds: Sequence[Any] = ()) -> None:
-        """Solve at inputs [rad or m] and, for velocities, their speeds [per second]."""
+    def solve(self, inputs: Sequence[float], speeds: Sequence[Any] = ()) -> bool:
+        """
+        Solve at inputs [rad or m] and, for velocities, their speeds [per second].
+
+        Return True if all numbers are finite; if they are huge, it may return False, too.
+        """
         driven = (*inputs, *speeds) if self.layout.speeds else (*inputs,)
         arguments = driven if self.layout.speeds else (*inputs, *self._at_rest)
+        total = sum(driven)
+        self._pack_driven(self.values, self.rows.nbytes, *driven)
         if self._batch and self._batch.solve(arguments):
-            self._driven[:] = driven
-            return
-        self._pack(self.values, 0, *chain.from_iterable(
-            [self._function(*arguments, *leg) for leg in self._legs]), *driven)
+            # `vdot` overflows without the warning of `dot`.
+            return math.isfinite(total + np.vdot(self.rows, self.rows))
+        for place, leg in self._legs:
+            row = self._function(*arguments, *leg)
+            self._pack_row(self.values, place, *row)
+            total += sum(row)
+        return math.isfinite(total)
 
 
 class Assembly:

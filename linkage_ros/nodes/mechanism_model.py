@@ -68,7 +68,7 @@ class MechanismModel:
     SceneError if no robot model can be made of a planar mechanism.
     """
 
-    def __init__(self, mechanism: scene.SceneMechanism, frame_id: str, prefix: str):
+    def __init__(self, mechanism: scene.SceneMechanism, frame_id: str, prefix: str, logger: Any):
         self.mechanism, self.made_of = mechanism, (mechanism, frame_id, prefix)
         self.inputs = list(mechanism.inputs.values())
         self.robot = None if mechanism.in_space else bodies.robot([mechanism], frame_id)
@@ -79,8 +79,8 @@ class MechanismModel:
         drawn = mechanism.name, prefix + frame_id, mechanism.pose
         self._points, shown = _shown(mechanism)
         self._drawn = *drawn, bodies.size(mechanism), shown
-        self._states, self._conversions = Cache(), Cache(self._conversion)
-        self._publishers = Cache(size=PUBLISHERS)
+        self._states, self._conversions = Cache(self._regular), Cache(self._conversion)
+        self._publishers, self._logger = Cache(self._publisher, PUBLISHERS), logger
 
     @cached_property
     def marker_array(self) -> messages.Markers:
@@ -100,11 +100,12 @@ class MechanismModel:
 
         The solution includes velocities if `moving`.
         """
-        return self._states.get_or_make((joints, markers, moving), lambda: self._regular(
-            # With several inputs, only the joint angles show whether the linkage is assembled.
-            joints or len(self.inputs) > 1, markers, moving))
+        return self._states[joints, markers, moving]
 
-    def _regular(self, joints: bool, markers: bool, moving: bool) -> AssemblyState:
+    def _regular(self, wanted: Tuple[bool, bool, bool]) -> AssemblyState:
+        joints, markers, moving = wanted
+        # With several inputs, only the joint angles show whether the linkage is assembled.
+        joints = joints or len(self.inputs) > 1
         names = self.assembly.joints if joints else ()
         solution = self.assembly.solution(
             self._points if markers else (), names, names if joints and moving else None,
@@ -120,17 +121,15 @@ class MechanismModel:
         `inputs` are positions [rad or m]; the speeds [per second] may be None without velocities.
         """
         layout, values = regular.solution.layout, regular.solution.values
-        regular.solution.solve(inputs, speeds)
+        is_finite = regular.solution.solve(inputs, speeds)
         if layout.efforts:
-            layout.effort(values)[:] = self.mechanism.efforts(inputs)
+            efforts = self.mechanism.efforts(inputs)
+            layout.effort(values)[:] = efforts
+            is_finite = is_finite and all(map(math.isfinite, efforts))
         if not self._is_plain:
             self._convert(values, *self._conversions[layout])
         within = self.assembly.within_reach(inputs[0]) if self.assembly.is_limited else ()
-        # One sum of squares tests whether all are finite; `vdot` overflows without the warning of
-        # `dot`.
-        if math.isfinite(np.vdot(values, values)) and all(within):
-            return regular
-        return self._check_assembly(regular, within)
+        return regular if is_finite and all(within) else self._check_assembly(regular, within)
 
     def _check_assembly(self, regular: AssemblyState, within: Sequence[bool]) -> AssemblyState:
         """Return the state of solved values; `within` are the legs in reach, () if all are."""
@@ -161,13 +160,16 @@ class MechanismModel:
                 _arranged(layout, 0.0, self._offsets, none),
                 np.flatnonzero(_arranged(layout, 0.0, self._wrapped, none)))
 
-    def publisher(self, state: AssemblyState, topics: Tuple[Any, Any], logger: Any
-                  ) -> PatchedPublisher:
+    def publisher(self, state: AssemblyState, topics: Tuple[Any, Any]) -> PatchedPublisher:
         """Return the publisher of joint states and markers, on `topics`; None omits one."""
+        return self._publishers[state, topics]
+
+    def _publisher(self, key: Tuple[AssemblyState, Tuple[Any, Any]]) -> PatchedPublisher:
+        state, topics = key
         builders = self.joint_message, self.marker_message
-        return self._publishers.get_or_make((state, *topics), lambda: PatchedPublisher(
+        return PatchedPublisher(
             [(topic, partial(build, state)) for topic, build in zip(topics, builders) if topic],
-            state.solution.layout.size, logger))
+            state.solution.layout.size, self._logger)
 
     def joint_message(self, state: AssemblyState, stamp: Any, values: np.ndarray) -> JointState:
         """Build the joint states of the assembled legs from a solution's values."""

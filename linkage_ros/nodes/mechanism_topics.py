@@ -83,14 +83,14 @@ class MechanismTopics:
 
     def publish(self, in_scene: bool) -> None:
         """Solve for the subscribers, and for the scene's joint states if `in_scene`; publish."""
-        topics = self._subscribed()
+        topics = self._joint_states.subscribed, self._markers.subscribed
         if None in self.inputs or not (in_scene or any(topics)):
             # The last solution is that of earlier inputs.
             self.state = None
             return
         state = self._solve(self._regular(self.model, in_scene))
         if state.any_assembled and any(topics):
-            self.model.publisher(state, topics, self._logger).publish(
+            self.model.publisher(state, topics).publish(
                 self.stamp, state.solution.values)
 
     def state_in_scene(self) -> Optional[AssemblyState]:
@@ -101,10 +101,6 @@ class MechanismTopics:
         if state is None or state.solution is not regular.solution:
             state = self._solve(regular)
         return state if state.any_assembled else None
-
-    def _subscribed(self) -> Tuple[Any, Any]:
-        """Return the publishers of joint states and of markers; None without subscribers."""
-        return self._joint_states.subscribed, self._markers.subscribed
 
     def _regular(self, model: MechanismModel, in_scene: bool) -> AssemblyState:
         return model.regular(in_scene or self._joint_states.has_subscribers,
@@ -128,13 +124,13 @@ class MechanismTopics:
         before, inputs = self._model, [*self.inputs]
         if before and before.made_of == (mechanism, frame_id, prefix):
             return before
-        model = MechanismModel(mechanism, frame_id, prefix)
+        model = MechanismModel(mechanism, frame_id, prefix, self._logger)
         # This runs in the worker's thread, while subscribers may change.
-        topics = self._subscribed()
+        topics = self._joint_states.subscribed, self._markers.subscribed
         if before and None not in inputs and (in_scene or any(topics)):
             regular = self._regular(model, in_scene)
             regular.solution.solve(inputs, [0.0] * len(inputs))
-            model.publisher(regular, topics, self._logger)
+            model.publisher(regular, topics)
         return model
 
     def adopt(self, model: MechanismModel) -> None:

@@ -203,8 +203,9 @@ class Template:
         """Return the serialised messages with a packed stamp and values (count,)."""
         self._values[:] = values
         self._table.take(self._sources, out=self._numbers, mode='clip')
+        data = self._bytes
         for place in self._stamps:
-            self._bytes[place] = stamp
+            data[place] = stamp
         return [bytes(message) for message in self._messages]
 
     def _check(self, builds: Sequence[Callable], layouts: Sequence[MessageLayout], count: int

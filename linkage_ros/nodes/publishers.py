@@ -26,24 +26,28 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 class TrackedPublisher:
     """
-    A publisher whose flag `has_subscribers` is updated by events, not by a query per message.
+    A publisher that events tell whether it has subscribers, so that no message needs a query.
 
     `own` is the number of this process's subscriptions, which do not count.
+
+    Attributes
+    ----------
+    has_subscribers : bool
+        Whether there are any.
+    subscribed : Publisher, optional
+        The publisher if there are any, else None.
+
     """
 
     def __init__(self, node: Node, type_: Any, name: str, qos: Any, own: int = 0):
-        self.has_subscribers, self._own = False, own
+        self.has_subscribers, self.subscribed, self._own = False, None, own
         self.publisher = node.create_publisher(
             type_, name, qos, event_callbacks=PublisherEventCallbacks(matched=self._count))
         self.publish = self.publisher.publish
 
-    @property
-    def subscribed(self) -> Any:
-        """Return the publisher if it has subscribers, else None."""
-        return self.publisher if self.has_subscribers else None
-
     def _count(self, _: Any) -> None:
         self.has_subscribers = self.publisher.get_subscription_count() > self._own
+        self.subscribed = self.publisher if self.has_subscribers else None
 
 
 class PatchedPublisher:
@@ -51,14 +55,15 @@ class PatchedPublisher:
     Publishes messages again and again with new values.
 
     `parts` are, for each message, its publisher and its builder; builders and `count` are as for
-    Template. If a message cannot be patched, a warning is logged, and every message is built.
+    Template. If a message cannot be patched, a warning is logged, `template` is None, and every
+    message is built.
     """
 
     def __init__(self, parts: Sequence[Tuple[Any, Callable]], count: int, logger: Any):
-        self._parts, self._template = parts, None
+        self._parts, self.template = parts, None
         self._publish = [publisher.publish for publisher, _ in parts]
         try:
-            self._template = Template([build for _, build in parts], count)
+            self.template = Template([build for _, build in parts], count)
         except NoLayout as reason:
             topics = ', '.join(publisher.topic_name for publisher, _ in parts)
             logger.warning(f'{topics}: {reason}; each message is built anew, which takes longer',
@@ -66,8 +71,8 @@ class PatchedPublisher:
 
     def publish(self, stamp: bytes, values: Any) -> None:
         """Publish the messages with a packed stamp and values (count,)."""
-        if self._template:
-            for publish, data in zip(self._publish, self._template.patched(stamp, values)):
+        if self.template:
+            for publish, data in zip(self._publish, self.template.patched(stamp, values)):
                 publish(data)
         else:
             for publish, (_, build) in zip(self._publish, self._parts):
