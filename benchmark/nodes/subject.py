@@ -90,9 +90,9 @@ class Deaf(Node):
 class FreshModel(MechanismModel):
     """Builds ordinary messages, as one writes it: new ones each time."""
 
-    def _publisher(self, key):
+    def publisher(self, *args):
         """Return a publisher that never patches."""
-        publisher = super()._publisher(key)
+        publisher = super().publisher(*args)
         publisher.template = None
         return publisher
 
