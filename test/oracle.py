@@ -478,12 +478,9 @@ class Bench:
 
     def compiled(self):
         """Wait until what is being compiled is there."""
-        self._until_idle('linkage_ros compiler')
-
-    def _until_idle(self, name):
-        if not self._until(lambda: not any(
-                thread.name.startswith(name) for thread in threading.enumerate())):
-            raise Mismatch(f'the thread {name} does not end')
+        if not self._until(lambda: not any(thread.name.startswith('linkage_ros compiler')
+                                           for thread in threading.enumerate())):
+            raise Mismatch('the compiler does not end')
         self._drain()
 
     def send(self, text):
@@ -516,7 +513,9 @@ class Bench:
         if not result.successful and not result.reason:
             raise Mismatch('refused without a reason')
         # It is accepted at once, and acts when it is prepared.
-        self._until_idle('linkage_ros worker')
+        if not self._until(lambda: self.node.is_settled):
+            raise Mismatch('it is not adopted')
+        self._drain()
         after = self._contents()
         self._check_changed({topic for topic in after if after[topic] != before.get(topic)}
                             & before.keys() if not reason else set(), changed)

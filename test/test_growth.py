@@ -70,7 +70,7 @@ def test_a_changed_scene_is_what_all_values_read_anew_make(values):
 @pytest.mark.slow
 def test_of_a_change_to_one_only_that_is_read_prepared_and_announced(graph, monkeypatch):
     pytest.importorskip('rclpy')
-    from linkage_ros.nodes import mechanism_topics, kinematics, ownership
+    from linkage_ros.nodes import kinematics, mechanism_topics, ownership
     from rcl_interfaces.msg import ParameterEvent
 
     read, made = [], []

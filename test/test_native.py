@@ -186,7 +186,7 @@ def test_a_single_leg_is_solved_without_llvmlite_in_memory(legs):
 import sys, threading
 from linkage_ros import mechanisms
 from linkage_ros.linkage.walker import Assembly
-Assembly(mechanisms.create('jansen'), {legs}).solution(('G',), ('BC',), ('BC',)).solve([0.3], [1.0])
+Assembly(mechanisms.create('jansen'), {legs}).solution(('G',), ('BC',)).solve([0.3])
 for thread in threading.enumerate():
     if thread is not threading.main_thread():
         thread.join()

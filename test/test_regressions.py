@@ -11,10 +11,6 @@
 """Defects of the nodes that were found from outside, each as what it has to be instead."""
 
 import math
-import os
-from pathlib import Path
-import signal
-import sys
 
 import numpy as np
 import pytest
@@ -22,7 +18,6 @@ import pytest
 pytest.importorskip('rclpy')
 
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from ros_harness import Graph, Process  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 

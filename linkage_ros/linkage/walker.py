@@ -18,7 +18,7 @@ leg at pi - (theta - 2 pi j/N), on the same crank pin.
 from importlib.util import find_spec
 import math
 from struct import Struct
-from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Union
+from typing import Any, List, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 
@@ -83,9 +83,11 @@ class Solution:
         self.layout, self.values = layout, np.zeros(layout.size)
         self.rows, self._function = layout.rows(self.values), function.at
         self._at_rest = layout.inputs * (0.0,)
-        # Packing is faster than assignment to an array. Each leg with the place of its row [bytes].
-        self._pack_row, self._pack_driven = (Struct(f'{count}d').pack_into for count in (
-            self.rows.shape[1], layout.inputs + layout.speeds))
+        # Packing is faster than assignment to an array.
+        pack_row: Any = Struct(f'{self.rows.shape[1]}d').pack_into
+        pack_driven: Any = Struct(f'{layout.inputs + layout.speeds}d').pack_into
+        self._pack_row, self._pack_driven = pack_row, pack_driven
+        # Each leg, with the place of its row [bytes].
         self._legs = [(i * self.rows.strides[0], leg) for i, leg in enumerate(legs)]
         self._batch: Optional[Batch] = None
         if len(legs) > 1 and find_spec('llvmlite'):
@@ -104,7 +106,7 @@ class Solution:
         self._pack_driven(self.values, self.rows.nbytes, *driven)
         if self._batch and self._batch.solve(arguments):
             # `vdot` overflows without the warning of `dot`.
-            return math.isfinite(total + np.vdot(self.rows, self.rows))
+            return math.isfinite(total) and math.isfinite(np.vdot(self.rows, self.rows))
         for place, leg in self._legs:
             row = self._function(*arguments, *leg)
             self._pack_row(self.values, place, *row)
