@@ -90,8 +90,7 @@ class MechanismTopics:
             return
         state = self._solve(self._regular(self.model, in_scene))
         if state.any_assembled and any(topics):
-            self.model.publisher(state, topics).publish(
-                self.stamp, state.solution.values)
+            self.model.publisher(state, topics).publish(self.stamp, state.solution.values)
 
     def state_in_scene(self) -> Optional[AssemblyState]:
         """Return the present state for the scene's joint states; None without assembled legs."""
@@ -130,7 +129,8 @@ class MechanismTopics:
         if before and None not in inputs and (in_scene or any(topics)):
             regular = self._regular(model, in_scene)
             regular.solution.solve(inputs, [0.0] * len(inputs))
-            model.publisher(regular, topics)
+            if any(topics):
+                model.publisher(regular, topics)
         return model
 
     def adopt(self, model: MechanismModel) -> None:
@@ -183,11 +183,11 @@ class MechanismTopics:
         of = f' of {missing[first]}' if others else ''
         return f'{legs} cannot be assembled at {at}; the reach{of} is {reach}'
 
-    def _reach(self, drive: scene.InputSettings, leg: int) -> Sequence[Tuple[float, float]]:
+    def _reach(self, settings: scene.InputSettings, leg: int) -> Sequence[Tuple[float, float]]:
         """Return the reach of a leg, by the crank that all legs have in common."""
         if len(self.model.assembly.legs) == 1:
-            return drive.reach
+            return settings.reach
         lag, start, side, _ = [*self.model.assembly.legs.values()][leg]
-        arcs = [sorted(lag + side * (end - start) for end in arc) for arc in drive.reach]
-        turns = [drive.input.turn * math.floor(low / drive.input.turn + 0.5) for low, _ in arcs]
+        arcs = [sorted(lag + side * (end - start) for end in arc) for arc in settings.reach]
+        turns = [settings.input.turns_of(low) for low, _ in arcs]
         return sorted((low - turn, high - turn) for (low, high), turn in zip(arcs, turns))
