@@ -87,14 +87,25 @@ class Deaf(Node):
         pass
 
 
+class Unpatched:
+    """Publishers that never patch."""
+
+    def __init__(self, publishers):
+        self._publishers = publishers
+
+    def __getitem__(self, key):
+        """Return a publisher."""
+        publisher = self._publishers[key]
+        publisher.template = None
+        return publisher
+
+
 class FreshModel(MechanismModel):
     """Builds ordinary messages, as one writes it: new ones each time."""
 
-    def publisher(self, *args):
-        """Return a publisher that never patches."""
-        publisher = super().publisher(*args)
-        publisher.template = None
-        return publisher
+    def __init__(self, *args):
+        super().__init__(*args)
+        self.publishers = Unpatched(self.publishers)
 
     def marker_message(self, *args):
         """Return new markers."""

@@ -66,6 +66,15 @@ class MechanismModel:
 
     `frame_id` is the frame of its pose; in markers, this name has the prefix `prefix`. Raises
     SceneError if no robot model can be made of a planar mechanism.
+
+    Attributes
+    ----------
+    regular : Cache
+        The regular state of a solution, by what this contains: joints, markers, velocities (bool).
+    publishers : Cache
+        The publisher of a state, by the state and the topics of joint states and of markers; a
+        topic is an rclpy publisher, or None if its message is left out.
+
     """
 
     def __init__(self, mechanism: scene.SceneMechanism, frame_id: str, prefix: str, logger: Any):
@@ -79,8 +88,8 @@ class MechanismModel:
         drawn = mechanism.name, prefix + frame_id, mechanism.pose
         self._points, shown = _shown(mechanism)
         self._drawn = *drawn, bodies.size(mechanism), shown
-        self._states, self._conversions = Cache(self._regular), Cache(self._conversion)
-        self._publishers, self._logger = Cache(self._publisher, PUBLISHERS), logger
+        self._conversions, self._logger = Cache(self._conversion), logger
+        self.regular, self.publishers = Cache(self._regular), Cache(self._publisher, PUBLISHERS)
 
     @cached_property
     def marker_array(self) -> messages.Markers:
@@ -93,14 +102,6 @@ class MechanismModel:
         curve = self.assembly.locus(self.mechanism.tracer)
         return (urdf.write(self.robot) if self.robot else '',
                 messages.locus(*drawn, curve, size) if len(curve) > 1 else None)
-
-    def regular(self, joints: bool, markers: bool, moving: bool) -> AssemblyState:
-        """
-        Return the regular state of the solution for joint states and for markers.
-
-        The solution includes velocities if `moving`.
-        """
-        return self._states[joints, markers, moving]
 
     def _regular(self, wanted: Tuple[bool, bool, bool]) -> AssemblyState:
         joints, markers, moving = wanted
@@ -159,10 +160,6 @@ class MechanismModel:
         return (_arranged(layout, 1.0, self._signs, self._signs),
                 _arranged(layout, 0.0, self._offsets, none),
                 np.flatnonzero(_arranged(layout, 0.0, self._wrapped, none)))
-
-    def publisher(self, state: AssemblyState, topics: Tuple[Any, Any]) -> PatchedPublisher:
-        """Return the publisher of joint states and markers, on `topics`; None omits one."""
-        return self._publishers[state, topics]
 
     def _publisher(self, key: Tuple[AssemblyState, Tuple[Any, Any]]) -> PatchedPublisher:
         state, topics = key

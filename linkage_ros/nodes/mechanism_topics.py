@@ -41,10 +41,14 @@ class MechanismTopics:
         Their speeds [rad/s or m/s]; None: not in the last message of the input.
     stamp : bytes
         The packed stamp of the last message that set an input.
+    model : MechanismModel
+        The adopted model; there is one before the first message arrives.
     state : AssemblyState, optional
         That of the solution at the present inputs; None: not solved yet.
 
     """
+
+    model: MechanismModel
 
     def __init__(self, node: Any, mechanism: scene.SceneMechanism):
         name = self.name = mechanism.name
@@ -54,7 +58,6 @@ class MechanismTopics:
         self._description = node.create_publisher(String, f'{name}/robot_description', LATCHED)
         self._logger = node.get_logger().get_child(name)
         self._throttle = Throttle(self._logger)
-        self._model: Optional[MechanismModel] = None
         self.inputs: List[Any] = [None] * len(mechanism.inputs)
         self.speeds: List[Optional[float]] = [None] * len(mechanism.inputs)
         self.stamp = NEVER
@@ -65,12 +68,6 @@ class MechanismTopics:
         # Ids of the displayed markers, whether the locus is displayed, and the last robot model.
         self._displayed: AbstractSet[int] = frozenset()
         self._has_locus, self._described = False, ''
-
-    @property
-    def model(self) -> MechanismModel:
-        """Return the adopted model; it exists before the first message arrives."""
-        assert self._model
-        return self._model
 
     def receive(self, i: int, position: float, speed: Optional[float]) -> None:
         """Set input `i` by the position of its source joint and, if known, its speed."""
@@ -90,7 +87,7 @@ class MechanismTopics:
             return
         state = self._solve(self._regular(self.model, in_scene))
         if state.any_assembled and any(topics):
-            self.model.publisher(state, topics).publish(self.stamp, state.solution.values)
+            self.model.publishers[state, topics].publish(self.stamp, state.solution.values)
 
     def state_in_scene(self) -> Optional[AssemblyState]:
         """Return the present state for the scene's joint states; None without assembled legs."""
@@ -102,8 +99,8 @@ class MechanismTopics:
         return state if state.any_assembled else None
 
     def _regular(self, model: MechanismModel, in_scene: bool) -> AssemblyState:
-        return model.regular(in_scene or self._joint_states.has_subscribers,
-                             self._markers.has_subscribers, None not in self.speeds)
+        return model.regular[in_scene or self._joint_states.has_subscribers,
+                             self._markers.has_subscribers, None not in self.speeds]
 
     def _solve(self, regular: AssemblyState) -> AssemblyState:
         """Solve at the present inputs; display or delete markers if the state has changed."""
@@ -120,7 +117,7 @@ class MechanismTopics:
     def prepared(self, mechanism: scene.SceneMechanism, frame_id: str, prefix: str,
                  in_scene: bool) -> MechanismModel:
         """Return a model, with messages for the present subscribers, or the equal present one."""
-        before, inputs = self._model, [*self.inputs]
+        before, inputs = getattr(self, 'model', None), [*self.inputs]
         if before and before.made_of == (mechanism, frame_id, prefix):
             return before
         model = MechanismModel(mechanism, frame_id, prefix, self._logger)
@@ -130,12 +127,13 @@ class MechanismTopics:
             regular = self._regular(model, in_scene)
             regular.solution.solve(inputs, [0.0] * len(inputs))
             if any(topics):
-                model.publisher(regular, topics)
+                # Building its messages takes longest.
+                model.publishers[regular, topics]
         return model
 
     def adopt(self, model: MechanismModel) -> None:
         """Replace the model, and delete those markers that the new model does not have."""
-        self._model, self.state = model, None
+        self.model, self.state = model, None
         self._delete(self._displayed - model.marker_array.ids)
 
     def publish_latched(self, latched: Tuple[str, Optional[Marker]]) -> None:

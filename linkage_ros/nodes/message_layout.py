@@ -202,7 +202,7 @@ class Template:
     def patched(self, stamp: bytes, values: Any) -> List[bytes]:
         """Return the serialised messages with a packed stamp and values (count,)."""
         self._values[:] = values
-        self._table.take(self._sources, out=self._numbers, mode='clip')
+        self._table.take(self._sources, None, self._numbers, 'clip')
         data = self._bytes
         for place in self._stamps:
             data[place] = stamp
