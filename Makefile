@@ -71,6 +71,7 @@ bench: build $(venv)/.tools .venv-bench/.installed ## Measure run time against e
 	@.venv-bench/bin/python -m benchmark.report
 	@.venv-bench/bin/python -m benchmark.engines --document
 	@.venv-bench/bin/python -m benchmark.arrays --document
+	@$(in_ros) python -m benchmark.calls --document
 	@$(in_ros) python -m benchmark.nodes --quick
 
 .PHONY: pictures

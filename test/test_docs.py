@@ -296,6 +296,16 @@ def test_every_file_that_the_architecture_names_is_there():
         (folder / file).exists() for folder in (ROOT, ROOT / 'linkage_ros'))]
 
 
+def test_every_call_that_the_pages_show_is_timed(measured, tmp_path, monkeypatch):
+    from benchmark import calls, document
+    monkeypatch.chdir(tmp_path)
+    shown = [[page, f'`{calls.short(call)}`'] for page, code in calls.code_of_pages().items()
+             for call, _ in calls.calls(code)]
+    timed = [re.split(r' ?\| ', line)[1:3] for line in document.written(
+        'performance.md', 'measured: calls').splitlines()[2:] if line.startswith('|')]
+    assert timed == shown and len(shown) > 20
+
+
 def test_text_of_a_docstring_is_taken_for_text(catalogue):
     assert catalogue.markdown('a*b*c <d> [e] `f*g` sqrt(theta^2) -> |h|') == \
         r'a\*b\*c \<d\> \[e\] `f*g` √(θ²) → \|h\|'

@@ -357,7 +357,7 @@ def test_there_is_one_value_for_each_output():
     inverse = mechanisms.create('five_bar').inverse(('P.x', 'P.y'))
     for ask in (lambda: inverse.over(0.05), lambda: inverse.nearest((0.05,)),
                 lambda: inverse.nearest((0.05, 0.15, 0.2))):
-        with pytest.raises(ValueError, match='values of 2 outputs are needed'):
+        with pytest.raises(ValueError, match='five_bar has 2 inputs: values must be as many'):
             ask()
 
 

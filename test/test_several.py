@@ -181,9 +181,11 @@ def test_outputs_of_few_inputs_are_solved_first():
 @pytest.mark.parametrize('outputs, values, reason', [
     (('P.x',), [0.1], '2 inputs: as many outputs are needed, got P.x'),
     (('P.x', 'P.z'), [0.1, 0.1], "no output 'P.z'; allowed: "),
-    ('P.x', [0.1, 0.1], "outputs must be a list of names, got 'P.x'"),
+    ('P.x', [0.1, 0.1], '2 inputs: as many outputs are needed, got P.x'),
+    ('P', [0.1, 0.1], "no output 'P'; allowed: .* did you mean P.x, P.y?"),
     (None, [0.1, 0.1], 'outputs must be a list of names, got None'),
-    (('P.x', 7), [0.1, 0.1], 'outputs must be a list of names'),
+    (('P.x', 7), [0.1, 0.1], 'five_bar has no output 7; allowed: '),
+    (({}, 'P.x'), [0.1, 0.1], 'five_bar has no output {}; allowed: '),
     (('P.x', 'P.x'), [0.1, 0.1],
      'P.x, P.x do not determine all inputs: P.x, P.x depends on too few'),
     (('A.x', 'crank'), [0.1, 0.1],

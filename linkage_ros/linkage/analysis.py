@@ -47,11 +47,11 @@ class Analysis:
         linkage.check_output(output)
         pose, angular = linkage.bound('output', output), np.array([linkage.is_angle(output)])
         size = self._first.size
-        parts = linkage.reach() if arcs is None else arcs
+        parts = linkage.reach(*self._others) if arcs is None else arcs
         if arcs is None and (branches := self.branches(output)).jumps:
             parts = [(low * size, high * size) for low, high in branches.arcs]
-        found = [extremes(lambda value: pose.searched(value)[:1], low, high, angular)[0].tolist()
-                 for low, high in parts]
+        found = [extremes(lambda value: pose.searched(value, *self._others)[:1], low, high,
+                          angular)[0].tolist() for low, high in parts]
         return [(tuple(least), tuple(greatest)) for least, greatest in found]
 
     # From here on the first input is in units of its size.

@@ -67,7 +67,10 @@ def numbers(name: str, value: Any) -> np.ndarray:
     try:
         if isinstance(value, (str, *BYTES)):
             raise TypeError
-        return np.asarray(value, float)
+        found = np.asarray(value)
+        if found.dtype.kind != 'f' and not _are_numbers(found, 'biuO'):
+            raise TypeError
+        return found.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError, RecursionError):
         raise ValueError(f'{name} must be a number or an array of numbers, '
                          f'got {quoted(value)}') from None
@@ -76,12 +79,15 @@ def numbers(name: str, value: Any) -> np.ndarray:
 def _numbers(value: Any) -> np.ndarray:
     """Return numbers as an array; raise for other types that numpy would convert."""
     given = np.asarray(value)
-    if isinstance(value, BYTES) or given.dtype.kind not in 'iufO' or not given.size:
-        raise TypeError
-    if given.dtype.kind == 'O' and any(isinstance(each, (str, bytes, bool, type(None)))
-                                       for each in given.flat):
+    if isinstance(value, BYTES) or not given.size or not _are_numbers(given, 'iufO', bool):
         raise TypeError
     return given.astype(float)
+
+
+def _are_numbers(given: np.ndarray, kinds: str, *others: type) -> bool:
+    """Return whether an array has one of numpy's kinds of numbers, and no other objects."""
+    return given.dtype.kind in kinds and not (given.dtype.kind == 'O' and any(
+        isinstance(each, (str, bytes, type(None), *others)) for each in given.flat))
 
 
 def checked_branches(design: Design, given: Optional[Mapping[str, int]]) -> dict:

@@ -104,6 +104,9 @@ class Answer(NamedTuple):
         """Return the signs as text: 'AP+ CP- det-'."""
         return ' '.join(f'{name}{"0+-"[sign]}' for name, sign in self.signs.items())
 
+    def __repr__(self) -> str:
+        return f'Answer(inputs={self.inputs}, mode={self.mode!r}, margin={self.margin:.3g})'
+
 
 class Inverse:
     """
@@ -136,6 +139,9 @@ class Inverse:
     def __reduce__(self) -> Tuple[Any, ...]:
         """Pickle the linkage and the outputs only."""
         return self.linkage.inverse, (self.outputs,)
+
+    def __repr__(self) -> str:
+        return f'<inverse of {self.linkage.type} for {listed(self.outputs)}>'
 
     def __str__(self) -> str:
         what = listed(self.outputs)
@@ -173,9 +179,7 @@ class Inverse:
         """
         found = [inputs for inputs, _ in self._all(self._one_each(values))]
         if near is not None:
-            beside = self._one_each(near, 'near')
-            if not all(map(math.isfinite, beside)):
-                raise ValueError(f'near must be finite, got {quoted(list(beside))}')
+            beside = self._finite(near, 'near')
             found = sorted((self._problem.next_to(inputs, beside) for inputs in found),
                            key=lambda x: sum(((a - b) / size) ** 2 for a, b, size in zip(
                                x, beside, self._problem.sizes)))
@@ -192,8 +196,7 @@ class Inverse:
             output by the first input, by the second and so on.
 
         """
-        self._check_count(values)
-        rows = np.broadcast_arrays(*(numbers('values', each) for each in values))
+        rows = _broadcast(self._each(values))
         inputs, rates = self._found(np.stack([row.ravel() for row in rows]))
         self._single(inputs, rates)
         order = np.lexsort(np.nan_to_num(inputs, nan=np.inf).swapaxes(0, 1)[::-1], axis=0)
@@ -239,7 +242,10 @@ class Inverse:
             apart = max(apart, min(gap, abs(turn - gap)) / size)
         if apart <= SAME:
             return True
-        values = np.linalg.svd(problem.jacobian(answer[1]), compute_uv=False)
+        jacobian = problem.jacobian(answer[1])
+        if not np.isfinite(jacobian).all():  # at an end of the reach an output tells all digits
+            return False
+        values = np.linalg.svd(jacobian, compute_uv=False)
         rounding = 8 * 2.0 ** -53 if self.closed or self._n == 1 else SAME
         return bool(apart <= rounding * (1.0 + values[0]) / max(values[-1], SAME))
 
@@ -260,23 +266,39 @@ class Inverse:
 
     def _one_each(self, values: Any, name: str = 'values') -> Tuple[float, ...]:
         """Return one number for each output; raise ValueError if there are not as many."""
-        if type(values) is list and len(values) == self._n and set(map(type, values)) == {float}:
-            return tuple(values)
-        found = numbers(name, values)
-        if found.shape != (self._n,) and not (self._n == 1 and found.shape == ()):
-            raise ValueError(f'{self.linkage.type} has {self._n} inputs: {name} must be as many '
-                             f'numbers, got {quoted(found.tolist())}')
-        return tuple(found.ravel().tolist())
+        found = self._each(values, name)
+        if any(np.size(each) != 1 for each in found):
+            raise self._miscounted(values, name)
+        return tuple(each if type(each) is float else each.item() for each in found)
 
-    def _check_count(self, values: Sequence[Any]) -> None:
+    def _finite(self, values: Any, name: str) -> Tuple[float, ...]:
+        """Return what `_one_each` does; raise ValueError also if one is not finite."""
+        found = self._one_each(values, name)
+        if not all(map(math.isfinite, found)):
+            raise ValueError(f'{name} must be finite, got {quoted(list(found))}')
+        return found
+
+    def _each(self, values: Any, name: str = 'values') -> Tuple[Any, ...]:
+        """Return a float or an array for each output; raise ValueError if they are not that."""
+        if not isinstance(values, (list, tuple)):
+            values = np.atleast_1d(numbers(name, values))
         if len(values) != self._n:
-            raise ValueError(f'{self.linkage.type} has {self._n} inputs: values of {self._n} '
-                             f'outputs are needed, got {len(values)}')
+            raise self._miscounted(values, name)
+        if set(map(type, values)) == {float}:
+            return tuple(values)
+        found = [numbers(name, each) for each in values]
+        return tuple(each if each.ndim else float(each) for each in found)
+
+    def _miscounted(self, values: Any, name: str) -> ValueError:
+        return ValueError(f'{self.linkage.type} has {self._n} inputs: {name} must be as many '
+                          f'numbers, got {quoted(values)}')
 
     def _limits(self, ends: Ends) -> Tuple[Tuple[float, ...], ...]:
         """Return the ends of each input as floats, () if it has none."""
+        if ends is None:
+            return ((),) * self._n
         try:
-            limits = ((),) * self._n if ends is None else tuple(
+            limits = tuple(
                 () if pair is None else tuple(map(float, pair)) for pair in ends)
             if len(limits) == self._n and all(
                     len(pair) == 2 and -LARGE < pair[0] <= pair[1] < LARGE
@@ -319,16 +341,16 @@ class Inverse:
             If there is not one value for each output, or ends are not finite and in order.
 
         """
-        limits, near = self._limits(ends), None if near is None else tuple(near)
-        self._check_count(values)
+        limits, values = self._limits(ends), self._each(values)
+        near = None if near is None else self._each(near, 'near')
         given = (*values, *(near or ()), *chain(*limits))
         if set(map(type, given)) == {float}:
-            return self._chosen(self._solutions(tuple(values)), near, limits)[1:]
+            return self._chosen(self._solutions(values), near, limits)[1:]
         if not self.closed:
             inputs, rates = self.over(*values)
             return self._chosen([(inputs[..., k], rates[..., k])
                                  for k in range(inputs.shape[-1])], near, limits)[1:]
-        arrays = np.broadcast_arrays(*given)
+        arrays = _broadcast(given)
         flat = np.stack([each.ravel() for each in arrays])
         flat[:self._n] = self._problem.within_turns(flat[:self._n])
         rows = self._choice(0, near is not None, tuple(map(bool, limits))).over(*flat)
@@ -358,8 +380,11 @@ class Inverse:
             As `nearest` does.
 
         """
-        inputs, rates = self._found(np.array(values, float))
-        limits, beside = self._limits(ends), near and tuple(np.ravel(near).tolist())
+        rows = np.stack([np.atleast_1d(row) for row in _broadcast(self._each(values))])
+        if rows.ndim > 2:
+            raise self._miscounted(values, 'values')
+        inputs, rates = self._found(rows)
+        limits, beside = self._limits(ends), None if near is None else self._finite(near, 'near')
         found = np.full((self._n + self._n ** 2, inputs.shape[2]), np.nan)
         breaks: Dict[int, np.ndarray] = {}
         at, known = 0, np.flatnonzero(self._may_be_inside(inputs, limits))
@@ -469,7 +494,8 @@ class Inverse:
 
     def margin(self, inputs: Sequence[float]) -> float:
         """Return the distance of a pose from a singular one; see `Answer.margin`."""
-        jacobian = self._problem.jacobian(self._problem.rated.at(*inputs)[self._n:])
+        jacobian = self._problem.jacobian(self._problem.rated.at(
+            *self._one_each(inputs, 'inputs'))[self._n:])
         if not np.isfinite(jacobian).all():
             return 0.0
         values = np.linalg.svd(jacobian, compute_uv=False)
@@ -477,7 +503,7 @@ class Inverse:
 
     def signs(self, inputs: Sequence[float]) -> Mapping[str, int]:
         """Return the working mode of a pose; see `Answer.signs`."""
-        linkage = self.linkage
+        linkage, inputs = self.linkage, self._one_each(inputs, 'inputs')
         cranks = {link.name: link for link in linkage.links
                   if any(input_.turns and link.name == input_.name for input_ in linkage.inputs)}
         places, signs = linkage.solve(inputs if self._n > 1 else inputs[0]), {}
@@ -490,6 +516,15 @@ class Inverse:
         signs['det'] = 0 if self.margin(inputs) < SINGULAR else _sign(float(np.linalg.det(
             self._problem.jacobian(self._problem.rated.at(*inputs)[self._n:]))), 0.0)
         return signs
+
+
+def _broadcast(values: Sequence[Any]) -> Sequence[np.ndarray]:
+    """Return arrays of one shape; raise ValueError with their shapes if they have none."""
+    try:
+        return np.broadcast_arrays(*values)
+    except ValueError:
+        shapes = ', '.join(str(np.shape(each)) for each in values)
+        raise ValueError(f'arrays must have shapes that broadcast, got {shapes}') from None
 
 
 def _sign(value: float, size: float) -> int:

@@ -459,18 +459,21 @@ class Mechanism:
 
     def check_output(self, output: str) -> None:
         """Raise ValueError if an output does not exist or does not move."""
-        self.check_there(output)
-        if not self.moves(output):
+        if not isinstance(output, str) or not self.moves(output):
+            self.check_there(output)
             raise ValueError(f'{plain_text(output)} of {self.type} does not move with the '
                              f'{self.inputs[0].name}')
 
     def check_there(self, output: str) -> None:
         """Raise ValueError if an output does not exist."""
         if not self.has_output(output):
-            named = (*self.joints, *(f'{name}.{axis}' for name in self.points for axis in 'xy'))
+            named = (*self.joints, *(f'{name}.{axis}' for name in self.points
+                                     for axis in self.axes))
+            own = listed([name for name in named if output == name[:-2]])
             raise ValueError(
                 f'{self.type} has no output {quoted(output)}; allowed: distance(A,B) and '
-                f'angle(A,B) of two joints, {listed(named)}{meant(output, named)}')
+                f'angle(A,B) of two joints, {listed(named)}'
+                + (f'; did you mean {own}?' if output in self.points else meant(output, named)))
 
     def gear(self, name: str, by: int = 0) -> Tuple[float, float]:
         """Return ratio and offset [rad or m] by which an input drives a link, anywhere."""
@@ -494,20 +497,26 @@ class Mechanism:
         joint lines of its linkage. Raises ValueError if an output does not exist, their number is
         not that of the inputs, they do not determine all inputs, or a dimension is an array.
         """
-        names = (outputs,) if isinstance(outputs, str) and len(self.inputs) == 1 else outputs
-        if not isinstance(names, (list, tuple)) or not all(isinstance(x, str) for x in names):
+        try:
+            found: Inverse = self.cache['inverse', outputs]
+            return found
+        except (KeyError, TypeError):  # the first time, and for a list
+            names = (outputs,) if isinstance(outputs, str) else outputs
+        if not isinstance(names, (list, tuple)):
             raise ValueError(f'outputs must be a list of names, got {quoted(outputs)}')
+        for name in names:
+            self.check_there(name)
         plain = tuple(map(plain_text, names))
-        return self.cache.get_or_make(('inverse', plain), lambda: self._inverse(plain))
+        made = self.cache.get_or_make(('inverse', plain), lambda: self._inverse(plain))
+        return self.cache.get_or_make(
+            ('inverse', plain[0] if isinstance(outputs, str) else plain), lambda: made)
 
     def _inverse(self, names: Tuple[str, ...]) -> Inverse:
         if len(names) != len(self.inputs):
             raise ValueError(f'{self.type} has {len(self.inputs)} inputs: as many outputs are '
                              f'needed, got {listed(names)}')
-        for name in names:
-            self.check_there(name)
-        if len(names) == 1:
-            self.check_output(*names)
+        if names[1:] == tuple(input_.name for input_ in self.inputs[1:]):
+            self.check_output(names[0])
         return Inverse(self, names)
 
     def input_for(self, output: str, value: ArrayLike, near: Optional[ArrayLike] = None,
@@ -523,20 +532,23 @@ class Mechanism:
         value beyond an extreme by rounding counts as the extreme. Raises ValueError if the
         output's formula does not depend on the input.
         """
-        value, (inverse, fixed) = numbers('value', value), self._with_others(output, others)
-        if near is None:
+        fixed = self._fixed(others) if len(self.inputs) > 1 or others else ()
+        inverse = self.inverse((output, *(input_.name for input_ in self.inputs[1:])))
+        if near is not None:
+            return inverse.nearest((value, *fixed), (near, *fixed))[0][0]
+        value = numbers('value', value)
+        if value.ndim:
             return inverse.over(value, *fixed)[0][0]
-        near = numbers('near', near)
-        return inverse.nearest((value, *fixed), (near, *fixed))[0][0][()]
+        found = inverse.all((float(value), *fixed))
+        return np.array([answer.inputs[0] for answer in found] or [math.nan])
 
-    def _with_others(self, output: Any, others: Sequence[float]) -> Tuple[Inverse, List[float]]:
-        """Return the inverse of an output with all inputs but the first fixed."""
-        self.check_output(output)
-        if len(others) != len(self.inputs) - 1:
+    def _fixed(self, others: Any) -> Tuple[float, ...]:
+        """Return the values of all inputs but the first; raise ValueError if they are not that."""
+        values = numbers('others', others)
+        if values.shape != (len(self.inputs) - 1,):
             raise ValueError(f'{self.type} has {len(self.inputs)} inputs: the values of all '
-                             f'except the first are needed, got {len(others)}')
-        return (self.inverse((output, *(input_.name for input_ in self.inputs[1:]))),
-                list(map(float, others)))
+                             f'except the first are needed, got {quoted(values.tolist())}')
+        return tuple(values.tolist())
 
     def servo_for(self, output: str, value: ArrayLike, near: Optional[ArrayLike] = None,
                   ends: Optional[Tuple[float, float]] = None) -> Sequence:
@@ -547,10 +559,8 @@ class Mechanism:
         Without `near` it is on the working branch, on which lever and crank turn the same way.
         Floats, or arrays in the broadcast shape of value and near; NaN without a solution.
         """
-        inverse, _ = self._with_others(output, ())
-        given = [x if type(x) is float else numbers(name, x)
-                 for name, x in (('value', value), ('near', near)) if x is not None]
-        (found,), (rate,) = inverse.nearest(given[:1], given[1:] or None, [ends])
+        (found,), (rate,) = self.inverse(output).nearest(
+            (value,), None if near is None else (near,), None if ends is None else (ends,))
         return found, rate
 
     def follow(self, output: str, value: float, near: float) -> Tuple[float, float]:
@@ -560,7 +570,7 @@ class Mechanism:
         See `Inverse.follow`, for a linkage with one input: the input [rad or m] with its whole
         turns, and d output / d input; NaN beyond the next dead point or extreme of the output.
         """
-        (found,), (rate,) = self._with_others(output, ())[0].follow(value, near)
+        (found,), (rate,) = self.inverse(output).follow((value,), (near,))
         return found, rate
 
     def inputs_for(self, outputs: Sequence[str], values: ArrayLike,
@@ -578,16 +588,14 @@ class Mechanism:
         [(-pi, pi)]; strokes (lo, hi) of a cylinder are in m; the list may be empty. Raises
         ValueError if not every other input is given, or a dimension is an array.
         """
-        return list(self.cache.get_or_make(('reach', *others), lambda: self._arcs(others)))
+        fixed = self._fixed(others)
+        return list(self.cache.get_or_make(('reach', *fixed), lambda: self._arcs(fixed)))
 
     def _arcs(self, others: Tuple[float, ...]) -> List[Arc]:
         margins = self.bound('margins', ())
         if margins.shape:
             raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
                              'not for arrays')
-        if len(others) != len(self.inputs) - 1:
-            raise ValueError(f'{self.type} has {len(self.inputs)} inputs: the values of all '
-                             f'except the first are needed, got {len(others)}')
         first = self.inputs[0]
         return [(lo * first.size, hi * first.size) for lo, hi in arcs(
             lambda value: margins.searched(value * first.size, *others), first.counted(),
@@ -602,7 +610,8 @@ class Mechanism:
         or pi, and the input alone does not determine the motion. Crank angles are in
         [-pi, pi). Raises ValueError as `reach` does.
         """
-        return [dead * self.inputs[0].size for dead in Analysis(self, others).dead_points()]
+        return [dead * self.inputs[0].size
+                for dead in Analysis(self, self._fixed(others)).dead_points()]
 
     def distance_to_dead_point(self, theta: ArrayLike, *others: float) -> Any:
         """Return the distance of the first input to the nearest dead point [rad or m], or inf."""
@@ -610,19 +619,21 @@ class Mechanism:
         away = [self.inputs[0].apart(theta, dead) for dead in self.dead_points(*others)]
         return np.min([np.full(np.shape(theta), np.inf), *away], axis=0)[()]
 
-    def extremes(self, output: str, arcs: Optional[Sequence[Arc]] = None) -> list:
+    def extremes(self, output: str, arcs: Optional[Sequence[Arc]] = None,
+                 others: Sequence[float] = ()) -> list:
         """
-        Return the extremes of an output on arcs of the only input, by default its reach.
+        Return the extremes of an output on arcs of the first input, by default its reach.
 
         Each arc has its minimum and the input there, then its maximum; an angle continues
         past -pi and pi. By default an arc in which the output jumps, as an angle may where its
         ends meet, counts as several.
         """
-        return Analysis(self).extremes(output, arcs)
+        return Analysis(self, self._fixed(others)).extremes(output, arcs)
 
-    def monotone(self, output: str, most: float) -> Tuple[List[Tuple[float, ...]], Pose]:
+    def monotone(self, output: str, most: float, others: Sequence[float] = ()
+                 ) -> Tuple[List[Tuple[float, ...]], Pose]:
         """
-        Return pieces of the only input's reach on which an output is monotone, and its code.
+        Return pieces of the first input's reach on which an output is monotone, and its code.
 
         Each piece has the input [rad or m] and the output at both ends; the output changes by
         `most` at most. The code computes the output and its rate.
@@ -630,7 +641,8 @@ class Mechanism:
         size = self.inputs[0].size
         self.check_output(output)
         return [(low * size, high * size, *values) for low, high, *values
-                in Analysis(self).branches(output).pieces(most)], self.bound('output', output)
+                in Analysis(self, self._fixed(others)).branches(output).pieces(most)
+                ], self.bound('output', output)
 
     # --- its code ---
 

@@ -82,7 +82,7 @@ class Structure:
         design.words.draw(self.built, design.lines, joint_lines.symbols_of(
             design.dimensions, design.signed), branches, **given)
         self.branches = dict(branches)
-        self._programs = Cache()
+        self._programs, self._moving = Cache(), Cache()
         self._outputs: Mapping[str, Callable] = {
             'points': self._points, 'velocities': self._velocities, 'angles': self._angles,
             'rates': self._rates, 'parts': self._parts, 'margins': self._margins,
@@ -267,9 +267,9 @@ class Structure:
         return output.startswith('angle(')
 
     def moves(self, output: str, by: int = 0) -> bool:
-        """Return whether an output depends on one of the inputs."""
-        rate, = self._rates((output,), by)
-        return not _vanishes(rate)
+        """Return whether there is an output of this name and it depends on one of the inputs."""
+        return self._moving.get_or_make((output, by), lambda: self.has(output) and not _vanishes(
+            self._rates((output,), by)[0]))
 
 
 def _vanishes(rate: Real) -> bool:

@@ -42,8 +42,9 @@ if TYPE_CHECKING:
 
 # Grid points of a search at first and at most, and the least number that can be assembled.
 STARTS, MOST_STARTS, ASSEMBLED = 1024, 1 << 16, 250
-# Steps from a start, the longest one, and their damping: initial, least, and that of giving up.
-STEPS, LONGEST_STEP = 40, 0.7
+# Steps from a start (few need many: where outputs hardly differ), the longest one, and their
+# damping: initial, least, and that of giving up.
+STEPS, LONGEST_STEP = 100, 0.7
 DAMPING, LEAST_DAMPING, HOPELESS, TINY = 1e-3, 1e-14, 1e4, 1e-300
 # Newton steps that polish a solution; halvings of the distance at which a twin is searched.
 POLISHING, HALVINGS = 3, 24

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arguments import numbers
-from ..words import listed, plain_text, quoted
+from ..words import listed, quoted
 
 if TYPE_CHECKING:
     from .mechanism import Inputs, Mechanism
@@ -41,14 +41,13 @@ def effort(linkage: Mechanism, theta: Inputs, loads: Mapping[str, ArrayLike]) ->
         with np.errstate(invalid='ignore', over='ignore'):
             for power in _powers(linkage, theta, loads, by):
                 efforts[by] = efforts[by] - power
-    return np.stack(np.broadcast_arrays(*efforts), -1)
+    return np.stack(efforts, -1)
 
 
 def _powers(linkage: Mechanism, theta: Inputs, loads: Mapping[str, ArrayLike],
             by: int) -> Iterator[np.ndarray]:
     """Yield each load's work per unit of an input."""
     for name, load in loads.items():
-        name = plain_text(name)
         force = numbers(f'the load on {name}', load)
         if name in linkage.points:
             if force.shape[-1:] != (len(linkage.axes),):

@@ -12,7 +12,8 @@
 The four-bar: crank OA = a, coupler AB = b, rocker QB = c, ground OQ = d along x.
 
 P is a point on the coupler's line, p from A towards B. Branch B is the open (+1, left of A -> Q)
-or the crossed assembly. The defaults are Norton's example.
+or the crossed assembly. The defaults are Norton's example, with P in the middle of the coupler;
+with a coupler of your own give p as well: it does not follow b.
 
 Source: Norton, "Design of Machinery", sec. 2.13 (Grashof's condition) and 4.5 (position).
 """

@@ -61,7 +61,7 @@ class Mechanism(mechanism.Mechanism):
             of the slot.
 
         """
-        return self.servo(lever_angle, near)[0]
+        return self.servo_for('lever', lever_angle, near)[0]
 
     def servo(self, lever_angle: ArrayLike, near: Optional[ArrayLike] = None) -> Sequence:
         """Return the result of `servo_angle`, and d lever / d servo there."""

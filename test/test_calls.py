@@ -1,0 +1,258 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The calls that users type: what they accept, what they return, and what they cost."""
+
+import math
+
+from effort import calls
+from linkage_ros import mechanisms
+from linkage_ros.linkage.inverse import Answer
+import numpy as np
+import pytest
+
+WRONG = 'x', ['x'], None, {}, object(), b'\x01', [[1.0], 'x']
+
+
+@pytest.fixture(scope='module')
+def bars():
+    return mechanisms.create('four_bar')
+
+
+@pytest.fixture(scope='module')
+def arm():
+    return mechanisms.create('five_bar')
+
+
+# --- one number may be of any type ---
+
+@pytest.mark.parametrize('number', [float, np.float64, np.float32, np.array, lambda x: np.array(
+    [x])[0]])
+def test_one_value_of_any_type_gives_floats(bars, number):
+    value, near = 0.75, 0.5
+    inverse = bars.inverse('QB')
+    for wanted, found in (
+            (bars.servo_for('QB', value), bars.servo_for('QB', number(value))),
+            (bars.servo_for('QB', value, near), bars.servo_for('QB', number(value), number(near))),
+            (bars.follow('QB', value, near), bars.follow('QB', number(value), number(near))),
+            ((bars.input_for('QB', value, near),), (bars.input_for(
+                'QB', number(value), number(near)),)),
+            (inverse.nearest(value)[0], inverse.nearest([number(value)])[0]),
+            (inverse.nearest((value,), near)[1], inverse.nearest(number(value), number(near))[1])):
+        assert found == wanted and {*map(type, found)} == {float}
+
+
+def test_integers_are_numbers(bars, arm):
+    assert bars.servo_for('QB', 1) == bars.servo_for('QB', 1.0)
+    assert bars.input_for('P.x', 50, near=1) == bars.input_for('P.x', 50.0, near=1.0)
+    assert arm.reach(2) == arm.reach(2.0) and arm.dead_points(np.int64(2)) == arm.dead_points(2.0)
+
+
+@pytest.mark.parametrize('shape', [(), (1,), (3, 2), (0,)])
+def test_results_have_the_shape_of_value_and_near(bars, shape):
+    value, near = np.full(shape, 0.75), np.full(shape, 0.5)
+    assert np.shape(bars.input_for('QB', value)) == (*shape, 1)
+    for found in (bars.input_for('QB', value, 0.5), bars.input_for('QB', 0.75, near),
+                  *bars.servo_for('QB', value, near), *bars.servo_for('QB', value)):
+        assert np.shape(found) == shape
+        np.testing.assert_array_equal(found, np.full(shape, found.flat[0] if shape and value.size
+                                                     else found))
+
+
+def test_all_inputs_for_one_value_are_those_of_an_array(bars, arm):
+    for output, values in (('QB', (0.75, 1.3, 9.0, math.nan)), ('P.x', (50.0, 0.0, 1e9))):
+        for value in values:
+            np.testing.assert_allclose(
+                bars.input_for(output, value), bars.input_for(output, [value])[0], rtol=1e-14)
+    np.testing.assert_allclose(arm.input_for('P.x', 0.05, others=[2.0]),
+                               arm.input_for('P.x', [0.05], others=[2.0])[0], rtol=1e-14)
+
+
+# --- values that are wrong are named ---
+
+@pytest.mark.parametrize('wrong', WRONG)
+def test_what_is_no_number_is_refused_with_its_name(bars, arm, wrong):
+    one, two = bars.inverse('QB'), arm.inverse(('P.x', 'P.y'))
+    for ask, name in (
+            (lambda: one.all(wrong), 'values'), (lambda: two.all([0.1, wrong]), 'values'),
+            (lambda: one.over(wrong), 'values'), (lambda: two.over(0.1, wrong), 'values'),
+            (lambda: one.nearest(wrong), 'values'), (lambda: two.nearest([0.1, wrong]), 'values'),
+            (lambda: two.nearest([0.1, 0.1], [0.1, wrong]), 'near'),
+            (lambda: one.path(wrong), 'values'), (lambda: two.path([[0.1], wrong]), 'values'),
+            (lambda: two.path([[0.1], [0.1]], [0.1, wrong]), 'near'),
+            (lambda: one.margin(wrong), 'inputs'), (lambda: two.signs([0.1, wrong]), 'inputs'),
+            (lambda: one.follow(wrong, 0.1), 'values'), (lambda: two.follow(
+                [0.1, 0.1], [0.1, wrong]), 'near'),
+            (lambda: arm.reach(wrong), 'others'), (lambda: arm.dead_points(wrong), 'others'),
+            (lambda: arm.distance_to_dead_point(0.1, wrong), 'others'),
+            (lambda: arm.input_for('P.x', 0.1, others=[wrong]), 'others'),
+            (lambda: arm.extremes('P.x', others=[wrong]), 'others'),
+            (lambda: bars.servo_for('QB', wrong), 'values'),
+            (lambda: bars.input_for('QB', wrong), 'value')):
+        with pytest.raises(ValueError, match=name):
+            ask()
+
+
+def test_there_are_as_many_numbers_as_inputs(bars, arm):
+    one, two = bars.inverse('QB'), arm.inverse(('P.x', 'P.y'))
+    for linkage, name, asks in (
+            (bars, 'values', (lambda x: one.nearest(x), lambda x: one.all(x), lambda x: one.path(
+                x), lambda x: one.over(*x))),
+            (bars, 'near', (lambda x: one.nearest(0.7, x), lambda x: one.all(0.7, x),
+                            lambda x: one.path([[0.7]], x))),
+            (bars, 'inputs', (one.margin, one.signs)),
+            (arm, 'values', (lambda x: two.nearest(x), lambda x: two.all(x), lambda x: two.path(
+                x), lambda x: two.over(*x))),
+            (arm, 'near', (lambda x: two.nearest([0.1, 0.1], x), lambda x: two.path(
+                [[0.1], [0.1]], x), lambda x: two.follow([0.1, 0.1], x))),
+            (arm, 'inputs', (two.margin, two.signs))):
+        for ask in asks:
+            with pytest.raises(ValueError, match=f'{linkage.type} has . inputs: {name} must be'):
+                ask([0.1, 0.2, 0.3])
+    for others in ((), (0.1, 0.2), [[0.1]], 0.1):
+        with pytest.raises(ValueError, match='five_bar has 2 inputs: the values of all except'):
+            arm.input_for('P.x', 0.1, others=others)
+    with pytest.raises(ValueError, match='four_bar has 1 inputs: the values of all except'):
+        bars.reach(0.1)
+
+
+def test_arrays_of_shapes_that_do_not_broadcast_are_refused_with_their_shapes(bars, arm):
+    for ask in (lambda: bars.servo_for('QB', [0.1, 0.2], [1.0, 1.0, 1.0]),
+                lambda: arm.inverse(('P.x', 'P.y')).over([0.1, 0.2], [0.1, 0.2, 0.3]),
+                lambda: arm.inverse(('P.x', 'P.y')).path([[0.1, 0.2], [0.1, 0.2, 0.3]])):
+        with pytest.raises(ValueError, match=r'broadcast, got \(2,\), \(3,\)'):
+            ask()
+
+
+def test_a_path_starts_next_to_an_input_of_zero(bars):
+    inverse = bars.inverse('P.x')
+    value = bars.solve(0.0)['P'][0]
+    found, = inverse.path([np.array([value])], 0.0)[0]
+    assert found == pytest.approx([0.0], abs=1e-9)
+    for near in (math.nan, math.inf):
+        with pytest.raises(ValueError, match='near must be finite'):
+            inverse.path([np.array([value])], near)
+
+
+# --- outputs of linkages with several inputs ---
+
+def test_extremes_over_the_first_input_have_the_others_fixed(arm):
+    (low, at_low), (high, at_high) = arm.extremes('P.x', others=[2.0])[0]
+    (lo, hi), *_ = arm.reach(2.0)
+    sampled = arm.solve([np.linspace(lo, hi, 20001), 2.0])['P'][:, 0]
+    assert low == pytest.approx(np.nanmin(sampled), abs=1e-7)
+    assert high == pytest.approx(np.nanmax(sampled), abs=1e-7)
+    assert arm.solve([at_low, 2.0])['P'][0] == low and arm.solve([at_high, 2.0])['P'][0] == high
+    with pytest.raises(ValueError, match='the values of all except the first are needed'):
+        arm.extremes('P.x')
+    pieces, _ = arm.monotone('P.x', math.inf, others=[2.0])
+    for first, last, start, end in pieces:
+        for value, wanted in ((first, start), (last, end)):
+            assert arm.solve([value, 2.0])['P'][0] == pytest.approx(wanted, abs=1e-9)
+
+
+def test_calls_for_one_input_name_the_outputs_that_are_missing(arm):
+    for ask in (lambda: arm.servo_for('P.x', 0.1), lambda: arm.follow('P.x', 0.1, 0.2),
+                lambda: arm.inverse('P.x')):
+        with pytest.raises(ValueError, match='2 inputs: as many outputs are needed, got P.x'):
+            ask()
+
+
+@pytest.mark.parametrize('name', ['four_bar', 'five_bar'])
+def test_a_joint_as_an_output_is_answered_with_its_coordinates(name):
+    with pytest.raises(ValueError, match=r"no output 'P'; .*; did you mean P.x, P.y\?$"):
+        mechanisms.create(name).inverse('P')
+
+
+# --- what is printed ---
+
+def test_an_answer_prints_its_inputs_its_mode_and_its_margin(arm):
+    inverse = arm.inverse(('P.x', 'P.y'))
+    answer = inverse.all((0.05, 0.15))[0]
+    assert repr(answer) == (
+        f'Answer(inputs={answer.inputs}, mode={answer.mode!r}, margin={answer.margin:.3g})')
+    assert repr(inverse) == '<inverse of five_bar for P.x, P.y>'
+    assert isinstance(answer, Answer) and ' at 0x' not in str([answer])
+
+
+# --- what they cost beside the inverse below them ---
+
+@pytest.mark.parametrize('near', [None, 0.5])
+def test_a_call_by_name_adds_a_few_calls_to_the_inverse_below_it(bars, near):
+    given = [0.75] if near is None else [0.75, near]
+    inverse = bars.inverse('QB')
+    for below, call, most in (
+            (lambda: inverse.nearest(*([x] for x in given)),
+             lambda: bars.servo_for('QB', *given), 5),
+            (lambda: inverse.nearest(*([x] for x in given)) if near else inverse.all(0.75),
+             lambda: bars.input_for('QB', *given), 15),
+            (lambda: inverse.follow([0.75], [0.5]), lambda: bars.follow('QB', 0.75, 0.5), 5),
+            (lambda: bars.joint_rates(0.5, ('QB',)),
+             lambda: bars.output_effort('QB', 0.5, 2.0), 20)):
+        below(), call()
+        assert calls(call) - calls(below) <= most
+
+
+# --- values near an end ---
+
+@pytest.mark.parametrize('cranks', [
+    (-0.870126, -1.881109), (0.86055566, -1.44647274), (-0.85956347, -1.93895148)])
+def test_outputs_that_hardly_differ_are_answered_with_their_pose(arm, cranks):
+    outputs = 'angle(O,P)', 'P.y'
+    values = [float(value) for value in arm.joint_angles(cranks, outputs).values()]
+    found = arm.inverse(outputs).all(values)
+    assert any(np.allclose(answer.inputs, cranks, atol=1e-6) for answer in found)
+    for answer in found:
+        np.testing.assert_allclose([*arm.joint_angles(answer.inputs, outputs).values()], values,
+                                   rtol=0.0, atol=1e-15)
+
+
+def test_the_margin_of_a_pose_without_rates_is_zero():
+    stretched = mechanisms.create('custom', joints=(
+        'O ground 0 0', 'Q ground 1 2', 'A crank O 1', 'B dyad A Q 1 1 left'))
+    for output in ('distance(O,B)', 'B.y', 'AB'):
+        inverse, value = stretched.inverse(output), float(stretched.joint_angles(
+            0.0, (output,))[output])
+        found = inverse.all(value)
+        assert any(abs(answer.inputs[0]) < 1e-9 for answer in found)
+        assert inverse.margin(0.0) == 0.0
+        assert all(0.0 <= answer.margin <= 1.0 and repr(answer) for answer in found)
+
+
+# --- what a linkage is created with ---
+
+@pytest.mark.parametrize('given, problem', [
+    ({'c': math.nan}, 'dimension c must be finite, got nan'),
+    ({'c': -math.inf}, 'dimension c must be finite, got -inf'),
+    ({'a': [1.0, math.nan]}, 'dimension a must be finite'),
+    ({'c': 1e-301}, 'dimension c must lie between 1e-300 and 1e\\+300'),
+    ({'b': 1e301}, 'dimension b must lie between'),
+    ({'a': [1.0, 2.0], 'b': [1.0, 2.0, 3.0]}, r'shapes that broadcast, got a \(2,\), b \(3,\)'),
+    ({'branches': {'B': True}}, 'branch B must be \\+1 or -1, got True'),
+    ({'branches': {'B': 1.5}}, 'branch B must be \\+1 or -1, got 1.5'),
+    ({'branches': ['B']}, 'branches must be a mapping'),
+    ({'tracer': 'A'}, 'joints and tracer are for type custom or rods, not for slider_crank')])
+def test_wrong_dimensions_branches_and_tracers_are_named(given, problem):
+    with pytest.raises(ValueError, match=problem):
+        mechanisms.create('slider_crank', **given)
+
+
+def test_the_reach_of_an_offset_lever_ends_where_the_pin_is_square_to_it():
+    for e in (0.0, 10.0, -30.0):
+        lever = mechanisms.create('slotted_lever', e=e)
+        swept = lever.joint_angles(np.linspace(-math.pi, math.pi, 200001), ('lever',))['lever']
+        (low, high), = lever.lever_reach()
+        assert (low, high) == pytest.approx((np.nanmin(swept), np.nanmax(swept)), abs=1e-8)
+
+
+def test_sums_of_bars_that_differ_by_rounding_are_a_change_point():
+    assert mechanisms.create('four_bar', a=0.1, b=0.3, c=0.2, d=0.4).grashof() == 'change point'
+    assert mechanisms.create('four_bar', a=0.1, b=0.3, c=0.2, d=0.4 + 1e-15).grashof() != (
+        'change point')
