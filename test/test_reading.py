@@ -217,6 +217,13 @@ def test_a_sender_that_cannot_be_learnt_excludes_itself_alone(reader):
     assert reader.looked == 10 + 1
 
 
+def test_no_bytes_at_all_are_of_no_sender(reader):
+    for text in (big_endian(message(['a'])), serialize_message(message(['b']))):
+        reader.sender(text)
+        with pytest.raises(Unreadable):
+            reader.sender(b'')
+
+
 def test_a_name_that_is_no_text_excludes_its_sender_alone(reader):
     sent = message(['a_crank', 'b'])
     good, bad = (serialize_message(sent), serialize_message(sent).replace(b'a_c', b'\xff\xfec'))

@@ -150,7 +150,8 @@ class Sender:
 
     def has_sent(self, data: bytes) -> bool:
         """Return whether a serialised message has this sender's known length and bytes."""
-        return len(data) == self.size and int.from_bytes(data, 'little') & self.mask == self.same
+        return (len(data) == self.size > 0
+                and int.from_bytes(data, 'little') & self.mask == self.same)
 
     def read(self, data: bytes) -> Numbers:
         """
